@@ -9,6 +9,8 @@ import wbc
 from wbc.walking import cylinder
 from wbc.walking.body_path import grid_path
 from wbc.walking.loop.body_command import BodyCommand
+from wbc.walking.loop.hand_command import braking
+from wbc.walking.loop.stack import SWING_GAIN
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.planner import plan_walk
 
@@ -46,6 +48,7 @@ def test_a_hand_follows_its_law_and_its_wrist_goes_from_grip_to_grip() -> None:
                 np.array(swinging.wrist),
                 walk.machine.chain.origins[swinging.arm],
             )
+        elbow = walk.q[machine.arms[arm].q][2]
         walk.tick()
         if arm < 0 or walk.swinging is not swinging:
             continue
@@ -57,7 +60,8 @@ def test_a_hand_follows_its_law_and_its_wrist_goes_from_grip_to_grip() -> None:
         assert np.allclose(swinging.wrist, first + now.blend * (last - first), atol=1e-12)
         followed, joints = walk.stack._swings[arm], machine.arms[arm]
         gap = np.linalg.norm(aim.position - place)
-        waits = place + (aim.position - place) * min(1.0, 0.02 / max(gap, 1e-9))
+        brakes = braking(machine.arm_data, elbow, SWING_GAIN)
+        waits = place + (aim.position - place) * min(1.0, 0.02 / max(gap, 1e-9), np.sqrt(brakes / max(gap, 1e-9)))
         assert np.allclose(followed.target, waits, atol=1e-12)
         assert np.allclose(followed.feedforward, (now.position - aim.position) / DT, atol=1e-9)
         assert np.allclose(walk.stack.controller["posture"].target[joints.q][3:], bend, atol=1e-12)

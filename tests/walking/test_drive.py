@@ -162,6 +162,18 @@ def test_it_slows_down_before_a_gap_and_says_why(
     assert len(walk.progress.steps) == lifts
 
 
+def test_a_body_stands_when_its_joints_can_be_at_rest_in_a_tick(
+    machine: Walker, structure: Structure, stack: WalkStack, begin: Plan
+) -> None:
+    walk = Walk(machine, structure, begin, stack=stack)
+    drive, most = Drive(walk), machine.robot.limits.acceleration[6:] * walk.dt
+    assert drive.standing
+    walk.machine.v[6:] = 0.9 * most
+    assert drive.standing
+    walk.machine.v[8] = -2.8 * most[2]
+    assert not drive.standing
+
+
 def test_directions_and_rates() -> None:
     rates, spacing = np.array([0.03, 0.05, 0.1, 0.01]), 0.05
     for structure, pose in ((plane(), pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([2.0, 1.0, 1.3]))), (None, None)):

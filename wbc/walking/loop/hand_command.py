@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from math import cos, inf, sin, sqrt
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
 from wbc.native.compiled_function import compiled
+from wbc.robots import WalkerData
 from wbc.stack.evaluation import SingleState
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import BEHIND, angle
@@ -20,23 +22,52 @@ from wbc.walking.planner.swings.law import Aim
 #: velocity, and what the stack follows
 NOW, WRIST, VELOCITY, FOLLOWED = slice(0, 6), slice(3, 7), slice(7, 10), slice(10, 22)
 
+#: Part of joint 3's acceleration with which a hand brakes; what the elbow is off the line from shoulder to wrist at
+#: least [m]
+BRAKING, LEAST_BEND = 0.5, 0.02
+#: Keeps 0 / 0 away; a hand that can brake as it wants [m]
+TINY, MOST = 1e-300, 1e3
+
+
+def braking(data: WalkerData, elbow: float, gain: float) -> float:
+    """b of an arm: at a distance d from its aim a hand that follows with a gain k and brakes with a comes to rest there
+    if k min(d, sqrt(b d)) <= sqrt(2 a d), so
+
+        b = 2 a / k^2,     a = BRAKING h a_3,     h = L1 L2 |sin theta3| / |L1 + L2 exp(i theta3)|
+
+    h, by which the elbow is off the line from shoulder to wrist, is the lever of joint 3 along that line. Where the
+    elbow is nearly straight a hand that followed with all of the gain would swing about its aim.
+
+    Args:
+        data: of the arm. elbow: theta3 [rad]. gain: k [1/s].
+
+    Returns:
+        b [m].
+    """
+    first, second = data.upper_arm_length, data.forearm_length
+    reach = sqrt(max(first * first + second * second + 2.0 * first * second * cos(elbow), TINY))
+    lever = max(first * second * abs(sin(elbow)) / reach, LEAST_BEND)
+    return 2.0 * BRAKING * lever * data.joint_accelerations[2] / (gain * gain)
+
 
 @functools.cache
 def aim_function() -> ca.Function:
-    """f(place, now, law, source, target, parts, rate) of a hand at ``place`` ``[3]``.
+    """f(place, now, law, source, target, parts, rate, brakes) of a hand at ``place`` ``[3]``.
 
     Args:
         now: its aim and joints 4 to 6 as the tick begins ``[6]``. law: two rows of its law ``[14]``.
         source, target: joints 4 to 6 of the grips that it leaves and comes to, at two samples of the body's path
             ``[6]``. parts: of the segments between those rows and samples ``[3]``. rate: 1 / dt [1/s].
+        brakes: b, see :func:`braking` [m].
 
     Returns:
         The position of the law, joints 4 to 6 as the tick ends, the part of the wrist's path, the velocity; and place,
         velocity, joints and their rates to follow, from where things are to be as the tick begins to where they are to
-        be as it ends. A hand that cannot follow must not drag the body: its place waits within :data:`BEHIND` of it.
+        be as it ends. A hand that cannot follow must not drag the body: its place waits within :data:`BEHIND` of it,
+        and at a distance d within sqrt(b d), so that it can brake.
     """
-    sizes = {"place": 3, "now": 6, "law": 14, "source": 6, "target": 6, "parts": 3, "rate": 1}
-    place, now, law, source, target, parts, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
+    sizes = {"place": 3, "now": 6, "law": 14, "source": 6, "target": 6, "parts": 3, "rate": 1, "brakes": 1}
+    place, now, law, source, target, parts, rate, brakes = (ca.SX.sym(name, size) for name, size in sizes.items())
     row, first, last = (
         rows[: rows.numel() // 2] + parts[k] * (rows[rows.numel() // 2 :] - rows[: rows.numel() // 2])
         for k, rows in enumerate((law, source, target))
@@ -44,10 +75,11 @@ def aim_function() -> ca.Function:
     wrist = first + row[6] * (last - first)
     gap = now[:3] - place
     far = ca.norm_2(gap)
-    waits = place + gap * (BEHIND / ca.fmax(far, BEHIND))
-    followed = ca.vertcat(ca.if_else(far <= BEHIND, now[:3], waits), (row[:3] - now[:3]) * rate)
+    most = ca.fmin(BEHIND, ca.sqrt(brakes * far))
+    waits = place + gap * (most / ca.fmax(far, most + TINY))
+    followed = ca.vertcat(ca.if_else(far <= most, now[:3], waits), (row[:3] - now[:3]) * rate)
     out = ca.vertcat(row[:3], wrist, row[6], row[3:6], followed, now[3:], (wrist - now[3:]) * rate)
-    return compiled(ca.Function("aim", [place, now, law, source, target, parts, rate], [out]))
+    return compiled(ca.Function("aim", [place, now, law, source, target, parts, rate, brakes], [out]))
 
 
 class HandCommand:
@@ -59,17 +91,22 @@ class HandCommand:
 
     def __init__(self, dt: float) -> None:
         self._step = SingleState(aim_function())
-        self._place, self._now, self._law, self._source, self._target, self._parts, rate = self._step.inputs
+        self._place, self._now, self._law, self._source, self._target, self._parts, rate, self._brakes = (
+            self._step.inputs
+        )
         rate[0] = 1.0 / dt
         # What the inputs are of, so that they are written when they change
         self._swinging: Swinging | None = None
         self._known: list[tuple[Grips | None, int, int]] = [(None, -1, -1)] * 2
 
-    def go(self, swinging: Swinging, place: Array, grips: Grips, source: int, sample: float) -> Array:
+    def go(
+        self, swinging: Swinging, place: Array, grips: Grips, source: int, sample: float, brakes: float = inf
+    ) -> Array:
         """Move the hand's aim and its wrist on to its clock.
 
         Args:
             place: of the hand [m]. source: the grip that it leaves. sample: of the body's path.
+            brakes: see :func:`braking` [m].
 
         Returns:
             Place [m], velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] to follow ``[12]``.
@@ -79,7 +116,7 @@ class HandCommand:
             self._now[:] = self._step.output[NOW]
         else:
             self._now[:], self._swinging = (*swinging.aim.position, *swinging.wrist), swinging
-        self._place[:] = place
+        self._place[:], self._brakes[0] = place, min(brakes, MOST)
         self._law[:], parts[0], whole = swinging.law.rows_at(swinging.clock)
         if swinging.first_wrist is None:
             parts[1] = self._between(0, grips, source, sample)

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from wbc.errors import ShapeError
 from wbc.validation import Array
-from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding
+from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
 from wbc.walking.loop.hand_pace import HAND_RAMP, LANDING, at_rest, hand_pace, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
@@ -100,11 +100,16 @@ class ArmLeader:
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
         grip = progress.grip[arm]
-        followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample)
+        elbow = machine.q.item(machine.walker.arms[arm].q.start + 2)
+        brakes = braking(machine.walker.arm_data, elbow, self._stack.swing_gain)
+        followed = self._hand.go(swinging, swinging.place, progress.grips, grip, progress.sample, brakes)
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9 and not swinging.dropped:
             # What postures pull at a hand that has arrived is taken back, else it stays beside its hold
+            # Where it brakes it follows less than it is told, and what is summed up then would make it swing about
+            off = swinging.aim.position - swinging.place
             settling = min(SETTLING, PART * self._stack.swing_gain)
-            swinging.shift += settling * self._dt * (swinging.aim.position - swinging.place)
+            settling *= min(1.0, brakes / max(dist(swinging.aim.position, swinging.place), 1e-9)) ** 2
+            swinging.shift += settling * self._dt * off
         followed[:3] += swinging.shift
         if machine.lag > 0.0 and swinging.state == "open":
             # Joints that lag are told now how fast the hand is to be when they follow

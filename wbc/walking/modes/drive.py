@@ -82,8 +82,11 @@ class Drive:
 
     @property
     def standing(self) -> bool:
-        """The body stands as commanded, and no hand is swinging."""
-        return not self.command.any() and self.walk.pace == 0.0 and self.walk.swinging is None
+        """The body stands as commanded, no hand is swinging, and the joints can be at rest in the next tick."""
+        walk = self.walk
+        if self.command.any() or walk.pace > 0.0 or walk.swinging is not None:
+            return False
+        return bool((np.abs(walk.v[6:]) <= walk.walker.robot.limits.acceleration[6:] * walk.dt).all())
 
     def tick(self) -> Tick:
         """One control period.
