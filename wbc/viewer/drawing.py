@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.controller import Controller, core_of
+from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
 from wbc.tasks.base import Input, Task
