@@ -24,9 +24,11 @@ from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.presets import PRESETS, Playground, playground
 
 FOLDER = ROOT / "docs" / "images"
-SIZE, CELL, PAGE, WINDOW = (480, 360), (400, 300), (1280, 720), (960, 810)
+SIZE, CELL, PAGE, WINDOW = (480, 360), (380, 285), (1280, 807), (960, 810)
 #: Pictures of a loop, its seconds, and colours
 FRAMES, SECONDS, COLOURS = 16, 6.0, 128
+#: Colours of a picture, and of the sheet
+SHADES, FEW = 256, 64
 #: Part of a page without viser's own bar [pixels]
 CUT = (0, 30, 960, 720)
 #: The page says what is in the way
@@ -91,10 +93,11 @@ def held_back(browser: Chromium) -> Path:
         try:
             page.wait(EXPLAINED, 60.0)
             undisturbed(page)
-            (FOLDER / "viewer.png").write_bytes(page.picture())
+            shown = Image.open(io.BytesIO(page.picture())).convert("RGB")
         finally:
             over.set()
             running.join()
+    shown.quantize(SHADES, method=Image.Quantize.MEDIANCUT).save(FOLDER / "viewer.png", optimize=True)
     return FOLDER / "viewer.png"
 
 
@@ -105,7 +108,7 @@ def strip() -> Path:
         chosen = playground(name)
         controller, q = chosen.stack.compile(), chosen.start
         controller.reset(q)
-        moved, off = led(chosen), RADII.get(name, 0.12) * np.array([0.3, 1.0, 1.0])
+        moved, off = led(chosen), 0.8 * RADII.get(name, 0.12) * np.array([0.5, 1.0, 0.3])
         home = controller[moved].target
         pose = isinstance(home, pin.SE3)
         controller[moved].target = pin.SE3(home.rotation, home.translation + off) if pose else home + off
@@ -125,7 +128,7 @@ def strip() -> Path:
     sheet = Image.new("RGB", (3 * CELL[0], 2 * CELL[1]))
     for k, shown in enumerate(pictures):
         sheet.paste(shown, (k % 3 * CELL[0], k // 3 * CELL[1]))
-    sheet.quantize(COLOURS, method=Image.Quantize.MEDIANCUT).save(FOLDER / "presets.png", optimize=True)
+    sheet.quantize(FEW, method=Image.Quantize.MEDIANCUT).save(FOLDER / "presets.png", optimize=True)
     return FOLDER / "presets.png"
 
 

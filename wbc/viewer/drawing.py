@@ -30,13 +30,13 @@ NEAR, TIGHT = 0.25, 0.03
 TRAIL, APART = 300, 0.004
 GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
 #: Lengths of the arrows at a target, as part of the robot's; an obstacle's are shorter
-GIZMO = 0.28
+GIZMO = 0.24
 FLOOR = (226, 231, 236)
 #: The sky above and at the horizon
 SKY, HORIZON = (188, 205, 222), (238, 242, 246)
 #: Where a page's camera looks from, its field of view upwards [rad], and the part of it that the robot fills;
 #: the field is taken to be so many times as wide
-FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.84, 1.35
+FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.76, 1.35
 #: In place of a quaternion for what has none
 EMPTY = np.zeros(0)
 #: What is told of a drag: item, value, pose in the world, phase, number of viser's client
