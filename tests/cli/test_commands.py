@@ -224,13 +224,13 @@ def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest
     """Ctrl-C at tick 9 of the demo: log, plots and summary of nine ticks, exit code 130."""
     real = session.track
 
-    def interrupted(plan: Any, progress: Any, stop: Any, compiled: Any) -> track.Log:
+    def interrupted(plan: Any, progress: Any, stop: Any, compiled: Any, plant: Any) -> track.Log:
         def at_nine(ticks: int) -> None:
             progress(ticks)
             if ticks == 9:
                 os.kill(os.getpid(), signal.SIGINT)
 
-        return real(plan, at_nine, stop, compiled)
+        return real(plan, at_nine, stop, compiled, plant=plant)
 
     monkeypatch.setattr(session, "track", interrupted)
     monkeypatch.setattr(session, "save_picture", functools.partial(save_picture, size=(96, 60)))

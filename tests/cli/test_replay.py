@@ -62,9 +62,9 @@ def test_another_back_end(folder: Path) -> None:
 def test_a_run_that_ends_early_or_is_killed(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     real = session.track
 
-    def short(plan: Any, progress: Any, stop: Any, compiled: Any) -> track.Log:
+    def short(plan: Any, progress: Any, stop: Any, compiled: Any, plant: Any) -> track.Log:
         ticks = iter(range(9))
-        return real(plan, progress, lambda: next(ticks, None) is None, compiled)
+        return real(plan, progress, lambda: next(ticks, None) is None, compiled, plant=plant)
 
     monkeypatch.setattr(session, "track", short)
     assert run("track", *FAST, "--output", tmp_path)[0] == 130

@@ -115,10 +115,10 @@ def _errors(plt: Any, log: Log) -> Any:
         if values.min() >= 0.0:
             panel.set_ylim(bottom=0.0)
         _mark(panel, log)
-    axes[-1].set_xlabel("time [s]")
+    axes[-1, 0].set_xlabel("time [s]")
     title = f"Task errors of {log.meta['frame']}"
     figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=13)
-    _mark_legend(axes[0], log)
+    _mark_legend(axes[0, 0], log)
     return figure
 
 

@@ -41,9 +41,7 @@ static int unsound(const wbc_tick *t, int flag) {
 static int primal_of_the_rest(wbc_tick *t, int flag) {
     if (flag != WBC_RELAXED || LAST_ORDER == 0) return 0;
     for (int i = 0; i < NV; i++) t->report.v[i] = clamp(t->met[i], t->low[i], t->high[i]);
-    if (!primal(t)) return 0;
-    report_slack(t, flag);
-    return 1;
+    return primal(t);
 }
 #endif
 
@@ -107,18 +105,21 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     /* What accelerations count from, for who looks at the tick afterwards */
     memcpy(t->v_in, t->v_last, sizeof t->v_in);
     assemble(t, 1);
-    int flag = wbc_tick_solve(t);
+    int flag = wbc_tick_solve(t), nameless = 0;
 #if LEVELS > 0
     if (t->cap == 0.0 && flag == WBC_BRAKED && t->unusable == 0.0 && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
-    if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag)))
+    if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag))) {
         flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
+        /* Rows that contradicted each other by rounding only: their frozen bounds are not what is to be certified */
+        nameless = flag == WBC_RELAXED && !report_slack(t, flag);
+    }
 #endif
     if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);
-    const int sound = !unsound(t, flag);
+    const int sound = !unsound(t, flag) && !nameless;
     commanded(t, sound && flag != WBC_BRAKED);
     return sound ? flag : flag + WBC_UNSOUND;
 }

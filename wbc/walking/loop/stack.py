@@ -116,6 +116,9 @@ DT = 0.01
 BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
 #: Gains [1/s] of body, swinging hand, its axis and the wrists
 BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
+#: A hand that has come to lean in its hold becomes upright by a gain that grows to AXIS_GAIN within this time [s]. All
+#: of it at once asks for more than the joints' accelerations, and then the body leaves its path
+RISING = 0.3
 #: On joints that lag by T no gain is greater than this over T: an error then falls with hardly any overshoot, as from
 #: 1/4 on it begins to swing
 CRITICAL = 0.4
@@ -151,6 +154,8 @@ class WalkStack:
         self._mask = np.full(walker.robot.nv - 6, RESTING)
         self._turning = np.zeros(walker.robot.nv)
         self._near = (-1, False)
+        # Row of an arm that holds -> part of the gain of its axis
+        self._rising: dict[int, float] = {}
         items: Any = self.controller
         self._body = InputGroup(core_of(self.controller), [("body", "target", None), ("body", "feedforward", None)])
         self._rest = items["posture"]
@@ -171,6 +176,8 @@ class WalkStack:
         self.swing_gain = min(SWING_GAIN, most)
         for item, gain in self._gains:
             item.gain = min(gain, most)
+        for arm, part in self._rising.items():
+            self._axes[arm].gain = part * min(AXIS_GAIN, most)
 
     def begin(self, q: Array) -> None:
         """A walk begins at ``q`` ``[nq]``, at rest: nothing is left of the walk that was on this stack before."""
@@ -191,6 +198,7 @@ class WalkStack:
         if tilts:
             axis = self._axes[arm]
             axis.target, axis.feedforward, axis.weight = self.structure.axes[hold], np.zeros(3), UPRIGHT
+            axis.gain, self._rising[arm] = 0.0, 0.0
         self._mask[self._joints(arm)] = RESTING
         self._still(arm)
         self._rest.mask = self._mask
@@ -199,6 +207,7 @@ class WalkStack:
         """An open hand, which follows aims."""
         self._holds.release(arm)
         self._swings[arm].enabled = self._axes[arm].enabled = True
+        self._rise(arm, 1.0)
         self._catch_up()
 
     def rest(self, arm: int, place: Array, axis: Array) -> None:
@@ -213,6 +222,8 @@ class WalkStack:
         (linear; angular) ``[18]`` [m, m/s, rad/s].
         """
         self._body.write(aim)
+        for arm in tuple(self._rising):
+            self._rise(arm, self._rising[arm] + self.dt / RISING)
 
     def swing(self, arm: int, followed: Array, at_hold: Axes | None) -> None:
         """What a free hand follows.
@@ -253,6 +264,14 @@ class WalkStack:
         self.rest(arm, place, axis)
         self._mask[self._joints(arm)] = RESTING
         self._rest.mask = self._mask
+
+    def _rise(self, arm: int, part: float) -> None:
+        """The gain of a hand's axis becomes a part of what it is to be."""
+        if arm in self._rising:
+            self._axes[arm].gain = min(part, 1.0) * min(AXIS_GAIN, CRITICAL / max(self._lag, 1e-9))
+            self._rising[arm] = part
+            if part >= 1.0:
+                del self._rising[arm]
 
     def _still(self, arm: int) -> None:
         """Wrists of arms that do not swing have no rates of their own."""
