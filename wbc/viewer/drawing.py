@@ -75,7 +75,7 @@ class Drawing:
             item = block.entry.item
             if isinstance(item, Obstacle):
                 self._obstacles[name] = item
-                self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts), flat=True)
+                self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts))
             if isinstance(item, Task) and "target" in block.slots and is_place(block.slots["target"].input):
                 self._targets[name] = "target"
         self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
@@ -288,9 +288,9 @@ class Drawing:
 
     # Nodes
 
-    def _add_mesh(self, node: str, mesh: Mesh, flat: bool = False) -> None:
+    def _add_mesh(self, node: str, mesh: Mesh) -> None:
         self._nodes[node] = self._scene.add_mesh_simple(
-            node, mesh.corners, mesh.triangles, color=mesh.colour, flat_shading=flat, side="double"
+            node, mesh.corners, mesh.triangles, color=mesh.colour, side="double"
         )
 
     def _place(self, node: str, pose: pin.SE3) -> None:
