@@ -103,6 +103,9 @@ class Session:
         # The scene after the address: a page that comes early waits for it
         self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
         self._explainer = Explainer()
+        if link is not None:
+            # A page may operate before the first of the regular signs: without one the loop would stop as if it were lost
+            link.live()
 
     @property
     def url(self) -> str:
