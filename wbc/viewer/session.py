@@ -104,7 +104,7 @@ class Session:
         self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
         self._explainer = Explainer()
         if link is not None:
-            # A page may operate before the first of the regular signs: without one the loop would stop as if it were lost
+            # A page may operate before the first of the regular signs; the loop would take it for lost
             link.live()
 
     @property
