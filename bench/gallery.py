@@ -28,7 +28,7 @@ SIZE, CELL, PAGE, WINDOW = (480, 360), (380, 285), (1280, 807), (960, 810)
 #: Pictures of a loop, its seconds, and colours
 FRAMES, SECONDS, COLOURS = 16, 6.0, 128
 #: Colours of a picture, and of the sheet
-SHADES, FEW = 256, 112
+SHADES, FEW = 256, 64
 #: Part of a page without viser's own bar [pixels]
 CUT = (0, 30, 960, 720)
 #: The page says what is in the way
@@ -128,7 +128,7 @@ def strip() -> Path:
     sheet = Image.new("RGB", (3 * CELL[0], 2 * CELL[1]))
     for k, shown in enumerate(pictures):
         sheet.paste(shown, (k % 3 * CELL[0], k // 3 * CELL[1]))
-    sheet.quantize(FEW, method=Image.Quantize.MAXCOVERAGE).save(FOLDER / "presets.png", optimize=True)
+    sheet.quantize(FEW, method=Image.Quantize.MEDIANCUT).save(FOLDER / "presets.png", optimize=True)
     return FOLDER / "presets.png"
 
 
