@@ -1,6 +1,7 @@
-"""Pictures of the viewer's presets: ``python -m bench.gallery [PRESET ...]`` draws them in a browser without a window.
+"""Pictures of the viewer: ``python -m bench.gallery [page] [presets] [PRESET ...]``, in a browser without a window.
 
-Each preset's first target is led round a loop, at the controller's own pace and not in real time, so that a slow
+``page`` is the page with a hand that is held back, ``presets`` a sheet of the other presets, and the name of a preset a
+film: the preset's first target is led round a loop, at the controller's own pace and not in real time, so that a slow
 machine draws the same film.
 """
 
@@ -9,24 +10,31 @@ from __future__ import annotations
 import io
 import math
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from bench.pool import ROOT
-from wbc.viewer import show
+from wbc.viewer import Viewer, show
 from wbc.viewer.chromium import Chromium, Page
-from wbc.viewer.presets import PRESETS, playground
+from wbc.viewer.presets import PRESETS, Playground, playground
 
 FOLDER = ROOT / "docs" / "images"
-SIZE, PAGE, WINDOW = (480, 360), (1040, 620), (960, 810)
+SIZE, CELL, PAGE, WINDOW = (480, 360), (380, 285), (1280, 807), (960, 810)
 #: Pictures of a loop, its seconds, and colours
 FRAMES, SECONDS, COLOURS = 16, 6.0, 128
+#: Colours of a picture, and of the sheet
+SHADES, FEW = 256, 64
 #: Part of a page without viser's own bar [pixels]
 CUT = (0, 30, 960, 720)
+#: The page says what is in the way
+EXPLAINED = "!!wbc.state && (wbc.state.sentences || []).some((s) => s.includes('ball/'))"
+#: Standard deviation of a drawn scene's grey values, at the least
+BUSY = 8.0
 #: Radii of the loop [m], where they are not those of an arm
 RADII = {"ssrms": 2.0, "walker": 0.15, "mobile": 0.5}
 
@@ -36,7 +44,7 @@ def film(browser: Chromium, name: str) -> Path:
     chosen = playground(name)
     controller, q = chosen.stack.compile(), chosen.start
     controller.reset(q)
-    task = next(e.name for e in chosen.stack.tasks if type(e.item).__name__ == "EndEffector")
+    task = led(chosen)
     home, radius = controller[task].target, RADII.get(name, 0.12)
     dt, pictures = chosen.stack.dt, []
     with show(controller, open_browser=False, silence=60.0) as viewer:
@@ -54,7 +62,6 @@ def film(browser: Chromium, name: str) -> Path:
             viewer.update(step)
             if frame == 0:
                 page.wait("wbc.state", 60.0)
-                page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')", 60.0)
                 undisturbed(page)
             page.wait(f"wbc.state.number >= {frame + 1}", 60.0)
             time.sleep(0.6)
@@ -64,45 +71,84 @@ def film(browser: Chromium, name: str) -> Path:
 
 
 def held_back(browser: Chromium) -> Path:
-    """The whole page, with a hand that was dragged into a ball."""
+    """The whole page, with a hand that was dragged into a ball, while the loop runs."""
     chosen = playground("panda")
-    controller, q = chosen.stack.compile(), chosen.start
-    controller.reset(q)
-    home = controller["hand"].target
-    with show(controller, open_browser=False, silence=60.0) as viewer:
-        page = browser.open(viewer.url)
-        until = time.monotonic() + 12.0
-        controller["hand"].target = pin.SE3(home.rotation, home.translation + [0.12, 0.42, -0.05])
-        while time.monotonic() < until or not explained(page):
+    controller = chosen.stack.compile()
+    controller.reset(chosen.start)
+    home, over = controller["hand"].target, threading.Event()
+
+    def loop(viewer: Viewer) -> None:
+        q = chosen.start
+        while not over.is_set():
             step = controller.step(q)
             viewer.update(step)
             q = chosen.stack.robot.integrate(q, step.v, chosen.stack.dt)
             time.sleep(chosen.stack.dt)
-        undisturbed(page)
-        (FOLDER / "viewer.png").write_bytes(page.picture())
+
+    with show(controller, open_browser=False, silence=60.0) as viewer:
+        page = browser.open(viewer.url)
+        running = threading.Thread(target=loop, args=(viewer,))
+        controller["hand"].target = pin.SE3(home.rotation, home.translation + [0.12, 0.42, -0.05])
+        running.start()
+        try:
+            page.wait(EXPLAINED, 60.0)
+            undisturbed(page)
+            shown = Image.open(io.BytesIO(page.picture())).convert("RGB")
+        finally:
+            over.set()
+            running.join()
+    shown.quantize(SHADES, method=Image.Quantize.MEDIANCUT).save(FOLDER / "viewer.png", optimize=True)
     return FOLDER / "viewer.png"
 
 
+def strip() -> Path:
+    """Every preset but the first, each a second after its target was moved."""
+    pictures = []
+    for name in [*PRESETS][1:]:
+        chosen = playground(name)
+        controller, q = chosen.stack.compile(), chosen.start
+        controller.reset(q)
+        moved, off = led(chosen), 0.8 * RADII.get(name, 0.12) * np.array([0.5, 1.0, 0.3])
+        home = controller[moved].target
+        pose = isinstance(home, pin.SE3)
+        controller[moved].target = pin.SE3(home.rotation, home.translation + off) if pose else home + off
+        for _ in range(round(1.0 / chosen.stack.dt)):
+            step = controller.step(q)
+            q = chosen.stack.robot.integrate(q, step.v, chosen.stack.dt)
+        with Chromium(WINDOW) as browser, show(controller, open_browser=False, silence=60.0) as viewer:
+            viewer.update(step)
+            page = browser.open(f"{viewer.url}?bare&watch")
+            page.wait("wbc.state", 60.0)
+            undisturbed(page)
+            shown = (
+                Image.open(io.BytesIO(page.picture())).convert("RGB").crop(CUT).resize(CELL, Image.Resampling.LANCZOS)
+            )
+        ImageDraw.Draw(shown).text((10, 8), f"wbc play {name}", fill=(29, 39, 51), font=ImageFont.load_default(15))
+        pictures.append(shown)
+    sheet = Image.new("RGB", (3 * CELL[0], 2 * CELL[1]))
+    for k, shown in enumerate(pictures):
+        sheet.paste(shown, (k % 3 * CELL[0], k // 3 * CELL[1]))
+    sheet.quantize(FEW, method=Image.Quantize.MEDIANCUT).save(FOLDER / "presets.png", optimize=True)
+    return FOLDER / "presets.png"
+
+
+def led(chosen: Playground) -> str:
+    """The first task with a place."""
+    return next(e.name for e in chosen.stack.tasks if type(e.item).__name__ == "EndEffector")
+
+
 def undisturbed(page: Page) -> None:
-    """Nothing is drawn any more, and viser has said what it says of software that draws."""
-    page.evaluate(
-        "document.getElementById('scene').contentDocument"
-        ".querySelectorAll('.mantine-Notification-closeButton').forEach((b) => b.click())"
-    )
-    # A page fades in, which takes a minute where software draws on a busy machine
-    before, until = 256.0, time.monotonic() + 150.0
-    while time.monotonic() < until:
-        time.sleep(4.0)
+    """The scene is drawn, and viser has said what it says of software that draws."""
+    scene = "document.getElementById('scene').contentDocument"
+    page.wait(f"!!{scene}.querySelector('canvas')", 60.0)
+    drawn, until = 0.0, time.monotonic() + 60.0
+    while drawn < BUSY and time.monotonic() < until:
+        time.sleep(3.0)
+        page.evaluate(f"{scene}.querySelectorAll('.mantine-Notification-closeButton').forEach((b) => b.click())")
         shown = np.asarray(Image.open(io.BytesIO(page.picture())).convert("L"), dtype=float)
-        scene = shown[: int(0.8 * shown.shape[0]), : int(0.6 * shown.shape[1])]
-        if np.percentile(scene, 2) < 170.0 and abs(scene.mean() - before) < 0.2:
-            return
-        before = float(scene.mean())
-
-
-def explained(page: Page) -> bool:
-    """The page says what is in the way."""
-    return bool(page.evaluate("!!wbc.state && (wbc.state.sentences || []).some((s) => s.includes('ball/'))"))
+        drawn = float(shown[: int(0.8 * shown.shape[0]), : int(0.6 * shown.shape[1])].std())
+    # Meshes come after the floor, and what viser says goes slowly
+    time.sleep(4.0)
 
 
 def save(frames: list[Image.Image], file: Path) -> Path:
@@ -116,8 +162,11 @@ def save(frames: list[Image.Image], file: Path) -> Path:
 
 def main() -> None:
     """Those that are named, or all."""
-    wanted = sys.argv[1:] or ["page", *PRESETS]
+    wanted = sys.argv[1:] or ["page", "presets", "panda"]
     for name in wanted:
+        if name == "presets":
+            print(strip(), flush=True)
+            continue
         with Chromium(PAGE if name == "page" else WINDOW) as browser:
             print(held_back(browser) if name == "page" else film(browser, name), flush=True)
 

@@ -10,18 +10,23 @@ import pinocchio as pin
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape, Shape
 from wbc.track import render
-from wbc.track.scene import DARK, WHITE, link_meshes, simplified
+from wbc.track.scene import link_meshes, simplified
 from wbc.validation import Array
 
 Colour = tuple[int, int, int]
 
-#: Corners of a mesh closer than this part of the robot's characteristic length are one
-DETAIL = 0.012
+#: Corners of a mesh closer than this part of the robot's characteristic length are one, where they are also closer than
+#: this part of the link's least side: of a thin link on a long robot nothing would be left
+DETAIL, OF_LINK = 0.007, 0.045
+#: Cosine of the angle between faces from which there is an edge
+EDGE = 0.6
 #: Meshes of fewer triangles are drawn as they are
-FEW = 1000
+FEW = 2500
 #: Half side of the square that stands for a half-space [m]
 GROUND = 1.5
-OBSTACLE: Colour = (222, 176, 96)
+OBSTACLE: Colour = (222, 166, 78)
+LINK: Colour = (206, 211, 219)
+HAND: Colour = (70, 78, 92)
 
 
 class Mesh(NamedTuple):
@@ -45,10 +50,16 @@ def robot_meshes(robot: Robot, detail: float = DETAIL) -> dict[str, Mesh]:
         dark = int(model.frames[model.getFrameId(link)].parentJoint) in tips
         merged = np.concatenate(groups)
         if len(merged) > FEW:
-            merged = simplified(merged, detail * robot.characteristic_length)
+            least = float(np.ptp(merged.reshape(-1, 3), axis=0).min())
+            merged = simplified(merged, min(detail * robot.characteristic_length, OF_LINK * least))
         if len(merged):
-            out[link] = indexed(merged, _bytes(DARK if dark else WHITE))
+            out[link] = indexed(merged, HAND if dark else LINK)
     return out
+
+
+def bounded(parts: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    """Those that end somewhere."""
+    return tuple(part for part in parts if not isinstance(part, HalfSpace))
 
 
 def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> Mesh:
@@ -64,17 +75,29 @@ def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> Mesh:
 
 
 def indexed(triangles: Array, colour: Colour) -> Mesh:
-    """Corners that are the same are one."""
-    corners, places = np.unique(triangles.reshape(-1, 3).round(5), axis=0, return_inverse=True)
-    return Mesh(corners.astype(np.float32), places.reshape(-1, 3).astype(np.uint32), colour)
+    """Corners that are the same are one, but not across an edge.
+
+    A page shades a corner by the mean normal of its faces, which is none where both sides of a thin wall meet.
+    """
+    corners, owner = np.unique(triangles.reshape(-1, 3).round(5), axis=0, return_inverse=True)
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = np.linalg.norm(across, axis=1)
+    normals = np.repeat(across / np.maximum(areas, 1e-12)[:, None], 3, axis=0)
+    owner, first = owner.reshape(-1), np.zeros((len(corners), 3))
+    places, parts, left = np.empty(len(owner), dtype=np.uint32), list[Array](), np.argsort(-np.repeat(areas, 3))
+    while len(left):
+        # Of the faces that are left at a corner, the largest and what is turned little against it
+        used, largest = np.unique(owner[left], return_index=True)
+        first[used] = normals[left[largest]]
+        near = np.einsum("ij,ij->i", normals[left], first[owner[left]]) > EDGE
+        near[largest] = True
+        places[left[near]] = sum(map(len, parts)) + np.searchsorted(used, owner[left[near]])
+        parts.append(corners[used])
+        left = left[~near]
+    return Mesh(np.concatenate(parts).astype(np.float32), places.reshape(-1, 3), colour)
 
 
 def wxyz(rotation: Array) -> Array:
     """A rotation as viser takes it."""
     x, y, z, w = pin.Quaternion(rotation).coeffs()
     return np.array([w, x, y, z])
-
-
-def _bytes(colour: tuple[float, float, float]) -> Colour:
-    red, green, blue = (round(255 * part) for part in colour)
-    return red, green, blue

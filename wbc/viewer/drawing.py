@@ -11,11 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.controller import Controller, core_of
+from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
-from wbc.viewer.bodies import DETAIL, Colour, Mesh, robot_meshes, shape_mesh, wxyz
+from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh, wxyz
 from wbc.viewer.tick import Tick
 
 if TYPE_CHECKING:
@@ -28,6 +29,14 @@ NEAR, TIGHT = 0.25, 0.03
 #: Points of the path of a hand, and how far apart they are [m]
 TRAIL, APART = 300, 0.004
 GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
+#: Lengths of the arrows at a target, as part of the robot's; an obstacle's are shorter
+GIZMO = 0.24
+FLOOR = (226, 231, 236)
+#: The sky above and at the horizon
+SKY, HORIZON = (188, 205, 222), (238, 242, 246)
+#: Where a page's camera looks from, its field of view upwards [rad], and the part of it that the robot fills;
+#: the field is taken to be so many times as wide
+FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.76, 1.35
 #: In place of a quaternion for what has none
 EMPTY = np.zeros(0)
 #: What is told of a drag: item, value, pose in the world, phase, number of viser's client
@@ -48,13 +57,14 @@ class Drawing:
         self._scene, self._dragged = scene, dragged
         self._controller, self._stack = controller, controller.stack
         self._robot = robot = controller.stack.robot
-        self._size = float(np.clip(robot.characteristic_length, 0.1, 30.0))
+        self._size = size(robot)
         self._placed: dict[str, tuple[Array, Array]] = {}
         self._nodes: dict[str, Any] = {}
         self._held: set[str] = set()
+        self._floor = False
         self._trails: dict[str, list[Array]] = {}
         scene.set_up_direction("+z")
-        scene.configure_default_lights(cast_shadow=False)
+        _light(scene)
         self._links = robot_meshes(robot, detail)
         for link, mesh in self._links.items():
             self._add_mesh(f"/robot/{link}", mesh)
@@ -65,17 +75,17 @@ class Drawing:
             item = block.entry.item
             if isinstance(item, Obstacle):
                 self._obstacles[name] = item
-                self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts), flat=True)
+                self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts))
             if isinstance(item, Task) and "target" in block.slots and is_place(block.slots["target"].input):
                 self._targets[name] = "target"
         self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
         self._add_gizmos()
-        wide = self._size
-        ground = (0.0, 0.0, self._lowest())
-        scene.add_grid("/floor", 6 * wide, 6 * wide, cell_size=wide / 4, section_size=wide, position=ground)
 
     def show(self, tick: Tick) -> None:
         """Draw a tick."""
+        if not self._floor:
+            self._floor = True
+            self._add_floor(tick)
         for link in self._links:
             self._place(f"/robot/{link}", tick.pose(link))
         for name in self._obstacles:
@@ -93,6 +103,27 @@ class Drawing:
         self._planes(tick)
         self._balance(tick)
 
+    def _add_floor(self, tick: Tick) -> None:
+        """A floor under the robot where it begins."""
+        wide = self._size
+        ground = self._lowest()
+        low = min((float(tick.pose(link).translation[2]) for link in self._links), default=ground)
+        # What hangs below its base is above no floor there
+        if low < ground - 0.05 * wide:
+            ground = low - 0.1 * wide
+        self._scene.add_grid(
+            "/floor",
+            8 * wide,
+            8 * wide,
+            cell_size=wide / 4,
+            section_size=wide,
+            cell_color=(196, 203, 211),
+            section_color=(160, 170, 181),
+            plane_color=FLOOR,
+            plane_opacity=1.0,
+            position=(0.0, 0.0, ground),
+        )
+
     # What can be dragged
 
     def _add_gizmos(self) -> None:
@@ -103,7 +134,7 @@ class Drawing:
             value = "pose" if name in self._obstacles else "target"
             turns = slot[value].input.kind == "pose"
             node = f"/gizmos/{name}"
-            scale = 0.32 * self._size if name in self._targets else 0.24 * self._size
+            scale = GIZMO * self._size * (1.0 if name in self._targets else 0.6)
             gizmo = self._scene.add_transform_controls(
                 node,
                 scale=scale,
@@ -257,9 +288,9 @@ class Drawing:
 
     # Nodes
 
-    def _add_mesh(self, node: str, mesh: Mesh, flat: bool = False) -> None:
+    def _add_mesh(self, node: str, mesh: Mesh) -> None:
         self._nodes[node] = self._scene.add_mesh_simple(
-            node, mesh.corners, mesh.triangles, color=mesh.colour, flat_shading=flat, side="double"
+            node, mesh.corners, mesh.triangles, color=mesh.colour, side="double"
         )
 
     def _place(self, node: str, pose: pin.SE3) -> None:
@@ -288,14 +319,51 @@ def is_place(declared: Input) -> bool:
     return declared.kind == "pose" or (declared.kind == "vector" and declared.size == 3 and declared.unit == "m")
 
 
-def look(server: viser.ViserServer, controller: Controller) -> None:
-    """Where a page's camera begins: the robot fills the view."""
-    robot = controller.stack.robot
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.neutral)
-    points = np.array([frame.translation for frame in data.oMf])
-    low, high = points.min(axis=0), points.max(axis=0)
-    reach = max(float((high - low).max()), 0.3)
+def size(robot: Robot) -> float:
+    """What gizmos and floor are measured by [m]."""
+    return float(np.clip(robot.characteristic_length, 0.1, 30.0))
+
+
+def look(server: viser.ViserServer, controller: Controller, tick: Tick) -> None:
+    """Where a page's camera begins."""
     camera = server.initial_camera
-    camera.position = (low + high) / 2 + reach * np.array([1.35, -1.1, 0.7])
-    camera.look_at = (low + high) / 2
+    camera.position, camera.look_at = viewpoint(controller, tick)
+    camera.fov = float(FIELD)
+
+
+def viewpoint(controller: Controller, tick: Tick) -> tuple[Array, Array]:
+    """(eye, point that it looks at): robot, targets and obstacles fill the view [m]."""
+    frames = controller.stack.robot.model.frames
+    points = [tick.pose(frame.name).translation for frame in frames[1:]]
+    for name, block in core_of(controller).layout.blocks.items():
+        item = block.entry.item
+        if isinstance(item, EndEffector) and (there := tick.world_pose(name, "target")) is not None:
+            points.extend(
+                there.translation + 0.6 * GIZMO * size(controller.stack.robot) * np.vstack([np.eye(3), -np.eye(3)])
+            )
+        pose = tick.world_pose(name, "pose") if isinstance(item, Obstacle) else None
+        if pose is not None and isinstance(item, Obstacle) and (solid := bounded(item.parts)):
+            corners = shape_mesh(solid).corners.astype(float)
+            points.extend(corners @ pose.rotation.T + pose.translation)
+    back = FROM / np.linalg.norm(FROM)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(back, right), back])
+    seen = np.array(points) @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+    off, slope = np.abs(seen - middle), FILLED * np.tan(FIELD / 2)
+    needed = np.maximum(off[:, 1], off[:, 0] / WIDE) / slope + (seen - middle)[:, 2]
+    target = middle @ axes
+    return target + max(float(needed.max()), 0.3) * back, target
+
+
+def _light(scene: viser.SceneApi) -> None:
+    """Lights and a sky, so that a light robot stands out from what is behind it."""
+    # viser's own picture of a city as light bleaches what is bright, and the page fades in until it is computed
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(enabled=False)
+    scene.add_light_hemisphere("/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 156, 166), intensity=1.5)
+    scene.add_light_directional("/lights/sun", color=(255, 250, 242), intensity=2.2, position=(0.6, -1.2, 2.0))
+    share = np.linspace(0.0, 1.0, 64)[:, None, None]
+    sky = (1.0 - share) * np.array(SKY) + share * np.array(HORIZON)
+    scene.set_background_image(np.repeat(sky, 2, axis=1).astype(np.uint8), format="png")

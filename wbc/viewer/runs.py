@@ -25,7 +25,7 @@ RECORDING, REPLAY = "ticks.npz", "replay.html"
 #: States of a recording that are kept a second, and of a page; a page has this many at most
 RATE, PAGE_RATE, MOST = 40.0, 20.0, 1200
 #: Corners of a page's meshes closer than this part of the robot's characteristic length are one
-DETAIL = 0.02
+DETAIL = 0.012
 
 
 def states_of(
@@ -99,8 +99,9 @@ def save_page(controller: Controller, states: Sequence[State], file: pathlib.Pat
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             drawing = Drawing(server.scene, controller, detail=DETAIL)
-            look(server, controller)
-            drawing.show(Tick(controller, states[0]))
+            first = Tick(controller, states[0])
+            look(server, controller, first)
+            drawing.show(first)
             serializer = server.get_scene_serializer()
             before = states[0].time
             for state in states[1:]:

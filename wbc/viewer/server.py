@@ -110,8 +110,7 @@ class PageServer:
             self.server.stop()
             raise ViewerError("viewer", viser.__version__, "this viser cannot be kept from foreign pages; use 1.1")
         self.scene = self.server.scene
-        # viser's own panel holds the tree of the scene alone here
-        self.server.gui.main_panel.minimize()
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         shown = host if ":" not in host else f"[{host}]"
         shown = "127.0.0.1" if shown in ("0.0.0.0", "localhost") else shown
         self.url = f"http://{shown}:{self.server.get_port()}/" + (f"?token={token}" if token else "")

@@ -102,8 +102,10 @@ class Session:
         self.server.on_lost(self._operator_lost)
         # The scene after the address: a page that comes early waits for it
         self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
-        look(self.server.server, controller)
         self._explainer = Explainer()
+        if link is not None:
+            # A page may operate before the first of the regular signs; the loop would take it for lost
+            link.live()
 
     @property
     def url(self) -> str:
@@ -149,6 +151,8 @@ class Session:
 
     def _show(self, state: State, sentence_rate: float) -> None:
         tick = Tick(self._controller, state)
+        if self._tick is None:
+            look(self.server.server, self._controller, tick)
         self._tick = tick
         with self.server.server.atomic():
             self._drawing.show(tick)

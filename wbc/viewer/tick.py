@@ -91,5 +91,5 @@ def se3(numbers: Array) -> pin.SE3:
 
 def relative_to(item: Item) -> str:
     """The frame of the robot that an item's target is given in."""
-    frame: Any = getattr(item, "relative_to", WORLD)
+    frame: Any = getattr(item, "relative_to", getattr(item, "frame_a", WORLD))
     return frame if isinstance(frame, str) else WORLD

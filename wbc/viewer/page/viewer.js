@@ -21,7 +21,7 @@ function number(x, unit) {
 const link = new Worker("link.js");
 let open = false;
 link.onmessage = (event) => {
-  if (event.data.text) { const message = JSON.parse(event.data.text); if (message.type === "state") newest = message; else take(message); return; }
+  if (event.data.text) { const message = JSON.parse(event.data.text); if (message.type === "state") { newest = message; seen.states += 1; } else take(message); return; }
   open = event.data.link === "open";
   if (!open) { pill("no connection", "gone"); operator = ""; who(); }
 };
@@ -34,7 +34,7 @@ requestAnimationFrame(draw);
 
 function take(message) {
   if (message.type === "hello") { hello = message; link.postMessage({ patience: 2500 * hello.silence }); operator = message.operator; me = message.you; build(); }
-  else if (message.type === "state") { state = message; seen.states += 1; show(); }
+  else if (message.type === "state") { state = message; show(); }
   else if (message.type === "operator") { operator = message.name; who(); }
   else if (message.type === "refused") notice(message.reason);
   else if (message.type === "ended") notice(message.reason);
@@ -170,6 +170,8 @@ addEventListener("blur", () => keys.clear());
 // Keys reach the scene's frame while it has the focus; it is of this origin
 $("scene").addEventListener("load", () => {
   const inner = $("scene").contentWindow;
+  // viser's panel, which holds its tree of the scene alone, cannot be left out by its server
+  inner.document.head.append(make("style", { textContent: "[data-floating-window] { display: none !important; }" }));
   inner.addEventListener("keydown", (event) => pressed(event, true), true);
   inner.addEventListener("keyup", (event) => pressed(event, false), true);
   inner.addEventListener("blur", () => keys.clear());
