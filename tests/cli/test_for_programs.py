@@ -83,5 +83,6 @@ def test_ctrl_c_while_a_command_starts_is_quiet(wait: float) -> None:
     time.sleep(wait)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
-    assert process.returncode in (0, 130)
+    # Before Python has a handler of its own the signal ends the process
+    assert process.returncode in (0, 130, -signal.SIGINT)
     assert "Traceback" not in err

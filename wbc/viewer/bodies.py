@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape, Shape
@@ -33,7 +34,7 @@ class Mesh(NamedTuple):
     """A mesh in the frame of what it is part of: corners [n x 3] m, triangles [m x 3], colour."""
 
     corners: Array
-    triangles: Array
+    triangles: NDArray[np.uint32]
     colour: Colour
 
 
