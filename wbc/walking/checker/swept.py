@@ -1,8 +1,8 @@
 """Clearances as a proof: bodies over the whole motion between ticks, by :mod:`wbc.clearance`.
 
 A hand may be nearer than the clearance to what a hold is mounted on from where it comes near to that hold, on which the
-log has it then, to where it is no longer near, and no deeper in it than a stated depth beyond its own roundness. Where a
-hold vanishes that a hand is coming to, it counts as the hand's until the hand comes no nearer, as no hand stops at once.
+log has it then, to where it is no longer near, and no deeper in it than a stated depth beyond its own roundness. A hold
+that vanishes while a hand comes to it counts as the hand's until the hand comes no nearer: no hand stops at once.
 """
 
 from __future__ import annotations
