@@ -20,7 +20,7 @@ from wbc.viewer.session import Session
 from wbc.viewer.zeromq import ZeroMqEnd
 
 #: Below the loop where cores are few
-NICE = 2
+NICE = 5
 
 
 def main() -> None:

@@ -62,8 +62,8 @@ class Explainer(threading.Thread):
                 last = tick.state.data
             self.count += 1
             took = time.monotonic() - began
-            # The rest of the process has two thirds of its core at the least
-            time.sleep(max(1.0 / EXPLAINED - took, 0.5 * took))
+            # The rest of the process has a fifth of its core at the least
+            time.sleep(max(1.0 / EXPLAINED - took, 0.25 * took))
 
     def end(self) -> None:
         """Stop after the explanation that is under way."""
@@ -96,7 +96,7 @@ class Session:
         self._sending = threading.Lock()
         self.timeline = Timeline(states)
         self.ended = threading.Event()
-        self._stopped = ""
+        self._stopped, self._drawn = "", False
         told_first = declared(controller) | {"live": link is not None, "silence": silence}
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
@@ -154,6 +154,10 @@ class Session:
         if self._tick is None:
             look(self.server.server, self._controller, tick)
         self._tick = tick
+        if not self.server.watched and self._drawn:
+            # Who comes later is told where everything is by the next tick
+            return
+        self._drawn = True
         with self.server.server.atomic():
             self._drawing.show(tick)
         # Not in a window of up to a sixtieth of a second
