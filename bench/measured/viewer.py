@@ -53,8 +53,8 @@ def parts() -> dict[str, Sheet | str]:
         for name in ("one client", "ten clients")
     )
     text = (
-        f"The 99th percentile of a tick changes by {with_one[0]} with a viewer and one client and by {with_ten[0]} with "
-        f"ten, that of how late it begins by {with_one[1]} and {with_ten[1]}. The address is there after "
+        f"The 99th percentile of a tick changes by {with_one[0]} with a viewer and one client and by {with_ten[0]} "
+        f"with ten, that of how late it begins by {with_one[1]} and {with_ten[1]}. The address is there after "
         f"{ready:.1f} s, with compiled code cached."
     )
     delay = Sheet(

@@ -11,7 +11,9 @@ from PIL import Image
 from wbc.track import film
 from wbc.track.page import RunPage
 
-FRAMES = [Image.new("RGB", (9, 6), (80 * k, 20, 200 - 80 * k)) for k in range(3)]
+FRAMES = [Image.new("RGB", (9, 6), (250, 250, 250)) for _ in range(3)]
+for _k, _frame in enumerate(FRAMES):
+    _frame.paste((20, 20, 20), (2 * _k, 0, 2 * _k + 2, 3))
 
 
 @pytest.fixture(autouse=True)

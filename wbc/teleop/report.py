@@ -64,7 +64,8 @@ def save_report(session: Teleoperation, log: SessionLog, folder: pathlib.Path) -
         page.section("What was lost, and why")
         reasons = _flags(log, lambda seen: seen.why if seen.lost > NOTHING else ())
         page.strips(times, reasons)
-        for first, last in sorted(stretches(lost > LOST), key=lambda pair: pair[0] - pair[1])[:TOLD]:
+        found = stretches(np.asarray(lost > LOST, dtype=float))
+        for first, last in sorted(found, key=lambda pair: pair[0] - pair[1])[:TOLD]:
             worst = first + int(lost[first:last].argmax())
             seen = log.seen[worst]
             page.text(

@@ -14,6 +14,7 @@ from wbc.controller import Controller, core_of
 from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
+from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
 from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh, wxyz
@@ -29,6 +30,9 @@ NEAR, TIGHT = 0.25, 0.03
 #: Points of the path of a hand, and how far apart they are [m]
 TRAIL, APART = 300, 0.004
 GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
+PURPLE, GREY = (130, 60, 170), (150, 158, 168)
+#: What is drawn only where it is asked for: the camera goes along, how far a hand can be
+DEMANDED = ("follow", "reach")
 #: Lengths of the arrows at a target, as part of the robot's; an obstacle's are shorter
 GIZMO = 0.24
 FLOOR = (226, 231, 236)
@@ -63,6 +67,9 @@ class Drawing:
         self._held: set[str] = set()
         self._floor = False
         self._trails: dict[str, list[Array]] = {}
+        self._demanded = set[str]()
+        self._middle: Array | None = None
+        self._weight = float(pin.computeTotalMass(robot.model)) * NOMINAL
         scene.set_up_direction("+z")
         _light(scene)
         self._links = robot_meshes(robot, detail)
@@ -102,6 +109,77 @@ class Drawing:
         self._trail(tick)
         self._planes(tick)
         self._balance(tick)
+        self._lines("/lines/forces", *self._forces(tick))
+        self._lines("/lines/reach", *self._reach(tick))
+
+    def demand(self, what: str, on: bool) -> None:
+        """Draw one of :data:`DEMANDED` from now on, or no longer."""
+        (self._demanded.add if on else self._demanded.discard)(what)
+        self._middle = None
+
+    def follow(self, server: viser.ViserServer, tick: Tick) -> None:
+        """Where that is asked for, cameras go with the robot's root and first target."""
+        if "follow" not in self._demanded:
+            return
+        frame, _ = hand_of(self._controller)
+        middle = np.array(tick.pose(frame or self._robot.frame_names[1]).translation)
+        if self._middle is not None and np.linalg.norm(off := middle - self._middle) > 1e-3:
+            for client in server.get_clients().values():
+                client.camera.position = client.camera.position + off
+                client.camera.look_at = client.camera.look_at + off
+            self._middle = middle
+        elif self._middle is None:
+            self._middle = middle
+
+    def _forces(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """An arrow from each contact along its force, half the robot's size for its weight on earth."""
+        lines: list[Array] = []
+        if not core_of(self._controller).layout.forces:
+            return lines, []
+        scale = 0.5 * self._size / max(self._weight, 1e-3)
+        for name, wrench in tick.step.forces.items():
+            item = self._stack[name].item
+            assert isinstance(item, Contact)
+            pose, force = tick.pose(item.frame), np.zeros(6)
+            force[list(item.axes)] = wrench
+            tip = scale * pose.rotation @ force[:3]
+            length = float(np.linalg.norm(tip))
+            if length < 1e-3 * self._size:
+                continue
+            aside = np.cross(tip, [0.0, 0.0, 1.0] if abs(tip[2]) < 0.9 * length else [1.0, 0.0, 0.0])
+            aside *= 0.08 * length / np.linalg.norm(aside)
+            end = pose.translation + tip
+            back = end - 0.2 * tip
+            lines += [np.array(pair) for pair in ((pose.translation, end), (end, back + aside), (end, back - aside))]
+        return lines, [PURPLE] * len(lines)
+
+    def _reach(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """Three great circles: beyond them the first hand of an arm cannot be, whatever its joints do."""
+        frame, _ = hand_of(self._controller)
+        if "reach" not in self._demanded or not frame:
+            return [], []
+        model = self._robot.model
+        joint = int(model.frames[model.getFrameId(frame)].parentJoint)
+        chain = [k for k in model.supports[joint] if k and model.joints[k].nv == 1]
+        if not chain:
+            return [], []
+        # Between joints the distance is fixed, of a prismatic one up to its limit
+        length = float(np.linalg.norm(model.frames[model.getFrameId(frame)].placement.translation))
+        for k in chain[1:]:
+            length += float(np.linalg.norm(model.jointPlacements[k].translation))
+        for k in chain:
+            if "P" in model.joints[k].shortname():
+                place = model.joints[k].idx_q
+                length += float(max(abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])))
+        if not np.isfinite(length):
+            return [], []
+        center = np.array(tick.joint(chain[0]).translation)
+        angles = np.linspace(0.0, 2.0 * np.pi, 65)
+        ring, lines = length * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), list[Array]()
+        for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
+            points = center + ring[:, order]
+            lines += [np.array(pair) for pair in itertools.pairwise(points)]
+        return lines, [GREY] * len(lines)
 
     def _add_floor(self, tick: Tick) -> None:
         """A floor under the robot where it begins."""
@@ -276,7 +354,9 @@ class Drawing:
         if not any(isinstance(item, CenterOfMass) for item in items):
             return
         center = tick.center_of_mass()
-        feet = [tick.pose(item.frame).translation for item in items if isinstance(item, Hold)]
+        feet = [tick.pose(item.frame).translation for item in items if isinstance(item, Hold | Contact)]
+        around = np.mean(feet, axis=0) if feet else np.zeros(3)
+        feet.sort(key=lambda foot: float(np.arctan2(foot[1] - around[1], foot[0] - around[0])))
         low = min((float(foot[2]) for foot in feet), default=self._lowest())
         below = np.array([center[0], center[1], low])
         if "/com" not in self._nodes:
@@ -312,6 +392,14 @@ class Drawing:
         data = self._robot.model.createData()
         pin.framesForwardKinematics(self._robot.model, data, self._robot.neutral)
         return min(float(frame.translation[2]) for frame in data.oMf)
+
+
+def hand_of(controller: Controller) -> tuple[str, int]:
+    """(frame, rows) of the first end-effector task, ("", 0) where there is none."""
+    for entry in controller.stack.entries:
+        if isinstance(entry.item, EndEffector):
+            return entry.item.frame, 6 if entry.item.kind == "pose" else 3
+    return "", 0
 
 
 def is_place(declared: Input) -> bool:

@@ -33,7 +33,13 @@ OBEYED: dict[str, tuple[str, ...]] = {
     "release": (),
 }
 #: Types between a client and its server alone
-SERVED: dict[str, tuple[str, ...]] = {"alive": (), "seek": ("time",), "play": ("speed",), "live": (), "follow": ("on",)}
+SERVED: dict[str, tuple[str, ...]] = {
+    "alive": (),
+    "seek": ("time",),
+    "play": ("speed",),
+    "live": (),
+    "show": ("what", "on"),
+}
 #: How long a rate is obeyed [s]
 RATE_LASTS = 0.25
 #: Longest message [bytes]

@@ -9,24 +9,30 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Controller, core_of
 from wbc.errors import WbcError
 from wbc.tasks.base import Constraint
+from wbc.validation import Array
 from wbc.viewer import messages
-from wbc.viewer.drawing import Drawing, look
+from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, State, ViewerEnd
 from wbc.viewer.operation import Operation
 from wbc.viewer.reading import declared, sentences, told
+from wbc.viewer.self_motion import self_motion
 from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
 from wbc.viewer.timeline import Timeline
 
 #: States that are drawn and told a second, and explanations, at most
 RATE, EXPLAINED = 40.0, 25.0
+#: What a page can ask to be drawn
+SELF_MOTION = "self-motion"
+DRAWN = (*DEMANDED, SELF_MOTION)
 #: Between two signs of life for the loop [s]
 BEAT = 0.05
 
@@ -97,6 +103,8 @@ class Session:
         self.timeline = Timeline(states)
         self.ended = threading.Event()
         self._stopped, self._drawn = "", False
+        #: configurations that are shown in place of the robot's own
+        self._preview: list[Array] = []
         told_first = declared(controller) | {"live": link is not None, "silence": silence}
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
@@ -131,7 +139,7 @@ class Session:
                 sentence_rate = (self._explainer.count - counted[1]) / (now - counted[0])
                 counted = now, self._explainer.count
             # What did not change is told twice a second, for who comes late
-            fresh = current is not None and (current.data != shown or now - quiet > 0.5)
+            fresh = current is not None and (current.data != shown or now - quiet > 0.5 or bool(self._preview))
             if current is not None and fresh:
                 shown, quiet = current.data, now
                 self._show(current, sentence_rate)
@@ -159,7 +167,8 @@ class Session:
             return
         self._drawn = True
         with self.server.server.atomic():
-            self._drawing.show(tick)
+            self._drawing.show(self._shown(tick))
+        self._drawing.follow(self.server.server, tick)
         # Not in a window of up to a sixtieth of a second
         self.server.server.flush()
         if not self.server.watched:
@@ -175,6 +184,7 @@ class Session:
             "explained": number,
             "sentence_rate": sentence_rate,
             "timeline": self.timeline.told(),
+            "previewed": bool(self._preview),
         }
         self.server.publish(told(self._controller, tick) | extra)
 
@@ -195,10 +205,35 @@ class Session:
             self.timeline.play(validation.scalar("play.speed", message["speed"], low=0.0, high=100.0))
         elif kind == "live":
             self.timeline.back()
+        elif kind == "show":
+            self._draw(
+                validation.one_of("show.what", message["what"], DRAWN), validation.flag("show.on", message["on"])
+            )
         else:
             if kind == "stop":
                 self._stopped = str(message.get("reason", "by hand"))
             self._send(message)
+
+    def _draw(self, what: str, on: bool) -> None:
+        """What is drawn on demand."""
+        tick = self._tick
+        if what != SELF_MOTION:
+            self._drawing.demand(what, on)
+            return
+        self._preview = []
+        if on and tick is not None:
+            frame, rows = hand_of(self._controller)
+            self._preview = self_motion(tick.robot, frame, tick.q, rows) if frame else []
+            if not self._preview:
+                raise ViewerError("show", what, "no joint can move while the hand stays")
+
+    def _shown(self, tick: Tick) -> Tick:
+        """The tick, or instead of it the next picture of a self-motion."""
+        if not self._preview:
+            return tick
+        numbers = np.frombuffer(tick.state.data).copy()
+        numbers[core_of(self._controller).context.memory["q"]] = self._preview.pop(0)
+        return Tick(self._controller, tick.state._replace(data=numbers.tobytes()))
 
     def _send(self, message: dict[str, Any]) -> None:
         """On to the loop.

@@ -112,6 +112,7 @@ function dial(item, target, entry) {
 function show() {
   const stopped = state.stopped || "";
   if (stopped) pill(`stopped: ${stopped}${state.speed > 1e-4 ? ", braking" : ""}`, "stopped");
+  else if (state.previewed) pill("self-motion is shown, not commanded", "relaxed");
   else pill(state.ended ? "the loop has ended" : state.status, state.ended ? "gone" : state.status);
   $("resume").hidden = !stopped;
   const now = performance.now();
@@ -154,6 +155,8 @@ $("slider").oninput = () => { dragging.add($("slider")); send({ type: "seek", ti
 $("slider").onchange = () => setTimeout(() => dragging.delete($("slider")), 200);
 $("play").onclick = () => send({ type: "play", speed: state.timeline.playing ? 0 : Number($("speed").value) });
 $("speed").onchange = () => send({ type: "play", speed: Number($("speed").value) });
+for (const what of ["reach", "follow"]) $(what).onchange = () => send({ type: "show", what, on: $(what).checked });
+$("selfmotion").onclick = () => send({ type: "show", what: "self-motion", on: !state.previewed });
 $("live").onclick = () => send({ type: "live" });
 $("showstick").onchange = () => { $("stick").hidden = !$("showstick").checked; };
 
