@@ -66,9 +66,8 @@ class SessionLog:
 
     def trim(self) -> None:
         """Leave out a tick that an interrupt has cut in two."""
-        kept = (self.time, self.q, self.seen, self.cost)
-        count = min(map(len, kept))
-        for some in kept:
+        count = min(len(self.time), len(self.q), len(self.seen), len(self.cost))
+        for some in (self.time, self.q, self.seen, self.cost):
             del some[count:]
 
     def write(self, path: str | os.PathLike[str], names: tuple[str, ...]) -> pathlib.Path:

@@ -18,6 +18,7 @@ from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
 from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh, wxyz
+from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ SKY, HORIZON = (188, 205, 222), (238, 242, 246)
 FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.76, 1.35
 #: In place of a quaternion for what has none
 EMPTY = np.zeros(0)
+#: What is told of a click at a hold: its id, number of viser's client
+Picked = Callable[[str, int | None], None]
 #: What is told of a drag: item, value, pose in the world, phase, number of viser's client
 Dragged = Callable[[str, str, pin.SE3, str, int | None], None]
 
@@ -56,7 +59,14 @@ class Drawing:
     """
 
     def __init__(
-        self, scene: viser.SceneApi, controller: Controller, dragged: Dragged | None = None, detail: float = DETAIL
+        self,
+        scene: viser.SceneApi,
+        controller: Controller,
+        dragged: Dragged | None = None,
+        detail: float = DETAIL,
+        *,
+        scenery: Scenery | None = None,
+        picked: Picked | None = None,
     ) -> None:
         self._scene, self._dragged = scene, dragged
         self._controller, self._stack = controller, controller.stack
@@ -70,7 +80,8 @@ class Drawing:
         self._demanded = set[str]()
         self._middle: Array | None = None
         self._weight = float(pin.computeTotalMass(robot.model)) * NOMINAL
-        scene.set_up_direction("+z")
+        self._scenery = scenery
+        scene.set_up_direction("+z" if scenery is None else scenery.up)
         _light(scene)
         self._links = robot_meshes(robot, detail)
         for link, mesh in self._links.items():
@@ -87,12 +98,15 @@ class Drawing:
                 self._targets[name] = "target"
         self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
         self._add_gizmos()
+        if scenery is not None:
+            self._add_scenery(scenery, picked)
 
     def show(self, tick: Tick) -> None:
         """Draw a tick."""
-        if not self._floor:
+        if not self._floor and self._scenery is None:
             self._floor = True
             self._add_floor(tick)
+        self._mark_holds(tick)
         for link in self._links:
             self._place(f"/robot/{link}", tick.pose(link))
         for name in self._obstacles:
@@ -201,6 +215,46 @@ class Drawing:
             plane_opacity=1.0,
             position=(0.0, 0.0, ground),
         )
+
+    # What stands around
+
+    def _add_scenery(self, scenery: Scenery, picked: Picked | None) -> None:
+        for k, mesh in enumerate(scenery.surfaces):
+            self._add_mesh(f"/scenery/{k}", mesh)
+        self._add_mesh("/holds/all", scenery.studs)
+        if picked is not None:
+
+            async def clicked(event: Any) -> None:
+                hold = scenery.hit(np.array(event.ray_origin), np.array(event.ray_direction))
+                if hold is not None:
+                    picked(hold, event.client_id)
+
+            self._nodes["/holds/all"].on_click(clicked)
+
+    def mark_goal(self, hold: str) -> None:
+        """The hold that was clicked."""
+        assert self._scenery is not None
+        self._mark("/holds/goal", self._scenery.places[self._scenery.holds.index(hold)], GREEN)
+
+    def _mark_holds(self, tick: Tick) -> None:
+        """A ball on every hold that a hand has."""
+        if self._scenery is None:
+            return
+        held = set()
+        for name, block in core_of(self._controller).layout.blocks.items():
+            item = block.entry.item
+            if isinstance(item, Hold) and tick.is_on(block) and (pose := tick.world_pose(name, "target")) is not None:
+                node = f"/holds/of {item.frame}"
+                held.add(node)
+                self._mark(node, self._scenery.places[self._scenery.nearest(pose.translation)], AMBER)
+        for node in (n for n in self._nodes if n.startswith("/holds/of ")):
+            if bool(self._nodes[node].visible) != (node in held):
+                self._nodes[node].visible = node in held
+
+    def _mark(self, node: str, place: Array, colour: Colour) -> None:
+        if node not in self._nodes:
+            self._nodes[node] = self._scene.add_icosphere(node, 0.05 * self._size, color=colour)
+        self._place(node, pin.SE3(np.eye(3), np.array(place, dtype=float)))
 
     # What can be dragged
 
@@ -412,11 +466,18 @@ def size(robot: Robot) -> float:
     return float(np.clip(robot.characteristic_length, 0.1, 30.0))
 
 
-def look(server: viser.ViserServer, controller: Controller, tick: Tick) -> None:
+def look(server: viser.ViserServer, controller: Controller, tick: Tick, scenery: Scenery | None = None) -> None:
     """Where a page's camera begins."""
     camera = server.initial_camera
-    camera.position, camera.look_at = viewpoint(controller, tick)
     camera.fov = float(FIELD)
+    if scenery is None:
+        camera.position, camera.look_at = viewpoint(controller, tick)
+        return
+    body = tick.pose(scenery.body)
+    away = body.rotation @ np.array([-0.75, 0.6, -1.0])
+    camera.position = body.translation + 2.6 * size(controller.stack.robot) * away
+    camera.look_at = np.array(body.translation)
+    camera.up = scenery.up
 
 
 def viewpoint(controller: Controller, tick: Tick) -> tuple[Array, Array]:

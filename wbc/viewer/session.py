@@ -20,9 +20,10 @@ from wbc.validation import Array
 from wbc.viewer import messages
 from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
-from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, State, ViewerEnd
+from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
 from wbc.viewer.operation import Operation
 from wbc.viewer.reading import declared, sentences, told
+from wbc.viewer.scenery import Scenery, checked
 from wbc.viewer.self_motion import self_motion
 from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
@@ -95,7 +96,9 @@ class Session:
         port: int = 0,
         token: str | None = None,
         silence: float = SILENT,
+        scenery: Scenery | None = None,
     ) -> None:
+        self._scenery = scenery
         self._controller, self._link = controller, link
         self._checker = Operation(controller)
         self._tick: Tick | None = None
@@ -105,11 +108,12 @@ class Session:
         self._stopped, self._drawn = "", False
         #: configurations that are shown in place of the robot's own
         self._preview: list[Array] = []
-        told_first = declared(controller) | {"live": link is not None, "silence": silence}
+        told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
         # The scene after the address: a page that comes early waits for it
-        self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
+        dragged = None if link is None or scenery is not None else self._dragged
+        self._drawing = Drawing(self.server.scene, controller, dragged, scenery=scenery, picked=self._picked)
         self._explainer = Explainer()
         if link is not None:
             # A page may operate before the first of the regular signs; the loop would take it for lost
@@ -160,7 +164,7 @@ class Session:
     def _show(self, state: State, sentence_rate: float) -> None:
         tick = Tick(self._controller, state)
         if self._tick is None:
-            look(self.server.server, self._controller, tick)
+            look(self.server.server, self._controller, tick, self._scenery)
         self._tick = tick
         if not self.server.watched and self._drawn:
             # Who comes later is told where everything is by the next tick
@@ -185,6 +189,7 @@ class Session:
             "sentence_rate": sentence_rate,
             "timeline": self.timeline.told(),
             "previewed": bool(self._preview),
+            "waits": bool(self._link is not None and self._link.flags & WAITS),
         }
         self.server.publish(told(self._controller, tick) | extra)
 
@@ -243,7 +248,10 @@ class Session:
         """
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
-        self._checker.check(message)
+        if self._scenery is None:
+            self._checker.check(message)
+        else:
+            checked(message, self._scenery.holds)
         if message["type"] in ("set", "rate") and self._link.flags & STOPPED:
             block = core_of(self._controller).layout.blocks[message["item"]]
             if not isinstance(block.entry.item, Constraint):
@@ -267,6 +275,15 @@ class Session:
             self._send({"type": "set", "item": item, "values": {value: sent}})
         except WbcError as error:
             if phase == "end":
+                self.server.tell_all({"type": "refused", "reason": str(error)})
+
+    def _picked(self, hold: str, client: int | None) -> None:
+        """A hold was clicked by one of viser's clients."""
+        if self.server.operates(client):
+            try:
+                self._send({"type": "go", "hold": hold})
+                self._drawing.mark_goal(hold)
+            except WbcError as error:
                 self.server.tell_all({"type": "refused", "reason": str(error)})
 
     def _operator_lost(self) -> None:
