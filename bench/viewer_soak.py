@@ -28,6 +28,8 @@ from wbc.viewer.presets import playground
 
 #: Between two stops [s], of which every third is a connection that is cut; between two looks at memory [s]
 EVERY, LOOK = 5.0, 2.0
+#: Ticks of a loop that does not wait
+FAST = 50_000
 #: Part of the time that memory may take to be what it is: caches fill, the past of the page does
 WARM = 0.3
 FILE = ROOT / "bench" / "data" / "viewer_soak.json"
@@ -72,6 +74,19 @@ def loop(viewer: Viewer, seen: Seen, controller: Controller, q: np.ndarray) -> N
             due = time.monotonic()
 
 
+def growth(controller: Controller, q: np.ndarray) -> float:
+    """Memory that ticks and updates alone take, as fast as they go [MiB]."""
+    with show(controller, open_browser=False) as viewer:
+        before = 0.0
+        for tick in range(FAST):
+            step = controller.step(q)
+            viewer.update(step)
+            q = controller.stack.robot.integrate(q, step.v, controller.stack.dt)
+            if tick == FAST // 5:
+                before = memory(os.getpid())
+    return memory(os.getpid()) - before
+
+
 def stopped_after(seen: Seen, began: float) -> float:
     """Seconds, infinite where the stop did not come."""
     return time.monotonic() - began if seen.stopped.wait(5.0) else np.inf
@@ -104,6 +119,8 @@ def main() -> None:
     seen, random = Seen(), np.random.default_rng(0)
     delays: dict[str, list[float]] = {"button": [], "connection": []}
     grown: list[tuple[float, float, float]] = []
+    alone = growth(controller, chosen.start)
+    controller.reset(chosen.start)
     with show(controller, open_browser=False) as viewer, watched(viewer, given.watchers):
         runner = threading.Thread(target=loop, args=(viewer, seen, controller, chosen.start))
         runner.start()
@@ -138,7 +155,8 @@ def main() -> None:
             ("minutes, watchers", f"{rows[-1, 0] / 60.0:.1f}, {given.watchers}"),
             ("ticks, of them later than a period", f"{seen.ticks}, {seen.late}"),
             ("viewer's memory at the first look, after the warm-up, at the end", memory_row(rows, kept, 1)),
-            ("loop's memory, the same", memory_row(rows, kept, 2)),
+            ("loop's memory with the client that drives, the same", memory_row(rows, kept, 2)),
+            (f"loop's memory alone, growth in the last {FAST - FAST // 5} of {FAST} ticks", f"{alone:+.2f} MiB"),
             ("slopes after the warm-up", f"{slopes[0]:+.1f} and {slopes[1]:+.1f} MiB/h"),
             *((f"stops by {name}: sent, dropped, slowest", told(times)) for name, times in delays.items()),
             ("hardest braking of any joint", f"{100.0 * seen.hardest:.2f} % of its acceleration limit"),

@@ -229,7 +229,9 @@ class Drawing:
                 if hold is not None:
                     picked(hold, event.client_id)
 
-            self._nodes["/holds/all"].on_click(clicked)
+            # A click beside a stud is one on the surface, and means the hold next to it
+            for node in ("/holds/all", *(f"/scenery/{k}" for k in range(len(scenery.surfaces)))):
+                self._nodes[node].on_click(clicked)
 
     def mark_goal(self, hold: str) -> None:
         """The hold that was clicked."""

@@ -13,7 +13,7 @@ from wbc.viewer.bodies import Mesh
 from wbc.viewer.messages import MessageError
 
 #: A click counts for the hold that it passes nearer than this [m]
-NEAR = 0.12
+NEAR = 0.25
 
 
 class Scenery(NamedTuple):
@@ -41,7 +41,7 @@ class Scenery(NamedTuple):
             return None
         first = along[near].min()
         # Of those that lie about as far as the first the one that was meant
-        near &= along < first + 2.0 * NEAR
+        near &= along < first + NEAR
         return self.holds[int(np.where(near, off, np.inf).argmin())]
 
     def nearest(self, place: Array) -> int:
