@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.clearance import (
-    EndlessCylinder,
     Exemption,
     Motion,
     Nearest,
@@ -23,22 +22,21 @@ from wbc.clearance import (
     self_pairs,
 )
 from wbc.robots import Walker
-from wbc.shapes import HalfSpace
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.holds.structure import Structure
-from wbc.walking.holds.surface import PlaneSurface
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.state import Swinging
+from wbc.walking.planner.around import MOUNTED
 from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.proof import DEPTH, things_of
 from wbc.walking.planner.swings.law import SwingLaw
 
 #: Time from knot to knot of a motion [s]: between them joints go straight
 STEP = 0.025
-#: A hold is mounted on what is this near to it, and its hand may be this deep in it, beyond its own roundness [m]
-MOUNTED, DEPTH = 0.005, 0.005
-#: The same of a hand that holds, whose posture is foreseen less well than its place [m]
+#: A hand that holds, whose posture is foreseen less well than its place, may be so much deeper than its roundness in
+#: what its hold is mounted on [m]
 HELD_DEPTH = 0.03
 #: A swinging arm that is off its way comes back to it within some of these [s]
 FADES = 0.15
@@ -71,7 +69,7 @@ class Foresight:
         self._hands = [self._grasping(tree, arm) for arm in range(len(walker.arms))]
         hands = {body.name: body for mine in self._hands for body in mine}
         bodies = [hands.get(body.name, body) for body in bodies_of(walker.robot)]
-        things = list(_things(structure))
+        things = list(things_of(structure))
         pairs = self_pairs(walker.robot, clearance) if walker.robot.self_pairs is not None else []
         pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
@@ -206,15 +204,6 @@ class Foresight:
             Exemption(hand.name, mount, point, distance, deep + float(getattr(hand.shape, "radius", 0.0)))
             for hand, mount in product(self._hands[arm], self._mounts[name])
         ]
-
-
-def _things(structure: Structure) -> list[SweptBody]:
-    out = [SweptBody(f"obstacle {one.id}", one.shape, placement=one.placement) for one in structure.obstacles]
-    surface = structure.surface
-    if surface is not None:
-        shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
-        out.append(SweptBody("the surface", shape, placement=surface.pose))
-    return out
 
 
 def _mounted(structure: Structure, point: Array) -> list[str]:

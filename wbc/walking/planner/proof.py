@@ -49,7 +49,7 @@ class ClearScene:
         required = walker.tolerances.clearance - TOLERANCE
         self._hands = [self._with_hand(arm.hand) for arm in walker.arms]
         bodies = [self._grasping(body) for body in bodies_of(walker.robot)]
-        things = list(_things(structure))
+        things = list(things_of(structure))
         pairs = list(self_pairs(walker.robot, required)) if walker.robot.self_pairs is not None else []
         pairs += [Pair(body.name, thing.name, required) for body in bodies for thing in things]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs)) if pairs else None
@@ -172,7 +172,8 @@ class Proof:
         return self._known[name]
 
 
-def _things(structure: Structure) -> Iterator[SweptBody]:
+def things_of(structure: Structure) -> Iterator[SweptBody]:
+    """Obstacles and surface as bodies of a sweep, under the names that refusals have for them."""
     for k, one in enumerate(structure.obstacles):
         yield SweptBody(_thing_name(structure, k), one.shape, placement=one.placement)
     surface = structure.surface

@@ -162,7 +162,8 @@ def _candidates(
     found = list[tuple[int, ...]]()
     if len(choices) <= FEW_ARMS:
         found += together(choices, fit)
-    for count in range(2, max(map(len, choices)) + 1) if len(choices) > FEW_ARMS else ():
+    longest = max(map(len, choices))
+    for count in range(min(2, longest), longest + 1) if len(choices) > FEW_ARMS else ():
         found = list(together([mine[:count] for mine in choices], lasting))
         if len(found) >= ENOUGH:
             break
