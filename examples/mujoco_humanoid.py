@@ -12,12 +12,13 @@ DT, REACHED, PUSHED, LASTS, SECONDS = 0.002, 1.5, 2.0, 0.15, 3.5  # s
 HALF, REACH, PUSH = (0.1, 0.06), np.array([0.3, 0.05, 0.25]), np.array([0.0, 120.0, 0.0])  # of a sole, m; m; N
 HAND, CHEST, SOLES = "gripper_right_fingertip_1_link", "torso_2_link", ("left_sole_link", "right_sole_link")
 
-robot = wbc.robots.load("talos")
+# Without limits of acceleration, JointLimits lets an arm run at its stop until it would have to brake within one tick
+robot = wbc.robots.load("talos").with_limits(acceleration=40.0)
 stack = wbc.Stack(robot, dt=DT)
 stack.add(wbc.tasks.CenterOfMass(gain=4.0), name="balance", weight=10.0)
 stack.add(wbc.tasks.EndEffector(CHEST, kind="orientation", gain=5.0), name="chest")
 stack.add(wbc.tasks.EndEffector(HAND, kind="position", gain=5.0), name="hand")
-stack.add(wbc.tasks.Posture(gain=5.0), name="posture", weight=1e-3)
+stack.add(wbc.tasks.Posture(gain=5.0), name="posture", weight=1e-4)
 stack.add(wbc.tasks.JointLimits()).add(wbc.tasks.TorqueLimits())
 for sole in SOLES:
     stack.add(wbc.tasks.SurfaceContact(sole, half_lengths=HALF, friction=0.6), name=sole)
