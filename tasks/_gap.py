@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -183,9 +182,11 @@ def _gap(sphere: Placed, other: Placed, distance: ca.SX, normal: ca.SX) -> Gap:
 def _to_capsule(sphere: Placed, capsule: Placed) -> Gap:
     assert isinstance(sphere.shape, Sphere)
     assert isinstance(capsule.shape, Capsule)
-    pose, length = capsule.pose, capsule.shape.length
-    shift = SHIFT * (length + capsule.shape.radius)
-    distance, normal = _from_axis()(sphere.pose.position, pose.rotation, pose.position, length / 2, shift)
+    pose, center = capsule.pose, sphere.pose.position
+    axis = pose.rotation[:, 2]
+    offset = center - (pose.position + SHIFT * (capsule.shape.length + capsule.shape.radius) * pose.rotation[:, 0])
+    along = clamp(ca.dot(axis, offset), capsule.shape.length / 2)
+    distance, normal = between(offset, along * axis)
     return _gap(sphere, capsule, distance - (sphere.shape.radius + capsule.shape.radius), normal)
 
 
@@ -201,44 +202,19 @@ def _capsules(first: Placed, second: Placed) -> list[Gap]:
 
 def _between_cores(first: Placed, second: Placed, a: Capsule, b: Capsule) -> Gap:
     """Nearest points s, t of the segments m + s u, |s| <= half: of the lines, then each clamped for the other."""
-    one, other = first.pose, second.pose
-    lengths = a.length / 2, b.length / 2, SHIFT * (a.length + a.radius)
-    distance, normal, start = _cores()(one.rotation, one.position, other.rotation, other.position, *lengths)
-    return Gap(first.frame, second.frame, distance - (a.radius + b.radius), normal, start)
-
-
-@cache
-def _from_axis() -> ca.Function:
-    """(x, R, p, half length, shift) -> distance and normal from a point to a capsule's axis.
-
-    As functions, since an operator called from Python costs tens of microseconds, and an arm has hundreds of pairs.
-    """
-    center, rotation, position = ca.SX.sym("x", 3), ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3)
-    half, shift = ca.SX.sym("half"), ca.SX.sym("shift")
-    axis = rotation[:, 2]
-    offset = center - (position + shift * rotation[:, 0])
-    along = clamp(ca.dot(axis, offset), half)
-    return ca.Function("from_axis", [center, rotation, position, half, shift], between(offset, along * axis))
-
-
-@cache
-def _cores() -> ca.Function:
-    """(R0, p0, R1, p1, half lengths, shift) -> distance, normal and the first one's nearest point of two axes."""
-    (r0, p0), (r1, p1) = ((ca.SX.sym(f"R{k}", 3, 3), ca.SX.sym(f"p{k}", 3)) for k in range(2))
-    half, other_half, shift = (ca.SX.sym(name) for name in ("half", "other_half", "shift"))
-    u, w = r0[:, 2], r1[:, 2]
-    offset = p0 - p1
+    u, w = first.pose.rotation[:, 2], second.pose.rotation[:, 2]
+    offset = first.pose.position - second.pose.position
     cos, on_u, on_w = ca.dot(u, w), ca.dot(u, offset), ca.dot(w, offset)
     across = 1 - cos * cos
-    s = clamp((cos * on_w - on_u) / (across + PARALLEL), half)
-    t = clamp(cos * s + on_w, other_half)
-    s = clamp(cos * t - on_u, half)
+    s = clamp((cos * on_w - on_u) / (across + PARALLEL), a.length / 2)
+    t = clamp(cos * s + on_w, b.length / 2)
+    s = clamp(cos * t - on_u, a.length / 2)
     crossed = across > PARALLEL
     both = ca.cross(u, w) / ca.sqrt(ca.if_else(crossed, across, 1))
-    instead = ca.if_else(crossed, both, r0[:, 0])
-    start = p0 + s * u
-    distance, normal = between(start, p1 + t * w + shift * instead)
-    return ca.Function("cores", [r0, p0, r1, p1, half, other_half, shift], [distance, normal, start])
+    instead = ca.if_else(crossed, both, first.pose.rotation[:, 0])
+    start = first.pose.position + s * u
+    distance, normal = between(start, second.pose.position + t * w + SHIFT * (a.length + a.radius) * instead)
+    return Gap(first.frame, second.frame, distance - (a.radius + b.radius), normal, start)
 
 
 def _over_plane(solid: Placed, plane: Placed) -> list[Gap]:

@@ -40,7 +40,7 @@ def between(start: ca.SX, end: ca.SX) -> tuple[ca.SX, ca.SX]:
     return length, offset * (1 / length)
 
 
-def clamp(x: ca.SX, half: float | ca.SX) -> ca.SX:
+def clamp(x: ca.SX, half: float) -> ca.SX:
     """x cut to [-half, half]. In compiled code four additions are faster than the calls that fmin and fmax are."""
     return (ca.fabs(x + half) - ca.fabs(x - half)) / 2
 
