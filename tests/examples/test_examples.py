@@ -46,6 +46,8 @@ LONG = (
     "dual_arm",
     "mujoco_humanoid",
     "mujoco_quadruped",
+    "grips",
+    "squeeze",
 )
 
 

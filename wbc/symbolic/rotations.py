@@ -44,13 +44,15 @@ def skew(w: ca.SX) -> ca.SX:
 
 def rotation_rate(rotation: ca.SX) -> ca.SX:
     """9x3 map from an angular velocity in the outer axes to d vec(R)/dt = vec([w]x R), columns first."""
-    return ca.horzcat(*(ca.vec(turn @ rotation) for turn in _unit_turns()))
+    return _turned()(rotation)
 
 
 @lru_cache(maxsize=1)
-def _unit_turns() -> tuple[ca.SX, ...]:
-    """[w]x of w along x, y and z."""
-    return tuple(ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) for axis in _EYE)
+def _turned() -> ca.Function:
+    """R -> the map, kept because one call costs less than the operations."""
+    rotation = ca.SX.sym("R", 3, 3)
+    turns = [ca.skew(ca.SX(ca.sparsify(ca.DM(axis)))) for axis in _EYE]
+    return ca.Function("turned", [rotation], [ca.horzcat(*(ca.vec(turn @ rotation) for turn in turns))])
 
 
 def from_axis_angle(axis: ArrayLike, cos: ca.SX, sin: ca.SX) -> ca.SX:

@@ -53,6 +53,8 @@ class Tracer:
     _poses: dict[str, Pose] = field(default_factory=dict)
     _seen: dict[str, Pose] = field(default_factory=dict)
     _symbols: list[Placeholder] = field(default_factory=list)
+    #: How many placeholders there were -> symbols of those that are not inner, and their values
+    _outer: dict[int, tuple[ca.SX, ca.SX]] = field(default_factory=dict)
     _com: ca.SX | None = None
 
     @property
@@ -423,12 +425,15 @@ class Tracer:
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
         expression = self._without_inner(expression)
-        outer = [s for s in self._symbols if not s.inner]
-        if not outer:
+        if all(s.inner for s in self._symbols):
             return expression
-        # A chain of coordinate axes has structural zeros that its placeholders have not
-        values = ca.densify(ca.vertcat(*[s.value() for s in outer]))
-        return ca.substitute(expression, ca.vertcat(*[s.symbol for s in outer]), values)
+        known = self._outer.get(len(self._symbols))
+        if known is None:
+            outer = [s for s in self._symbols if not s.inner]
+            # A chain of coordinate axes has structural zeros that its placeholders have not
+            values = ca.densify(ca.vertcat(*[s.value() for s in outer]))
+            known = self._outer[len(self._symbols)] = ca.vertcat(*[s.symbol for s in outer]), values
+        return ca.substitute(expression, *known)
 
     def formula(self, expression: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
         """The expression before the robot's kinematics are put in, and its symbols by what they stand for.
