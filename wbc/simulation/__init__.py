@@ -10,7 +10,16 @@ from wbc.simulation.mujoco_grips import GrippingMujocoPlant
 from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
-from wbc.simulation.plant import Command, CommandKind, GripKind, GrippingPlant, Plant, PlantError, PlantState
+from wbc.simulation.plant import (
+    Command,
+    CommandKind,
+    GripKind,
+    GrippingPlant,
+    Plant,
+    PlantError,
+    PlantState,
+    WatchedPlant,
+)
 from wbc.simulation.real_time import RealTime
 
 __all__ = [
@@ -33,6 +42,7 @@ __all__ = [
     "RealTime",
     "SavedState",
     "VelocityDrive",
+    "WatchedPlant",
     "driven",
     "level",
     "mujoco_model",
