@@ -126,6 +126,14 @@ class GrippingPlant(Protocol):
 
 
 @runtime_checkable
+class MovingPlant(Protocol):
+    """What a plant has besides whose robot has masses, so that it can go on with a velocity."""
+
+    def move(self, v: Array) -> None:
+        """Have this velocity ``[nv]``, right after a reset."""
+
+
+@runtime_checkable
 class WatchedPlant(Protocol):
     """What a plant has besides that notices when something of it fails."""
 

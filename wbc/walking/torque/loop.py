@@ -117,10 +117,18 @@ class TorqueLoop:
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
         self._closed: dict[str, GripKind] = {}
-        self._coming = list(self._faults)
+        # What came before is seen in the state; a motor that died is still dead
+        self._coming = [fault for fault in self._faults if fault.kind == "limp" or fault.time >= time]
         self._decided[:] = 0.0
         self._q = np.array(q)
         self._v, self._next = np.zeros((2, self.nv))
+
+    def move(self, v: Array) -> None:
+        """See :class:`wbc.simulation.MovingPlant`."""
+        state = self.plant.read()
+        self._tested.reset(state.q, state.time, v)
+        self._motors.begin(state.q, v)
+        self._v, self._next = np.array(v), np.array(v)
 
     def read(self) -> PlantState:
         """The plant's."""

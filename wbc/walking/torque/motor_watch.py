@@ -11,10 +11,10 @@ from wbc.validation import Array
 #: Of the observer [1/s]
 GAIN = 50.0
 #: A motor is judged while more than this part of its largest torque is asked of it, ...
-ASKED = 0.15
+ASKED = 0.3
 #: ... and is limp when it gives less than this part of what is asked, for so long [s]: friction takes less, and blows
 #: of hands that close pass
-GIVEN, LASTING = 0.4, 0.04
+GIVEN, LASTING = 0.3, 0.04
 
 
 class MotorWatch:
