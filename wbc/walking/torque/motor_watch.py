@@ -10,10 +10,11 @@ from wbc.validation import Array
 
 #: Of the observer [1/s]
 GAIN = 50.0
-#: A motor is judged while more than this part of its largest torque is asked of it, ...
-ASKED = 0.3
-#: ... and is limp when it gives less than this part of what is asked, for so long [s]: friction takes less, and blows
-#: of hands that close pass
+#: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
+#: knows of may take [N m], ...
+ASKED, FRICTION = 0.15, 6.0
+#: ... and is limp when it gives less than this part of what is asked, for so long [s]: blows of hands
+#: that close pass
 GIVEN, LASTING = 0.3, 0.04
 
 
@@ -31,7 +32,7 @@ class MotorWatch:
 
     def __init__(self, model: pin.Model, effort: Array, dt: float) -> None:
         self._observer = MomentumObserver(model, GAIN, dt)
-        self._least, self._rate, self._ticks = ASKED * effort, GAIN * dt, round(LASTING / dt)
+        self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), GAIN * dt, round(LASTING / dt)
         self._least[effort <= 0.0] = np.inf
         self.share, self.limp = np.ones(model.nv), list[int]()
         self._asked, self._low = np.zeros(model.nv), np.zeros(model.nv, dtype=int)
