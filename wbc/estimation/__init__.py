@@ -1,5 +1,6 @@
 """Where a moving frame is and how it moves, from measurements of its pose; the calibration of what measures it; and
-what acts on a robot that nobody commanded."""
+what acts on a robot that nobody commanded.
+"""
 
 from wbc.estimation.calibration import Calibration, calibrate
 from wbc.estimation.momentum_observer import MomentumObserver
