@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import _thread
+import os
+import signal
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +18,7 @@ from tests.levels import arms
 from tests.torque import problems
 from wbc import Controller, Policy, Stack, Status
 from wbc.batch import Batch
+from wbc.batch.engine import Compiled
 from wbc.controller import core_of
 from wbc.errors import (
     CommandError,
@@ -289,3 +294,37 @@ def test_measured_distances_and_escapes_are_refused() -> None:
     one.policy = Policy(escape=True)
     with pytest.raises(SolverError, match="escape"):
         one.batch(2)
+
+
+def test_a_batch_goes_on_in_a_forked_process() -> None:
+    """The child has none of the threads that the parent's ticks were done by."""
+    q = np.array([robot("panda").random(seed) for seed in range(130)])
+    batch = bare("native").batch(len(q), threads=2)
+    first = batch.step(q).v.copy()
+    batch.reset(q)
+    if not (child := os.fork()):
+        signal.alarm(20)
+        os._exit(0 if (batch.step(q).v == first).all() else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_ctrl_c_ends_a_step_when_no_thread_is_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    q = np.array([robot("panda").random(seed) for seed in range(130)])
+    batch = bare("native").batch(len(q), threads=2)
+    run, begun, ended = Compiled._run, list[int](), list[int]()
+
+    def slow(self: Compiled, tick: Any, inputs: Any, reports: Any, start: int, count: int) -> None:
+        begun.append(start)
+        if len(begun) == 1:
+            _thread.interrupt_main()
+        time.sleep(0.02)
+        run(self, tick, inputs, reports, start, count)
+        ended.append(start)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Compiled, "_run", slow)
+        with pytest.raises(KeyboardInterrupt):
+            batch.step(q)
+        assert sorted(begun) == sorted(ended)
+    batch.reset(q)
+    assert (batch.step(q).v == bare("native").batch(len(q), threads=1).step(q).v).all()

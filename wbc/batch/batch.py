@@ -24,6 +24,9 @@ from wbc.stack.layout import Slot
 from wbc.tasks.inputs import require_order
 from wbc.validation import Array
 
+#: Most robots, and most threads, of a batch
+MOST = 2**31 - 1
+
 
 class Batch:
     """n robots with the same stack, each with its own run-time values, last command and active set.
@@ -226,5 +229,5 @@ def _below(handle: Handle, name: str) -> str | None:
 
 
 def _require_count(field: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise RangeError(field, value, "expected an integer >= 1")
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST:
+        raise RangeError(field, value, f"expected an integer from 1 to {MOST}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
@@ -50,22 +52,40 @@ class Compiled:
         self._left = sum(1 << UNSOUND + flag for flag in range(UNSOUND))
         if controller.policy.conflict == "brake":
             self._left |= 1 << RELAXED
-        self._pool = ThreadPoolExecutor(threads, "wbc-batch") if threads > 1 else None
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+
+    def _threads(self) -> ThreadPoolExecutor:
+        """A pool of this process: a fork has none of its parent's threads."""
+        if self._pool is None or self._pool[0] != os.getpid():
+            self._pool = os.getpid(), ThreadPoolExecutor(len(self._ticks), "wbc-batch")
+        return self._pool[1]
 
     def tick(self, inputs: Array, reports: Array) -> None:
         chunk = max(_CHUNK, -(-self._count // (4 * len(self._ticks))))
         starts = list(range(0, self._count, chunk))
-        if self._pool is None or len(starts) == 1:
+        if len(self._ticks) == 1 or len(starts) == 1:
             self._run(self._ticks[0], inputs, reports, 0, self._count)
         else:
             idle = list(self._ticks)
 
             def run(start: int) -> None:
                 tick = idle.pop()
-                self._run(tick, inputs, reports, start, min(chunk, self._count - start))
-                idle.append(tick)
+                try:
+                    self._run(tick, inputs, reports, start, min(chunk, self._count - start))
+                finally:
+                    idle.append(tick)
 
-            list(self._pool.map(run, starts))
+            pool = self._threads()
+            try:
+                list(pool.map(run, starts))
+            except BaseException:
+                # Ctrl-C: no thread may go on with memory that the next tick takes
+                pool.shutdown(cancel_futures=True)
+                self._pool = None
+                # A thread that was being started is not known to the pool yet
+                while len(idle) < len(self._ticks):
+                    time.sleep(1e-3)
+                raise
         for k in np.flatnonzero((self._left >> self._flags) & 1).tolist():
             self._finish(k, inputs, reports)
 

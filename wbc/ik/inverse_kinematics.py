@@ -19,6 +19,7 @@ from wbc.ik.branches import Branches, branches
 from wbc.ik.continuation import PathBranch, branch
 from wbc.ik.engine import Engine, ending
 from wbc.ik.moving_targets import MovingTargets
+from wbc.ik.reach import beyond_reach
 from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
 from wbc.ik.solution import Batch, Ending, Solution
 from wbc.ik.timeless import TICK
@@ -110,6 +111,7 @@ class InverseKinematics(Handles):
         restarts: int = 100,
         tolerance: float = 1e-5,
         workers: int | None = None,
+        nearest: bool = True,
     ) -> Batch:
         """:meth:`solve` for many targets, in threads that run at the same time.
 
@@ -118,6 +120,9 @@ class InverseKinematics(Handles):
             targets: name of a task -> its ``target`` in each search; all of one length.
             budget: time for each search [s].
             workers: threads; default: as many as cores. Without a compiler, or where rows are measured, there is one.
+            nearest: also look for the nearest configuration where a target is proven out of reach, see
+                :func:`wbc.ik.reach.beyond_reach`; False: such a search is left out, its q is q0 and its descents are 0.
+                Statuses and all other answers are the same.
 
         Raises:
             WbcError: as for :meth:`solve`; ShapeError: no targets, or of different lengths.
@@ -139,26 +144,31 @@ class InverseKinematics(Handles):
             for k, value in enumerate(values):
                 parameters[k, span] = handle.checked("target", value)
         query, before = engine.query(self.goals, near, starts, number), engine.tick.p.copy()
+        hopeless = np.zeros(total, bool)
+        if not validation.flag("nearest", nearest):
+            for entry in self.stack.entries:
+                if entry.name in self.goals and (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
+                    hopeless |= beyond(parameters[:, controller[entry.name].slot("target").span])
+        sought = np.flatnonzero(~hopeless)
         answers = np.tile(first, (total, 1))
         if isinstance(engine.search, NativeSearch):
-            clones = [core_of(controller.clone()).tick for _ in range(min(threads, max(1, total)))]
+            clones = [core_of(controller.clone()).tick for _ in range(min(threads, max(1, len(sought))))]
             ticks = [tick for tick in clones if isinstance(tick, NativeTick)]
             for tick in ticks:
                 tick.dt[0] = TICK
-            answers, found = search_many(ticks, query, seconds, answers, parameters)
+            answers[sought], found = search_many(ticks, query, seconds, answers[sought], parameters[sought])
         else:
             found = []
-            for k in range(total):
+            for k in sought.tolist():
                 engine.tick.p[:] = parameters[k]
                 found.append(engine.run(first, query, seconds))
                 answers[k] = engine.tick.q
             engine.tick.p[:] = before
-        return Batch(
-            engine.within_limits(answers),
-            tuple(ending(f) for f in found),
-            np.array([float(f.descents + (f.ending > EXHAUSTED)) for f in found]),
-            np.array([f.seconds for f in found]),
-        )
+        statuses = [Ending.UNREACHABLE] * total
+        descents, spent = np.zeros(total), np.zeros(total)
+        for k, f in zip(sought.tolist(), found, strict=True):
+            statuses[k], descents[k], spent[k] = ending(f), float(f.descents + (f.ending > EXHAUSTED)), f.seconds
+        return Batch(engine.within_limits(answers), tuple(statuses), descents, spent)
 
     def along(
         self,

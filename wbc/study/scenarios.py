@@ -85,7 +85,9 @@ def reach(
     away *= (size * np.cbrt(rng.random(count)) / np.linalg.norm(away, axis=1))[:, None]
     targets[:, :3, 3] = _centre(machine) + away
     start = _middle(machine)
-    found = kinematics.solve_batch(start, {"hand": targets}, budget=None, restarts=restarts, workers=threads)
+    found = kinematics.solve_batch(
+        start, {"hand": list(targets)}, budget=None, restarts=restarts, workers=threads, nearest=False
+    )
     x, y, z = targets[:, :3, 3].T
     return {"x": x, "y": y, "z": z, "reached": found.solved}
 
