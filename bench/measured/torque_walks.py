@@ -24,9 +24,9 @@ from wbc.walking.body_path import grid_path
 from wbc.walking.checker import check_walk
 from wbc.walking.log.log import CLOSED, WalkLog
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.loop.walk import Tick, Walk
-from wbc.walking.planner.plan import HoldLost
+from wbc.walking.loop.walk import PATIENCE, SLACK, Tick, Walk
 from wbc.walking.planner.planner import plan_walk
+from wbc.walking.run.carrying_out import CarryingOut
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.torque.faults import Fault, delay_of
 from wbc.walking.torque.loop import TorqueLoop
@@ -86,7 +86,8 @@ def torques() -> tuple[Sheet, WalkLog]:
     # Forked processes would share locks of what is loaded here
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
         found = list(pool.map(tried, TRIALS))
-    columns = ("walk", "end", "hold slip", "grip off its hold", "largest grip", "momentum given", "external checker")
+    columns = ("walk", "end", "found wrong by the loop", "hold slip", "grip off its hold", "largest grip",
+               "momentum given", "external checker")  # fmt: skip
     return Sheet("", columns, [row for row, _ in found]), found[0][1]
 
 
@@ -110,7 +111,8 @@ def tried(trial: Trial) -> tuple[tuple[str, ...], WalkLog]:
     watch = loop.watch
     print(f"{trial.name}: {end}", file=sys.stderr)
     grip, given = f"{watch.force:.0f} N, {watch.moment:.0f} N m", f"{watch.given[0]:.0f} N s"
-    row = (trial.name, f"{end} after {walk.time:.1f} s", slip, f"{1e3 * watch.drift:.2g} mm", grip, given, kinds)
+    noted = "; ".join(f"{text} at {when:.2f} s" for when, text in watch.noted) or "nothing"
+    row = (trial.name, f"{end} after {walk.time:.1f} s", noted, slip, f"{1e3 * watch.drift:.2g} mm", grip, given, kinds)
     return row, log
 
 
@@ -121,20 +123,21 @@ class FallenError(WbcError):
 def _walked(walk: Walk, machine: Walker, structure: Structure) -> tuple[str, WalkLog, str, str]:
     """How it ended, and what the checker says of its log."""
     recorder, slip = WalkRecorder(walk), 0.0
+    longest = PATIENCE * walk.plan.path.duration + SLACK
 
-    def keep(tick: Tick) -> None:
+    def tick() -> Tick:
         nonlocal slip
-        recorder.tick(tick)
+        tick = walk.tick()
         slip = max(slip, tick.slip)
         if tick.body_error > FALLEN:
             raise FallenError("body", tick.body_error, "fell")
+        return tick
 
-    try:
-        end = walk.run(keep)
-    except HoldLost:
-        end = "hold lost"
-    except FallenError:
-        end = "fell"
+    doing = CarryingOut(walk, recorder, tick=tick)
+    while not walk.done and walk.time < longest and doing.step():
+        pass
+    end: str = doing.outcome or ("arrived" if walk.done else "late")
+    end = {"refused": "fell", "plant failed": "ended"}.get(end, end)
     log = recorder.log()[0]
     with TemporaryDirectory() as folder:
         report = check_walk(log, machine.urdf(Path(folder) / "robot.urdf"), structure)

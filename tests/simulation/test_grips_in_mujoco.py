@@ -50,6 +50,25 @@ def test_grips_hold_and_bear_what_rigid_ones_do(plant: GrippingMujocoPlant, kind
         assert plant.wrenches[hand] == pytest.approx(other.wrenches[hand], abs=0.5)
 
 
+def test_wrenches_are_in_the_axes_of_a_frame_that_rolls_on_its_hold(plant: GrippingMujocoPlant) -> None:
+    """M a + h = tau + J'w, by Pinocchio, long after the hand has rolled away from where it closed."""
+    plant.reset(ROBOT.neutral, 0.0)
+    hold = ROBOT.pose(ROBOT.neutral, HANDS[0])
+    plant.grasp(HANDS[0], pin.SE3(hold.rotation @ pin.exp3(np.array([0.0, 0.0, 1.0])), hold.translation), GripKind.AXIS)
+    tau = random_torque(ROBOT, 1.0, 5)
+    plant.apply(Command(CommandKind.TORQUE, tau))
+    plant.advance(0.1)
+    model, before = ROBOT.model, plant.state
+    q, v = before.q.copy(), before.v.copy()
+    plant.advance(0.001)
+    data, wrench = model.createData(), plant.wrenches[HANDS[0]]
+    push = pin.computeFrameJacobian(model, data, q, model.getFrameId(HANDS[0]), pin.LOCAL).T @ wrench
+    a = pin.aba(model, data, q, v, tau + push)
+    theirs = np.array(plant.data.qacc)
+    theirs[:3] = pin.Quaternion(q[3:7]).matrix().T @ theirs[:3] - np.cross(v[3:6], v[:3])
+    assert a == pytest.approx(theirs, abs=1e-6 * np.abs(theirs).max() + 1e-6)
+
+
 def test_faults_and_delay() -> None:
     plant = GrippingMujocoPlant(ROBOT, HANDS, motors=Motors(delay=0.01))
     plant.reset(ROBOT.neutral, 0.0)

@@ -99,3 +99,42 @@ def test_what_cannot_walk_under_torques_is_refused() -> None:
     assert_refused(lambda: PlantChoice("pinocchio", faults=("delay 0.02", "delay 0.01")), RangeError, "one delay")
     choice, walker = PlantChoice("pinocchio", faults=("break arm9 at 1",)), wbc.robots.walker()
     assert_refused(lambda: choice.build(walker, cylinder(rigid=True)), UnknownNameError, "arm1")
+
+
+def test_a_limp_motor_is_named_and_the_stack_does_without_it() -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT), faults=[Fault.read("limp arm3_joint2 at 0")]), HANDS[:2])
+    swing = np.zeros(ROBOT.nv)
+    swing[ROBOT.dofs("arm3_joint2")] = 0.3
+    for _ in range(30):
+        loop.apply(Command(CommandKind.VELOCITY, swing))
+        loop.advance(0.01)
+        if loop.failing():
+            break
+    assert "arm3_joint2 is limp" in loop.failing()
+    assert [text for _, text in loop.watch.noted] == [loop.failing().rpartition(", seen")[0]]
+    loop.advance(0.01)
+    assert abs(loop.step.torque[ROBOT.dofs("arm3_joint2")]).max() < 1e-6
+    begun(loop)
+    assert loop.failing() == ""
+
+
+def test_a_hand_that_slips_is_named() -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT), faults=[Fault.read("slip arm2 0.005 at 0")]))
+    for _ in range(22):
+        loop.advance(0.01)
+    assert "arm2_hand has slipped by 2" in loop.failing()
+    assert [text for _, text in loop.watch.noted][:1] == ["arm2_hand slips on its hold"]
+
+
+def test_it_goes_on_with_a_velocity() -> None:
+    faults = [Fault.read("break arm1 at 1"), Fault.read("limp arm3_joint1 at 1")]
+    loop, v = TorqueLoop(stack(), PinocchioPlant(ROBOT), faults=faults), rates(0.02)
+    loop.reset(ROBOT.neutral, 2.0)
+    loop.move(v)
+    for hand in HANDS:
+        loop.grasp(hand, ROBOT.pose(ROBOT.neutral, hand), GripKind.AXIS)
+    assert loop.read().v == pytest.approx(v, abs=1e-3 * np.abs(v).max())
+    loop.advance(0.01)
+    # The hold broke before it went on, the motor is still dead
+    assert loop.lost() == ()
+    assert not loop.plant._state.scale[ROBOT.dofs("arm3_joint1")].any()  # type: ignore[attr-defined]

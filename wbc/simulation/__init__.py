@@ -10,7 +10,17 @@ from wbc.simulation.mujoco_grips import GrippingMujocoPlant
 from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
-from wbc.simulation.plant import Command, CommandKind, GripKind, GrippingPlant, Plant, PlantError, PlantState
+from wbc.simulation.plant import (
+    Command,
+    CommandKind,
+    GripKind,
+    GrippingPlant,
+    MovingPlant,
+    Plant,
+    PlantError,
+    PlantState,
+    WatchedPlant,
+)
 from wbc.simulation.real_time import RealTime
 
 __all__ = [
@@ -25,6 +35,7 @@ __all__ = [
     "Ground",
     "KinematicPlant",
     "Motors",
+    "MovingPlant",
     "MujocoPlant",
     "PinocchioPlant",
     "Plant",
@@ -33,6 +44,7 @@ __all__ = [
     "RealTime",
     "SavedState",
     "VelocityDrive",
+    "WatchedPlant",
     "driven",
     "level",
     "mujoco_model",

@@ -67,6 +67,10 @@ class GrippingMujocoPlant(MujocoPlant):
         model = spec.compile()
         self._equality = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         self._rows = {name: [int(model.equality(f"{name} {k}").id) for k in range(len(POINTS))] for name in frames}
+        frames_of = robot.model.frames
+        self._placements = {
+            name: np.array(frames_of[robot.model.getFrameId(name)].placement.rotation) for name in frames
+        }
         self._drive = Drive(motors or Motors(), robot, time_step)
         self._balance, self._placed, self._seed = Balance(robot.model), robot.model.createData(), seed
         self._grips: dict[str, Grip] = {}
@@ -185,9 +189,12 @@ class GrippingMujocoPlant(MujocoPlant):
         ours = np.asarray(data.efc_type[: data.nefc]) == self._equality
         numbers, forces = np.asarray(data.efc_id[: data.nefc]), np.asarray(data.efc_force[: data.nefc])
         for name, grip in self._grips.items():
-            total = np.zeros(6)
-            for row, point in zip(self._rows[name][: HELD[grip.kind]], POINTS, strict=False):
-                force = grip.pose.rotation.T @ forces[ours & (numbers == row)]
+            total, rows = np.zeros(6), self._rows[name]
+            # The frame's own axes: a hand that rolls on its hold turns away from where it closed
+            body = data.xmat[self._model.eq_obj1id[rows[0]]].reshape(3, 3)
+            rotation = body @ self._placements[name]
+            for row, point in zip(rows[: HELD[grip.kind]], POINTS, strict=False):
+                force = rotation.T @ forces[ours & (numbers == row)]
                 total += np.append(force, pin.skew(point) @ force)
             out[name] = total
         return out

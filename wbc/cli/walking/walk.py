@@ -126,8 +126,7 @@ def _resumed(
     from wbc.cli.walking.modes import performance
     from wbc.cli.walking.run import changed_machine, new_folder, walk_free
     from wbc.errors import RangeError
-    from wbc.walking.log.folder import read_begun
-    from wbc.walking.run.resume_mode import going_on, machine_walked, read_resume
+    from wbc.walking.run.resume_mode import going_on, machine_walked, plant_walked, read_resume
     from wbc.walking.torque.choice import PlantChoice
 
     given, of = context.params, read_resume(resume, points)
@@ -141,8 +140,8 @@ def _resumed(
         raise RangeError("arms", given["arms"], f"the run has {len(machine.arms)} arms")
     if "change" in named:
         machine = changed_machine(given["change"], machine.two_ended, len(machine.arms))
-    begun = read_begun(Path(of.folder))["plant"] if request is not of else {}
-    perform = performance(request, machine, ask, least_time, PlantChoice.of_run(begun))
+    plant = PlantChoice.of_run(plant_walked(request, Path(of.folder)))
+    perform = performance(request, machine, ask, least_time, plant)
     folder = new_folder("resumed", output, given["force"])
     walk_free(perform, machine, folder, given["backend"], check, given["pictures"])
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.robots import Walker
-from wbc.simulation import Connection, GripKind, GrippingPlant, Plant
+from wbc.simulation import Connection, GripKind, GrippingPlant, MovingPlant, Plant, WatchedPlant
 from wbc.validation import Array
 from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
@@ -53,6 +53,8 @@ class Machine:
         self._connection = Connection(plant, walker.robot, dt)
         self._broken: set[int] = set()
         self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
+        self._moving: MovingPlant | None = plant if isinstance(plant, MovingPlant) else None
+        self._watched: WatchedPlant | None = plant if isinstance(plant, WatchedPlant) else None
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
@@ -72,6 +74,8 @@ class Machine:
         self.fixed = len(self.held) < self.walker.min_holds
         self._place(q[7:])
         state = self._connection.reset(self.q, time)
+        if v is not None and self._moving is not None:
+            self._moving.move(v)
         self.time = state.time
         if (state.q[7:] != self.q[7:]).any():
             self._place(state.q[7:])
@@ -129,6 +133,10 @@ class Machine:
         arms = [arm for arm in self.held if self.walker.arms[arm].hand in names]
         self._broken.update(arms)
         return [self.held[arm] for arm in arms]
+
+    def failing(self) -> str:
+        """What the plant says of itself that has failed; "": nothing."""
+        return "" if self._watched is None else self._watched.failing()
 
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""

@@ -90,6 +90,9 @@ class CarryingOut:
         except WbcError as error:
             # Such as a pose that the holding hands do not fix: what was walked until then is kept
             self.outcome, self.reason = "refused", str(error)
+        failing = self.walk.machine.failing()
+        if failing and self.outcome is None:
+            self.abort("plant failed", f"{failing}; it was brought to rest")
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None

@@ -149,6 +149,17 @@ def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset())
     return going_on(before, seen | {folder.resolve()})
 
 
+def plant_walked(request: Request | ResumeRequest, folder: pathlib.Path) -> dict[str, Any]:
+    """What moved in a run that is gone on with, or begun again, as plain data; empty: the kinematic plant.
+
+    Args:
+        request: of :func:`going_on`. folder: of the run that was asked for.
+    """
+    if not isinstance(request, ResumeRequest):
+        return dict(read_begun(folder)["plant"])
+    return dict(WalkLog.load(request.folder).meta.get("plant", {}))
+
+
 def machine_walked(request: Request | ResumeRequest, folder: pathlib.Path) -> Walker:
     """The machine of a run that is gone on with, or begun again.
 
@@ -175,7 +186,7 @@ class ResumeMode(Mode[PathRequest]):
 
     Raises:
         WalkLogError: no log of a walk. RangeError: a time that it does not have, another robot, a state that is not
-            legal, a run that has no goal, or one under torques.
+            legal, or a run that has no goal.
     """
 
     def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
@@ -186,10 +197,6 @@ class ResumeMode(Mode[PathRequest]):
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
         if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
-        if "plant" in old.meta:
-            name = old.meta["plant"]["name"]
-            why = f"it ran under torques in {name}, whose state is not in the log: run it again from its beginning"
-            raise RangeError("resume", str(self._folder), why)
         if len(old.arms) != len(walker.arms):
             raise RangeError("resume", len(old.arms), f"the run has another number of arms than {len(walker.arms)}")
         row = row_at(old, resume.at)

@@ -14,9 +14,13 @@ from wbc.errors import ShapeError
 from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
 from wbc.validation import Array
 from wbc.walking.torque.faults import Fault
+from wbc.walking.torque.motor_watch import MotorWatch
 from wbc.walking.torque.stack import TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
+
+#: A closed hand that is farther from its hold slips; farther than that the walk ends [m]
+SLIPS, LOST = 3e-4, 2e-3
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,10 @@ class TorqueLoop:
     its integral. Every millisecond the stack finds torques for dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q),
     and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
     read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
+
+    A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
+    found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
+    the walk then brings it to rest.
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.
@@ -88,20 +96,39 @@ class TorqueLoop:
         self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
         self.about = dict(about or {"name": type(plant).__name__})
         self.watch = Watch(stack.rating, [arm.hand for arm in arms])
+        self._effort = np.array(stack.walker.robot.limits.effort)
+        self._effort[: stack.walker.robot.base_nv] = 0.0
+        self._motors = MotorWatch(self._model, self._effort, self.time_step)
+        self._data = self._model.createData()
+        # Torques on their way, the oldest first, and that which takes hold next at the end
+        self._sent = np.zeros((ahead + 1, self.nv))
 
     def reset(self, q: Array, time: float) -> None:
         """At rest, nothing grasped."""
         self.plant.reset(q, time)
         gains, controller = self._gains, self.stack.controller
         controller.reset(q)
+        controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
+        self._motors.begin(q, np.zeros(self.nv))
+        self._sent[:] = 0.0
+        self._slipping: dict[str, float] = {}
+        self._failing = ""
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
         self._closed: dict[str, GripKind] = {}
-        self._coming = list(self._faults)
+        # What came before is seen in the state; a motor that died is still dead
+        self._coming = [fault for fault in self._faults if fault.kind == "limp" or fault.time >= time]
         self._decided[:] = 0.0
         self._q = np.array(q)
         self._v, self._next = np.zeros((2, self.nv))
+
+    def move(self, v: Array) -> None:
+        """See :class:`wbc.simulation.MovingPlant`."""
+        state = self.plant.read()
+        self._tested.reset(state.q, state.time, v)
+        self._motors.begin(state.q, v)
+        self._v, self._next = np.array(v), np.array(v)
 
     def read(self) -> PlantState:
         """The plant's."""
@@ -115,6 +142,8 @@ class TorqueLoop:
         """The plant's hand closes, and the stack counts on it."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
         self._tested.grasp(frame, pose, kind)
+        state = self.plant.read()
+        self._motors.struck(state.q, state.v)
         item = self._items[frame, kind]
         item.target, item.enabled = pose, True
         self._closed[frame] = kind
@@ -122,11 +151,19 @@ class TorqueLoop:
     def release(self, frame: str) -> None:
         """The plant's hand opens, and the stack does without it."""
         self._tested.release(frame)
+        self._slipping.pop(frame, None)
         self._let_go(frame)
 
     def lost(self) -> tuple[str, ...]:
         """Hands whose holds have broken off; the stack has done without them since."""
-        return self._tested.lost()
+        lost = self._tested.lost()
+        for frame in lost:
+            self._note(self.plant.read().time, f"the hold of {frame} broke off")
+        return lost
+
+    def failing(self) -> str:
+        """The first motor that was found limp, or hand that has slipped too far, in words; "": none."""
+        return self._failing
 
     def advance(self, dt: float) -> None:
         """A period of the walk: as many of torques as go into it."""
@@ -144,6 +181,9 @@ class TorqueLoop:
             command.values[:] = self.step.torque
             plant.apply(command)
             plant.advance(step)
+            self._sent[:-1] = self._sent[1:]
+            self._sent[-1] = self.step.torque
+            self._find()
             self._q = pin.integrate(self._model, self._q, (self._v + 0.5 * ramp) * step)
             self._v = self._v + ramp
             if len(self._decided):
@@ -152,6 +192,46 @@ class TorqueLoop:
             self.watch.see(self._tested, self._model, self.step.status)
         off = pin.difference(self._model, self._q, plant.read().q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
+        self._feel()
+
+    def _find(self) -> None:
+        """Motors that have gone limp."""
+        state, model, data = self.plant.read(), self._model, self._data
+        pin.computeJointJacobians(model, data, state.q)
+        contacts = np.zeros(self.nv)
+        for name, wrench in self._tested.wrenches.items():
+            contacts += pin.getFrameJacobian(model, data, model.getFrameId(name), pin.LOCAL).T @ wrench
+        for dof in self._motors.see(state.q, state.v, self._sent[0], contacts):
+            robot, share = self.stack.walker.robot, float(self._motors.share[dof])
+            self._effort_left()
+            text = f"the motor of {robot.dof_names[dof]} is limp: it gives {share:.0%} of its torque"
+            self._note(state.time, text, ends=True)
+
+    def _effort_left(self) -> None:
+        """The stack asks nothing of motors that are limp."""
+        left = self._effort.copy()
+        left[self._motors.limp] = 0.0
+        self.stack.controller["torques"].torque = left[self.stack.walker.robot.base_nv :]
+
+    def _feel(self) -> None:
+        """Hands that slip on their holds."""
+        state, model, data = self.plant.read(), self._model, self._data
+        pin.framesForwardKinematics(model, data, state.q)
+        for frame, kind in self._closed.items():
+            gap = data.oMf[model.getFrameId(frame)].translation - self._items[frame, kind].target.translation
+            off, before = float(np.sqrt(gap @ gap)), self._slipping.get(frame, 0.0)
+            if off <= SLIPS:
+                continue
+            self._slipping[frame] = max(off, before)
+            if before == 0.0:
+                self._note(state.time, f"{frame} slips on its hold")
+            if off > LOST >= before:
+                self._note(state.time, f"{frame} has slipped by {1e3 * off:.1f} mm on its hold", ends=True)
+
+    def _note(self, time: float, text: str, ends: bool = False) -> None:
+        self.watch.noted.append((time, text))
+        if ends and not self._failing:
+            self._failing = f"{text}, seen at {time:.2f} s"
 
     def _ahead(self, state: PlantState) -> tuple[Array, Array]:
         """Where the torque of this tick will find the robot."""

@@ -10,6 +10,7 @@ from wbc import tasks
 from wbc.controller.controller import Controller
 from wbc.controller.stack import Stack
 from wbc.errors import RangeError
+from wbc.robot.transmission import Transmission
 from wbc.robots import HoldRating, Walker, hold_rating
 from wbc.simulation import GripKind
 from wbc.walking.torque.grasps import GRASPS
@@ -51,7 +52,12 @@ class TorqueStack:
         weights = np.where(np.arange(robot.nv) < robot.base_nv, BODY, 1.0)
         follow = tasks.Posture(joints=robot.joint_names, weights=tuple(weights.tolist()))
         stack.add(follow, name="reference")
-        stack.add(tasks.JointLimits(), name="limits").add(tasks.TorqueLimits(), name="torques")
+        joints = tuple(name for name in robot.joint_names if robot.dofs(name).start >= robot.base_nv)
+        # Each joint has a drive of its own: their limits can be set one by one, of a limp motor to 0
+        drives = Transmission(joints, {name: {name: 1.0} for name in joints})
+        effort = tuple(robot.limits.effort[robot.base_nv :].tolist())
+        stack.add(tasks.JointLimits(), name="limits")
+        stack.add(tasks.DriveTorqueLimits(drives, torque=effort), name="torques")
         for arm in walker.arms:
             for kind in self.kinds:
                 grasp = GRASPS[kind](arm.hand, force=rating.force, torque=rating.torque)

@@ -13,6 +13,9 @@ from wbc.validation import Array
 class Tested(GrippingPlant, Protocol):
     """What a plant has besides that says how a walk does on it, and can be made to fail."""
 
+    def reset(self, q: Array, time: float, v: Array | None = None) -> None:
+        """At a configuration, at rest or with a velocity, and nothing grasped."""
+
     @property
     def grips(self) -> Mapping[str, Grip]:
         """Frame -> how it is held."""

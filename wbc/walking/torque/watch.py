@@ -19,7 +19,8 @@ class Watch:
     Attributes:
         drift: farthest that a held frame was from where its grip holds it [m]. force, moment: largest components of a
             grip's wrench [N], [N m]. given: largest components of the momentum given to the structure, linear [N s] and
-            angular about the body's origin [N m s]. unsolved: ticks of torques that gave way or had no answer.
+            angular about the body's origin [N m s]. unsolved: ticks of torques that gave way or had no answer. noted:
+            what the loop found wrong, (time [s], in words).
     """
 
     def __init__(self, rating: HoldRating, hands: Sequence[str]) -> None:
@@ -27,6 +28,7 @@ class Watch:
         self.drift = self.force = self.moment = 0.0
         self.given = np.zeros(2)
         self.ticks = self.unsolved = 0
+        self.noted: list[tuple[float, str]] = []
         self._data: pin.Data | None = None
 
     def see(self, plant: Tested, model: pin.Model, status: str) -> None:
@@ -64,4 +66,10 @@ class Watch:
                 f"{given[0]:.1f} N s, {given[1]:.1f} N m s about the body",
             ),
             Figure("unsolved", "torques that gave way", self.unsolved, f"{self.unsolved} of {self.ticks} ticks"),
+            Figure(
+                "noted",
+                "found wrong",
+                [list(entry) for entry in self.noted],
+                "; ".join(f"{text} at {time:.2f} s" for time, text in self.noted) or "nothing",
+            ),
         )

@@ -1,0 +1,64 @@
+"""Which motor no longer does what it is commanded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.estimation import MomentumObserver
+from wbc.validation import Array
+
+#: Of the observer [1/s]
+GAIN = 50.0
+#: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
+#: knows of may take [N m], ...
+ASKED, FRICTION = 0.15, 6.0
+#: ... and is limp when it gives less than this part of what is asked, for so long [s]: blows of hands
+#: that close pass
+GIVEN, LASTING = 0.3, 0.04
+
+
+class MotorWatch:
+    """Compares what the motors give with what they are commanded: with the residual r of a :class:`MomentumObserver`
+    and the command u behind a filter of the same lag, joint k gives the part 1 + r_k / u_k.
+
+    Args:
+        model: with masses. effort: largest torques ``[nv]``, 0 for a base [N m; N]. dt: [s].
+
+    Attributes:
+        share: of its command that each motor gives, as far as it is judged; else 1 ``[nv]``.
+        limp: degrees of freedom whose motors have been found limp.
+    """
+
+    def __init__(self, model: pin.Model, effort: Array, dt: float) -> None:
+        self._observer = MomentumObserver(model, GAIN, dt)
+        self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), GAIN * dt, round(LASTING / dt)
+        self._least[effort <= 0.0] = np.inf
+        self.share, self.limp = np.ones(model.nv), list[int]()
+        self._asked, self._low = np.zeros(model.nv), np.zeros(model.nv, dtype=int)
+
+    def begin(self, q: Array, v: Array) -> None:
+        """At a state, with motors that work."""
+        self._observer.begin(q, v)
+        self._asked[:], self._low[:], self.share[:] = 0.0, 0, 1.0
+        self.limp = []
+
+    def struck(self, q: Array, v: Array) -> None:
+        """A hand has closed, which changed the velocity at once."""
+        self._observer.struck(q, v)
+
+    def see(self, q: Array, v: Array, torque: Array, contacts: Array) -> list[int]:
+        """A tick on; the degrees of freedom that are found limp in it.
+
+        Args:
+            q, v: at its end. torque: commanded, that took hold in it. contacts: J'w of what touched ``[nv]``.
+        """
+        residual, asked = self._observer.update(q, v, torque + contacts), self._asked
+        asked += self._rate * (torque - asked)
+        judged = np.abs(asked) > self._least
+        self.share[:] = 1.0
+        np.divide(asked + residual, asked, out=self.share, where=judged)
+        self._low = np.where(self.share < GIVEN, self._low + 1, 0)
+        found = [int(k) for k in np.flatnonzero(self._low == self._ticks) if int(k) not in self.limp]
+        self.limp += found
+        return found
