@@ -551,7 +551,7 @@ class Walk:
         soonest = min([end, *self._lasting(leaving)])
         margin, landing = max(soonest - u, 0.0), None
         if swinging is not None:
-            needed = swinging.law.duration - swinging.clock + self.hands.data.latch_time + SETTLE
+            needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
             until = margin
             if swinging.counted and not self._changing:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
