@@ -60,7 +60,7 @@ def test_a_live_loop_is_followed_looked_back_at_and_followed_again() -> None:
     assert shown is not None
     assert 5.0 - 2 * BETWEEN < shown.time <= 5.0
     timeline.add(State(2000, 12.0, b"x"))
-    assert timeline.state() is shown
+    assert timeline.state() == shown
     timeline.back()
     assert number(timeline) == 2000
     timeline.play(0.0)

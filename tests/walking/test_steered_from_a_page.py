@@ -52,8 +52,16 @@ def test_a_body_goes_while_it_is_steered_and_stops_when_nobody_says_so(begun: Be
     ticks(operation, now, round((RATE_LASTS + 0.6) / walk.dt))
     assert not operation.drive.command.any()
     assert walk.pace == 0.0
-    # A stop by hand, and what a stopped walk does not obey
+    # A stop by hand while it goes, within the accelerations of its joints, and what a stopped walk does not obey
+    operation.obey({"type": "steer", "rates": [0.0, 1.0, 0.0]})
+    ticks(operation, now, 20)
     operation.obey({"type": "stop"})
+    limit = walk.walker.robot.limits.acceleration[6:] * walk.dt
+    for _ in range(60):
+        before = walk.v[6:].copy()
+        ticks(operation, now, 1)
+        assert (np.abs(walk.v[6:] - before) <= limit * (1 + 1e-6)).all()
+    assert np.abs(walk.v).max() < 1e-3
     with pytest.raises(WbcError, match="resume"):
         operation.obey({"type": "steer", "rates": [1.0, 0.0, 0.0]})
     assert walk.aborted

@@ -44,7 +44,7 @@ class WalkOperation(Operation):
     def __init__(self, drive: Drive, now: Callable[[], float] = time.monotonic) -> None:
         super().__init__(drive.walk.stack.controller)
         self.drive, self.waiting, self._now = drive, "", now
-        self._rates, self._until, self._goal = np.zeros(3), 0.0, -1
+        self._steered, self._until, self._goal = np.zeros(3), 0.0, -1
         self._approved = ""
         self._asks = False
 
@@ -63,7 +63,7 @@ class WalkOperation(Operation):
         if kind in ("steer", "go") and self.stopped:
             raise MessageError("message", kind, f"the robot is stopped ({self.stopped}); resume first")
         if kind == "steer":
-            self._rates = FASTEST * np.array([float(x) for x in message["rates"]])
+            self._steered = FASTEST * np.array([float(x) for x in message["rates"]])
             self._until, self._goal = self._now() + RATE_LASTS, -1
         elif kind == "go":
             self._goal = self.drive.walk.structure.index(message["hold"])
@@ -80,7 +80,7 @@ class WalkOperation(Operation):
         """Slow down along the paths; the first reason stays."""
         if not self.stopped:
             self.stopped, self._goal = reason, -1
-            self._rates = np.zeros(3)
+            self._steered = np.zeros(3)
             self.drive.walk.abort()
 
     def resume(self) -> None:
@@ -96,7 +96,7 @@ class WalkOperation(Operation):
         elif self._now() > self._until or self.stopped:
             self.drive.steer(0.0, 0.0, 0.0)
         else:
-            self.drive.steer(*self._rates)
+            self.drive.steer(*self._steered)
 
     def _course(self) -> Array:
         """Straight for the hold that was clicked, until the body is over it."""
@@ -118,7 +118,7 @@ class WalkOperation(Operation):
         # Every other command is planned anew, so that one that is good enough stays
         if before[:2].any() and float(before @ course) > np.cos(OFF) * np.linalg.norm(before) * np.linalg.norm(course):
             return np.asarray(before)
-        return course
+        return np.asarray(course)
 
     def _approve(self, step: Regrasp) -> bool:
         name = f"{step.arm}: {step.source} -> {step.target}"

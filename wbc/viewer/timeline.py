@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import zlib
 from collections.abc import Sequence
 
 from wbc.viewer.link import State
@@ -25,6 +26,8 @@ class Timeline:
     def __init__(self, states: Sequence[State] = ()) -> None:
         self._states: list[State] = list(states)
         self._times = [state.time for state in self._states]
+        #: bytes of a loop's states, which are compressed
+        self._held = 0
         self.recorded = bool(states)
         self.live = not self.recorded
         self.at = self._times[0] if states else 0.0
@@ -36,14 +39,17 @@ class Timeline:
             # The loop began anew
             self._states.clear()
             self._times.clear()
+            self._held = 0
         if self._times and state.time - self._times[-1] < BETWEEN:
             return
-        self._states.append(state)
+        self._states.append(state._replace(data=zlib.compress(state.data, 1)))
         self._times.append(state.time)
-        if len(self._states) * len(state.data) > MOST:
+        self._held += len(self._states[-1].data)
+        if self._held > MOST:
             # A tenth at a time: to cut the front off a list costs all of it
             gone = len(self._states) // 10
             del self._states[:gone], self._times[:gone]
+            self._held = sum(len(kept.data) for kept in self._states)
 
     def seek(self, time: float) -> None:
         """Show the state of a time, and stay there."""
@@ -75,9 +81,9 @@ class Timeline:
         """The state that is shown, None before there is any."""
         if not self._states:
             return None
-        if self.live:
-            return self._states[-1]
-        return self._states[max(bisect.bisect_right(self._times, self.at + 1e-9) - 1, 0)]
+        place = -1 if self.live else max(bisect.bisect_right(self._times, self.at + 1e-9) - 1, 0)
+        found = self._states[place]
+        return found if self.recorded else found._replace(data=zlib.decompress(found.data))
 
     @property
     def begin(self) -> float:
