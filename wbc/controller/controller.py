@@ -49,7 +49,7 @@ class Controller(Handles):
 
     def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
-        self.backend = "native" if artifact.library is not None else "vm"
+        self.backend = artifact.backend
         self._artifact = artifact
         self._core = core = Core(stack, artifact, solver, assembly)
         super().__init__(core.handles, stack)

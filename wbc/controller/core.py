@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pathlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -18,7 +17,7 @@ from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Context, Step
 from wbc.controller.tick.buffers import BAD_V, Assembly
-from wbc.controller.tick.generic import GenericTick
+from wbc.controller.tick.generic import generic_tick
 from wbc.controller.tick.native import CompiledTick, NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.controller.tick.vm import VmAssembly
@@ -41,9 +40,8 @@ def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
     if artifact.library is not None:
         return NativeTick(artifact.library, artifact.layout)
     if artifact.program is not None:
-        if os.environ.get("WBC_GENERIC"):
-            return GenericTick(artifact.program, stack, artifact.layout)
-        return VmAssembly(artifact.program, stack, artifact.layout)
+        generic = generic_tick(artifact.program, stack, artifact.layout) if artifact.compiled else None
+        return generic or VmAssembly(artifact.program, stack, artifact.layout)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
 
 

@@ -215,7 +215,7 @@ def _table(kind: str, name: str, values: Iterable[float]) -> str:
 
 
 def blocks(start: np.ndarray, col: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """(first row, rows, first entry, entries a row) of task rows with the same columns; all rows of one entry together."""
+    """(first row, rows, first entry, entries a row) of task rows with equal columns; rows of one entry together."""
     out: list[tuple[int, int, int, int]] = []
     row, rows = 0, len(start) - 1
     while row < rows:

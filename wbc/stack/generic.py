@@ -1,16 +1,15 @@
 """The hand-written C of a tick for stacks of any size: compiled once, for rows that CasADi's virtual machine computes.
 
 ``native/*.h`` is written for sizes that are known when it is compiled: an array of ``NV`` numbers stands in a
-structure, a table is a constant. Here the same text is made to take them when it runs: a size is a number of a context,
-a table a pointer of it, and an array a pointer into memory that ``bind_tick`` lays out. So nothing is written twice, and
-a tick gives the same answer both ways.
+structure, a table is a constant. Here the same text is made to take them when it runs: a size is a number of a
+context, a table a pointer of it, and an array a pointer into memory that ``bind_tick`` lays out. So nothing is written
+twice, and a tick gives the same answer both ways.
 
 Rows are evaluated by :class:`casadi.FunctionBuffer`, whose address the context has.
 """
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import pathlib
 import re
@@ -18,27 +17,29 @@ from dataclasses import dataclass, field
 from importlib import resources
 
 from wbc.native import cache, toolchain
+from wbc.stack import prebuilt
 from wbc.stack.declaration import COMMANDS
 from wbc.stack.memory import INPUTS, LEVEL_NUMBERS, LEVEL_REPORT, QP_FIELDS, REPORT, REST_INPUTS, TORQUE_REPORT, Field
 
 #: Whole sizes of ``stack.h``, and real ones
-SIZES = tuple(
-    "NQ NV NP MT MC NB MH NNZJ NNZA NNZK CALM UNITS LAST_ORDER ACTIVE_MAX DOFS SOFT_ROWS PRICES KEPT SLEWED LEADING LEVELS "
-    "LEVEL_MOST SOFT_MAX BLOCKED".split()
-)
+SIZES = (
+    "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "UNITS", "LAST_ORDER", "ACTIVE_MAX",
+    "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST", "SOFT_MAX", "BLOCKED",
+)  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
-INT_TABLES = tuple(
-    "j_start j_col a_start a_end a_col row_order bound_sequence unit_start unit_size k_row k_col margin_at rate_at gain_at "
-    "brake_at stop_at stop_q kept_of price_at slewed_at slewed_dof level_start row_level block_row block_rows block_first "
-    "block_columns".split()
-)
-REAL_TABLES = tuple(
-    "force_scale brake_limit stop_low stop_high row_scale dof_scale damping slack_reported task_scale".split()
-)
+INT_TABLES = (
+    "j_start", "j_col", "a_start", "a_end", "a_col", "row_order", "bound_sequence", "unit_start", "unit_size",
+    "k_row", "k_col", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
+    "slewed_at", "slewed_dof", "level_start", "row_level", "block_row", "block_rows", "block_first", "block_columns",
+)  # fmt: skip
+REAL_TABLES = (
+    "force_scale", "brake_limit", "stop_low", "stop_high", "row_scale", "dof_scale", "damping", "slack_reported",
+    "task_scale",
+)  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
 FUNCTIONS = ("rows", "ahead", "curvature", "torque")
-COPIED = {"ahead": (1, "mean", "DOFS"), "curvature": (4, "force", "MT")}
+COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "MT")]}
 #: Arrays that only C knows and the functions write
 WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries")
 #: What is either there or not when C is compiled
@@ -98,18 +99,26 @@ class _Structure:
         return out
 
 
+def variants() -> list[Variant]:
+    """All kinds of code."""
+    kinds = ((False, False), (False, True), (True, False))
+    return [
+        Variant(command, levels, soft, curved)
+        for command in COMMANDS
+        for levels, soft in kinds
+        for curved in (False, True)
+    ]
+
+
 def library(variant: Variant) -> pathlib.Path:
     """The library of a variant, compiled where it is not in the cache.
 
     Raises:
         CompileError: there is no compiler, or it fails.
     """
-    return _library(variant)
-
-
-@functools.cache
-def _library(variant: Variant) -> pathlib.Path:
     files = sources(variant)
+    if toolchain.compiler() is None and (shipped := prebuilt.place(files)).exists():
+        return shipped
     said = "\n".join((*files.values(), toolchain.identity(), "generic"))
     name = hashlib.sha256(said.encode()).hexdigest()
     folder, _ = cache.fetch(name, lambda place: toolchain.compile_generic(files, place / "generic.so"), library=True)
@@ -120,7 +129,8 @@ def sources(variant: Variant) -> dict[str, str]:
     """File name -> text; ``generic.c`` is what is compiled."""
     native = resources.files("wbc.stack") / "native"
     left_out = ("balls.h", "sensed.h", "converge.h", "converge.c", "many.h", "library.c")
-    texts = {f.name: f.read_text() for f in native.iterdir() if f.name.endswith((".c", ".h")) and f.name not in left_out}
+    found = [f for f in native.iterdir() if f.name.endswith((".c", ".h")) and f.name not in left_out]
+    texts = {file.name: file.read_text() for file in found}
     report, rest = variant.fields()
     given, reported = _Structure(), _Structure()
     for to, fields, prefix in ((reported, report, "report."), (given, rest, "")):
@@ -136,7 +146,12 @@ def sources(variant: Variant) -> dict[str, str]:
     texts["primal.h"] = texts["primal.h"].replace("memset(&s, 0, sizeof s);", "PRIMAL_ROOM(s)")
     tick.layout = [*reported.layout, *given.layout, *tick.layout]
     scalars = [each.c_name for each in (*report, *rest) if not each.shape]
-    own = {"out->": reported.sizes, "t->report.": reported.sizes, "t->levels.": levels.sizes, "t->": given.sizes | tick.sizes}
+    own = {
+        "out->": reported.sizes,
+        "t->report.": reported.sizes,
+        "t->levels.": levels.sizes,
+        "t->": given.sizes | tick.sizes,
+    }
     for name, text in texts.items():
         sizes = own | {"s->": primal.sizes if name == "primal.h" else levels.sizes}
         texts[name] = _at_run_time(text, scalars, sizes)
@@ -156,7 +171,9 @@ def sources(variant: Variant) -> dict[str, str]:
 
 def _tick_structures(text: str, variant: Variant) -> tuple[str, _Structure, _Structure]:
     """``tick.h`` with pointers."""
-    bodies = re.search(r"typedef struct \{\n(.*?)\n\} wbc_levels;.*typedef struct \{\n(.*?)\n\} wbc_tick;", text, re.DOTALL)
+    bodies = re.search(
+        r"typedef struct \{\n(.*?)\n\} wbc_levels;.*typedef struct \{\n(.*?)\n\} wbc_tick;", text, re.DOTALL
+    )
     assert bodies is not None
     levels, tick = _Structure.of(bodies[1]), _Structure.of(bodies[2])
     tick.text = tick.text.replace("    WBC_BUFFERS", "    const wbc_context *context;\n    WBC_BUFFERS", 1)
@@ -187,7 +204,9 @@ def _layouts(tick: _Structure, levels: _Structure, variant: Variant) -> str:
 def _conditions(text: str) -> str:
     """Conditions on sizes that are known only when the code runs."""
     known = "|".join((*_CHOICES, *_ALWAYS))
-    return re.sub(r"^\s*#if.*$", lambda line: re.sub(rf"\b({known})\b", r"HAS_\1", line[0].strip()), text, flags=re.MULTILINE)
+    return re.sub(
+        r"^\s*#if.*$", lambda line: re.sub(rf"\b({known})\b", r"HAS_\1", line[0].strip()), text, flags=re.MULTILINE
+    )
 
 
 def _at_run_time(text: str, scalars: list[str], sizes: dict[str, dict[str, str]]) -> str:
@@ -208,7 +227,9 @@ def _at_run_time(text: str, scalars: list[str], sizes: dict[str, dict[str, str]]
             line += "".join(f" memset({name}, 0, sizeof {name});" for name, _ in zeroed)
         lines.append(line)
     text = "\n".join(lines) + "\n"
-    return re.sub(r"^(EXPORT [\w ]+\((?:const )?wbc_tick \*t[^)]*\) \{)", r"\1 use(t->context);", text, flags=re.MULTILINE)
+    return re.sub(
+        r"^(EXPORT [\w ]+\((?:const )?wbc_tick \*t[^)]*\) \{)", r"\1 use(t->context);", text, flags=re.MULTILINE
+    )
 
 
 def _memory(report: list[str], rest: list[str]) -> str:
@@ -229,9 +250,10 @@ def _memory(report: list[str], rest: list[str]) -> str:
 
 def _context(variant: Variant) -> str:
     """``stack.h``: sizes and tables of the stack whose tick runs."""
-    chosen = dict(zip(_CHOICES, (variant.levels, variant.soft, variant.curved, variant.command != "velocity"), strict=True))
+    there = (variant.levels, variant.soft, variant.curved, variant.command != "velocity")
+    chosen = dict(zip(_CHOICES, there, strict=True))
     tables = [(name, "int") for name in INT_TABLES] + [(name, "double") for name in REAL_TABLES]
-    copies = [name for _, name, _ in COPIED.values()]
+    copies = [name for given in COPIED.values() for _, name, _ in given]
     names = [*SIZES, *REALS, *(name for name, _ in tables)]
     lines = [
         "#ifndef WBC_STACK_H",
@@ -291,7 +313,7 @@ _MAIN = (
 """
     + "".join(
         f"EVALUATED({name})\n    if (!S.{name}_) return 0;\n"
-        + (f"    memcpy(S.{COPIED[name][1]}_, arg[{COPIED[name][0]}], {COPIED[name][2]} * 8);\n" if name in COPIED else "")
+        + "".join(f"    memcpy(S.{to}_, arg[{k}], {n} * 8);\n" for k, to, n in COPIED.get(name, ()))
         + f"    S.evaluate(S.{name}_);\n    return 0;\n}}\n"
         for name in FUNCTIONS
     )

@@ -1,4 +1,4 @@
-"""The tick whose hand-written part is compiled once for all stacks, and whose rows CasADi's virtual machine computes."""
+"""The tick whose hand-written part is compiled once for all stacks; CasADi's virtual machine computes its rows."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from wbc.controller.tick.native import CompiledTick
 from wbc.errors import CompileError
+from wbc.native import toolchain
 from wbc.native.library import load_library
 from wbc.stack import generic
 from wbc.stack.codegen import blocks, header
@@ -43,9 +44,24 @@ def _evaluate() -> int:
     return 0
 
 
-def available() -> bool:
-    """Whether CasADi's library has what this needs."""
-    return _evaluate() != 0
+def generic_tick(program: TickProgram, stack: Declaration, layout: Layout) -> GenericTick | None:
+    """The tick of a stack; None where there is neither its library nor a compiler, and the log says so."""
+    if not _evaluate():
+        return None
+    try:
+        return GenericTick(program, stack, layout)
+    except CompileError as error:
+        if toolchain.compiler() is not None:
+            toolchain.fall_back(str(error))
+        return None
+
+
+@functools.cache
+def _library(variant: generic.Variant) -> ctypes.PyDLL:
+    library = load_library(generic.library(variant))
+    library.wbc_generic_room.restype = library.wbc_tick_size.restype = ctypes.c_longlong
+    library.wbc_generic_written.restype = ctypes.c_void_p
+    return library
 
 
 class GenericTick(CompiledTick):
@@ -60,12 +76,7 @@ class GenericTick(CompiledTick):
         soft = not layout.cascade and any(at >= 0 for at in layout.price_at)
         curved = program.curvature is not None and program.curvature.nnz_out(0) > 0
         variant = generic.Variant(layout.command, layout.cascade, soft, curved)
-        library = load_library(generic.library(variant))
-        if not available():
-            raise CompileError("casadi", ca.__file__, "its library has no _function_buffer_eval")
-        for name in ("wbc_generic_room", "wbc_tick_size"):
-            getattr(library, name).restype = ctypes.c_longlong
-        library.wbc_generic_written.restype = ctypes.c_void_p
+        library = _library(variant)
         self._context = _Context(stack, layout, program)
         room = int(library.wbc_generic_room(self._context.pointer)) // 8
         memory, self._tick = np.zeros(room), np.zeros(int(library.wbc_tick_size()) // 8 + 1)
@@ -139,7 +150,7 @@ class _Context:
         numbers["BLOCKED"] = str(len(found))
         self.names = [
             "serial", *generic.SIZES, *generic.REALS, *generic.INT_TABLES, *generic.REAL_TABLES, "evaluate",
-            *generic.FUNCTIONS, *(name for _, name, _ in generic.COPIED.values()), "memory",
+            *generic.FUNCTIONS, *(name for given in generic.COPIED.values() for _, name, _ in given), "memory",
         ]  # fmt: skip
         self._entries = np.zeros(len(self.names), np.int64)
         self._kept: list[np.ndarray] = []
