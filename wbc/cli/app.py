@@ -204,7 +204,10 @@ class CommandGroup(TyperGroup):
             return super().invoke(ctx)
         finally:
             if (results := sys.modules.get("wbc.cli.results")) is not None:
-                results.write()
+                from wbc.cli.console import print_json
+
+                for found in results.taken():
+                    print_json(found)
 
 
 app = typer.Typer(

@@ -8,8 +8,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from wbc.cli.console import print_json
-
 #: What has been printed so far: one where data is wanted
 _found: list[dict[str, list[Any]]] = []
 
@@ -19,10 +17,11 @@ def collect() -> None:
     _found[:] = [{"lines": [], "tables": []}]
 
 
-def write() -> None:
-    """Print what was kept as one document."""
-    while _found:
-        print_json(_found.pop())
+def taken() -> list[dict[str, list[Any]]]:
+    """What was kept, one or none; nothing is kept from now on."""
+    kept = list(_found)
+    _found.clear()
+    return kept
 
 
 def console() -> Console | None:

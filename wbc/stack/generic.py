@@ -12,14 +12,19 @@ from __future__ import annotations
 
 import hashlib
 import pathlib
+import platform
 import re
+import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import resources
+from importlib import metadata, resources
 
 from wbc.native import cache, toolchain
-from wbc.stack import prebuilt
 from wbc.stack.declaration import COMMANDS
 from wbc.stack.memory import INPUTS, LEVEL_NUMBERS, LEVEL_REPORT, QP_FIELDS, REPORT, REST_INPUTS, TORQUE_REPORT, Field
+
+#: What ``make wheel`` puts into a wheel, see :mod:`wbc.stack.prebuilt`
+PREBUILT = pathlib.Path(__file__).parent / "prebuilt_libraries"
 
 #: Whole sizes of ``stack.h``, and real ones
 SIZES = (
@@ -117,12 +122,18 @@ def library(variant: Variant) -> pathlib.Path:
         CompileError: there is no compiler, or it fails.
     """
     files = sources(variant)
-    if toolchain.compiler() is None and (shipped := prebuilt.place(files)).exists():
+    if toolchain.compiler() is None and (shipped := prebuilt(files)).exists():
         return shipped
     said = "\n".join((*files.values(), toolchain.identity(), "generic"))
     name = hashlib.sha256(said.encode()).hexdigest()
     folder, _ = cache.fetch(name, lambda place: toolchain.compile_generic(files, place / "generic.so"), library=True)
     return folder / "generic.so"
+
+
+def prebuilt(files: Mapping[str, str]) -> pathlib.Path:
+    """Where the library of these sources is, if it came with the package: its name says what it was made of."""
+    said = "\n".join((*files.values(), metadata.version("casadi"), sys.platform, platform.machine()))
+    return PREBUILT / f"{hashlib.sha256(said.encode()).hexdigest()[:32]}.so"
 
 
 def sources(variant: Variant) -> dict[str, str]:
