@@ -19,7 +19,7 @@ TYPES := build/types
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs site check-export figures bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs site check-export wheel figures bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -63,6 +63,10 @@ site: $(SITE_READY)  ## the pages as a site with a reference of all public names
 
 check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 states under qemu; says what is not installed
 	$(BIN)/python -m bench.export_machines
+
+wheel: $(READY)  ## a wheel for this platform, with the code that ticks need where there is no compiler, into dist/
+	$(BIN)/python -m wbc.stack.prebuilt
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 
 figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code
 	$(BIN)/python -m bench.figures --stale

@@ -27,7 +27,7 @@ def state(bot: Any, rng: np.random.Generator, tick: int) -> tuple[np.ndarray, np
 
 def pairs(builder: tuple[str, ...], setup: Setup, count: int, seed: int) -> list[tuple[Step, Step]]:
     """Steps of both back ends at the same states."""
-    both = [controller(*builder, backend=backend) for backend in ("native", "vm")]
+    both = [controller(*builder, backend=backend) for backend in ("native", "python")]
     rng, out = np.random.default_rng(seed), []
     for tick in range(count):
         q, v = state(both[0].stack.robot, rng, tick)
@@ -106,7 +106,7 @@ def test_certificate_of_a_relaxed_native_tick_is_about_what_was_left() -> None:
 
 
 def test_rows_of_levels_are_refused_by_code_that_has_none() -> None:
-    native, vm = (core_of(small().compile(backend=backend)).tick for backend in ("native", "vm"))
+    native, vm = (core_of(small().compile(backend=backend)).tick for backend in ("native", "python"))
     native.qp()
     for name in ("task_rows", "curvature"):
         with pytest.raises(SolverError, match="strict levels"):

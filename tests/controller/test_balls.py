@@ -48,7 +48,7 @@ def _moved(machine: wbc.Robot, link: str) -> bool:
 @cache
 def pair(name: str, calm: bool = True) -> tuple[Controller, Controller]:
     """(native, vm)."""
-    return stack(name, calm).compile(backend="native"), stack(name, calm).compile(backend="vm")
+    return stack(name, calm).compile(backend="native"), stack(name, calm).compile(backend="python")
 
 
 def configuration(machine: wbc.Robot, rng: np.random.Generator) -> np.ndarray:

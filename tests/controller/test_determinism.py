@@ -17,7 +17,7 @@ from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack
 from wbc.tasks import EndEffector, JointLimits, Posture
 
-BACKENDS = ("vm", "native")
+BACKENDS = ("python", "native")
 
 
 def arm(backend: str) -> Controller:

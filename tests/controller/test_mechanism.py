@@ -34,7 +34,7 @@ def violation(bot: Robot, v: np.ndarray) -> float:
     return float(np.abs(off).max())
 
 
-def build(name: str, backend: str = "vm") -> Controller:
+def build(name: str, backend: str = "python") -> Controller:
     bot = wbc.robots.load(name).with_limits(acceleration=20.0)
     stack = Stack(bot, DT).add(EndEffector(TIPS[name]), name="hand").add(Posture(), name="posture", weight=1e-2)
     stack.add(JointLimits(), name="limits").add(FrameVelocityLimit(TIPS[name], linear=0.5), name="speed")
@@ -84,9 +84,9 @@ def test_a_platform_drives_round_its_sideways_direction() -> None:
     assert data.oMf[frame].translation == pytest.approx(goal.translation, abs=0.02)
 
 
-@pytest.mark.parametrize("backend", ["vm", "native"])
+@pytest.mark.parametrize("backend", ["python", "native"])
 def test_a_configuration_that_does_not_fit_is_brought_back(backend: str) -> None:
-    bot = wbc.robots.load("talos_full", base="fixed") if backend == "vm" else coupled_arm()
+    bot = wbc.robots.load("talos_full", base="fixed") if backend == "python" else coupled_arm()
     tick = Stack(bot, DT).add(Posture(), name="posture", weight=0.1).compile(backend=backend)
     q = coupled(bot, np.random.default_rng(2))
     c = bot.couplings[0]

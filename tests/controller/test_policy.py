@@ -22,7 +22,7 @@ from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return conflicting(request.param)
 
@@ -115,9 +115,9 @@ def test_an_empty_chain_brakes(tick: Controller, monkeypatch: pytest.MonkeyPatch
 def test_a_solver_that_gives_up_is_followed_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
     """DAQP may take one iteration: no verdict, and OSQP answers; without it the elastic tick cannot, and it brakes."""
     bot = robot("panda")
-    good = conflicting("vm")
+    good = conflicting("python")
     monkeypatch.setattr(daqp_module, "SETTINGS", {**daqp_module.SETTINGS, "iter_limit": 1})
-    bad = conflicting("vm")
+    bad = conflicting("python")
     steps = []
     for each in (good, bad):
         each.reset(bot.neutral, np.zeros(7))

@@ -30,7 +30,7 @@ def stack(hold: float | None, slow: float | None, level: int = 0) -> Stack:
     return out.add(FrameVelocityLimit(TIP, linear=LIMIT), name="slow", soft=slow)
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return stack(3.0, 5.0).compile(backend=request.param)
 
@@ -187,7 +187,7 @@ def test_levels_price_violations_within_a_level() -> None:
     out.add(Hold(TIP, kind="position"), name="hold", soft=1e3, level=1)
     out.add(FrameVelocityLimit(TIP, linear=LIMIT), name="slow", soft=4.0)
     speeds = {}
-    for backend in ("vm", "native"):
+    for backend in ("python", "native"):
         c = out.compile(backend=backend)
         c.reset(bot.neutral)
         c["hand"].target = jacobian(bot, bot.neutral, TIP)[0] + np.array([0.0, 0.15, 0.0])
@@ -197,7 +197,7 @@ def test_levels_price_violations_within_a_level() -> None:
         moved = (jacobian(bot, bot.neutral, TIP)[1] @ step.v)[1]
         assert moved == pytest.approx((0.3 + 4.0 * LIMIT) / 5.0, abs=1e-6)
         assert {(s.item, s.row) for s in step.relaxed} == {("slow", "y"), ("hold", "y")}
-    assert speeds["native"] == pytest.approx(speeds["vm"], abs=1e-8)
+    assert speeds["native"] == pytest.approx(speeds["python"], abs=1e-8)
 
 
 @pytest.mark.parametrize("item", [JointLimits(), Fixed("panda_joint1"), EndEffector(TIP)])

@@ -15,7 +15,7 @@ from wbc.controller import Controller, Stack, Status, Step, core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Posture, Row, Rows, SacrificeOrder
 
-BACKENDS = ("native", "vm")
+BACKENDS = ("native", "python")
 TIP = "panda_hand_tcp"
 
 

@@ -31,7 +31,7 @@ from wbc.tasks import (
     SacrificeOrder,
 )
 
-BACKENDS = ("native", "vm")
+BACKENDS = ("native", "python")
 
 
 def numbers(step: Step) -> np.ndarray:

@@ -27,7 +27,7 @@ def slow(scaled: bool, calm: bool = True, elbow: int | None = None) -> Stack:
     return out.add(JointLimits(acceleration=calm, position=calm), name="limits")
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def two(request: pytest.FixtureRequest) -> Controller:
     """Two scaled tasks that compete, on velocity limits alone."""
     return slow(True, calm=False, elbow=0).compile(backend=request.param)
@@ -77,7 +77,7 @@ def along_the_line(controller: Controller, ticks: int = 400) -> tuple[float, flo
     return beside, float(np.linalg.norm(start + line - jacobian(bot, q, TIP)[0])), np.array(shares)
 
 
-@pytest.mark.parametrize("backend", ["vm", "native"])
+@pytest.mark.parametrize("backend", ["python", "native"])
 def test_a_hand_that_is_asked_for_too_much_goes_straight(backend: str) -> None:
     beside, left, shares = along_the_line(slow(True).compile(backend=backend))
     assert beside < 5e-4, "second order of a step, 0.38 mm when this was written"
@@ -92,7 +92,7 @@ def test_without_the_option_it_leaves_the_line() -> None:
 
 
 def test_nothing_changes_where_nothing_limits() -> None:
-    plain, kept = (slow(scaled, calm=False).compile(backend="vm") for scaled in (False, True))
+    plain, kept = (slow(scaled, calm=False).compile(backend="python") for scaled in (False, True))
     q = Q
     for c in (plain, kept):
         c.reset(q)
@@ -143,7 +143,7 @@ def test_weights_masks_and_switches_of_the_task_count_for_its_direction(two: Con
 def test_scaled_tasks_at_strict_levels() -> None:
     out = slow(True, elbow=1)
     bot, q = out.robot, Q
-    both = [out.compile(backend=backend) for backend in ("vm", "native")]
+    both = [out.compile(backend=backend) for backend in ("python", "native")]
     targets = {"hand": (TIP, np.array([-0.15, 0.5, 0.1])), "elbow": (MIDDLE, np.array([0.0, 0.0, 0.3]))}
     for c in both:
         c.reset(q)
@@ -158,7 +158,7 @@ def test_scaled_tasks_at_strict_levels() -> None:
         assert J @ steps[0].v == pytest.approx(steps[0].scales["hand"] * wish, abs=1e-5)
         q = pin.integrate(bot.model, q, steps[0].v * DT)
     assert 0.1 < steps[0].scales["hand"] < 0.9
-    alone = slow(True).compile(backend="vm")
+    alone = slow(True).compile(backend="python")
     alone.reset(Q)
     alone["hand"].target = jacobian(bot, Q, TIP)[0] + targets["hand"][1]
     both[0].reset(Q)

@@ -38,7 +38,7 @@ def stack(hard: bool) -> Stack:
     return out.add(Ask(0.01), name="firm").add(Ask(0.03), name="other", hard=hard)
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return stack(hard=False).compile(backend=request.param)
 
@@ -62,7 +62,7 @@ def test_soft_rows_give_way_alone(tick: Controller) -> None:
 def test_hard_rows_of_one_class_share(tick: Controller) -> None:
     """What `hard` changes: without it both rows are of one class and each gives half."""
     q = robot("panda").neutral
-    both = stack(hard=True).compile(backend="vm")
+    both = stack(hard=True).compile(backend="python")
     both.reset(q)
     assert both.step(q).v[0] == pytest.approx(0.02, abs=1e-8)
     assert stack(True).key_data() != stack(False).key_data()

@@ -25,7 +25,7 @@ SETS: dict[str, tuple[tuple[Any, ...], int, float]] = {
 def every(builder: tuple[Any, ...]) -> dict[str, Controller]:
     """The native tick, and each solver behind both assemblies."""
     out = {"native": controller(*builder, backend="native")}
-    out |= {f"vm {solver}": controller(*builder, backend="vm", solver=solver) for solver in SOLVERS}
+    out |= {f"vm {solver}": controller(*builder, backend="python", solver=solver) for solver in SOLVERS}
     return out | {"native osqp": controller(*builder, backend="native", solver="osqp")}
 
 

@@ -58,7 +58,7 @@ def test_disabled_is_as_if_not_declared(full: Controller, name: str) -> None:
     for each in core_of(full).layout.blocks:
         full[each].enabled = True
     full[name].enabled = False
-    smaller = without(full.stack, name).compile(backend="vm")
+    smaller = without(full.stack, name).compile(backend="python")
     copy_values(full, smaller)
     full.step(q, v)
     smaller.step(q, v)
@@ -110,7 +110,7 @@ def test_masked_rows_are_as_if_not_there(full: Controller) -> None:
         full[name].mask = 1.0
 
 
-@pytest.mark.parametrize("backend", ["vm", "native"])
+@pytest.mark.parametrize("backend", ["python", "native"])
 def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
     """One controller with numbers set at run time, one that was declared with them."""
     bot, f = robot("panda"), FRAMES["panda"]
@@ -190,14 +190,14 @@ def test_first_configuration_is_the_default_target() -> None:
 
 def test_default_rate_fits_the_longest_tick() -> None:
     stack = Stack(robot("panda"), dt=0.1).add(Obstacle(everything("panda")["ball"].item.shape), name="ball")
-    tick = stack.compile(backend="vm")
+    tick = stack.compile(backend="python")
     assert tick["ball"].rate * stack.dt_range[1] <= 1.0
     assert tick["ball"].rate == pytest.approx(5.0)
 
 
 def test_reset_starts_anew() -> None:
     """After any history a reset gives the bits of a fresh controller with the same values."""
-    for backend in ("vm", "native"):
+    for backend in ("python", "native"):
         used, fresh = (controller("arm", "panda", backend=backend) for _ in range(2))
         bot, rng = used.stack.robot, np.random.default_rng(2)
         for _ in range(20):
@@ -267,7 +267,7 @@ def residual_items() -> list[tuple[Any, str]]:
 
 @pytest.mark.parametrize(("item", "unit"), residual_items(), ids=lambda x: getattr(x, "kind", "") or type(x).__name__)
 def test_residuals_name_rows_and_units(item: Any, unit: str) -> None:
-    tick = Stack(robot("panda"), DT).add(item, name="it").compile(backend="vm")
+    tick = Stack(robot("panda"), DT).add(item, name="it").compile(backend="python")
     residual = tick.step(robot("panda").neutral).residuals["it"]
     rows = item.rows(robot("panda"))
     assert residual.labels == tuple(r.label for r in rows)

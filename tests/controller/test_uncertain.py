@@ -151,11 +151,11 @@ def test_soft_rows_add_no_variables() -> None:
     assert Layout(faces(2000, 1.0)).variables == Layout(faces(2000, None)).variables == 7
 
 
-@pytest.mark.parametrize("backend", ["native", "vm"])
+@pytest.mark.parametrize("backend", ["native", "python"])
 def test_many_soft_rows_at_once(backend: str) -> None:
     controller, rng = faces(60, 1.0).compile(backend=backend), np.random.default_rng(4)
     offsets, given = controller["planes"].offsets.copy(), 0
-    for k in range(6 if backend == "vm" else 30):
+    for k in range(6 if backend == "python" else 30):
         q = np.asarray(pin.integrate(robot("panda").model, robot("panda").neutral, rng.uniform(-0.05, 0.05, 7)))
         controller.reset(q)
         controller["planes"].set(price=float(10.0 ** rng.uniform(-4.0, 7.0)), offsets=offsets + 0.1 * (k % 3))
@@ -176,7 +176,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
     rng = np.random.default_rng(505)
     bot = machines.machine(rng)
     declared = with_levels(stacks.random_stack(bot, rng), rng)
-    native, vm = declared.compile(backend="native"), declared.compile(backend="vm")
+    native, vm = declared.compile(backend="native"), declared.compile(backend="python")
     for _ in range(12):
         q, state = machines.configuration(bot, rng, False), rng.bit_generator.state
         stacks.provoke(native, rng)
@@ -192,7 +192,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
 
 
 def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
-    controller, rng, statuses = wild(1, "vm"), np.random.default_rng(0), []
+    controller, rng, statuses = wild(1, "python"), np.random.default_rng(0), []
     for _ in range(50):
         provoke(controller, rng)
         statuses.append(

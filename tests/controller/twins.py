@@ -14,7 +14,7 @@ from wbc.controller import core_of
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, PitchPlane, Posture
 
-BACKENDS = ("vm", "native")
+BACKENDS = ("python", "native")
 TURN = pin.exp3(np.array([0.3, -1.2, 0.7]))
 POSE = pin.SE3(TURN, np.array([0.4, 0.1, 0.5]))
 

@@ -15,7 +15,7 @@ from wbc.tasks import Hold
 STEP = 1e-5
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = arm(posture=0.1).add(Hold(FRAMES["panda"].tip, kind="position"), name="hold")
     controller = stack.compile(backend=request.param)

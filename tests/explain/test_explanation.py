@@ -39,7 +39,7 @@ class Ask(Constraint):
         return Rows(matrix, ca.sqrt(inputs["x"]), ca.SX.inf(1))
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = Stack(robot("panda"), DT)
     stack.add(EndEffector(TIP), name="hand").add(Posture(), name="posture", weight=1e-3)

@@ -14,7 +14,7 @@ from wbc.controller.policy import CHAIN
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return arms.levels().compile(backend=request.param)
 

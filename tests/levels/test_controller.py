@@ -20,7 +20,7 @@ from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits,
 
 @pytest.fixture(scope="module")
 def vm() -> Controller:
-    return arms.levels().compile(backend="vm")
+    return arms.levels().compile(backend="python")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def native() -> Controller:
 @pytest.fixture(scope="module")
 def calm() -> tuple[Controller, Controller]:
     stack = arms.levels(calm=True, soft=False)
-    return stack.compile(backend="vm"), stack.compile(backend="native")
+    return stack.compile(backend="python"), stack.compile(backend="native")
 
 
 def goals(controller: Controller) -> list[Goal]:
@@ -91,7 +91,7 @@ def test_later_levels_never_disturb_earlier_ones(native: Controller) -> None:
     rng = np.random.default_rng(6)
     stack = wbc.Stack(arms.arm(), arms.DT, calm=False)
     stack.add(EndEffector("tip", kind="position"), name="tip").add(JointLimits())
-    upper = stack.compile(backend="vm")
+    upper = stack.compile(backend="python")
     for _ in range(40):
         q, v = arms.put(native, rng)
         step = native.step(q, v)
@@ -127,7 +127,7 @@ def test_contradicting_and_redundant_equalities_are_named() -> None:
     stack.add(Hold("link2", kind="position"), name="hold")
     stack.add(Fixed(("joint1",)), name="fixed")
     stack.add(Posture(), name="posture", level=1).add(EndEffector("tip", kind="position"), name="tip")
-    controller = stack.compile(backend="vm")
+    controller = stack.compile(backend="python")
     step = controller.step([0.3, 0.4, -0.2, 0.6, 0.1])
     assert {(d.item, d.inconsistency <= 1e-12) for d in step.levels[0].dropped if d.item == "hold"} == {("hold", True)}
     # joints 1 and 2 are held: the posture cannot move them
@@ -147,7 +147,7 @@ def test_a_braked_tick_has_no_levels(vm: Controller) -> None:
 
 def test_one_level_by_another_number_is_one_level() -> None:
     stack = wbc.Stack(arms.arm(), arms.DT).add(Posture(), level=4).add(JointLimits())
-    controller = stack.compile(backend="vm")
+    controller = stack.compile(backend="python")
     assert not core_of(controller).layout.cascade
     assert controller.step(np.full(5, 0.1)).levels == ()
 

@@ -17,17 +17,17 @@ STEP = 1e-6
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def calm(request: pytest.FixtureRequest) -> Controller:
     return arms.levels(calm=True, soft=False).compile(backend=request.param)
 
 
 @pytest.fixture(scope="module")
 def plain() -> Controller:
-    return arms.levels().compile(backend="vm")
+    return arms.levels().compile(backend="python")
 
 
-@pytest.fixture(scope="module", params=("vm", "native"))
+@pytest.fixture(scope="module", params=("python", "native"))
 def held(request: pytest.FixtureRequest) -> Controller:
     """A hand that is held, and levels that pull at it."""
     controller = holding(lower=True).compile(backend=request.param)
@@ -144,7 +144,7 @@ def test_prices_reach_across_levels(plain: Controller) -> None:
 
 def test_equality_rows_tell_what_they_cost_the_first_level(held: Controller) -> None:
     step = held.step(Q)
-    alone = holding(lower=False).compile(backend="vm")
+    alone = holding(lower=False).compile(backend="python")
     pull(alone)
     wanted = {(b.item, b.row): b.multiplier for b in alone.step(Q).binding}
     found = {(b.item, b.row): b.multiplier for b in step.binding}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 import pathlib
+import sys
 from typing import Annotated, Any, NamedTuple
 
 import typer
@@ -148,7 +149,31 @@ def command(name: str) -> Any:
     function = getattr(importlib.import_module(f"wbc.cli.{entry.module}"), entry.function)
     single = typer.Typer(add_completion=False, rich_markup_mode="rich")
     single.command(name, context_settings=entry.settings)(function)
-    return typer.main.get_command(single)
+    made = typer.main.get_command(single)
+    if not any("--json" in option.opts for option in made.params) and not entry.in_clone:
+        made.params += [option for option in typer.main.get_command(_with_json).params if "--json" in option.opts]
+    return made
+
+
+def _wants_data(wanted: bool) -> None:
+    if wanted:
+        from wbc.cli import results
+
+        results.collect()
+
+
+#: Its option is added to commands that print lines and tables
+_with_json = typer.Typer(add_completion=False)
+
+
+@_with_json.command()
+def _printed(
+    as_json: Annotated[
+        bool,
+        typer.Option("--json", callback=_wants_data, expose_value=False, help="Print lines and tables as JSON."),
+    ] = False,
+) -> None:
+    """Nothing: only its option is used."""
 
 
 class CommandGroup(TyperGroup):
@@ -169,7 +194,7 @@ class CommandGroup(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
         try:
-            return super().invoke(ctx)
+            return self._run(ctx)
         except WbcError as error:
             from wbc.cli.console import complain
 
@@ -178,6 +203,16 @@ class CommandGroup(TyperGroup):
         except KeyboardInterrupt:
             # While the command starts: one that has begun says what is left of its run
             raise typer.Exit(INTERRUPTED) from None
+
+    def _run(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        finally:
+            if (results := sys.modules.get("wbc.cli.results")) is not None:
+                from wbc.cli.console import print_json
+
+                for found in results.taken():
+                    print_json(found)
 
 
 app = typer.Typer(

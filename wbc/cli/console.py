@@ -18,13 +18,20 @@ class OutputError(WbcError):
 
 
 def out() -> Console:
-    """For results. Made when needed, so that redirected streams are honoured."""
-    return Console(highlight=False)
+    """For results. Made when needed, so that redirected streams are honoured; keeps them where `--json` wants data."""
+    from wbc.cli import results
+
+    return results.console() or Console(highlight=False)
 
 
 def err() -> Console:
     """For progress and errors."""
     return Console(stderr=True, highlight=False)
+
+
+def say(text: str) -> None:
+    """A line of results as it is, however long."""
+    out().print(text, soft_wrap=True, markup=False, emoji=False)
 
 
 def print_json(data: object) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from wbc.cli import options
+from wbc.cli.console import say
 from wbc.cli.planning import given_obstacles, planned
 from wbc.controller import core_of
 
@@ -73,4 +74,4 @@ def export(
     place = Path(f"{plan.robot.name}_tick") if output is None else output
     source: bool | Path = solver_source if solver_archive is None else solver_archive
     controller.export(place, overwrite=force, solver_source=source, states=states)
-    typer.echo(f"{place}: {plan.robot.name}, {plan.robot.nv} degrees of freedom; try `make -C {place} run`")
+    say(f"{place}: {plan.robot.name}, {plan.robot.nv} degrees of freedom; try `make -C {place} run`")

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wbc.cli.console import say
+
 if TYPE_CHECKING:
     from wbc.published.ikor import Run
 
@@ -149,8 +151,8 @@ def ikor(
 
         save_film(machine, run, balls, folder / f"film.{film}")
     for key, value in figures.items():
-        typer.echo(f"{key.replace('_', ' '):>23}  {value}")
-    typer.echo(str(folder))
+        say(f"{key.replace('_', ' '):>23}  {value}")
+    say(str(folder))
     if run.code:
         raise typer.Exit(PARTIAL)
 
@@ -192,12 +194,10 @@ def _vectors(file: Path) -> None:
     J, x = files.read_jacobian(file)
     for make in (blocked, orthogonal):
         space = make(J, x)
-        typer.echo(
-            f"{make.__name__}: rank {space.rank}, {space.span} vectors, {space.status}, cond G {space.condition():.3g}"
-        )
+        say(f"{make.__name__}: rank {space.rank}, {space.span} vectors, {space.status}, cond G {space.condition():.3g}")
         for g in space.vectors:
-            typer.echo("  " + " ".join(f"{value:12.8f}" for value in g))
-    typer.echo("least norm\n  " + " ".join(f"{value:12.8f}" for value in best(space).v))
+            say("  " + " ".join(f"{value:12.8f}" for value in g))
+    say("least norm\n  " + " ".join(f"{value:12.8f}" for value in best(space).v))
 
 
 def _published(
@@ -241,20 +241,20 @@ def _published(
     if len(runs) == 1:
         _steps(*runs[key])
     _written(folder, figures, runs)
-    typer.echo(str(folder))
+    say(str(folder))
     if any(run.code for run, _ in runs.values()):
         raise typer.Exit(PARTIAL)
 
 
 def _steps(run: Run, printed: Any) -> None:
     """Printed and measured side by side, every tenth legible step."""
-    typer.echo(f"{'step':>6} {'printed FSP':>14} {'printed J+':>14} {'measured':>14}")
+    say(f"{'step':>6} {'printed FSP':>14} {'printed J+':>14} {'measured':>14}")
     for k in range(0, len(printed.steps), 10):
         step = int(printed.steps[k])
         if step > len(run.norms):
             break
         numbers = (printed.fsp[k], printed.pseudo_inverse[k], run.norms[step - 1])
-        typer.echo(f"{step:6d} " + " ".join(f"{x:14.6f}" for x in numbers))
+        say(f"{step:6d} " + " ".join(f"{x:14.6f}" for x in numbers))
 
 
 def _folder(out: Path | None, force: bool) -> Path:

@@ -67,7 +67,7 @@ PlantName = Annotated[
         rich_help_panel=_CONTROL,
     ),
 ]
-Backend = Annotated[str, typer.Option(help="auto, native or vm.", rich_help_panel=_CONTROL)]
+Backend = Annotated[str, typer.Option(help="auto, native, vm or python.", rich_help_panel=_CONTROL)]
 Gain = Annotated[float, typer.Option(help="Gain of the hand, in 1/s.", rich_help_panel=_CONTROL)]
 Kind = Annotated[str, typer.Option(help="What follows the path: pose or position.", rich_help_panel=_CONTROL)]
 Margin = Annotated[float, typer.Option(help="Distance kept from obstacles, in m.", rich_help_panel=_CONTROL)]

@@ -28,6 +28,7 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
     from rich.table import Table
 
     from wbc.cli.console import out as console
+    from wbc.cli.console import say
     from wbc.cli.folders import run_folder
     from wbc.published.relative_motion import INCH
     from wbc.published.relative_motion import printed as known
@@ -60,8 +61,8 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
     for row in rows if table else [{"table": name, **largest[name]} for name in chosen]:
         shown.add_row(*(x if isinstance(x, str) else f"{x:.2g}" if x < 0.01 else f"{x:.3f}" for x in row.values()))
     console().print(shown)
-    typer.echo(f"largest error of x, y, z [in]; line: {solves} solves with feedback, end and way")
-    typer.echo(str(folder))
+    say(f"largest error of x, y, z [in]; line: {solves} solves with feedback, end and way")
+    say(str(folder))
 
 
 def _plot(file: Path, measured: dict[str, Array]) -> None:

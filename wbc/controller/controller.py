@@ -18,7 +18,7 @@ from wbc.controller.handles import Handles
 from wbc.controller.policy import Policy
 from wbc.controller.step import Step
 from wbc.controller.tick.buffers import Assembly
-from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.native import CompiledTick
 from wbc.errors import BusyError, PicklingError, RangeError, ShapeError, SolverError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
@@ -49,7 +49,7 @@ class Controller(Handles):
 
     def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
-        self.backend = "native" if artifact.library is not None else "vm"
+        self.backend = artifact.backend
         self._artifact = artifact
         self._core = core = Core(stack, artifact, solver, assembly)
         super().__init__(core.handles, stack)
@@ -260,7 +260,7 @@ class Controller(Handles):
         if isinstance(cap, bool) or not isinstance(cap, int):
             raise RangeError("iteration_cap", cap, "expected an integer >= 1, or None for no cap")
         validation.scalar("iteration_cap", cap, low=1.0)
-        if not isinstance(self._core.tick, NativeTick):
+        if not isinstance(self._core.tick, CompiledTick):
             reason = f"only the native tick with daqp can be capped, this one is {self.backend} with {self.solver}"
             raise SolverError("iteration_cap", cap, reason)
         self._core.tick.cap[0] = float(cap)

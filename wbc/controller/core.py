@@ -17,7 +17,8 @@ from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Context, Step
 from wbc.controller.tick.buffers import BAD_V, Assembly
-from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.generic import generic_tick
+from wbc.controller.tick.native import CompiledTick, NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.controller.tick.vm import VmAssembly
 from wbc.controller.together import Plan, Together
@@ -39,7 +40,8 @@ def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
     if artifact.library is not None:
         return NativeTick(artifact.library, artifact.layout)
     if artifact.program is not None:
-        return VmAssembly(artifact.program, stack, artifact.layout)
+        generic = generic_tick(artifact.program, stack, artifact.layout) if artifact.compiled else None
+        return generic or VmAssembly(artifact.program, stack, artifact.layout)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
 
 
@@ -84,10 +86,10 @@ class Core:
         layout = self.layout
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
         self.assembly = assembly_of(stack, artifact) if assembly is None else assembly
-        native = self.assembly if isinstance(self.assembly, NativeTick) and solver == "daqp" else None
-        self.tick: NativeTick | SolvedTick = native or SolvedTick(self.assembly, stack, layout, solver)
+        native = self.assembly if isinstance(self.assembly, CompiledTick) and solver == "daqp" else None
+        self.tick: CompiledTick | SolvedTick = native or SolvedTick(self.assembly, stack, layout, solver)
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
-        self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, NativeTick) else self.tick.step
+        self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
         self._plain_call = self.call
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest

@@ -19,7 +19,7 @@ from wbc.controller.tick.buffers import (
     Assembly,
 )
 from wbc.controller.tick.elastic import ElasticTick
-from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.native import CompiledTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.errors import DuplicateNameError, ShapeError
 from wbc.qp.factor import load
@@ -73,7 +73,7 @@ class Fallback:
         prepared: no tick has to import or to make anything.
     """
 
-    def __init__(self, tick: NativeTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
+    def __init__(self, tick: CompiledTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
         self._flag, self._v = Memory(layout).flag, Memory(layout)["v"]

@@ -90,7 +90,8 @@ class Stack(Declaration):
         Args:
             command: what ticks command: ``velocity`` (default), ``acceleration`` or ``torque``. docs/torque.md.
             solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
-            backend: ``native``, ``vm``, or ``auto``: native where gcc is, else the CasADi virtual machine.
+            backend: ``native``, ``vm``, ``python``, or ``auto``: native where gcc is, else ``vm``: rows on the CasADi
+                virtual machine, all else in code that is compiled once for all stacks. ``python``: all else in numpy.
 
         Raises:
             UnknownNameError: unknown solver, backend or command. CompileError: native without gcc, or gcc failed.

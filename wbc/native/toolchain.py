@@ -198,6 +198,27 @@ def compile_library(
         _run([*_command(cc), *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
 
 
+def compile_generic(files: dict[str, str], output: pathlib.Path, portable: bool = False) -> None:
+    """Compile the files of :func:`wbc.stack.generic.sources`, with DAQP, to a shared library at ``output``.
+
+    ``portable``: for any processor of this kind, not only for this machine's.
+
+    Raises:
+        CompileError: as of :func:`compile_tick`.
+    """
+    cc = compiler()
+    if cc is None:
+        raise CompileError("compiler", None, "no C compiler found")
+    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
+        place = pathlib.Path(folder)
+        for name, text in files.items():
+            (place / name).write_text(text)
+        hidden = () if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)
+        link = ("-shared", *hidden, "-Wl,-Bsymbolic", str(library()), "-lm", "-o", str(output))
+        flags = [flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native")]
+        _run([*_command(cc), *flags, "-O1", f"-I{headers()}", "generic.c", *link], place)
+
+
 def _output(command: list[str]) -> str:
     """What a command prints; nothing where it cannot be started."""
     try:

@@ -18,6 +18,7 @@ from wbc.errors import ShapeError
 from wbc.record.recorder import about, declaration_key, recorded_inputs
 from wbc.record.recording import Recording, RecordingError
 from wbc.record.unpickle import load_stack
+from wbc.stack.artifact import BACKENDS
 from wbc.stack.declaration import Declaration
 from wbc.validation import Array
 
@@ -130,7 +131,7 @@ def compiled(
     given = recording.about
     if given["wbc"] != __version__:
         raise RecordingError("recording", given["wbc"], f"was made by another version of wbc, this is {__version__}")
-    chosen = given["backend"] if backend is None else validation.one_of("backend", backend, ("auto", "native", "vm"))
+    chosen = given["backend"] if backend is None else validation.one_of("backend", backend, BACKENDS)
     if stack is None:
         stack = _own_stack(recording, trust)
     if declaration_key(stack) != given["declaration"]:

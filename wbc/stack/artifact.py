@@ -17,7 +17,8 @@ from wbc.stack.key import key
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram, build
 
-BackendName = Literal["auto", "native", "vm"]
+BackendName = Literal["auto", "native", "vm", "python"]
+BACKENDS = ("auto", "native", "vm", "python")
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +30,29 @@ class Artifact:
         library: shared library of the tick, or None for the virtual machine.
         program: CasADi functions, or None for a native library.
         cached: it was in the cache, no expression was built.
+        compiled: the rest of a tick on the virtual machine is compiled code where that can be had, else numpy.
     """
 
     layout: Layout
     library: pathlib.Path | None
     program: TickProgram | None
     cached: bool
+    compiled: bool = True
+
+    @property
+    def backend(self) -> str:
+        """Its name."""
+        if self.library is not None:
+            return "native"
+        return "vm" if self.compiled else "python"
 
 
 def compile_stack(stack: Declaration, backend: str, version: str, search: bool = False) -> Artifact:
     """Compile a stack, or find it in the cache.
 
     Args:
-        backend: ``native`` (needs gcc), ``vm``, or ``auto``: native where it can be.
+        backend: ``native`` (needs gcc), ``vm``: rows on CasADi's virtual machine, ``python``: and the rest in numpy, or
+            ``auto``: native where it can be.
         search: a native library with inverse kinematics.
 
     Where ``auto`` finds a compiler that fails, the first lines of its message are in the log and the virtual machine
@@ -50,7 +61,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
     Raises:
         UnknownNameError: another backend. CompileError: native without a compiler, or it failed.
     """
-    validation.one_of("backend", backend, ("auto", "native", "vm"))
+    validation.one_of("backend", backend, BACKENDS)
     if backend == "native" and toolchain.missing():
         raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
     layout = Layout(stack)
@@ -61,7 +72,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
-    return _virtual(stack, layout, version)
+    return _virtual(stack, layout, version, backend != "python")
 
 
 def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> Artifact:
@@ -76,7 +87,7 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
-def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
+def _virtual(stack: Declaration, layout: Layout, version: str, compiled: bool) -> Artifact:
     """The functions for the virtual machine, built or from the cache."""
     made: dict[str, ca.Function] = {}
 
@@ -88,4 +99,4 @@ def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
     folder, cached = cache.fetch(key(stack, version, "vm"), fill)
     saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
-    return Artifact(layout, None, functions, cached)
+    return Artifact(layout, None, functions, cached, compiled)

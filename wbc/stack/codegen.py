@@ -38,7 +38,7 @@ def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[st
     functions = [*program.functions.values(), motion(stack)]
     return {
         "rows.c": _casadi_source(functions),
-        "stack.h": _header(stack, layout, program, functions),
+        "stack.h": header(stack, layout, program, functions),
         "memory.h": structures(layout),
         **written,
     }
@@ -51,7 +51,8 @@ def _casadi_source(functions: list[ca.Function]) -> str:
     return str(generator.dump())
 
 
-def _header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
+def header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
+    """``stack.h``: the sizes and tables of a stack; ``functions`` are those of its rows."""
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
@@ -213,12 +214,9 @@ def _table(kind: str, name: str, values: Iterable[float]) -> str:
     return f"static const {kind} {name}[] = {{{', '.join([*texts, '0'])}}};"
 
 
-def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
-    """BLOCKS: statements that add the task rows to H and g, rows of equal columns together.
-    DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``.
-    """
-    build: list[str] = []
-    diagonals: list[str] = []
+def blocks(start: np.ndarray, col: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """(first row, rows, first entry, entries a row) of task rows with equal columns; rows of one entry together."""
+    out: list[tuple[int, int, int, int]] = []
     row, rows = 0, len(start) - 1
     while row < rows:
         columns = tuple(col[start[row] : start[row + 1]])
@@ -226,16 +224,29 @@ def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
         if len(columns) == 1:
             while end < rows and start[end + 1] - start[end] == 1:
                 end += 1
-            build.append(f"diagonal(t, {row}, {end - row}, {start[row]});")
-            entry = "t->jt[e] * t->jt[e]"
-            weight = f"t->weight[{row} + e - {start[row]}] * t->report.factor[{row} + e - {start[row]}]"
-            diagonals.append(f"for (int e = {start[row]}; e < {start[end]}; e++) t->y[j_col[e]] += {weight} * {entry};")
         else:
             while end < rows and tuple(col[start[end] : start[end + 1]]) == columns:
                 end += 1
-            if columns:
-                build.append(f"block(t, {row}, {end - row}, {start[row]}, {len(columns)});")
+        if columns:
+            out.append((row, end - row, int(start[row]), len(columns)))
         row = end
+    return out
+
+
+def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
+    """BLOCKS: statements that add the task rows to H and g, rows of equal columns together.
+    DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``.
+    """
+    build: list[str] = []
+    diagonals: list[str] = []
+    for row, count, first, columns in blocks(start, col):
+        if columns > 1:
+            build.append(f"block(t, {row}, {count}, {first}, {columns});")
+            continue
+        build.append(f"diagonal(t, {row}, {count}, {first});")
+        entry = "t->jt[e] * t->jt[e]"
+        weight = f"t->weight[{row} + e - {first}] * t->report.factor[{row} + e - {first}]"
+        diagonals.append(f"for (int e = {first}; e < {first + count}; e++) t->y[j_col[e]] += {weight} * {entry};")
     return [f"#define BLOCKS {' '.join(build)}", f"#define DIAGONALS {' '.join(diagonals)}"]
 
 

@@ -20,26 +20,18 @@ from wbc.stack.memory import Memory
 from wbc.validation import Array
 
 
-class NativeTick(Assembly):
-    """Memory of one controller and the functions of its library; see :class:`wbc.controller.tick.Buffers`.
+class CompiledTick(Assembly):
+    """Memory of one controller and the functions of a library that works on it; see
+    :class:`wbc.controller.tick.Buffers`.
 
-    Where each field is in memory is checked against the layout, so that a library of another layout is refused.
+    Args:
+        memory: begins with the fields of :class:`wbc.stack.memory.Memory`. pointer: what the functions take.
     """
 
-    def __init__(self, library: pathlib.Path | ctypes.PyDLL, layout: Layout) -> None:
-        # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
-        self._library = library if isinstance(library, ctypes.PyDLL) else load_library(library)
-        self._library.wbc_tick_size.restype = ctypes.c_longlong
-        size = int(self._library.wbc_tick_size())
-        raw = np.zeros(size // 8 + 8)
-        shift = (-raw.ctypes.data % 64) // 8
-        self._memory = raw[shift : shift + size // 8]
-        self.pointer = ctypes.c_void_p(self._memory.ctypes.data)
-        places = Memory(layout)
-        self._library.wbc_tick_offset.restype = ctypes.c_longlong
-        places.require(self._library.wbc_tick_offset, self._library._name)
-        self._layout = layout
+    def __init__(self, library: ctypes.PyDLL, layout: Layout, memory: Array, pointer: ctypes.c_void_p) -> None:
+        self._library, self._layout, self._memory, self.pointer = library, layout, memory, pointer
         self._library.wbc_tick_init(self.pointer)
+        places = Memory(layout)
         view = functools.partial(places.view, self._memory)
         self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
@@ -62,26 +54,6 @@ class NativeTick(Assembly):
         self.call = builtin(self._library.wbc_python_step, self.pointer.value or 0)
         #: arrays that native code has the addresses of
         self._kept: list[np.ndarray] = []
-
-    def library_function(self, name: str, returns: Any, unlocked: bool = False) -> Any:
-        """Another function of the library; ``unlocked``: it works long enough to be worth releasing the lock for."""
-        library = ctypes.CDLL(self._library._name, handle=self._library._handle) if unlocked else self._library
-        function = getattr(library, name)
-        function.restype = returns
-        return function
-
-    @functools.cached_property
-    def converge_function(self) -> Any:
-        """One search; of a library that was compiled with inverse kinematics."""
-        return self.library_function("wbc_tick_converge", None)
-
-    @functools.cached_property
-    def converge_many(self) -> Any:
-        """Thousands of searches in one call."""
-        return self.library_function("wbc_tick_converge_many", None, unlocked=True)
-
-    def twin(self) -> NativeTick:
-        return NativeTick(self._library, self._layout)
 
     def step(self) -> int:
         return self.call()
@@ -167,3 +139,41 @@ class NativeTick(Assembly):
         low, high = self._low.copy(), self._high.copy()
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
         return QP(H, self._g[:nv].copy(), low, high, self._A.copy(), self._give.copy())
+
+
+class NativeTick(CompiledTick):
+    """The tick of one stack, compiled with its rows.
+
+    Where each field is in memory is checked against the layout, so that a library of another layout is refused.
+    """
+
+    def __init__(self, library: pathlib.Path | ctypes.PyDLL, layout: Layout) -> None:
+        # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
+        loaded = library if isinstance(library, ctypes.PyDLL) else load_library(library)
+        loaded.wbc_tick_size.restype = loaded.wbc_tick_offset.restype = ctypes.c_longlong
+        size = int(loaded.wbc_tick_size())
+        raw = np.zeros(size // 8 + 8)
+        shift = (-raw.ctypes.data % 64) // 8
+        memory = raw[shift : shift + size // 8]
+        Memory(layout).require(loaded.wbc_tick_offset, loaded._name)
+        super().__init__(loaded, layout, memory, ctypes.c_void_p(memory.ctypes.data))
+
+    def library_function(self, name: str, returns: Any, unlocked: bool = False) -> Any:
+        """Another function of the library; ``unlocked``: it works long enough to be worth releasing the lock for."""
+        library = ctypes.CDLL(self._library._name, handle=self._library._handle) if unlocked else self._library
+        function = getattr(library, name)
+        function.restype = returns
+        return function
+
+    @functools.cached_property
+    def converge_function(self) -> Any:
+        """One search; of a library that was compiled with inverse kinematics."""
+        return self.library_function("wbc_tick_converge", None)
+
+    @functools.cached_property
+    def converge_many(self) -> Any:
+        """Thousands of searches in one call."""
+        return self.library_function("wbc_tick_converge_many", None, unlocked=True)
+
+    def twin(self) -> NativeTick:
+        return NativeTick(self._library, self._layout)

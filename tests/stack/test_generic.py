@@ -1,0 +1,55 @@
+"""The tick that is compiled once for all stacks: the same bits as code compiled for one stack."""
+
+import numpy as np
+import pytest
+
+import wbc
+from wbc.controller import core_of
+from wbc.controller.tick.generic import GenericTick
+from wbc.robot import Robot
+from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Obstacle, Posture
+
+
+def stack(levels: bool, soft: bool) -> wbc.Stack:
+    made = wbc.Stack(wbc.robots.load("panda"), dt=0.005)
+    made.add(EndEffector("panda_hand_tcp"), name="hand")
+    made.add(CenterOfMass(), name="mass", weight=0.1)
+    made.add(Posture(), name="posture", weight=1e-2, level=1 if levels else 0)
+    made.add(JointLimits())
+    made.add(Obstacle(wbc.shapes.Box((0.2, 0.2, 0.2)), links=["panda_hand"]), name="box", soft=10.0 if soft else None)
+    return made
+
+
+def reports(controller: wbc.Controller, robot: Robot) -> list[np.ndarray]:
+    """Of ticks towards a pose that is far, with the box in the way."""
+    controller["hand"].target = robot.pose(robot.random(5), "panda_hand_tcp")
+    controller["box"].pose = robot.pose(robot.random(5), "panda_link7")
+    q, out = robot.random(3), []
+    for _ in range(8):
+        q = robot.integrate(q, controller.step(q).v, 0.005)
+        out.append(core_of(controller).tick.report.copy())
+    return out
+
+
+@pytest.mark.parametrize(("levels", "soft"), [(False, False), (True, False), (False, True)])
+def test_the_bits_of_a_tick_that_is_compiled_for_one_stack(levels: bool, soft: bool) -> None:
+    declared = stack(levels, soft)
+    one, shared = declared.compile(backend="native"), declared.compile(backend="vm")
+    assert isinstance(core_of(shared).tick, GenericTick)
+    np.testing.assert_array_equal(reports(shared, declared.robot), reports(one, declared.robot))
+
+
+def test_controllers_of_other_sizes_take_turns() -> None:
+    first, second = stack(False, False), wbc.Stack(wbc.robots.load("ur5"), dt=0.01)
+    second.add(EndEffector("tool0"), name="hand")
+    second.add(Posture(), name="posture", weight=1e-2)
+    alone, mixed, other = first.compile(backend="vm"), first.compile(backend="vm"), second.compile(backend="vm")
+    want = reports(alone, first.robot)
+    step = core_of(mixed).call
+
+    def interrupted() -> int:
+        other.step(second.robot.neutral)
+        return step()
+
+    core_of(mixed).call = interrupted
+    np.testing.assert_array_equal(reports(mixed, first.robot), want)

@@ -1,0 +1,178 @@
+"""The tick whose hand-written part is compiled once for all stacks; CasADi's virtual machine computes its rows."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import itertools
+import pathlib
+import re
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from wbc.controller.tick.native import CompiledTick
+from wbc.errors import CompileError
+from wbc.native import toolchain
+from wbc.native.library import load_library
+from wbc.stack import generic
+from wbc.stack.codegen import blocks, header
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.memory import Memory
+from wbc.stack.program import ROWS_OUTPUTS, TickProgram
+from wbc.validation import Array
+
+#: No two contexts of a process have the same
+_serials = itertools.count(1)
+_capsule = ctypes.pythonapi.PyCapsule_GetPointer
+_capsule.restype, _capsule.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+_capsule_name = ctypes.pythonapi.PyCapsule_GetName
+_capsule_name.restype, _capsule_name.argtypes = ctypes.c_char_p, [ctypes.py_object]
+
+
+@functools.cache
+def _evaluate() -> int:
+    """Address of what evaluates a buffer of CasADi; 0 where its library does not have it."""
+    for path in sorted(pathlib.Path(ca.__file__).parent.glob("libcasadi.*")):
+        try:
+            found: Any = ctypes.PyDLL(str(path))._ZN6casadi21_function_buffer_evalEPv
+        except (OSError, AttributeError):
+            continue
+        return ctypes.cast(found, ctypes.c_void_p).value or 0
+    return 0
+
+
+def generic_tick(program: TickProgram, stack: Declaration, layout: Layout) -> GenericTick | None:
+    """The tick of a stack; None where there is neither its library nor a compiler, and the log says so."""
+    if not _evaluate():
+        return None
+    try:
+        return GenericTick(program, stack, layout)
+    except CompileError as error:
+        if toolchain.compiler() is not None:
+            toolchain.fall_back(str(error))
+        return None
+
+
+@functools.cache
+def _library(variant: generic.Variant) -> ctypes.PyDLL:
+    library = load_library(generic.library(variant))
+    library.wbc_generic_room.restype = library.wbc_tick_size.restype = ctypes.c_longlong
+    library.wbc_generic_written.restype = ctypes.c_void_p
+    return library
+
+
+class GenericTick(CompiledTick):
+    """Memory of one controller, and functions of the library that all stacks of its kind share.
+
+    Raises:
+        CompileError: there is no such library and no compiler that could make it.
+    """
+
+    def __init__(self, program: TickProgram, stack: Declaration, layout: Layout) -> None:
+        self._given = (program, stack, layout)
+        soft = not layout.cascade and any(at >= 0 for at in layout.price_at)
+        curved = program.curvature is not None and program.curvature.nnz_out(0) > 0
+        variant = generic.Variant(layout.command, layout.cascade, soft, curved)
+        library = _library(variant)
+        self._context = _Context(stack, layout, program)
+        room = int(library.wbc_generic_room(self._context.pointer)) // 8
+        memory, self._tick = np.zeros(room), np.zeros(int(library.wbc_tick_size()) // 8 + 1)
+        self._context.set("memory", memory.ctypes.data)
+        pointer = ctypes.c_void_p(self._tick.ctypes.data)
+        library.wbc_generic_context(pointer, self._context.pointer)
+        super().__init__(library, layout, memory, pointer)
+        self._bind(program, layout)
+
+    def twin(self) -> GenericTick:
+        return GenericTick(*self._given)
+
+    def _written(self, name: str, count: int) -> Array:
+        """An array that only C has the name of."""
+        address = int(self._library.wbc_generic_written(self.pointer, generic.WRITTEN.index(name)))
+        start = (address - self._memory.ctypes.data) // 8
+        return self._memory[start : start + max(1, count)]
+
+    def _bind(self, program: TickProgram, layout: Layout) -> None:
+        """Have the functions of the rows read and write the tick's memory."""
+        places = Memory(layout)
+
+        def field(name: str, least: int = 0) -> Array:
+            place = places[name]
+            return self._memory[place.start : max(place.stop, place.start + 1, place.start + least)]
+
+        q, p, dt, v = field("q"), field("p"), field("dt"), field("v_last")
+        copies = {name: np.zeros(max(1, count)) for name, count in (("mean", layout.nv), ("force", layout.task_rows))}
+        for name, array in copies.items():
+            self._context.set(name, array.ctypes.data)
+        state = [q, v[: layout.nv], p, dt]
+        named = {"low": "free_low", "high": "free_high"}
+        sizes = dict(zip(ROWS_OUTPUTS, (program.rows.nnz_out(i) for i in range(len(ROWS_OUTPUTS))), strict=True))
+        written = [
+            self._written(name, sizes[name]) if name in generic.WRITTEN else field(named.get(name, name))
+            for name in ROWS_OUTPUTS
+        ]
+        calls: dict[str, tuple[ca.Function | None, list[Array], list[Array]]] = {
+            "rows": (program.rows, state, written),
+            "ahead": (program.ahead, [q, copies["mean"], p, dt], [field("ahead")]),
+        }
+        if program.curvature is not None:
+            entries = self._written("curvature_entries", program.curvature.nnz_out(0))
+            calls["curvature"] = program.curvature, [*state, copies["force"]], [entries]
+        if program.torque is not None:
+            calls["torque"] = program.torque, [*state, field("v"), field("enabled")], [field("torque")]
+        self._bound: list[Any] = [copies]
+        for name, (function, arguments, results) in calls.items():
+            if function is None:
+                continue
+            buffer = ca.FunctionBuffer(function)
+            for i, array in enumerate(arguments):
+                buffer.set_arg(i, memoryview(array.data))
+            for i, array in enumerate(results):
+                buffer.set_res(i, memoryview(array.data))
+            capsule = buffer._self()
+            self._context.set(name, _capsule(capsule, _capsule_name(capsule)))
+            self._bound += [buffer, function, arguments, results]
+
+
+class _Context:
+    """The sizes and tables of a stack as ``wbc_context`` has them: numbers and addresses of eight bytes each."""
+
+    def __init__(self, stack: Declaration, layout: Layout, program: TickProgram) -> None:
+        text = header(stack, layout, program, [program.rows])
+        numbers = dict(re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE))
+        tables = dict(re.findall(r"^static const \w+ (\w+)\[\] = \{(.*)\};$", text, re.MULTILINE))
+        jt = program.rows.sparsity_out("jt")
+        found = blocks(np.array(jt.colind()[: layout.leading + 1]), np.array(jt.row(), dtype=np.intp))
+        blocked = np.array(found, np.intc).reshape(-1, 4)
+        numbers["BLOCKED"] = str(len(found))
+        self.names = [
+            "serial", *generic.SIZES, *generic.REALS, *generic.INT_TABLES, *generic.REAL_TABLES, "evaluate",
+            *generic.FUNCTIONS, *(name for given in generic.COPIED.values() for _, name, _ in given), "memory",
+        ]  # fmt: skip
+        self._entries = np.zeros(len(self.names), np.int64)
+        self._kept: list[np.ndarray] = []
+        for name in generic.SIZES:
+            self.set(name, int(numbers.get(name, "0")))
+        for name in generic.REALS:
+            value = float.fromhex(numbers[name]) if "x" in numbers.get(name, "") else float(numbers.get(name, "0"))
+            self._entries.view(np.float64)[self.names.index(name)] = value
+        for k, name in enumerate(generic.INT_TABLES[-4:]):
+            self._table(name, np.ascontiguousarray(blocked[:, k]))
+        for name in generic.INT_TABLES[:-4]:
+            self._table(name, np.array(tables.get(name, "0").split(", "), np.intc))
+        for name in generic.REAL_TABLES:
+            self._table(name, np.array([float.fromhex(x) for x in tables.get(name, "0").split(", ")]))
+        self.set("evaluate", _evaluate())
+        self.pointer = ctypes.c_void_p(self._entries.ctypes.data)
+
+    def set(self, name: str, value: int) -> None:
+        """A whole number, or an address; with a new serial, by which C sees that something has changed."""
+        self._entries[0] = next(_serials)
+        self._entries[self.names.index(name)] = value
+
+    def _table(self, name: str, values: np.ndarray) -> None:
+        self._kept.append(values)
+        self.set(name, values.ctypes.data)

@@ -1,0 +1,22 @@
+"""Libraries of :mod:`wbc.stack.generic` for machines without a compiler, which ``make wheel`` packs."""
+
+from __future__ import annotations
+
+from wbc.native import toolchain
+from wbc.stack import generic
+
+
+def main() -> None:
+    """Compile all variants for any processor of this kind."""
+    generic.PREBUILT.mkdir(exist_ok=True)
+    for old in generic.PREBUILT.glob("*.so"):
+        old.unlink()
+    for variant in generic.variants():
+        files = generic.sources(variant)
+        toolchain.compile_generic(files, generic.prebuilt(files), portable=True)
+    found = list(generic.PREBUILT.glob("*.so"))
+    print(f"{len(found)} libraries, {sum(path.stat().st_size for path in found) / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
