@@ -20,7 +20,7 @@ from wbc.viewer import Viewer, show
 from wbc.viewer.presets import playground
 
 #: Ticks of a block at the preset's rate, and blocks of each kind, taken in turn
-TICKS, BLOCKS = 1000, 6
+TICKS, BLOCKS = 400, 10
 #: Messages that are timed
 SENT = 150
 WATCHERS = 10
@@ -41,17 +41,20 @@ def parts() -> dict[str, Sheet | str]:
                 with watched(viewer, count):
                     found.setdefault(name, []).append(block(controller, q, dt, None if count < 0 else viewer))
         there, back, rate, explained = delays(controller, q, dt, viewer)
-    rows = []
+    rows, worst = [], {}
     for name, blocks in found.items():
-        took, late = np.concatenate(blocks, axis=1)
-        figures = [np.percentile(x, p) for x in (took, late) for p in (50, 99)]
-        rows.append((name, *(us(1e6 * float(x)) for x in figures)))
-    base, one = (np.concatenate(found[name], axis=1)[1] for name in ("no viewer", "one client"))
-    change = float(np.percentile(one, 99) / np.percentile(base, 99)) - 1.0
-    columns = ("loop", "tick, median", "tick, p99", "late, median", "late, p99")
+        # Whatever else the machine does only adds: of every block its percentiles, and of those the least
+        figures = [min(float(np.percentile(block[k], p)) for block in blocks) for k in range(3) for p in (50, 99)]
+        worst[name] = figures[1], figures[5]
+        rows.append((name, *(us(1e6 * x) for x in figures)))
+    columns = ("loop", "tick, median", "tick, p99", "processor, median", "processor, p99", "late, median", "late, p99")
+    with_one, with_ten = (
+        [f"{100 * (worst[name][k] / worst['no viewer'][k] - 1.0):+.0f} %" for k in (0, 1)]
+        for name in ("one client", "ten clients")
+    )
     text = (
-        f"The 99th percentile of how late a tick begins is {100 * abs(change):.0f} % "
-        f"{'more' if change > 0 else 'less'} with a viewer and one client than without. The address is there after "
+        f"The 99th percentile of a tick changes by {with_one[0]} with a viewer and one client and by {with_ten[0]} "
+        f"with ten, that of how late it begins by {with_one[1]} and {with_ten[1]}. The address is there after "
         f"{ready:.1f} s, with compiled code cached."
     )
     delay = Sheet(
@@ -67,22 +70,23 @@ def parts() -> dict[str, Sheet | str]:
 
 
 def block(controller: Controller, q: np.ndarray, dt: float, viewer: Viewer | None) -> np.ndarray:
-    """Two rows: how long each tick took with its update, and how late it began [s]."""
-    took, late = np.zeros(TICKS), np.zeros(TICKS)
+    """How long each tick took with its update, its processor time, and how late it began [3 x TICKS] s."""
+    took, processor, late = np.zeros((3, TICKS))
     integrate = controller.stack.robot.integrate
     due = time.perf_counter() + dt
     for k in range(TICKS):
         wait = due - time.perf_counter()
         if wait > 0.0:
             time.sleep(wait)
-        start = time.perf_counter()
+        start, own = time.perf_counter(), time.thread_time()
         step = controller.step(q)
         if viewer is not None:
             viewer.update(step)
+        processor[k] = time.thread_time() - own
         took[k], late[k] = time.perf_counter() - start, start - due
         q = integrate(q, step.v, dt)
         due = max(due + dt, start)
-    return np.array([took, late])
+    return np.array([took, processor, late])
 
 
 @contextlib.contextmanager

@@ -154,7 +154,12 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structur
                 mounts[row] = list(_mounts(structure, log["hold_pose"][row, :3]))
             # As long as the hand is near the hold without a break
             point, k, last = log["hold_pose"][row, :3], int(start), int(end)
-            near = np.linalg.norm(places[:, arm] - point, axis=1) <= NEAR
+            gaps = np.linalg.norm(places[:, arm] - point, axis=1)
+            near = gaps <= NEAR
+            if _vanished(log, row, log["t"][end]):
+                # No hand stops at once: it comes nearer for a while
+                while last < len(near) - 1 and gaps[last + 1] < gaps[last]:
+                    last += 1
             while k > 0 and near[k]:
                 k -= 1
             while last < len(near) - 1 and near[last]:
@@ -164,6 +169,12 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structur
                 depth = DEPTH + float(getattr(part.shape, "radius", 0.0))
                 for mount in mounts[row]:
                     yield Exemption(part.name, mount, point, NEAR, depth, since, until)
+
+
+def _vanished(log: Columns, row: int, t: float) -> bool:
+    """Whether a hold that was there is gone a tick after a time [s]."""
+    ends = log["presence_span"][log["presence_hold"] == row, 1]
+    return bool((np.abs(ends - t) < 0.015).any())
 
 
 def _mounts(structure: Structure, point: Array) -> Iterator[str]:

@@ -55,6 +55,7 @@ FLOORS = {
     "wbc.published": 9,
     "wbc.walking": 9,
     "wbc.pages": 9,
+    "wbc.study": 10,
     "wbc.viewer": 10,
     "wbc.cli": 11,
 }

@@ -47,7 +47,7 @@ def test_limits_hold_at_accelerations_that_the_motors_have_and_not_at_others() -
     M = pin.crba(asked.model, asked.model.createData(), found.q)
     M = np.triu(M) + np.triu(M, 1).T
     h = pin.nonLinearEffects(asked.model, asked.model.createData(), found.q, found.v)
-    k = asked.dof_names.index(found.joint)
+    k = asked.dof_names.index(found.decides)
     assert np.abs(h[k]) + np.abs(M[k]) @ found.acceleration == pytest.approx(0.95 * asked.limits.effort[k])
     worst, braked = thrown(asked)
     assert max(worst, braked) > 0, "the adversary breaks nothing, which is no test"

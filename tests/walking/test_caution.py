@@ -18,8 +18,9 @@ from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
 from wbc.walking.loop.caution import Caution
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
+from wbc.walking.loop.hand_pace import RAMP_AGAIN
 from wbc.walking.loop.stack import DT, WalkStack
-from wbc.walking.loop.state import State
+from wbc.walking.loop.state import AFTER_PAUSE, State
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError, Plan
@@ -68,6 +69,29 @@ def test_swings_are_foreseen_as_they_are(
         assert np.linalg.norm(foreseen[:3] - walk.q[:3]) < 2e-3
         walk.tick()
     assert worst < 0.03
+
+
+def test_a_hand_goes_on_from_a_pause_slowly_and_as_foreseen(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    swinging = walk.swinging
+    assert swinging is not None
+    while swinging.clock < 0.6 * swinging.law.duration:
+        walk.tick()
+    swinging.pauses, swinging.paused = True, 1
+    while swinging.pauses:
+        walk.tick()
+    begin, foreseen = walk.time, walk._caution._foreseen  # type: ignore[union-attr]
+    paces = [swinging.pace]
+    while walk.swinging is swinging:
+        walk.tick()
+        paces.append(swinging.pace)
+    assert max(paces) == pytest.approx(AFTER_PAUSE)
+    assert max(np.diff(paces)) <= DT / RAMP_AGAIN + 1e-12
+    assert foreseen is not None
+    assert walk.time - begin == pytest.approx(foreseen[1][-1], abs=0.1)
 
 
 def test_a_swing_into_what_no_plan_knew_is_not_begun(

@@ -406,6 +406,35 @@ def test_a_vanished_hold_that_is_let_go_at_once_is_no_fault_of_the_hand(urdf: Pa
     assert check_walk(log, urdf, ground, rules).ok
 
 
+def test_a_hand_may_come_to_rest_where_its_hold_has_vanished(urdf: Path, walk: Walk) -> None:
+    """The hold vanishes while the hand is farther from it than it may touch things, and it still comes nearer."""
+    log, ground = walk
+    hold, frame = int(log.hand_hold[CLOSES, 0]), log.hands[0]
+    model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    data, gaps = model.createData(), []
+    for pose, q in zip(log.pose_body_in_structure, log.q, strict=True):
+        pin.framesForwardKinematics(model, data, np.concatenate([pose, q]))
+        there = data.oMf[model.getFrameId(frame)].translation
+        gaps.append(float(np.linalg.norm(there - log.hold_pose[hold, :3])))
+    gone = next(k for k in range(MIDDLE, CLOSES) if gaps[k] < 0.085)
+    end = next(k for k in range(gone, CLOSES) if gaps[k] < 0.04)
+    assert gaps[gone] > FEW.exempt_distance
+    short = replace(log, **rows(log, slice(end)))
+    short = changed(short, "hand_hold", (slice(gone, None), 0), -1)
+    assert not check_walk(short, urdf, ground, FEW)[SWEPT_STRUCTURE].ok
+    row = int(np.flatnonzero(log.presence_hold == hold)[0])
+    vanished = changed(short, "presence_span", (row, 1), log.t[gone] - 0.5 * DT)
+    assert check_walk(vanished, urdf, ground, FEW)[SWEPT_STRUCTURE].ok
+    # One that does not stop, but comes again, is not spared
+    again = {
+        name: np.concatenate([a[:gone], a[gone - 2 : gone], a[gone:]])
+        for name, a in rows(vanished, slice(None)).items()
+    }
+    again["t"] = log.t[0] + DT * np.arange(len(again["t"]))
+    again["hand_hold"][gone : gone + 2, 0] = -1
+    assert not check_walk(replace(vanished, **again), urdf, ground, FEW)[SWEPT_STRUCTURE].ok
+
+
 def test_a_runs_folder_is_checked(urdf: Path, walk: Walk, tmp_path: Path) -> None:
     log, ground = walk
     with pytest.raises(WalkLogError, match=r"there is no run\.npz"):

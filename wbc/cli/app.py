@@ -120,6 +120,11 @@ COMMANDS = {
         "Drive an arm by rates: the pair of coordinates that is chosen, at most six "
         "rates at a time, 50 times a second.",
     ),
+    "study": Listed(
+        "study",
+        "study",
+        "Carry out many trials of a scenario, over parameters and seeds, here or on a cluster, and go on after a kill.",
+    ),
     "bench": Listed(
         "bench",
         "bench",

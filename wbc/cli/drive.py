@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,7 @@ from rich.markup import escape
 from wbc.cli import completion
 from wbc.cli.analysis.advise import configuration_of
 from wbc.cli.console import err, out
+from wbc.cli.folders import run_folder
 from wbc.cli.options import Backend
 from wbc.coordinates import Condition, parts
 from wbc.errors import RangeError, UnknownNameError
@@ -24,6 +26,9 @@ from wbc.teleop.session import NOTHING
 
 #: Parts of a command between which losses are distinguished, and the exit code after Ctrl-C
 STEPS, INTERRUPTED = (NOTHING, 0.01, 0.1, 0.5), 130
+#: Files of a session's folder
+LOG, REPLAY = "log.csv", "replay.html"
+WRITTEN = (LOG, "report.html", REPLAY)
 #: While only the loss changes, a line after so long [s]
 PAUSE = 0.5
 #: The live line is written anew after so long [s]
@@ -48,6 +53,11 @@ def drive(
     automatic: Annotated[bool, typer.Option("--automatic", help="Change pairs as the adviser says.")] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wait for the clock with a file, too.")] = False,
     log: Annotated[Path | None, typer.Option(help="Write what happened to this CSV file, after Ctrl-C, too.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--out", "--output", help="A folder for log.csv, report.html and replay.html, after Ctrl-C, too."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write into a folder that has a run.")] = False,
     backend: Backend = "auto",
 ) -> None:
     """Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second.
@@ -56,6 +66,7 @@ def drive(
     """
     if keys == (rates is not None):
         raise RangeError("rates", rates, "give either --rates FILE or --keys")
+    folder = None if output is None else run_folder(output, "drive", WRITTEN, force)
     machine = _standing(robot)
     given = configuration_of(parts(machine).robot, at) if at else None
     source = RateFile(rates) if rates is not None else None
@@ -75,8 +86,24 @@ def drive(
                 run_session(session, keyboard, q, realtime=True, progress=line, log=found)
     finally:
         _report(found, session, log)
+        if folder is not None:
+            out().print(escape(f"{folder}: {', '.join(_pages(found, session, folder))}"), soft_wrap=True)
     if found.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _pages(found: SessionLog, session: Teleoperation, folder: Path) -> list[str]:
+    """Names of the files of a session's folder."""
+    from wbc.teleop.report import save_report
+    from wbc.viewer.errors import ViewerError
+    from wbc.viewer.runs import save_motion
+
+    found.write(folder / LOG, session.robot.dof_names)
+    # A session is worth keeping where what draws the page is not installed, and without a tick there is none
+    with contextlib.suppress(ViewerError):
+        save_motion(session.robot, found.time, found.q, folder / REPLAY)
+    save_report(session, found, folder)
+    return [name for name in WRITTEN if (folder / name).is_file()]
 
 
 def _standing(name: str) -> str | Robot:

@@ -116,9 +116,7 @@ def moving_target(
         if film and not stopper():
             pair = {k: done[k][0] for k in (min(done, key=kinds.index), max(done, key=kinds.index))}
             bar.update(stage, description="film", total=1, completed=0)
-            drawn = pictures.film(
-                study, pair, folder / "film.gif", lambda part: bar.update(stage, completed=part), stopper
-            )
+            drawn = pictures.film(study, pair, folder / "film", lambda part: bar.update(stage, completed=part), stopper)
             written += [] if drawn is None else [drawn]
     table = Table(title=f"{machine.name}, {job}, {motion}", title_justify="left", box=None, pad_edge=False)
     for head in ("the object is known by", "done", "rms mm", "largest mm", "degrees", "time s", "rate", "known to mm"):

@@ -15,9 +15,12 @@ from wbc.viewer.beside import require_viser
 from wbc.viewer.local import require_local
 from wbc.viewer.presets import PRESETS, playground
 
+#: Of the walker on its structure, which is more than a stack
+CLIMB = "climb"
+
 
 def play(
-    preset: Annotated[str, typer.Argument(help=f"{', '.join(PRESETS)}.")] = "panda",
+    preset: Annotated[str, typer.Argument(help=f"{', '.join(PRESETS)}, or {CLIMB}: the walker, steered.")] = "panda",
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     browser: viewing.Browser = True,
@@ -31,6 +34,14 @@ def play(
     require_viser()
     if zeromq:
         require_local(zeromq)
+    if preset == CLIMB:
+        from wbc.viewer.climbing import climb
+
+        err().print("Steer with W S A D and Q E or the stick, or click a hold. Space stops it, Ctrl-C ends.")
+        options = {"host": host, "port": port, "open_browser": browser, "zeromq": zeromq}
+        with viewing.until_interrupted():
+            climb(seconds, backend=backend, announce=viewing.announce, **options)
+        return
     chosen = playground(preset)
     err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
     controller = viewing.compiled(chosen.stack, backend)

@@ -166,15 +166,17 @@ def rows_of(past: Past, tick: Assembly, block: Block) -> tuple[Array, Array]:
             continue
         tick.weight[:] = 0.0
         tick.weight[block.start + k] = 1.0
-        qp = tick.qp()
+        H, g = tick.quadratic()
         share = float(factor[block.start + k])
         if not share > 0.0:
             continue
-        square = (qp.H - np.diag(damping)) / share
-        i = int(np.diag(square).argmax())
-        if square[i, i] > 0.0:
-            rows[k] = square[i] / np.sqrt(square[i, i])
-            desired[k] = -qp.g[i] / share / rows[k, i]
+        squares = (np.diagonal(H) - damping) / share
+        i = int(squares.argmax())
+        if squares[i] > 0.0:
+            square = np.concatenate([H[:i, i], H[i, i:]]) / share
+            square[i] = squares[i]
+            rows[k] = square / np.sqrt(squares[i])
+            desired[k] = -float(g[i]) / share / rows[k, i]
     tick.weight[:], tick.plain[0] = weight, before
     return rows, desired
 

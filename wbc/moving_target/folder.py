@@ -18,7 +18,7 @@ from wbc.moving_target.trial import Trial
 
 SUMMARY = "summary.json"
 """What was asked and what came of it."""
-WRITTEN = (SUMMARY, "trials.csv", "first.npz", "error.png", "object.png", "trials.png", "film.gif")
+WRITTEN = (SUMMARY, "trials.csv", "first.npz", "error.png", "object.png", "trials.png", "film.gif", "film.mp4")
 """All files of a run, those of the plots and the film too."""
 
 

@@ -15,6 +15,7 @@ from wbc.moving_target.study import Study
 from wbc.moving_target.trial import Trial
 from wbc.shapes import Box, Cylinder, PlacedShape
 from wbc.track import render
+from wbc.track.film import save_film
 from wbc.track.scene import link_meshes, simplified
 from wbc.validation import Array
 
@@ -100,7 +101,7 @@ def film(
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
-    """Trials side by side as an animated picture; None if ``stop`` ended it."""
+    """Trials side by side as an MP4 where an encoder is installed, else a GIF; None if ``stop`` ended it."""
     robot, scale = study.scenario.robot, study.scenario.size
     links = [(name, simplified(mesh, 0.1 * scale)) for name, mesh in link_meshes(robot)]
     camera = _camera(study, scale)
@@ -121,11 +122,7 @@ def film(
         frames.append(Image.fromarray(np.concatenate(halves, axis=1)))
         if progress is not None:
             progress((k + 1) / len(times))
-    palette = frames[len(frames) // 2].quantize(128, method=Image.Quantize.FASTOCTREE)
-    reduced = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    between = max(40, round(1000 * end / len(times)))
-    reduced[0].save(file, save_all=True, append_images=reduced[1:], duration=between, loop=0, optimize=False)
-    return file
+    return save_film(frames, file, min(25.0, len(times) / max(end, 1e-9)), 128)
 
 
 def _camera(study: Study, scale: float) -> render.Camera:

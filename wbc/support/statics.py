@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from wbc.controller import Controller, core_of
-from wbc.controller.tick.buffers import INFINITE
+from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.errors import CommandError, SolverError
+from wbc.stack.layout import Slot
 from wbc.tasks._contact import ContactWrench, Unactuated
 from wbc.tasks.base import Constraint
 from wbc.tasks.wrench_sum import WrenchSum
@@ -63,6 +64,83 @@ class Statics:
     scale: Array
 
 
+class Rows:
+    """General rows of ticks that command torques.
+
+    Attributes:
+        place: of rows on forces: of the base, motors and wrenches; ``base``, ``torques``, ``names`` and ``sizes`` of
+            these are as in :class:`Statics`. held: of equalities on motions. scale: of all variables of the QP.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        core = core_of(controller)
+        if core.layout.command != "torque":
+            reason = f'this controller commands {core.layout.command}; compile the stack with command="torque"'
+            raise CommandError("controller", core.layout.command, reason)
+        self.core, self.layout, self.stack = core, core.layout, core.stack
+        held: list[int] = []
+        place, names, base, torques, sizes = [], [], [], [], []
+        self._rates: list[tuple[int, list[Slot]]] = []
+        for block in self.layout.of_form("margins", "rows"):
+            item = block.entry.item
+            assert isinstance(item, Constraint)
+            motors = type(item).torque_rows is not Constraint.torque_rows and not isinstance(item, Unactuated)
+            if not (motors or isinstance(item, (ContactWrench, WrenchSum, Unactuated))):
+                if block.form == "rows" and item.equality:
+                    held += range(block.start, block.start + len(block.rows))
+                    slots = [block.slots[name] for name in ("rate", "gain") if name in block.slots]
+                    self._rates.append((len(block.rows), slots if len(slots) == 2 else []))
+                continue
+            for k, row in enumerate(block.rows):
+                place.append(block.start + k)
+                names.append((block.entry.name, row.label, row.unit))
+                base.append(isinstance(item, Unactuated))
+                torques.append(motors)
+                sizes.append(row.scale(self.stack.length))
+        self.place, self.held = np.array(place, np.intp), np.array(held, np.intp)
+        self.names, self.sizes = tuple(names), np.array(sizes)
+        self.base, self.torques = np.array(base, bool), np.array(torques, bool)
+        self.scale = self.layout.dof_scales(self.stack)
+        self._tick: Assembly | None = None
+
+    @property
+    def returning(self) -> Array:
+        """What a held row off by e asks for at rest is -returning e [1/s^2]; 0 where it says nothing of places."""
+        p = self.core.assembly.p
+        parts = [
+            np.full(n, np.prod([float(p[s.span][0]) for s in slots]) if slots else 0.0) for n, slots in self._rates
+        ]
+        return np.concatenate([*parts, np.zeros(0)])
+
+    def at(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """A, lower and upper of all general rows of the QP in a state, with the values of inputs as they are at the
+        first call.
+
+        Raises:
+            SolverError: numbers that are not finite, such as values of inputs that nobody has set.
+        """
+        core = self.core
+        if core.waiting:
+            core.take_first(q)
+        if self._tick is None:
+            self._tick = core.assembly.twin()
+            self._tick.state[:] = core.assembly.state
+        tick = self._tick
+        tick.forget()
+        tick.q[:], tick.v_in[:], tick.use_v[0] = q, 0.0, 1.0
+        tick.v_in[: len(v)] = v
+        tick.check()
+        with np.errstate(all="ignore"):
+            qp = tick.qp()
+        ends = (
+            np.where(np.abs(x) >= INFINITE, np.copysign(np.inf, x), x) for x in (qp.lower[qp.n :], qp.upper[qp.n :])
+        )
+        lower, upper = ends
+        if not np.isfinite(qp.A).all() or np.isnan(lower).any() or np.isnan(upper).any():
+            raise SolverError("q", q, "the rows of this configuration are not finite")
+        return qp.A.copy(), lower, upper
+
+
 def statics(controller: Controller, q: Any) -> Statics:
     """The rows at a configuration.
 
@@ -70,41 +148,12 @@ def statics(controller: Controller, q: Any) -> Statics:
         CommandError: the controller does not command torques. ShapeError, NotFiniteError: q.
         SolverError: numbers that are not finite, such as values of inputs that nobody has set.
     """
-    core = core_of(controller)
-    if core.layout.command != "torque":
-        reason = f'this controller commands {core.layout.command}; compile the stack with command="torque"'
-        raise CommandError("controller", core.layout.command, reason)
-    layout, stack, robot = core.layout, core.stack, core.stack.robot
-    configuration = robot.configuration("q", q)
-    if core.waiting:
-        core.take_first(configuration)
-    tick = core.assembly.twin()
-    tick.state[:] = core.assembly.state
-    tick.forget()
-    tick.q[:], tick.v_in[:], tick.use_v[0] = configuration, 0.0, 1.0
-    tick.check()
-    with np.errstate(all="ignore"):
-        qp = tick.qp()
-    place, names, base, torques, sizes = [], [], [], [], []
-    for block in layout.of_form("margins", "rows"):
-        item = block.entry.item
-        assert isinstance(item, Constraint)
-        motors = type(item).torque_rows is not Constraint.torque_rows and not isinstance(item, Unactuated)
-        if not (motors or isinstance(item, (ContactWrench, WrenchSum, Unactuated))):
-            continue
-        for k, row in enumerate(block.rows):
-            place.append(block.start + k)
-            names.append((block.entry.name, row.label, row.unit))
-            base.append(isinstance(item, Unactuated))
-            torques.append(motors)
-            sizes.append(row.scale(stack.length))
-    nv, rows = layout.nv, np.array(place, dtype=np.intp)
-    A, lower, upper = qp.A[rows, nv:], qp.lower[qp.n + rows], qp.upper[qp.n + rows]
-    if not np.isfinite(A).all() or np.isnan(lower).any() or np.isnan(upper).any():
-        raise SolverError("q", q, "the rows of this configuration are not finite")
-    scale = layout.dof_scales(stack)[nv : nv + A.shape[1]]
-    lower, upper = (np.where(np.abs(side) >= INFINITE, np.copysign(np.inf, side), side) for side in (lower, upper))
-    return Statics(A, lower, upper, np.array(sizes), np.array(base, bool), np.array(torques, bool), tuple(names), scale)
+    rows = Rows(controller)
+    robot = rows.stack.robot
+    A, lower, upper = rows.at(robot.configuration("q", q), np.zeros(robot.nv))
+    at, nv = rows.place, robot.nv
+    scale = rows.scale[nv : A.shape[1]]
+    return Statics(A[at, nv:], lower[at], upper[at], rows.sizes, rows.base, rows.torques, rows.names, scale)
 
 
 def lacking(controller: Controller, q: Any) -> tuple[Lacking, ...]:
@@ -123,6 +172,11 @@ def lacking(controller: Controller, q: Any) -> tuple[Lacking, ...]:
         CommandError, ShapeError, NotFiniteError, SolverError: see :func:`statics`.
     """
     found = statics(controller, q)
+    return least_lack(found, q)
+
+
+def least_lack(found: Statics, q: Any) -> tuple[Lacking, ...]:
+    """See :func:`lacking`, of any rows."""
     count, rows = found.A.shape[1], len(found.lower)
     wide = found.A * found.scale / found.sizes[:, None]
     price = np.concatenate([np.zeros(count), np.where(found.base, BASE_PRICE, 1.0)])

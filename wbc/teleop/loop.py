@@ -27,7 +27,7 @@ class SessionLog:
 
     Attributes:
         time [s]. q: configurations before each tick. seen: what the operator was shown. late: ticks that began more
-        than a period behind the clock. interrupted: ended by Ctrl-C.
+        than a period behind the clock. interrupted: ended by Ctrl-C. cost: processor time of each tick [s].
     """
 
     time: list[float] = field(default_factory=list)
@@ -35,6 +35,7 @@ class SessionLog:
     seen: list[Seen] = field(default_factory=list)
     late: int = 0
     interrupted: bool = False
+    cost: list[float] = field(default_factory=list)
 
     @property
     def v(self) -> list[Array]:
@@ -56,16 +57,17 @@ class SessionLog:
         """Parts of the command that were lost, see :class:`Seen`."""
         return [one.lost for one in self.seen]
 
-    def add(self, time: float, q: Array, seen: Seen) -> None:
+    def add(self, time: float, q: Array, seen: Seen, cost: float = 0.0) -> None:
         """One tick."""
         self.time.append(time)
         self.q.append(q)
         self.seen.append(seen)
+        self.cost.append(cost)
 
     def trim(self) -> None:
         """Leave out a tick that an interrupt has cut in two."""
-        count = min(len(self.time), len(self.q), len(self.seen))
-        for some in (self.time, self.q, self.seen):
+        count = min(len(self.time), len(self.q), len(self.seen), len(self.cost))
+        for some in (self.time, self.q, self.seen, self.cost):
             del some[count:]
 
     def write(self, path: str | os.PathLike[str], names: tuple[str, ...]) -> pathlib.Path:
@@ -169,8 +171,9 @@ def _run(
             order = source.order(now, session.names, session.control.active, session.units)
         except StopIteration:
             return
+        before = time.thread_time()
         seen = session.step(q, order)
-        log.add(now, q, seen)
+        log.add(now, q, seen, time.thread_time() - before)
         if progress is not None:
             validation.called("progress", progress, now, seen)
         q = connection.drive(seen.step.v).q

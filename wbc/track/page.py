@@ -23,7 +23,7 @@ body{font:15px/1.45 system-ui,"DejaVu Sans",sans-serif;color:#1d2733;max-width:9
 h1{font-size:24px;margin:0 0 4px}h2{font-size:17px;margin:30px 0 8px;border-bottom:1px solid #dde2e8;padding-bottom:3px}
 table{border-collapse:collapse}th{color:#66727f;font-weight:500}
 td,th{padding:3px 14px 3px 0;text-align:left;vertical-align:top}
-img{max-width:100%}svg text{font:11px system-ui,"DejaVu Sans",sans-serif;fill:#1d2733}.lead{color:#66727f}
+img,video{max-width:100%}svg text{font:11px system-ui,"DejaVu Sans",sans-serif;fill:#1d2733}.lead{color:#66727f}
 p.kept::before{content:"kept";background:#d8f0df}p.missed::before{content:"not kept";background:#f8d3cd}
 p.kept::before,p.missed::before{border-radius:8px;padding:1px 8px;margin-right:8px}
 pre{background:#f6f8fa;padding:10px;overflow-x:auto;font-size:13px}
@@ -59,7 +59,8 @@ class RunPage:
 
     def table(self, rows: Iterable[tuple[str, str]]) -> None:
         """Names and what belongs to them."""
-        lines = [f"<tr><th>{_text(a)}</th><td>{_text(b)}</td></tr>" for a, b in rows]
+        cells = [(_text(a), _text(b).replace("\n", "<br>")) for a, b in rows]
+        lines = [f"<tr><th>{a}</th><td>{b}</td></tr>" for a, b in cells]
         self._parts.append(f"<table>{''.join(lines)}</table>")
 
     def figures(self, figures: Sequence[Figure]) -> None:
@@ -76,15 +77,19 @@ class RunPage:
             self._parts.append(f"<ul>{items}</ul>")
 
     def picture(self, file: pathlib.Path, label: str = "") -> None:
-        """A PNG, JPEG or GIF, kept in the page; one that is not there, or is large, is left out or linked."""
+        """A PNG, JPEG, GIF or MP4, kept in the page; one that is not there, or is large, is left out or linked."""
         if not file.is_file():
             return
         content, name = file.read_bytes(), _text(label or file.stem.replace("_", " "))
         if len(content) > LARGEST:
             self._parts.append(f'<p><a href="{_text(file.name)}">{name}</a></p>')
             return
-        kind = {".gif": "gif", ".jpg": "jpeg"}.get(file.suffix, "png")
         data = base64.b64encode(content).decode()
+        if file.suffix == ".mp4":
+            source = f'src="data:video/mp4;base64,{data}"'
+            self._parts.append(f'<p><video title="{name}" controls loop muted autoplay {source}></video></p>')
+            return
+        kind = {".gif": "gif", ".jpg": "jpeg"}.get(file.suffix, "png")
         self._parts.append(f'<p><img alt="{name}" src="data:image/{kind};base64,{data}"></p>')
 
     def histogram(self, values: Array, unit: str) -> None:

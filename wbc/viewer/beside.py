@@ -19,9 +19,10 @@ from wbc.controller.step import state_of
 from wbc.errors import WbcError
 from wbc.viewer import messages
 from wbc.viewer.errors import ViewerError
-from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, LoopEnd
+from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, LoopEnd
 from wbc.viewer.local import LOOPBACK, require_local
 from wbc.viewer.operation import Operation
+from wbc.viewer.scenery import Scenery
 
 log = logging.getLogger("wbc")
 
@@ -39,14 +40,22 @@ class Viewer:
     """
 
     def __init__(
-        self, controller: Controller, host: str, port: int, token: str | None, silence: float, zeromq: str
+        self,
+        controller: Controller,
+        host: str,
+        port: int,
+        token: str | None,
+        silence: float,
+        zeromq: str,
+        operation: Operation | None = None,
+        scenery: Scenery | None = None,
     ) -> None:
         core = core_of(controller)
-        self.operation = Operation(controller)
+        self.operation = Operation(controller) if operation is None else operation
         self._dt, self._time = controller.stack.dt, 0.0
         size = 8 * core.context.memory.state
         self._link = LoopEnd(size)
-        self._said, self._silence = "", silence
+        self._said, self._silence = 0, silence
         order = {
             "stack": _pickled(controller),
             "solver": controller.solver,
@@ -58,6 +67,7 @@ class Viewer:
             "token": token,
             "silence": silence,
             "zeromq": zeromq,
+            "scenery": scenery,
         }
         command = [sys.executable, "-m", "wbc.viewer.process"]
         # Output of the process that is no answer goes where this one's errors go
@@ -104,10 +114,12 @@ class Viewer:
             operation.stop(UNHEARD_TEXT)
         if operation.moving:
             operation.advance(self._dt)
-        if operation.stopped != self._said:
-            self._said = operation.stopped
-            unheard = UNHEARD if self._said == UNHEARD_TEXT else 0
-            self._link.put_flags(STOPPED | unheard if self._said else 0)
+        flags = (STOPPED | (UNHEARD if operation.stopped == UNHEARD_TEXT else 0)) if operation.stopped else 0
+        if operation.waiting:
+            flags |= WAITS
+        if flags != self._said:
+            self._said = flags
+            self._link.put_flags(flags)
 
     @property
     def running(self) -> bool:
@@ -156,6 +168,8 @@ def show(
     token: str | None = None,
     silence: float = SILENT,
     zeromq: str = "",
+    operation: Operation | None = None,
+    scenery: Scenery | None = None,
 ) -> Viewer:
     """Show a controller that a loop steps, and let it be driven from a browser.
 
@@ -174,6 +188,8 @@ def show(
         open_browser: open the page; False: ``viewer.url`` says where it is.
         token: what a client must know; made anew where ``host`` is not this machine alone and none is given.
 
+        operation: what obeys the page, in place of an :class:`Operation` on the controller.
+        scenery: what stands around the robot.
         zeromq: address to take the same messages at, such as ``tcp://127.0.0.1:5555``; "" for none.
         silence: while somebody has control, the robot stops where their page, or the viewer, is silent for so long [s].
 
@@ -187,7 +203,7 @@ def show(
     number = validation.integer("port", port, 0, 65535)
     if zeromq:
         require_local(zeromq)
-    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq)
+    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq, operation, scenery)
     if open_browser:
         webbrowser.open(viewer.url)
     return viewer

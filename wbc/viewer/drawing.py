@@ -14,9 +14,11 @@ from wbc.controller import Controller, core_of
 from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
+from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
 from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh, wxyz
+from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
 if TYPE_CHECKING:
@@ -29,6 +31,9 @@ NEAR, TIGHT = 0.25, 0.03
 #: Points of the path of a hand, and how far apart they are [m]
 TRAIL, APART = 300, 0.004
 GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
+PURPLE, GREY = (130, 60, 170), (150, 158, 168)
+#: What is drawn only where it is asked for: the camera goes along, how far a hand can be
+DEMANDED = ("follow", "reach")
 #: Lengths of the arrows at a target, as part of the robot's; an obstacle's are shorter
 GIZMO = 0.24
 FLOOR = (226, 231, 236)
@@ -39,6 +44,8 @@ SKY, HORIZON = (188, 205, 222), (238, 242, 246)
 FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.76, 1.35
 #: In place of a quaternion for what has none
 EMPTY = np.zeros(0)
+#: What is told of a click at a hold: its id, number of viser's client
+Picked = Callable[[str, int | None], None]
 #: What is told of a drag: item, value, pose in the world, phase, number of viser's client
 Dragged = Callable[[str, str, pin.SE3, str, int | None], None]
 
@@ -52,7 +59,14 @@ class Drawing:
     """
 
     def __init__(
-        self, scene: viser.SceneApi, controller: Controller, dragged: Dragged | None = None, detail: float = DETAIL
+        self,
+        scene: viser.SceneApi,
+        controller: Controller,
+        dragged: Dragged | None = None,
+        detail: float = DETAIL,
+        *,
+        scenery: Scenery | None = None,
+        picked: Picked | None = None,
     ) -> None:
         self._scene, self._dragged = scene, dragged
         self._controller, self._stack = controller, controller.stack
@@ -63,7 +77,11 @@ class Drawing:
         self._held: set[str] = set()
         self._floor = False
         self._trails: dict[str, list[Array]] = {}
-        scene.set_up_direction("+z")
+        self._demanded = set[str]()
+        self._middle: Array | None = None
+        self._weight = float(pin.computeTotalMass(robot.model)) * NOMINAL
+        self._scenery = scenery
+        scene.set_up_direction("+z" if scenery is None else scenery.up)
         _light(scene)
         self._links = robot_meshes(robot, detail)
         for link, mesh in self._links.items():
@@ -80,12 +98,15 @@ class Drawing:
                 self._targets[name] = "target"
         self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
         self._add_gizmos()
+        if scenery is not None:
+            self._add_scenery(scenery, picked)
 
     def show(self, tick: Tick) -> None:
         """Draw a tick."""
-        if not self._floor:
+        if not self._floor and self._scenery is None:
             self._floor = True
             self._add_floor(tick)
+        self._mark_holds(tick)
         for link in self._links:
             self._place(f"/robot/{link}", tick.pose(link))
         for name in self._obstacles:
@@ -102,6 +123,77 @@ class Drawing:
         self._trail(tick)
         self._planes(tick)
         self._balance(tick)
+        self._lines("/lines/forces", *self._forces(tick))
+        self._lines("/lines/reach", *self._reach(tick))
+
+    def demand(self, what: str, on: bool) -> None:
+        """Draw one of :data:`DEMANDED` from now on, or no longer."""
+        (self._demanded.add if on else self._demanded.discard)(what)
+        self._middle = None
+
+    def follow(self, server: viser.ViserServer, tick: Tick) -> None:
+        """Where that is asked for, cameras go with the robot's root and first target."""
+        if "follow" not in self._demanded:
+            return
+        frame, _ = hand_of(self._controller)
+        middle = np.array(tick.pose(frame or self._robot.frame_names[1]).translation)
+        if self._middle is not None and np.linalg.norm(off := middle - self._middle) > 1e-3:
+            for client in server.get_clients().values():
+                client.camera.position = client.camera.position + off
+                client.camera.look_at = client.camera.look_at + off
+            self._middle = middle
+        elif self._middle is None:
+            self._middle = middle
+
+    def _forces(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """An arrow from each contact along its force, half the robot's size for its weight on earth."""
+        lines: list[Array] = []
+        if not core_of(self._controller).layout.forces:
+            return lines, []
+        scale = 0.5 * self._size / max(self._weight, 1e-3)
+        for name, wrench in tick.step.forces.items():
+            item = self._stack[name].item
+            assert isinstance(item, Contact)
+            pose, force = tick.pose(item.frame), np.zeros(6)
+            force[list(item.axes)] = wrench
+            tip = scale * pose.rotation @ force[:3]
+            length = float(np.linalg.norm(tip))
+            if length < 1e-3 * self._size:
+                continue
+            aside = np.cross(tip, [0.0, 0.0, 1.0] if abs(tip[2]) < 0.9 * length else [1.0, 0.0, 0.0])
+            aside *= 0.08 * length / np.linalg.norm(aside)
+            end = pose.translation + tip
+            back = end - 0.2 * tip
+            lines += [np.array(pair) for pair in ((pose.translation, end), (end, back + aside), (end, back - aside))]
+        return lines, [PURPLE] * len(lines)
+
+    def _reach(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
+        """Three great circles: beyond them the first hand of an arm cannot be, whatever its joints do."""
+        frame, _ = hand_of(self._controller)
+        if "reach" not in self._demanded or not frame:
+            return [], []
+        model = self._robot.model
+        joint = int(model.frames[model.getFrameId(frame)].parentJoint)
+        chain = [k for k in model.supports[joint] if k and model.joints[k].nv == 1]
+        if not chain:
+            return [], []
+        # Between joints the distance is fixed, of a prismatic one up to its limit
+        length = float(np.linalg.norm(model.frames[model.getFrameId(frame)].placement.translation))
+        for k in chain[1:]:
+            length += float(np.linalg.norm(model.jointPlacements[k].translation))
+        for k in chain:
+            if "P" in model.joints[k].shortname():
+                place = model.joints[k].idx_q
+                length += float(max(abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])))
+        if not np.isfinite(length):
+            return [], []
+        center = np.array(tick.joint(chain[0]).translation)
+        angles = np.linspace(0.0, 2.0 * np.pi, 65)
+        ring, lines = length * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1), list[Array]()
+        for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0]):
+            points = center + ring[:, order]
+            lines += [np.array(pair) for pair in itertools.pairwise(points)]
+        return lines, [GREY] * len(lines)
 
     def _add_floor(self, tick: Tick) -> None:
         """A floor under the robot where it begins."""
@@ -123,6 +215,48 @@ class Drawing:
             plane_opacity=1.0,
             position=(0.0, 0.0, ground),
         )
+
+    # What stands around
+
+    def _add_scenery(self, scenery: Scenery, picked: Picked | None) -> None:
+        for k, mesh in enumerate(scenery.surfaces):
+            self._add_mesh(f"/scenery/{k}", mesh)
+        self._add_mesh("/holds/all", scenery.studs)
+        if picked is not None:
+
+            async def clicked(event: Any) -> None:
+                hold = scenery.hit(np.array(event.ray_origin), np.array(event.ray_direction))
+                if hold is not None:
+                    picked(hold, event.client_id)
+
+            # A click beside a stud is one on the surface, and means the hold next to it
+            for node in ("/holds/all", *(f"/scenery/{k}" for k in range(len(scenery.surfaces)))):
+                self._nodes[node].on_click(clicked)
+
+    def mark_goal(self, hold: str) -> None:
+        """The hold that was clicked."""
+        assert self._scenery is not None
+        self._mark("/holds/goal", self._scenery.places[self._scenery.holds.index(hold)], GREEN)
+
+    def _mark_holds(self, tick: Tick) -> None:
+        """A ball on every hold that a hand has."""
+        if self._scenery is None:
+            return
+        held = set()
+        for name, block in core_of(self._controller).layout.blocks.items():
+            item = block.entry.item
+            if isinstance(item, Hold) and tick.is_on(block) and (pose := tick.world_pose(name, "target")) is not None:
+                node = f"/holds/of {item.frame}"
+                held.add(node)
+                self._mark(node, self._scenery.places[self._scenery.nearest(pose.translation)], AMBER)
+        for node in (n for n in self._nodes if n.startswith("/holds/of ")):
+            if bool(self._nodes[node].visible) != (node in held):
+                self._nodes[node].visible = node in held
+
+    def _mark(self, node: str, place: Array, colour: Colour) -> None:
+        if node not in self._nodes:
+            self._nodes[node] = self._scene.add_icosphere(node, 0.05 * self._size, color=colour)
+        self._place(node, pin.SE3(np.eye(3), np.array(place, dtype=float)))
 
     # What can be dragged
 
@@ -276,7 +410,9 @@ class Drawing:
         if not any(isinstance(item, CenterOfMass) for item in items):
             return
         center = tick.center_of_mass()
-        feet = [tick.pose(item.frame).translation for item in items if isinstance(item, Hold)]
+        feet = [tick.pose(item.frame).translation for item in items if isinstance(item, Hold | Contact)]
+        around = np.mean(feet, axis=0) if feet else np.zeros(3)
+        feet.sort(key=lambda foot: float(np.arctan2(foot[1] - around[1], foot[0] - around[0])))
         low = min((float(foot[2]) for foot in feet), default=self._lowest())
         below = np.array([center[0], center[1], low])
         if "/com" not in self._nodes:
@@ -314,6 +450,14 @@ class Drawing:
         return min(float(frame.translation[2]) for frame in data.oMf)
 
 
+def hand_of(controller: Controller) -> tuple[str, int]:
+    """(frame, rows) of the first end-effector task, ("", 0) where there is none."""
+    for entry in controller.stack.entries:
+        if isinstance(entry.item, EndEffector):
+            return entry.item.frame, 6 if entry.item.kind == "pose" else 3
+    return "", 0
+
+
 def is_place(declared: Input) -> bool:
     """A pose, or a point in metres: what a gizmo can stand for."""
     return declared.kind == "pose" or (declared.kind == "vector" and declared.size == 3 and declared.unit == "m")
@@ -324,11 +468,18 @@ def size(robot: Robot) -> float:
     return float(np.clip(robot.characteristic_length, 0.1, 30.0))
 
 
-def look(server: viser.ViserServer, controller: Controller, tick: Tick) -> None:
+def look(server: viser.ViserServer, controller: Controller, tick: Tick, scenery: Scenery | None = None) -> None:
     """Where a page's camera begins."""
     camera = server.initial_camera
-    camera.position, camera.look_at = viewpoint(controller, tick)
     camera.fov = float(FIELD)
+    if scenery is None:
+        camera.position, camera.look_at = viewpoint(controller, tick)
+        return
+    body = tick.pose(scenery.body)
+    away = body.rotation @ np.array([-0.75, 0.6, -1.0])
+    camera.position = body.translation + 2.6 * size(controller.stack.robot) * away
+    camera.look_at = np.array(body.translation)
+    camera.up = scenery.up
 
 
 def viewpoint(controller: Controller, tick: Tick) -> tuple[Array, Array]:

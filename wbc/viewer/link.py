@@ -27,6 +27,8 @@ STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, LOOP_ALIVE = range(6)
 SLOT_HEAD = 24
 #: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
 STOPPED, UNHEARD = 1, 2
+#: A hand is lifted when the operator says yes
+WAITS = 4
 UNHEARD_TEXT = "the viewer gave no sign of life"
 _LENGTH = struct.Struct("<I")
 #: Number of a state, and its time

@@ -4,6 +4,8 @@ A message is one JSON object with ``type``; ``wbc``: 1 is the format, and may be
 
     {"type": "set", "item": "hand", "values": {"target": [x, y, z, qx, qy, qz, qw], "weight": 2.0, "enabled": true}}
     {"type": "rate", "item": "hand", "rate": [vx, vy, vz, wx, wy, wz]}       m/s, rad/s, along the world's axes
+    {"type": "steer", "rates": [round, along, spin]}    parts of full speed, of a walk; {"type": "go", "hold": "3,4"}
+    {"type": "ask", "on": true}    {"type": "approve"}    every lift of a hand waits for a yes
     {"type": "stop"}    {"type": "resume"}    {"type": "operate"}    {"type": "release"}
 
 Poses are position [m] and quaternion x, y, z, w, rotations a quaternion, everything else the numbers of the input. A
@@ -31,9 +33,21 @@ OBEYED: dict[str, tuple[str, ...]] = {
     "resume": (),
     "operate": (),
     "release": (),
+    "steer": ("rates",),
+    "go": ("hold",),
+    "ask": ("on",),
+    "approve": (),
 }
+#: Those of them that only a walk obeys
+WALKED = ("steer", "go", "ask", "approve")
 #: Types between a client and its server alone
-SERVED: dict[str, tuple[str, ...]] = {"alive": (), "seek": ("time",), "play": ("speed",), "live": (), "follow": ("on",)}
+SERVED: dict[str, tuple[str, ...]] = {
+    "alive": (),
+    "seek": ("time",),
+    "play": ("speed",),
+    "live": (),
+    "show": ("what", "on"),
+}
 #: How long a rate is obeyed [s]
 RATE_LASTS = 0.25
 #: Longest message [bytes]

@@ -16,7 +16,7 @@ from wbc.controller.handles import TaskHandle
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
-from wbc.viewer.messages import RATE_LASTS, MessageError, value_of
+from wbc.viewer.messages import RATE_LASTS, WALKED, MessageError, value_of
 
 #: What is dragged and has a velocity goes to where it was dragged at this speed at most [m/s, rad/s]
 FASTEST = (1.0, 4.0)
@@ -42,7 +42,7 @@ class Operation:
     def __init__(self, controller: Controller) -> None:
         self._core = core_of(controller)
         self._command = self._core.layout.command
-        self.stopped, self.operated = "", False
+        self.stopped, self.operated, self.waiting = "", False, ""
         #: value of each task before a stop: (handle, name, value)
         self._kept: list[tuple[Handle, str, Any]] = []
         self._goals: dict[str, pin.SE3] = {}
@@ -66,9 +66,13 @@ class Operation:
             self._set(message["item"], message["values"])
         elif kind == "rate":
             self._rate(message["item"], message["rate"])
+        else:
+            raise MessageError("message.type", kind, "only a walk obeys it")
 
     def check(self, message: Mapping[str, Any]) -> None:
         """Raise what :meth:`obey` would raise for values, and change nothing."""
+        if message["type"] in WALKED:
+            raise MessageError("message.type", message["type"], "only a walk obeys it")
         if message["type"] in ("set", "rate"):
             handle = self._handle(message["item"])
             if message["type"] == "rate":

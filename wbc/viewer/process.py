@@ -20,7 +20,7 @@ from wbc.viewer.session import Session
 from wbc.viewer.zeromq import ZeroMqEnd
 
 #: Below the loop where cores are few
-NICE = 2
+NICE = 5
 
 
 def main() -> None:
@@ -35,7 +35,7 @@ def main() -> None:
         stack: Stack = pickle.loads(order["stack"])
         controller = stack.compile(solver=order["solver"], backend=order["backend"])
         link = ViewerEnd(order["file"], order["state"])
-        given = {name: order[name] for name in ("host", "port", "token", "silence")}
+        given = {name: order[name] for name in ("host", "port", "token", "silence", "scenery")}
         session = Session(controller, link, **given)
     except Exception as error:
         _say(answers, problem=f"{type(error).__name__}: {error}")

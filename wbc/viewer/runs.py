@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import io
 import pathlib
+import re
 import zipfile
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from wbc import record, validation
-from wbc.controller import Controller
+from wbc.controller import Controller, Stack
 from wbc.controller.step import state_of
 from wbc.record.recording import Recording
 from wbc.record.replaying import compiled
+from wbc.robot import Robot
+from wbc.tasks import EndEffector, Posture
+from wbc.validation import Array
 from wbc.viewer.beside import require_viser
 from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
@@ -80,7 +87,28 @@ def recording_in(folder: pathlib.Path) -> pathlib.Path | None:
     return found if found.is_file() and is_recording(found) else None
 
 
-def save_page(controller: Controller, states: Sequence[State], file: pathlib.Path) -> pathlib.Path:
+def save_motion(robot: Robot, times: Sequence[float], places: Sequence[Array], file: pathlib.Path) -> pathlib.Path:
+    """Write a motion of any robot as :func:`save_page` does: configurations ``places`` at ``times`` [s].
+
+    Raises:
+        ViewerError: as of :func:`save_page`. ShapeError, NotFiniteError, RotationError: no configurations.
+    """
+    stack = Stack(robot, dt=1.0 / PAGE_RATE)
+    for name, frame in robot.frames.items():
+        if name == "tip" or name.endswith("_hand"):
+            stack.add(EndEffector(frame), name=name)
+    stack.add(Posture(), name="posture")
+    controller, states, due = stack.compile(backend="vm"), list[State](), -np.inf
+    for time, q in zip(times, places, strict=True):
+        if time >= due - 1e-9:
+            # Its targets are where it is, so that nothing but the robot and the way of its hands is drawn
+            controller.reset(q)
+            states.append(State(len(states) + 1, time, state_of(controller.step(q))))
+            due = time + 1.0 / PAGE_RATE
+    return save_page(controller, states, file)
+
+
+def save_page(controller: Controller, states: Sequence[State], file: pathlib.Path, title: str = "") -> pathlib.Path:
     """Write states as one HTML file that plays in a browser, without a network or this package.
 
     Raises:
@@ -111,6 +139,8 @@ def save_page(controller: Controller, states: Sequence[State], file: pathlib.Pat
                 drawing.show(Tick(controller, state))
                 before = state.time
             text = str(serializer.as_html())
+            name = html.escape(title or f"{controller.stack.robot.name} – wbc replay")
+            text = re.sub("<title>.*?</title>", lambda _: f"<title>{name}</title>", text, count=1)
         finally:
             server.stop()
     try:

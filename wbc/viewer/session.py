@@ -9,24 +9,31 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Controller, core_of
 from wbc.errors import WbcError
 from wbc.tasks.base import Constraint
+from wbc.validation import Array
 from wbc.viewer import messages
-from wbc.viewer.drawing import Drawing, look
+from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
-from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, State, ViewerEnd
+from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
 from wbc.viewer.operation import Operation
 from wbc.viewer.reading import declared, sentences, told
+from wbc.viewer.scenery import Scenery, checked
+from wbc.viewer.self_motion import self_motion
 from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
 from wbc.viewer.timeline import Timeline
 
 #: States that are drawn and told a second, and explanations, at most
 RATE, EXPLAINED = 40.0, 25.0
+#: What a page can ask to be drawn
+SELF_MOTION = "self-motion"
+DRAWN = (*DEMANDED, SELF_MOTION)
 #: Between two signs of life for the loop [s]
 BEAT = 0.05
 
@@ -62,8 +69,8 @@ class Explainer(threading.Thread):
                 last = tick.state.data
             self.count += 1
             took = time.monotonic() - began
-            # The rest of the process has two thirds of its core at the least
-            time.sleep(max(1.0 / EXPLAINED - took, 0.5 * took))
+            # The rest of the process has a fifth of its core at the least
+            time.sleep(max(1.0 / EXPLAINED - took, 0.25 * took))
 
     def end(self) -> None:
         """Stop after the explanation that is under way."""
@@ -89,19 +96,24 @@ class Session:
         port: int = 0,
         token: str | None = None,
         silence: float = SILENT,
+        scenery: Scenery | None = None,
     ) -> None:
+        self._scenery = scenery
         self._controller, self._link = controller, link
         self._checker = Operation(controller)
         self._tick: Tick | None = None
         self._sending = threading.Lock()
         self.timeline = Timeline(states)
         self.ended = threading.Event()
-        self._stopped = ""
-        told_first = declared(controller) | {"live": link is not None, "silence": silence}
+        self._stopped, self._drawn = "", False
+        #: configurations that are shown in place of the robot's own
+        self._preview: list[Array] = []
+        told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
         # The scene after the address: a page that comes early waits for it
-        self._drawing = Drawing(self.server.scene, controller, None if link is None else self._dragged)
+        dragged = None if link is None or scenery is not None else self._dragged
+        self._drawing = Drawing(self.server.scene, controller, dragged, scenery=scenery, picked=self._picked)
         self._explainer = Explainer()
         if link is not None:
             # A page may operate before the first of the regular signs; the loop would take it for lost
@@ -131,7 +143,7 @@ class Session:
                 sentence_rate = (self._explainer.count - counted[1]) / (now - counted[0])
                 counted = now, self._explainer.count
             # What did not change is told twice a second, for who comes late
-            fresh = current is not None and (current.data != shown or now - quiet > 0.5)
+            fresh = current is not None and (current.data != shown or now - quiet > 0.5 or bool(self._preview))
             if current is not None and fresh:
                 shown, quiet = current.data, now
                 self._show(current, sentence_rate)
@@ -152,10 +164,15 @@ class Session:
     def _show(self, state: State, sentence_rate: float) -> None:
         tick = Tick(self._controller, state)
         if self._tick is None:
-            look(self.server.server, self._controller, tick)
+            look(self.server.server, self._controller, tick, self._scenery)
         self._tick = tick
+        if not self.server.watched and self._drawn:
+            # Who comes later is told where everything is by the next tick
+            return
+        self._drawn = True
         with self.server.server.atomic():
-            self._drawing.show(tick)
+            self._drawing.show(self._shown(tick))
+        self._drawing.follow(self.server.server, tick)
         # Not in a window of up to a sixtieth of a second
         self.server.server.flush()
         if not self.server.watched:
@@ -171,6 +188,8 @@ class Session:
             "explained": number,
             "sentence_rate": sentence_rate,
             "timeline": self.timeline.told(),
+            "previewed": bool(self._preview),
+            "waits": bool(self._link is not None and self._link.flags & WAITS),
         }
         self.server.publish(told(self._controller, tick) | extra)
 
@@ -191,10 +210,35 @@ class Session:
             self.timeline.play(validation.scalar("play.speed", message["speed"], low=0.0, high=100.0))
         elif kind == "live":
             self.timeline.back()
+        elif kind == "show":
+            self._draw(
+                validation.one_of("show.what", message["what"], DRAWN), validation.flag("show.on", message["on"])
+            )
         else:
             if kind == "stop":
                 self._stopped = str(message.get("reason", "by hand"))
             self._send(message)
+
+    def _draw(self, what: str, on: bool) -> None:
+        """What is drawn on demand."""
+        tick = self._tick
+        if what != SELF_MOTION:
+            self._drawing.demand(what, on)
+            return
+        self._preview = []
+        if on and tick is not None:
+            frame, rows = hand_of(self._controller)
+            self._preview = self_motion(tick.robot, frame, tick.q, rows) if frame else []
+            if not self._preview:
+                raise ViewerError("show", what, "no joint can move while the hand stays")
+
+    def _shown(self, tick: Tick) -> Tick:
+        """The tick, or instead of it the next picture of a self-motion."""
+        if not self._preview:
+            return tick
+        numbers = np.frombuffer(tick.state.data).copy()
+        numbers[core_of(self._controller).context.memory["q"]] = self._preview.pop(0)
+        return Tick(self._controller, tick.state._replace(data=numbers.tobytes()))
 
     def _send(self, message: dict[str, Any]) -> None:
         """On to the loop.
@@ -204,7 +248,10 @@ class Session:
         """
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
-        self._checker.check(message)
+        if self._scenery is None:
+            self._checker.check(message)
+        else:
+            checked(message, self._scenery.holds)
         if message["type"] in ("set", "rate") and self._link.flags & STOPPED:
             block = core_of(self._controller).layout.blocks[message["item"]]
             if not isinstance(block.entry.item, Constraint):
@@ -228,6 +275,15 @@ class Session:
             self._send({"type": "set", "item": item, "values": {value: sent}})
         except WbcError as error:
             if phase == "end":
+                self.server.tell_all({"type": "refused", "reason": str(error)})
+
+    def _picked(self, hold: str, client: int | None) -> None:
+        """A hold was clicked by one of viser's clients."""
+        if self.server.operates(client):
+            try:
+                self._send({"type": "go", "hold": hold})
+                self._drawing.mark_goal(hold)
+            except WbcError as error:
                 self.server.tell_all({"type": "refused", "reason": str(error)})
 
     def _operator_lost(self) -> None:

@@ -44,6 +44,10 @@ class Tick:
             return pin.SE3.Identity()
         return self._data.oMf[self.robot.model.getFrameId(frame)]
 
+    def joint(self, number: int) -> pin.SE3:
+        """A joint's place in the world, by its number in the model."""
+        return self._data.oMi[number]
+
     def center_of_mass(self) -> Array:
         """In the world [3]."""
         return np.asarray(pin.centerOfMass(self.robot.model, self.robot.model.createData(), self.q))

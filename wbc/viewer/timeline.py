@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from wbc.viewer.link import State
 
 #: Memory for the past of a live loop [bytes], and the time between states that are kept [s]
-MOST, BETWEEN = 48 << 20, 1 / 30
+MOST, BETWEEN = 24 << 20, 1 / 30
 
 
 class Timeline:

@@ -110,6 +110,11 @@ class Assembly(Buffers, ABC):
     def qp(self) -> QP:
         """The QP at the buffers' values, before any relaxation: of the first level, where there are several."""
 
+    def quadratic(self) -> tuple[Array, Array]:
+        """(H, g) of :meth:`qp` until the next call; only the upper triangle of H counts."""
+        qp = self.qp()
+        return qp.H, qp.g
+
     @abstractmethod
     def task_rows(self) -> TaskRows:
         """Rows of all levels in the last QP.

@@ -148,11 +148,22 @@ class NativeTick(Assembly):
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
         return low, high
 
+    def quadratic(self) -> tuple[Array, Array]:
+        self.assemble()
+        nv = self._layout.variables
+        return self._H[:, :nv], self._g[:nv]
+
+    @functools.cached_property
+    def _upper(self) -> np.ndarray:
+        """Which entries of H the library writes."""
+        nv = self._layout.variables
+        return np.tri(nv, dtype=bool).T
+
     def qp(self) -> QP:
         self.assemble()
         nv = self._layout.variables
-        upper = np.triu(self._H[:, :nv])
-        H = upper + np.triu(upper, 1).T
+        above = self._H[:, :nv]
+        H = np.where(self._upper, above, above.T)
         low, high = self._low.copy(), self._high.copy()
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
         return QP(H, self._g[:nv].copy(), low, high, self._A.copy(), self._give.copy())

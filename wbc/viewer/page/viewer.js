@@ -75,7 +75,9 @@ function build() {
     } else $("constraints").append(row);
     rows[item.name] = entry;
   }
-  $("driving").hidden = !$("driven").length;
+  $("driving").hidden = !$("driven").length || hello.walk;
+  $("walking").hidden = !hello.walk;
+  if (hello.walk) $("stick").hidden = false;
   who();
   const auto = hello.live && firstControl && operator === "" && !query.has("watch");
   if (auto) { firstControl = false; send({ type: "operate" }); }
@@ -112,8 +114,10 @@ function dial(item, target, entry) {
 function show() {
   const stopped = state.stopped || "";
   if (stopped) pill(`stopped: ${stopped}${state.speed > 1e-4 ? ", braking" : ""}`, "stopped");
+  else if (state.previewed) pill("self-motion is shown, not commanded", "relaxed");
   else pill(state.ended ? "the loop has ended" : state.status, state.ended ? "gone" : state.status);
   $("resume").hidden = !stopped;
+  $("approve").hidden = !state.waits;
   const now = performance.now();
   if (now - seen.since > 1000) { seen.rate = (1e3 * seen.states) / (now - seen.since); seen.states = 0; seen.since = now; }
   $("rates").textContent = `${seen.rate.toFixed(0)} states/s${state.sentence_rate ? `, sentence ${state.sentence_rate.toFixed(0)}/s` : ""}`;
@@ -154,6 +158,10 @@ $("slider").oninput = () => { dragging.add($("slider")); send({ type: "seek", ti
 $("slider").onchange = () => setTimeout(() => dragging.delete($("slider")), 200);
 $("play").onclick = () => send({ type: "play", speed: state.timeline.playing ? 0 : Number($("speed").value) });
 $("speed").onchange = () => send({ type: "play", speed: Number($("speed").value) });
+for (const what of ["reach", "follow"]) $(what).onchange = () => send({ type: "show", what, on: $(what).checked });
+$("selfmotion").onclick = () => send({ type: "show", what: "self-motion", on: !state.previewed });
+$("ask").onchange = () => send({ type: "ask", on: $("ask").checked });
+$("approve").onclick = () => send({ type: "approve" });
 $("live").onclick = () => send({ type: "live" });
 $("showstick").onchange = () => { $("stick").hidden = !$("showstick").checked; };
 
@@ -198,6 +206,7 @@ setInterval(() => {
   const any = move.some((x) => x) || turn;
   if (!any && !rating) return;
   rating = !!any;
+  if (hello.walk) { const most = (x) => Math.max(-1, Math.min(1, x)); send({ type: "steer", rates: [most(-move[1]), most(move[0]), most(-turn)] }); return; }
   const name = $("driven").value, item = hello.items.find((i) => i.name === name);
   if (!item) return;
   const target = item.inputs.find((i) => i.name === "target");

@@ -1,7 +1,8 @@
 """Clearances as a proof: bodies over the whole motion between ticks, by :mod:`wbc.clearance`.
 
 A hand may be nearer than the clearance to what a hold is mounted on from where it comes near to that hold, on which the
-log has it then, to where it is no longer near, and no deeper in it than a stated depth beyond its own roundness.
+log has it then, to where it is no longer near, and no deeper in it than a stated depth beyond its own roundness. A hold
+that vanishes while a hand comes to it counts as the hand's until the hand comes no nearer: no hand stops at once.
 """
 
 from __future__ import annotations
@@ -123,8 +124,9 @@ def _exemptions(
                 continue
             point = log.hold_pose[int(rows[start]), :3]
             # From where the hand came near to where it is no longer
-            far = np.flatnonzero(np.linalg.norm(places[:, arm] - point, axis=1) > rules.exempt_distance)
-            came, went = far[far < start], far[far > end]
+            gaps = np.linalg.norm(places[:, arm] - point, axis=1)
+            far = np.flatnonzero(gaps > rules.exempt_distance)
+            came, went = far[far < start], far[far > _left(log, int(rows[start]), int(end), gaps)]
             since = float(log.t[came[-1]] if len(came) else log.t[0])
             until = float(log.t[went[0]] if len(went) else log.t[-1])
             mounts = _mounts(structure, point)
@@ -132,6 +134,16 @@ def _exemptions(
                 depth = rules.exempt_depth + float(getattr(body.shape, "radius", 0.0))
                 for mount in mounts:
                     yield Exemption(body.name, mount, point, rules.exempt_distance, depth, since, until)
+
+
+def _left(log: WalkLog, hold: int, end: int, gaps: Array) -> int:
+    """The last row in which a hold is the one that a hand goes to, which the log has it at up to the row ``end``: of a
+    hold that vanishes then the one in which the hand, whose distances [m] are given, comes no nearer.
+    """
+    if end + 1 >= len(log) or log.present(hold, log.t[end + 1]):
+        return end
+    farther = np.flatnonzero(np.diff(gaps[end:]) >= 0.0)
+    return end + int(farther[0]) if len(farther) else len(log) - 1
 
 
 def _places(log: WalkLog, urdf: Urdf) -> Array:

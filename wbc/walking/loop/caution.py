@@ -11,7 +11,7 @@ import numpy as np
 from wbc.clearance import Nearest
 from wbc.validation import Array
 from wbc.walking.loop.foresight import STEP, Foresight, Timing
-from wbc.walking.loop.hand_pace import HAND_RAMP
+from wbc.walking.loop.hand_pace import ramp_of
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.state import Swinging
@@ -127,19 +127,19 @@ class Caution:
         law, latch = swinging.law, swinging.latch if swinging.state == "opening" else 0.0
         u, clock, pace, hand, t = self._progress.path_time, swinging.clock, course.pace, swinging.pace, 0.0
         closing = self._machine.walker.tolerances.latch_time + SETTLE
-        rows = [(0.0, u, clock)]
+        rows, most, ramp = [(0.0, u, clock)], swinging.most, ramp_of(swinging)
         while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
             left = law.duration - clock
-            needed, until = latch + left + closing, max(course.end - u, 0.0)
+            needed, until = latch + left / most + closing, max(course.end - u, 0.0)
             wanted = 0.0 if course.stands else min(1.0, until / needed, course.most(u))
             pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
             wait = course.due - u - wanted * left
-            aim = 1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0
+            aim = min(1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0, most)
             u, t = min(u + pace * STEP, course.end), t + STEP
             if latch > 1e-9:
                 latch -= STEP
             else:
-                hand += min(max(aim - hand, -STEP / HAND_RAMP), STEP / HAND_RAMP)
+                hand += min(max(aim - hand, -STEP / ramp), STEP / ramp)
                 clock = min(clock + hand * STEP, law.duration)
             rows.append((t, u, clock))
             if len(rows) > 4 * (law.duration + 2.0) / STEP:

@@ -25,8 +25,8 @@ LANDING, TURNED = 0.97, 0.5
 SURE = 0.7
 #: A hand closes on a compliant hold when it leans by less than this part of what it may
 CLOSING_TILT = 0.5
-#: The pace of a hand changes from nothing to all in [s]
-HAND_RAMP = 0.2
+#: The pace of a hand changes from nothing to all in [s]; after a pause, which may be where its law is fastest, in
+HAND_RAMP, RAMP_AGAIN = 0.2, 0.5
 #: After an abort it goes to nothing in [s]: joints at their rates need 0.25 s
 HAND_STOP = 0.3
 
@@ -52,6 +52,11 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
     if wait > 0.0:
         wanted /= 1.0 + 4.0 * wait
     return 0.0 if aim.blend > LANDING and not turned else wanted
+
+
+def ramp_of(swinging: Swinging) -> float:
+    """Time in which its pace changes from nothing to all [s]."""
+    return RAMP_AGAIN if swinging.paused else HAND_RAMP
 
 
 def at_rest(

@@ -12,7 +12,7 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
-from wbc.walking.loop.hand_pace import HAND_RAMP, LANDING, at_rest, hand_pace, turned
+from wbc.walking.loop.hand_pace import LANDING, at_rest, hand_pace, ramp_of, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
 from wbc.walking.loop.stack import WalkStack
@@ -94,9 +94,9 @@ class ArmLeader:
             swinging.open_on(self._dt)
         elif swinging.state == "open":
             far = dist(swinging.place, machine.structure.positions[swinging.hold])
-            wanted = hand_pace(swinging, swinging.place, at_branch, early, pace, far)
+            wanted = min(hand_pace(swinging, swinging.place, at_branch, early, pace, far), swinging.most)
             stops = aborted or swinging.dropped or swinging.pauses
-            wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / HAND_RAMP)
+            wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / ramp_of(swinging))
             swinging.pace += min(max(wanted - swinging.pace, -change), change)
             swinging.clock = min(swinging.clock + swinging.pace * self._dt, swinging.law.duration)
         grip = progress.grip[arm]

@@ -18,6 +18,10 @@ Wrist = tuple[float, float, float]
 What = Literal["lift", "land", "failed", "vanished", "replanned", "refused"]
 
 
+#: Pace of a hand after a pause; its accelerations are as the square of it
+AFTER_PAUSE = 0.75
+
+
 class Manual(NamedTuple):
     """A hand that is moved by hand commands and not by the plan: its arm's row, its state, its hold's row or -1."""
 
@@ -79,6 +83,13 @@ class Swinging:
 
     def __post_init__(self) -> None:
         self.aim = self.law.at(self.clock)
+
+    @property
+    def most(self) -> float:
+        """The pace that it may have: a hand that goes on from a pause speeds up, and the body with it, on a law that
+        was made for joints near their accelerations, so it leaves them some.
+        """
+        return AFTER_PAUSE if self.paused else 1.0
 
     def open_on(self, dt: float) -> None:
         """The latch of an opening hand goes on for a tick [s]; when it is through, the hand is open."""

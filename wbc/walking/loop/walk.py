@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wbc.clearance import Nearest
+from wbc.controller import Step
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.validation import Array
@@ -64,6 +65,7 @@ class Walk:
         opens: row of an arm that was opening at the beginning, and of its hold; None: none was.
         approve: asked before every lift; the body waits at the lift until it says yes. None: nobody is asked.
         limit: path time that the body does not pass, and how many re-grasps of the plan may be lifted; None: all of it.
+        step: of the last tick.
 
     Raises:
         ShapeError: a plan that was read from a file, without its grips, or of another machine; no plant, or one of
@@ -102,6 +104,7 @@ class Walk:
         self.halted = self.aborted = self._changing = False
         self.approve: Callable[[Regrasp], bool] | None = None
         self.limit: tuple[float, int] | None = None
+        self.step: Step | None = None
         self.opens = None if state is None else state.opening
         grips, mine = self.progress.grips, self.progress.grip
         if state is None:
@@ -237,7 +240,7 @@ class Walk:
             early = self._due(hands.swinging) - self.path_time
             self.leader.lead(hands.swinging, early, self.body.wanted, self.aborted)
         begin = time.perf_counter()
-        step = self.stack.controller.step(machine.q, machine.v)
+        step = self.step = self.stack.controller.step(machine.q, machine.v)
         cost = time.perf_counter() - begin
         slip, fixed = machine.move(step.v), machine.fixed
         self.stack.follow(machine.lag)
@@ -548,7 +551,7 @@ class Walk:
         soonest = min([end, *self._lasting(leaving)])
         margin, landing = max(soonest - u, 0.0), None
         if swinging is not None:
-            needed = swinging.law.duration - swinging.clock + self.hands.data.latch_time + SETTLE
+            needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
             until = margin
             if swinging.counted and not self._changing:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to

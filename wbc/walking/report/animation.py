@@ -10,6 +10,7 @@ from PIL import Image
 
 from wbc.shapes import Capsule, Sphere
 from wbc.track import render
+from wbc.track.film import save_film
 from wbc.validation import Array
 from wbc.walking.log.log import WalkLog
 from wbc.walking.report import surroundings
@@ -20,7 +21,8 @@ from wbc.walking.report.surroundings import arm_colour, mixed
 from wbc.walking.run.recording import configuration
 from wbc.walking.run.session import WalkRun
 
-FILE = "walk.gif"
+#: Without its suffix
+FILE = "walk"
 #: Width and height [pixels]
 SIZE = (600, 400)
 #: Pictures a second, how much faster than the walk they play, and how many there are at most
@@ -39,7 +41,7 @@ def save_animation(
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
-    """Writes ``walk.gif``; None if ``stop`` ended it.
+    """Writes ``walk.mp4`` where an encoder is installed, else ``walk.gif``; None if ``stop`` ended it.
 
     Args:
         size: width and height [pixels]; default: :data:`SIZE`. progress: is told what part is done.
@@ -65,7 +67,7 @@ def save_animation(
         frames.append(Image.fromarray(ground.over(_moving(run, log, int(row), parts, turn))))
         if progress is not None:
             progress((number + 1) / len(chosen))
-    return _write(frames, folder / FILE)
+    return save_film(frames, folder / FILE, FRAMES_PER_SECOND, COLOURS)
 
 
 def _rows(log: WalkLog) -> Array:
@@ -106,12 +108,3 @@ def _camera(points: Array, size: tuple[int, int]) -> render.Camera:
         target = target + (off[0] * right - off[1] * up) * distance / camera.focal
         distance *= float(np.max((high - low) / (FILLED * np.array(size))))
     return render.Camera(target + distance * direction, target, VIEW, *size)
-
-
-def _write(frames: list[Image.Image], file: pathlib.Path) -> pathlib.Path:
-    """Pictures of one palette, so that what stands still is stored once."""
-    palette = frames[len(frames) // 2].quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
-    reduced = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    between = round(1000 / FRAMES_PER_SECOND)
-    reduced[0].save(file, save_all=True, append_images=reduced[1:], duration=between, loop=0, optimize=False)
-    return file

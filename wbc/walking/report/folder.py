@@ -33,7 +33,7 @@ WRITTEN = (
     *(BEGUN, FILE, PART, TICKS, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
     *(CHECK, "summary.json", "summary.txt"),
     *(f"{name}.png" for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time")),
-    *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "replay.html", REPORT),
+    *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "walk.mp4", "replay.html", REPORT),
 )
 
 

@@ -62,7 +62,7 @@ def save_replay_page(
     if text is None:
         return None
     file = folder / FILE
-    file.write_text(text)
+    file.write_text(text.replace("<title>Viser</title>", "<title>walk – wbc replay</title>", 1))
     return file
 
 

@@ -12,7 +12,17 @@ from wbc.walking.report.figures import figures_of
 from wbc.walking.run.session import WalkRun
 
 #: Pictures that a folder may have, in the order of the page
-PICTURES = ("walk.png", "walk.gif", "holds.png", "margins.png", "speed.png", "joints.png", "rates.png", "drift.png")
+PICTURES = (
+    "walk.png",
+    "walk.gif",
+    "walk.mp4",
+    "holds.png",
+    "margins.png",
+    "speed.png",
+    "joints.png",
+    "rates.png",
+    "drift.png",
+)
 
 
 def save_report(run: WalkRun, folder: pathlib.Path, report: Report | None) -> pathlib.Path:
@@ -50,6 +60,7 @@ def save_report(run: WalkRun, folder: pathlib.Path, report: Report | None) -> pa
             "summary.json": "these figures for programs",
             "check.txt": "what the checker found",
             "walk.gif": "a film",
+            "walk.mp4": "a film",
         },
     )
     return page.save(folder)

@@ -1,0 +1,128 @@
+"""A walk that obeys a page: rates while they are renewed, a hold, a stop, and lifts that wait for a yes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wbc.errors import WbcError
+from wbc.robots import Walker
+from wbc.viewer.bodies import Mesh
+from wbc.viewer.climbing import FASTEST, WalkOperation, scenery_of
+from wbc.viewer.messages import RATE_LASTS
+from wbc.viewer.scenery import Scenery
+from wbc.walking import Structure
+from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.walk import Walk
+from wbc.walking.modes.drive import Drive, standing_plan
+from wbc.walking.planner.plan import Plan
+from wbc.walking.run.request import DriveRequest
+
+
+@pytest.fixture(scope="module")
+def begin(machine: Walker, structure: Structure) -> Plan:
+    return standing_plan(machine, structure, DriveRequest().beginning(machine.arm_data))
+
+
+Begun = tuple[WalkOperation, list[float]]
+
+
+@pytest.fixture
+def begun(machine: Walker, structure: Structure, stack: WalkStack, begin: Plan) -> Begun:
+    now = [0.0]
+    return WalkOperation(Drive(Walk(machine, structure, begin, stack=stack)), lambda: now[0]), now
+
+
+def ticks(operation: WalkOperation, now: list[float], count: int) -> None:
+    for _ in range(count):
+        operation.steer()
+        operation.drive.tick()
+        now[0] += operation.drive.walk.dt
+
+
+def test_a_body_goes_while_it_is_steered_and_stops_when_nobody_says_so(begun: Begun) -> None:
+    operation, now = begun
+    walk = operation.drive.walk
+    begin = walk.q[:3].copy()
+    for _ in range(8):
+        operation.obey({"type": "steer", "rates": [0.0, 1.0, 0.0]})
+        ticks(operation, now, 10)
+    gone = float(operation.drive.steering.axis @ (walk.q[:3] - begin))
+    assert 0.01 < gone < 0.8 * FASTEST[1] * 1.2
+    ticks(operation, now, round((RATE_LASTS + 0.6) / walk.dt))
+    assert not operation.drive.command.any()
+    assert walk.pace == 0.0
+    # A stop by hand, and what a stopped walk does not obey
+    operation.obey({"type": "stop"})
+    with pytest.raises(WbcError, match="resume"):
+        operation.obey({"type": "steer", "rates": [1.0, 0.0, 0.0]})
+    assert walk.aborted
+    operation.obey({"type": "resume"})
+    assert not walk.aborted
+    assert not operation.stopped
+
+
+def test_a_hold_that_was_clicked_is_gone_to_on_a_straight_course(begun: Begun) -> None:
+    operation, _ = begun
+    walk = operation.drive.walk
+    steering, here = operation.drive.steering, walk.q[:3]
+    scenery = scenery_of(walk)
+    hold = min(range(len(scenery.holds)), key=lambda k: abs(float(steering.axis @ (scenery.places[k] - here)) - 0.8))
+    # A ray from outside through the stud is a click
+    off = scenery.places[hold] - steering.origin
+    outward = off - (off @ steering.axis) * steering.axis
+    outward /= np.linalg.norm(outward)
+    assert scenery.hit(scenery.places[hold] + 2.0 * outward, -outward) == scenery.holds[hold]
+    assert scenery.hit(scenery.places[hold] + 2.0 * outward, outward) is None
+    operation.obey({"type": "go", "hold": scenery.holds[hold]})
+    operation.steer()
+    course = operation.drive.command
+    assert np.linalg.norm(course) == pytest.approx(FASTEST[0], rel=1e-6)
+    assert course[1] > 0.0
+    assert course[2] == 0.0
+    operation.stop("because")
+    operation.steer()
+    assert not operation.drive.command.any()
+
+
+def test_lifts_wait_for_a_yes(begun: Begun) -> None:
+    operation, _ = begun
+    walk, step = operation.drive.walk, type("Step", (), {"arm": "arm1", "source": "1,2", "target": "1,3"})()
+    operation.obey({"type": "ask", "on": True})
+    assert walk.approve is not None
+    assert not walk.approve(step)
+    assert operation.waiting == "arm1: 1,2 -> 1,3"
+    operation.obey({"type": "approve"})
+    assert not operation.waiting
+    assert walk.approve(step)
+    assert not walk.approve(step)
+    operation.obey({"type": "ask", "on": False})
+    assert walk.approve is None
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ({"type": "steer", "rates": [1, 2]}, "steer.rates"),
+        ({"type": "steer", "rates": [0, 0, float("nan")]}, "steer.rates"),
+        ({"type": "steer", "rates": [0, 9, 0]}, "full speed"),
+        ({"type": "steer", "rates": "fast"}, "steer.rates"),
+        ({"type": "go", "hold": "nowhere"}, "go.hold"),
+        ({"type": "go", "hold": 3}, "go.hold"),
+        ({"type": "ask", "on": "yes"}, "ask.on"),
+        ({"type": "set", "item": "body", "values": {}}, "steer"),
+    ],
+)
+def test_what_does_not_fit_is_refused(begun: Begun, message: dict, said: str) -> None:
+    operation, _ = begun
+    for act in (operation.check, operation.obey):
+        with pytest.raises(WbcError, match=said):
+            act(message)
+    assert not operation.drive.command.any()
+
+
+def test_a_click_beside_all_holds_is_none() -> None:
+    empty = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
+    scenery = Scenery((), empty, ("a", "b"), np.array([[0.0, 0, 0], [1.0, 0, 0]]), (0.0, 0.0, 1.0), "body")
+    assert scenery.hit(np.array([0.5, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])) is None
+    assert scenery.hit(np.array([0.9, 0.0, 1.0]), np.array([0.0, 0.0, -3.0])) == "b"

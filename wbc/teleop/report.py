@@ -1,0 +1,95 @@
+"""``report.html`` of a session of manual control, from its log."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from wbc.controller import Status
+from wbc.teleop.loop import SessionLog
+from wbc.teleop.session import NOTHING, Seen, Teleoperation
+from wbc.track.page import RunPage, stretches
+from wbc.track.summary import Figure
+from wbc.validation import Array
+
+#: A part of the command above which it counts as lost [1]; losses that are told with their reasons
+LOST, TOLD = 0.01, 5
+
+
+def session_figures(session: Teleoperation, log: SessionLog) -> list[Figure]:
+    """What came of a session."""
+    statuses = log.status
+    counts = {status: statuses.count(status) for status in dict.fromkeys(statuses)}
+    fastest = max((float(np.abs(v).max(initial=0.0)) for v in log.v), default=0.0)
+    worst = max(log.lost, default=0.0)
+    names = list(dict.fromkeys(log.active))
+    return [
+        Figure("status", "ticks", counts, ", ".join(f"{n} {name}" for name, n in counts.items()) or "none"),
+        Figure("pairs", "pairs in use", names, ", ".join(names)),
+        Figure("fastest", "fastest joint", fastest, f"{fastest:.4g} rad/s"),
+        Figure("lost", "largest part of the command that was lost", worst, f"{100.0 * worst:.3g} %"),
+        Figure("late", "ticks that began late", log.late, str(log.late)),
+        Figure("start", "start", log.q[0].tolist() if log.q else [], _numbers(log.q[0]) if log.q else "none"),
+    ]
+
+
+def save_report(session: Teleoperation, log: SessionLog, folder: pathlib.Path) -> pathlib.Path:
+    """Write ``report.html``; returns the file.
+
+    Raises:
+        WbcError: it cannot be written.
+    """
+    ticks, robot = len(log.time), session.robot
+    page = RunPage(f"{robot.name} driven by rates", f"{ticks} ticks of {1e3 * session.control.dt:g} ms")
+    page.section("Asked for, and whether it was kept")
+    lost = np.array(log.lost)
+    followed = int((lost <= LOST).sum())
+    page.verdict(followed == ticks, f"rates as they were ordered, to {100 * LOST:g} %: in {followed} of {ticks} ticks")
+    if ticks:
+        rates, limit = np.abs(np.array(log.v)), robot.limits.velocity
+        page.verdict(bool((rates <= limit * (1.0 + 1e-9) + 1e-12).all()), "velocity limits of all joints")
+        solved = log.status.count(str(Status.SOLVED))
+        page.verdict(solved == ticks, f"all constraints hold in every tick: in {solved} of {ticks}")
+    page.verdict(not log.interrupted, "done to the end" if not log.interrupted else "ended by Ctrl-C")
+    page.section("Figures")
+    page.figures(session_figures(session, log))
+    if ticks:
+        times = np.array(log.time)
+        page.section("What bound when")
+        page.strips(times, _flags(log, lambda seen: [str(row) for row in seen.step.binding if row.bound != "equal"]))
+        page.section("Pairs")
+        page.strips(times, _flags(log, lambda seen: [seen.active, *(["pairs are changing"] if seen.blending else [])]))
+        page.section("What was lost, and why")
+        reasons = _flags(log, lambda seen: seen.why if seen.lost > NOTHING else ())
+        page.strips(times, reasons)
+        found = stretches(np.asarray(lost > LOST, dtype=float))
+        for first, last in sorted(found, key=lambda pair: pair[0] - pair[1])[:TOLD]:
+            worst = first + int(lost[first:last].argmax())
+            seen = log.seen[worst]
+            page.text(
+                f"{times[first]:.3g} s to {times[last - 1]:.3g} s: at most {100 * lost[worst]:.3g} % of the command "
+                f"with {seen.active}; {'; '.join(seen.why)}."
+            )
+        page.section("Processor time of a tick")
+        page.histogram(1e6 * np.array(log.cost), "us")
+    page.section("Files")
+    page.links(
+        folder,
+        {"replay.html": "the session, played in the browser without a network", "log.csv": "every tick"},
+    )
+    return page.save(folder)
+
+
+def _flags(log: SessionLog, names: Callable[[Seen], Iterable[str]]) -> dict[str, Array]:
+    """What was said in which ticks."""
+    out: dict[str, Array] = {}
+    for k, seen in enumerate(log.seen):
+        for name in names(seen):
+            out.setdefault(name, np.zeros(len(log.seen)))[k] = 1.0
+    return out
+
+
+def _numbers(q: Array) -> str:
+    return f"--at={','.join(f'{x:.4f}' for x in q)}"

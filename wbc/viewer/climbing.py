@@ -1,0 +1,200 @@
+"""The walker on its structure, driven from a page: by rates, or to a hold that was clicked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc import robots
+from wbc.errors import WbcError
+from wbc.validation import Array
+from wbc.viewer.beside import Viewer, show
+from wbc.viewer.bodies import OBSTACLE, Colour, Mesh, indexed
+from wbc.viewer.messages import RATE_LASTS, MessageError
+from wbc.viewer.operation import Operation
+from wbc.viewer.scenery import Scenery, checked
+from wbc.walking.modes.drive import Drive
+from wbc.walking.planner.plan import Regrasp
+from wbc.walking.report import surroundings
+from wbc.walking.run.drive_mode import DriveMode
+from wbc.walking.run.request import DriveRequest, Site
+
+#: Rates at full stick: round, along [m/s], spin [rad/s]
+FASTEST = np.array([0.05, 0.05, 0.04])
+#: A body within this of its destination is there [m]; a course that is off by more than this is set anew [rad]
+THERE, OFF = 0.02, 0.15
+#: Colours of the structure and of its holds
+SURFACE: Colour = (204, 213, 223)
+STUD: Colour = (143, 153, 168)
+
+
+class WalkOperation(Operation):
+    """Obeys a page for a walk: its messages are ``steer``, ``go``, ``ask`` and ``approve``.
+
+    A stop is that of the walk: body and hand slow down along their paths, nothing is lifted and nothing planned.
+
+    Attributes:
+        waiting: the lift that waits for a yes, "" for none.
+    """
+
+    def __init__(self, drive: Drive, now: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(drive.walk.stack.controller)
+        self.drive, self.waiting, self._now = drive, "", now
+        self._rates, self._until, self._goal = np.zeros(3), 0.0, -1
+        self._approved = ""
+        self._asks = False
+
+    def check(self, message: Mapping[str, Any]) -> None:
+        """Raise what :meth:`obey` would raise, and change nothing."""
+        checked(message, self.drive.walk.structure.ids)
+
+    def obey(self, message: Mapping[str, Any]) -> None:
+        """Do what a message says.
+
+        Raises:
+            WbcError: it does not fit; nothing has changed.
+        """
+        self.check(message)
+        kind = message["type"]
+        if kind in ("steer", "go") and self.stopped:
+            raise MessageError("message", kind, f"the robot is stopped ({self.stopped}); resume first")
+        if kind == "steer":
+            self._rates = FASTEST * np.array([float(x) for x in message["rates"]])
+            self._until, self._goal = self._now() + RATE_LASTS, -1
+        elif kind == "go":
+            self._goal = self.drive.walk.structure.index(message["hold"])
+        elif kind == "ask":
+            self._asks = bool(message["on"])
+            self.drive.walk.approve = self._approve if self._asks else None
+            self.waiting = ""
+        elif kind == "approve":
+            self._approved, self.waiting = self.waiting, ""
+        else:
+            super().obey(message)
+
+    def stop(self, reason: str) -> None:
+        """Slow down along the paths; the first reason stays."""
+        if not self.stopped:
+            self.stopped, self._goal = reason, -1
+            self._rates = np.zeros(3)
+            self.drive.walk.abort()
+
+    def resume(self) -> None:
+        """Go on from there; the body stands until it is steered."""
+        if self.stopped:
+            self.stopped = ""
+            self.drive.walk.carry_on()
+
+    def steer(self) -> None:
+        """Before a tick: the rates that hold now."""
+        if self._goal >= 0:
+            self.drive.steer(*self._course())
+        elif self._now() > self._until or self.stopped:
+            self.drive.steer(0.0, 0.0, 0.0)
+        else:
+            self.drive.steer(*self._rates)
+
+    def _course(self) -> Array:
+        """Straight for the hold that was clicked, until the body is over it."""
+        walk, steering = self.drive.walk, self.drive.steering
+        place, off = walk.structure.positions[self._goal], walk.q[:3]
+        along = float(steering.axis @ (place - off))
+        if steering.origin is None:
+            across = float(np.cross(steering.normal, steering.axis) @ (place - off))
+        else:
+            one, other = (_flat(point - steering.origin, steering.axis) for point in (off, place))
+            across = float(np.arctan2(steering.axis @ np.cross(one, other), one @ other)) * float(np.linalg.norm(one))
+        left = np.array([across, along, 0.0])
+        distance = float(np.linalg.norm(left))
+        if distance < THERE:
+            self._goal = -1
+            return np.zeros(3)
+        course = FASTEST[0] * left / distance
+        before = self.drive.command
+        # Every other command is planned anew, so that one that is good enough stays
+        if before[:2].any() and float(before @ course) > np.cos(OFF) * np.linalg.norm(before) * np.linalg.norm(course):
+            return np.asarray(before)
+        return course
+
+    def _approve(self, step: Regrasp) -> bool:
+        name = f"{step.arm}: {step.source} -> {step.target}"
+        if self._approved == name:
+            self._approved = ""
+            return True
+        self.waiting = name
+        return False
+
+
+def climb(
+    seconds: float | None = None,
+    *,
+    backend: str = "auto",
+    announce: Callable[[Viewer], None] | None = None,
+    structure: str = "cylinder",
+    **options: Any,
+) -> None:
+    """The three-armed walker on a structure in real time, driven from the page, until it or the time ends.
+
+    Args:
+        structure: as of :class:`wbc.walking.run.request.Site`. options: as of :func:`wbc.viewer.show`.
+
+    Raises:
+        NoPlanError: it cannot stand there. What :func:`wbc.viewer.show` raises.
+    """
+    walker = robots.walker()
+    mode = DriveMode(DriveRequest(Site(structure), commands="page"), walker, _Nobody())
+    plan, stack = mode.plan(), mode.compiled(backend)
+    walk = mode.walk(plan, stack, None)
+    operation = WalkOperation(Drive(walk))
+    with show(stack.controller, operation=operation, scenery=scenery_of(walk), **options) as viewer:
+        if announce is not None:
+            announce(viewer)
+        begin = due = time.monotonic()
+        while viewer.running and (seconds is None or due - begin < seconds):
+            operation.steer()
+            try:
+                operation.drive.tick()
+            except WbcError as error:
+                operation.stop(str(error))
+            if walk.step is not None:
+                viewer.update(walk.step, walk.time)
+            due += walk.dt
+            wait = due - time.monotonic()
+            if wait > 0.0:
+                time.sleep(wait)
+            elif wait < -0.25:
+                due = time.monotonic()
+
+
+class _Nobody:
+    """Commands of a mode that is carried out here."""
+
+    def rates(self, time: float) -> Array | None:
+        return np.zeros(3)
+
+
+def scenery_of(walk: Any) -> Scenery:
+    """Structure and holds of a walk."""
+    structure = walk.structure
+    rows = np.arange(len(structure))
+    surfaces: list[Mesh] = []
+    for triangles, colour in (
+        (surroundings.surface_triangles(structure, rows), SURFACE),
+        (surroundings.obstacle_triangles(structure, rows), OBSTACLE),
+    ):
+        if len(triangles):
+            surfaces.append(indexed(triangles, colour))
+    studs = indexed(surroundings.stud_triangles(structure, rows), STUD)
+    up = [float(x) for x in -pin.XYZQUATToSE3(walk.q[:7]).rotation[:, 2]]
+    return Scenery(
+        tuple(surfaces), studs, tuple(structure.ids), np.array(structure.positions), (up[0], up[1], up[2]), "body"
+    )
+
+
+def _flat(off: Array, axis: Array) -> Array:
+    """Across an axis."""
+    return np.asarray(off - (off @ axis) * axis)

@@ -1,0 +1,68 @@
+"""What stands around a robot and does not move: surfaces and obstacles, and holds that can be clicked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wbc import validation
+from wbc.validation import Array
+from wbc.viewer.bodies import Mesh
+from wbc.viewer.messages import MessageError
+
+#: A click counts for the hold that it passes nearer than this [m]
+NEAR = 0.25
+
+
+class Scenery(NamedTuple):
+    """Meshes in the world, and holds.
+
+    Attributes:
+        surfaces: what is only seen. studs: what holds look like, all in one. holds: their ids. places: [n x 3] m.
+        up: direction that is up for whoever looks [3]. body: frame that cameras begin at.
+    """
+
+    surfaces: tuple[Mesh, ...]
+    studs: Mesh
+    holds: tuple[str, ...]
+    places: Array
+    up: tuple[float, float, float]
+    body: str
+
+    def hit(self, origin: Array, direction: Array) -> str | None:
+        """The first hold that a ray passes near to, None where it passes none."""
+        way = direction / np.linalg.norm(direction)
+        along = (self.places - origin) @ way
+        off = np.linalg.norm(self.places - origin - along[:, None] * way, axis=1)
+        near = (off < NEAR) & (along > 0.0)
+        if not near.any():
+            return None
+        first = along[near].min()
+        # Of those that lie about as far as the first the one that was meant
+        near &= along < first + NEAR
+        return self.holds[int(np.where(near, off, np.inf).argmin())]
+
+    def nearest(self, place: Array) -> int:
+        """Row of the hold at a place."""
+        return int(np.linalg.norm(self.places - place, axis=1).argmin())
+
+
+def checked(message: Mapping[str, Any], holds: tuple[str, ...]) -> None:
+    """Refuse what a walk does not obey.
+
+    Raises:
+        WbcError: which field does not fit.
+    """
+    kind = message["type"]
+    if kind == "steer":
+        rates = validation.real_array("steer.rates", message["rates"], (3,))
+        if np.abs(rates).max() > 1.0 + 1e-9:
+            raise MessageError("steer.rates", message["rates"], "expected parts of full speed, -1 to 1")
+    elif kind == "go":
+        validation.one_of("go.hold", message["hold"], holds)
+    elif kind == "ask":
+        validation.flag("ask.on", message["on"])
+    elif kind in ("set", "rate"):
+        raise MessageError("message", message.get("item"), "the walk sets its own targets; steer it")
