@@ -48,7 +48,11 @@ def _casadi_source(functions: list[ca.Function]) -> str:
     generator = ca.CodeGenerator("rows.c", {"with_header": False})
     for function in functions:
         generator.add(function)
-    return str(generator.dump())
+    text = str(generator.dump())
+    # The library's are calls; the same here, of NaN the other argument, but for the sign of zeros
+    for name, sign in (("fmin", "<"), ("fmax", ">")):
+        text = text.replace(f"return {name}(x, y);", f"return x {sign} y || y != y ? x : y;")
+    return text
 
 
 def header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:

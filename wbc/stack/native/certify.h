@@ -41,21 +41,18 @@ static void gradient(const wbc_tick *t, const double *v, double *residual, doubl
     }
     for (int i = 0; i < NV; i++) {
         const double *row = t->H + i * WIDE;
-        double part[8] = {0}, bulk[8] = {0};
-        for (int b = i / 8; b < WIDE / 8; b++)
-            for (int k = 0; k < 8; k++) {
-                const double up = row[8 * b + k] * v[8 * b + k], down = row[8 * b + k] * v[i];
-                part[k] += up;
-                bulk[k] += fabs(up);
-                residual[8 * b + k] += down;
-                size[8 * b + k] += fabs(down);
-            }
-        /* the diagonal went in twice */
-        residual[i] -= row[i] * v[i];
-        for (int k = 0; k < 8; k++) {
-            residual[i] += part[k];
-            size[i] += bulk[k];
+        const four own = EACH(v[i]);
+        four part = {0}, bulk = {0};
+        for (int at = i & ~3; at < WIDE; at += 4) {
+            const four h = GIVEN_FOUR(row + at), up = h * GIVEN_FOUR(v + at), down = h * own;
+            part += up;
+            bulk += SIZE_OF_FOUR(up);
+            FOUR(residual + at) += down;
+            FOUR(size + at) += SIZE_OF_FOUR(down);
         }
+        /* the diagonal went in twice */
+        residual[i] += ((part[0] + part[2]) + (part[1] + part[3])) - row[i] * v[i];
+        size[i] += (bulk[0] + bulk[2]) + (bulk[1] + bulk[3]);
     }
 }
 

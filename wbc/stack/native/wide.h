@@ -55,15 +55,21 @@ static void wide_forces(const wbc_tick *t, const wide *lambda, wide *residual, d
         residual[i] = t->g[i];
         rounding[i] = fabs(t->g[i]);
     }
-    for (int i = 0; i < NV; i++)
-        for (int j = i; j < NV; j++) {
-            const wide up = (wide)t->H[i * WIDE + j] * v[j], down = (wide)t->H[i * WIDE + j] * v[i];
-            residual[i] += up;
-            rounding[i] += fabs((double)up);
-            if (j == i) continue;
-            residual[j] += down;
-            rounding[j] += fabs((double)down);
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->H + i * WIDE, own = v[i];
+        wide sum = residual[i] + (wide)row[i] * own;
+        double bulk = rounding[i] + fabs(row[i] * own);
+        for (int j = i + 1; j < NV; j++) {
+            sum += (wide)row[j] * v[j];
+            residual[j] += (wide)row[j] * own;
         }
+        for (int j = i + 1; j < NV; j++) {
+            bulk += fabs(row[j] * v[j]);
+            rounding[j] += fabs(row[j] * own);
+        }
+        residual[i] = sum;
+        rounding[i] = bulk;
+    }
     for (int a = 0; a < t->daqp.n_active; a++) {
         const int k = t->daqp.WS[a] - NV;
         for (int e = k < 0 ? 0 : a_start[k]; k >= 0 && e < a_end[k]; e++) {
@@ -80,6 +86,9 @@ static void fit_multipliers(wbc_tick *t, wide *lambda) {
     DAQPWorkspace *work = &t->daqp;
     wide residual[NV];
     double rounding[NV], y[WIDE], mu[ACTIVE_MAX];
+    int general = 0;
+    for (int a = 0; a < work->n_active; a++) general |= work->WS[a] >= NV;
+    if (!general) return;
     for (int fit = 0; fit < FITS && work->n_active > 0; fit++) {
         wide_forces(t, lambda, residual, rounding);
         for (int i = 0; i < WIDE; i++) y[i] = 0.0;
