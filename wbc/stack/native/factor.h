@@ -91,10 +91,10 @@ INLINE void reduce_rows(wbc_tick *t, int k, int count, int at) {
         const double *f = t->R + i * WIDE + k, *above = t->R + i * WIDE + at;
         const four p = -GIVEN_FOUR(above), q = -GIVEN_FOUR(above + 4);
         const four f0 = EACH(f[0]), f1 = EACH(f[1]), f2 = EACH(f[2]), f3 = EACH(f[3]);
-        p0 = MADD4(f0, p, p0), q0 = MADD4(f0, q, q0);
-        p1 = MADD4(f1, p, p1), q1 = MADD4(f1, q, q1);
-        p2 = MADD4(f2, p, p2), q2 = MADD4(f2, q, q2);
-        p3 = MADD4(f3, p, p3), q3 = MADD4(f3, q, q3);
+        p0 = MADD(f0, p, p0), q0 = MADD(f0, q, q0);
+        p1 = MADD(f1, p, p1), q1 = MADD(f1, q, q1);
+        p2 = MADD(f2, p, p2), q2 = MADD(f2, q, q2);
+        p3 = MADD(f3, p, p3), q3 = MADD(f3, q, q3);
     }
     FOUR(r0) = p0, FOUR(r0 + 4) = q0, FOUR(r1) = p1, FOUR(r1 + 4) = q1;
     FOUR(r2) = p2, FOUR(r2 + 4) = q2, FOUR(r3) = p3, FOUR(r3 + 4) = q3;
@@ -105,8 +105,8 @@ INLINE void add_rows(double *out, const double *f, const double *rows, int count
     four p = FOUR(out), q = FOUR(out + 4);
     for (int i = 0; i < count; i++) {
         const four each = EACH(f[i]);
-        p = MADD4(each, GIVEN_FOUR(rows + i * WIDE), p);
-        q = MADD4(each, GIVEN_FOUR(rows + i * WIDE + 4), q);
+        p = MADD(each, GIVEN_FOUR(rows + i * WIDE), p);
+        q = MADD(each, GIVEN_FOUR(rows + i * WIDE + 4), q);
     }
     FOUR(out) = p, FOUR(out + 4) = q;
 }
@@ -267,10 +267,10 @@ INLINE void gather_rows(wbc_tick *t, int i, int from, int at) {
         const double *below = t->inverse + k * WIDE + at;
         const four p = GIVEN_FOUR(below), q = GIVEN_FOUR(below + 4);
         const four f0 = EACH(s0[k]), f1 = EACH(s1[k]), f2 = EACH(s2[k]), f3 = EACH(s3[k]);
-        p0 = MADD4(f0, p, p0), q0 = MADD4(f0, q, q0);
-        p1 = MADD4(f1, p, p1), q1 = MADD4(f1, q, q1);
-        p2 = MADD4(f2, p, p2), q2 = MADD4(f2, q, q2);
-        p3 = MADD4(f3, p, p3), q3 = MADD4(f3, q, q3);
+        p0 = MADD(f0, p, p0), q0 = MADD(f0, q, q0);
+        p1 = MADD(f1, p, p1), q1 = MADD(f1, q, q1);
+        p2 = MADD(f2, p, p2), q2 = MADD(f2, q, q2);
+        p3 = MADD(f3, p, p3), q3 = MADD(f3, q, q3);
     }
     FOUR(out) = p0, FOUR(out + 4) = q0, FOUR(out + WIDE) = p1, FOUR(out + WIDE + 4) = q1;
     FOUR(out + 2 * WIDE) = p2, FOUR(out + 2 * WIDE + 4) = q2, FOUR(out + 3 * WIDE) = p3, FOUR(out + 3 * WIDE + 4) = q3;

@@ -86,25 +86,11 @@ typedef long double wide;
 #define HELD(t, k) 0
 #endif
 
-/* x y + z, with one rounding where the processor has an instruction for it; compilers contract nothing themselves */
-#ifdef __FP_FAST_FMA
-#define MADD(x, y, z) __builtin_fma(x, y, z)
-#else
+/* x y + z with two roundings on every processor, so that an export computes the same bits as the tick in Python */
 #define MADD(x, y, z) ((x) * (y) + (z))
-#endif
 
 /* Four numbers at once, wherever they are */
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
-#if defined(__clang__)
-#if defined(__FMA__) && __has_builtin(__builtin_elementwise_fma)
-#define MADD4(x, y, z) __builtin_elementwise_fma(x, y, z)
-#endif
-#elif defined(__FMA__) && defined(__AVX__)
-#define MADD4(x, y, z) __builtin_ia32_vfmaddpd256(x, y, z)
-#endif
-#ifndef MADD4
-#define MADD4(x, y, z) ((x) * (y) + (z))
-#endif
 #define EACH(x) ((four){x, x, x, x})
 #define FOUR(place) (*(four *)(place))
 #define GIVEN_FOUR(place) (*(const four *)(place))
