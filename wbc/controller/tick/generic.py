@@ -114,7 +114,7 @@ class GenericTick(CompiledTick):
             self._written(name, sizes[name]) if name in generic.WRITTEN else field(named.get(name, name))
             for name in ROWS_OUTPUTS
         ]
-        calls: dict[str, tuple[ca.Function | None, list[Array], list[Array]]] = {
+        calls: dict[str, tuple[Any, list[Array], list[Array]]] = {
             "rows": (program.rows, state, written),
             "ahead": (program.ahead, [q, copies["mean"], p, dt], [field("ahead")]),
         }
@@ -127,7 +127,7 @@ class GenericTick(CompiledTick):
         for name, (function, arguments, results) in calls.items():
             if function is None:
                 continue
-            buffer = ca.FunctionBuffer(function)
+            buffer, _ = function.buffer()
             for i, array in enumerate(arguments):
                 buffer.set_arg(i, memoryview(array.data))
             for i, array in enumerate(results):
