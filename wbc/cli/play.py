@@ -38,9 +38,16 @@ def play(
         from wbc.viewer.climbing import climb
 
         err().print("Steer with W S A D and Q E or the stick, or click a hold. Space stops it, Ctrl-C ends.")
-        options = {"host": host, "port": port, "open_browser": browser, "zeromq": zeromq}
         with viewing.until_interrupted():
-            climb(seconds, backend=backend, announce=viewing.announce, **options)
+            climb(
+                seconds,
+                backend=backend,
+                announce=viewing.announce,
+                host=host,
+                port=port,
+                open_browser=browser,
+                zeromq=zeromq,
+            )
         return
     chosen = playground(preset)
     err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
