@@ -13,10 +13,13 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import DT, FRAMES, robot
+from tests.torque.problems import controller
 from wbc.controller import Controller, Stack, Status, core_of
 from wbc.controller.outcome import Binding
 from wbc.errors import SolverError
-from wbc.explain.explanation import Bound, Give
+from wbc.explain.explanation import Bound, Contradiction, Give
+from wbc.explain.naming import Naming
+from wbc.explain.past import past_of
 from wbc.shapes import Sphere
 from wbc.tasks import Constraint, EndEffector, Hold, Input, JointLimits, Obstacle, Posture, Row, Rows
 
@@ -204,3 +207,31 @@ def test_old_names_warn() -> None:
     for owner, old, value in ((bound, "side", "upper"), (give, "side", bound), (binding, "side", "upper")):
         with pytest.warns(DeprecationWarning, match="is called (which|bound) now"):
             assert getattr(owner, old) == value
+
+
+def test_a_large_contradiction_names_its_largest_members_and_counts_the_rest() -> None:
+    bounds = tuple(Bound(f"item {k % 8}", f"row {k}", "upper", float(k), "rad/s") for k in range(40))
+    gives = tuple(Give(b, 1.0 + k) for k, b in enumerate(bounds))
+    shares = tuple(1.0 / (1.0 + k) for k in range(40))
+    text = str(Contradiction(bounds, gives, True, gives[0], shares))
+    assert text == (
+        "These 40 cannot hold together, any 39 of them can: "
+        + ", ".join(
+            f"item {i} (5 rows: row {i} at most {i} rad/s, row {i + 8} at most {i + 8} rad/s, "
+            f"row {i + 16} at most {i + 16} rad/s, and 2 more)"
+            for i in range(6)
+        )
+        + ", and 10 rows of item 6, item 7. Cheapest to relax: item 0/row 0 by 1 rad/s, instead item 1/row 1 by 2 rad/s"
+        " or item 2/row 2 by 3 rad/s or item 3/row 3 by 4 rad/s or one of 36 others."
+    )
+    few = str(Contradiction(bounds[:12], gives[:12], True, gives[0], shares[:12]))
+    assert all(str(bound) in few for bound in bounds[:12])
+
+
+def test_wrenches_among_what_binds_have_names() -> None:
+    tick = controller("walker")
+    tick.reset(tick.stack.robot.neutral)
+    step = tick.step(tick.stack.robot.neutral, np.zeros(tick.stack.robot.nv))
+    naming = Naming(past_of(step._data, step._context))
+    names = [(bound.row, bound.unit) for bound in (naming.bound(row, True) for row in (24, 29, 35))]
+    assert names == [("grip 1.fx", "N"), ("grip 1.mz", "N m"), ("grip 2.mz", "N m")]

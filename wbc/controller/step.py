@@ -48,7 +48,7 @@ class Context:
 
     def variable(self, number: int) -> str:
         """Name of a variable of the QP."""
-        return self.stack.robot.dof_names[number] if number < self.nv else f"variable {number}"
+        return self.stack.robot.dof_names[number] if number < self.nv else self.layout.variable(number)[0]
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:

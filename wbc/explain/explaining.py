@@ -10,7 +10,7 @@ from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
 from wbc.explain.past import Past
 from wbc.explain.reasons import reasons
-from wbc.qp.conflict import Conflict, Infeasibility, diagnose
+from wbc.qp.conflict import TOLERANCE, Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block, rate_unit
 from wbc.validation import Array
@@ -40,7 +40,9 @@ class Explainer:
         )
         slack, nv = past.part("slack"), past.layout.variables
         given = tuple(Give(self._violated(nv + int(k), v), float(slack[k])) for k in np.flatnonzero(slack))
-        pushing = [int(i) for i in np.flatnonzero(multipliers)]
+        # what a relaxation holds without a bound of its own does not bind
+        has_bound = np.isfinite(past.qp.lower) | np.isfinite(past.qp.upper)
+        pushing = [int(i) for i in np.flatnonzero((multipliers != 0.0) & has_bound)]
         binding = {i: self._binding(i, multipliers[i], v) for i in pushing if not self.naming.keeps_direction(i)}
         task_groups = groups(past)
         missed = losses(past, task_groups, v, self._culprits(pushing, multipliers))
@@ -80,7 +82,10 @@ class Explainer:
         alone = tuple(Give(s, float(a * u)) for s, a, u in zip(bounds, needed, units, strict=True))
         may = [k for k in range(len(bounds)) if np.isfinite(needed[k]) and not bounds[k].actuator]
         cheapest = alone[min(may or range(len(bounds)), key=lambda k: needed[k])]
-        return Contradiction(bounds, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest)
+        # of a minimal set, what one bound alone has to give is inverse to its multiplier in the proof
+        pushes = 1.0 / np.maximum(conflict.within, TOLERANCE)
+        shares = tuple(float(push) for push in pushes / max(float(pushes.sum()), 1e-300))
+        return Contradiction(bounds, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest, shares)
 
     def _violated(self, row: int, v: Array) -> Bound:
         """The bound of a row that v misses, or is nearer to missing."""

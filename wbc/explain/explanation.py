@@ -11,6 +11,9 @@ from wbc.renamed import old_attribute
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
+#: The text names each member of a conflict up to this many; of larger ones so many items, and so many rows of each
+_LONG, _GROUPS, _MEMBERS = 12, 6, 3
+
 
 def listed(bounds: tuple[Bound, ...]) -> str:
     """Bounds as text, joint limits of one kind together."""
@@ -21,6 +24,24 @@ def listed(bounds: tuple[Bound, ...]) -> str:
             groups.setdefault((bound.item, bound.kind), []).append(text)
     plain = [str(bound) for bound in bounds if not bound.kind]
     return ", ".join([*plain, *(f"{item} ({kind}: {', '.join(rows)})" for (item, kind), rows in groups.items())])
+
+
+def summary(bounds: tuple[Bound, ...], shares: tuple[float, ...]) -> str:
+    """Many bounds as text, by item: those with the largest shares, the rest counted."""
+    groups: dict[str, list[int]] = {}
+    for k in sorted(range(len(bounds)), key=lambda k: -shares[k]):
+        groups.setdefault(bounds[k].item, []).append(k)
+    parts = []
+    for item, members in list(groups.items())[:_GROUPS]:
+        first = [bounds[k] for k in members[:_MEMBERS]]
+        named = ", ".join(f"{b.row} {RELATIONS[b.which]} {amount(b.value, b.unit)}" for b in first)
+        more = len(members) - len(first)
+        count = f"{len(members)} rows: " if more else ""
+        parts.append(f"{item} ({count}{named}{f', and {more} more' if more else ''})")
+    rest = list(groups)[_GROUPS:]
+    if rest:
+        parts.append(f"and {sum(len(groups[item]) for item in rest)} rows of {', '.join(rest)}")
+    return ", ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -84,22 +105,31 @@ class Contradiction:
         enough: the first of these.
         cheapest: the least of them among bounds that may give way at all, a length of ``stack.length`` counted as one
             radian; among all where none may.
+        shares: part of each member in the proof that they contradict each other, its multiplier as a share of the sum;
+            rows count in radians and ``stack.length``. The text of a large set names the largest first.
     """
 
     bounds: tuple[Bound, ...]
     alone: tuple[Give, ...]
     enough: bool
     cheapest: Give
+    shares: tuple[float, ...]
 
     sides = old_attribute("bounds")
 
     def __str__(self) -> str:
-        members = listed(self.bounds)
+        long = len(self.bounds) > _LONG
+        members = summary(self.bounds, self.shares) if long else listed(self.bounds)
         if len(self.bounds) == 1:
             text = f"This cannot hold within the bounds: {members}."
         else:
             text = f"These {len(self.bounds)} cannot hold together, any {len(self.bounds) - 1} of them can: {members}."
-        others = [str(g) for g in self.alone if g is not self.cheapest and not g.bound.actuator]
+        may = [g for g in self.alone if g is not self.cheapest and not g.bound.actuator]
+        others = [str(g) for g in may]
+        if long and len(may) > _MEMBERS:
+            share = dict(zip(self.bounds, self.shares, strict=True))
+            may.sort(key=lambda g: -share[g.bound])
+            others = [*map(str, may[:_MEMBERS]), f"one of {len(may) - _MEMBERS} others"]
         text += f" Cheapest to relax{'' if self.enough else ' (there are other conflicts too)'}: {self.cheapest}"
         return f"{text}, instead {' or '.join(others)}." if others else f"{text}."
 

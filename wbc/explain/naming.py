@@ -56,8 +56,10 @@ class Naming:
             order = block.entry.item.order
         item = block.entry.name if block is not None else "bounds"
         actuator = order == SacrificeOrder.ACTUATOR
+        robot = past.stack.robot
+        if robot.nv <= row < self._nv:
+            return Bound(item, past.layout.variable(row)[0], which, value, past.layout.variable(row)[1])
         if row < self._nv:
-            robot = past.stack.robot
             unit = rate_unit(robot.dof_units[row], past.layout.command)
             kind = self._kind(block, row, value) if past.layout.command == "velocity" else ""
             return Bound(item, robot.dof_names[row], which, value, unit, kind, None, actuator and kind != "position")

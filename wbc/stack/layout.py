@@ -205,6 +205,19 @@ class Layout:
             out[span] = force_sizes(stack.robot)[list(item.axes)]
         return out
 
+    def variable(self, number: int) -> tuple[str, str]:
+        """Name and unit of a variable of the QP that is no degree of freedom: of a contact's wrench, or a share."""
+        for name, span in self.forces.items():
+            if span.start <= number < span.stop:
+                item = self.blocks[name].entry.item
+                assert isinstance(item, Contact)
+                axis = item.axes[number - span.start]
+                return f"{name}.{WRENCH[axis]}", "N" if axis < 3 else "N m"
+        return f"variable {number}", ""
+
+
+#: Components of a wrench
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 #: Input of a contact or a load, 1 where it is enabled and 0 where it is not, so that it bears nothing
 CLOSED = "closed"
