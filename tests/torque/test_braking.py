@@ -78,6 +78,8 @@ def failed(bot: Robot, ticks: int, most: int) -> int:
             tick["posture"].target = target
         step = tick.step(q, v)
         count += step.status != "solved"
+        # whatever an answer costs, and whatever it says is lacking, no more is sent than the motors have
+        assert (np.abs(step.torque) <= limits.effort).all()
         q, v = pin.integrate(bot.model, q, (v + 0.0025 * step.a) * 0.005), v + 0.005 * step.a
         assert (q[places] <= limits.position_upper[arm] + 1e-9).all()
         assert (q[places] >= limits.position_lower[arm] - 1e-9).all()
@@ -118,6 +120,7 @@ def test_an_arm_at_its_stop_with_and_without_limits_of_acceleration(acceleration
     tick.reset(q)
     step = tick.step(q, v)
     assert (step.status == "solved") == np.isfinite(acceleration)
+    assert (np.abs(step.torque) <= bot.limits.effort).all()
     # the limit is kept either way; without an answer contacts give way, by name
     assert q[bot.position_index[joint]] + (v[joint] + 0.001 * step.a[joint]) * 0.002 > bot.limits.position_lower[joint]
     assert any(slack.item.startswith(("left", "right")) for slack in step.relaxed) != np.isfinite(acceleration)
