@@ -99,4 +99,6 @@ def _velocity_at_end(distance: ca.SX, v: ca.SX, dt: ca.SX, deceleration: float, 
 
 
 def _fastest(c: ca.SX, dt: ca.SX, deceleration: float) -> ca.SX:
+    if deceleration == 0.0:
+        return 0.0 * c  # a joint whose limit of velocity is zero
     return 4.0 * c / (dt + ca.sqrt(dt * dt + (8.0 / deceleration) * c))

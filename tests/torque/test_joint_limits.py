@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.repeats import repeats
-from tests.torque.problems import controller
+from tests.torque.problems import controller, robot
 from tests.torque.referee import acceleration_interval
-from wbc.controller import core_of
+from wbc.controller import Stack, core_of
+from wbc.tasks import JointLimits, Posture
 from wbc.tasks.stopping import allowed_accelerations, stopping_deceleration
 
 #: Ticks of an adversary
@@ -181,3 +182,14 @@ def test_bounds_of_a_tick_are_those_of_a_search() -> None:
         wanted = np.array([acceleration_interval(bot, i, q, v, dt, tick.stack.dt_range[1]) for i in range(bot.nv)])
         assert np.abs(qp.lower[: bot.nv] - wanted[:, 0]).max() < 1e-6
         assert np.abs(qp.upper[: bot.nv] - wanted[:, 1]).max() < 1e-6
+
+
+def test_a_joint_whose_limit_of_velocity_is_zero_comes_to_rest() -> None:
+    bot = robot("panda").with_limits(velocity=[0.0, *[2.0] * 6, *[0.2] * (robot("panda").nv - 7)])
+    tick = Stack(bot, dt=0.002).add(Posture()).add(JointLimits()).compile(command="acceleration", backend="vm")
+    v = np.zeros(bot.nv)
+    v[0] = 0.01
+    tick.reset(bot.neutral)
+    step = tick.step(bot.neutral, v)
+    assert step.status == "solved"
+    assert abs(v[0] + 0.002 * step.a[0]) < 1e-12
