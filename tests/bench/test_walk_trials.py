@@ -13,15 +13,17 @@ import pytest
 import wbc
 from bench.measured import clearance
 from bench.sheet import Sheet
-from bench.walk import trial_parts
+from bench.walk import second_checker, trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, capsule_between, random_structure
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
 from bench.walk.trials import names, tried
 from tests.repeats import repeats
+from wbc.clearance import SweptBody
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
-from wbc.walking import Structure, cylinder, read_structure
+from wbc.shapes import Sphere
+from wbc.walking import Hold, PlaneSurface, Structure, cylinder, read_structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.stack import WalkStack
@@ -124,6 +126,32 @@ def test_hands_go_no_deeper_than_they_may(walked: tuple[WalkLog, Structure], mac
     assert found(log, Structure("higher", bare.holds, (), higher), machine, tmp_path) == []
     higher = replace(bare.surface, radius=bare.surface.radius + 0.014)  # type: ignore[call-arg]
     assert found(log, Structure("higher", bare.holds, (), higher), machine, tmp_path) != []
+
+
+@pytest.mark.parametrize(("gone", "until"), [(0.025, 0.07), (1.0, 0.02)])
+def test_the_second_checker_lets_a_hand_stop_near_a_hold_that_vanished(
+    gone: float, until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes nearer after its hold has vanished, and goes away; one whose hold is still there has no such excuse."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
+    model.addFrame(pin.Frame("hand", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    heights = [0.1, 0.095, 0.09, 0.085, 0.07, 0.06, 0.07, 0.08, 0.09]
+    places = [[pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))] for height in heights]
+    monkeypatch.setattr(second_checker, "_hands", lambda *_: iter(places))
+    log = {
+        "hands": np.array(["hand"]),
+        "t": 0.01 * np.arange(9),
+        "hand_hold": np.array([[0]] * 3 + [[-1]] * 6),
+        "hold_pose": np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]),
+        "presence_hold": np.array([0]),
+        "presence_span": np.array([[0.0, gone]]),
+    }
+    ground = Structure("ground", (Hold("a", pin.SE3.Identity()),), (), PlaneSurface(pin.SE3.Identity()))
+    part = SweptBody("palm", Sphere(0.01), "hand", pin.SE3.Identity())
+    (spared,) = second_checker._exemptions(log, model, [part], ground)
+    assert (spared.hand, spared.mount) == ("palm", "surface")
+    assert (spared.since, spared.until) == (0.0, pytest.approx(until))
 
 
 def test_a_trial_that_fails_is_a_record(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
