@@ -72,7 +72,7 @@ class PairWatch:
 
     def __init__(self, robot: Robot, pairing: Pairing) -> None:
         self._robot, self._pairs = robot, pairing.pairs
-        self._names = frozenset().union(*(one.items for one in pairing.pairs))
+        self._names = frozenset[str]().union(*(one.items for one in pairing.pairs))
         some = [braked(robot, one.pair) for one in pairing.pairs]
         groups, brakes = [(*one.task, *one.held) for one in some], [one.joints for one in some]
         self._conditioning = Conditioning(robot, groups, brakes=brakes, backend="vm")
