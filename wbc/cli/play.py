@@ -24,6 +24,9 @@ def play(
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     browser: viewing.Browser = True,
+    pairs: Annotated[
+        bool, typer.Option("--pairs", help="Drive by coordinate pairs: ssrms, spdm, or any arm by name or file.")
+    ] = False,
     zeromq: Annotated[
         str, typer.Option(help="Take messages over ZeroMQ as well, at an address such as tcp://127.0.0.1:5555.")
     ] = "",
@@ -40,6 +43,22 @@ def play(
         err().print("Steer with W S A D and Q E or the stick, or click a hold. Space stops it, Ctrl-C ends.")
         with viewing.until_interrupted():
             climb(
+                seconds,
+                backend=backend,
+                announce=viewing.announce,
+                host=host,
+                port=port,
+                open_browser=browser,
+                zeromq=zeromq,
+            )
+        return
+    if pairs:
+        from wbc.viewer.operating import operate
+
+        err().print("Choose a pair, and drive what it commands by its sliders. Space stops it, Ctrl-C ends.")
+        with viewing.until_interrupted():
+            operate(
+                preset,
                 seconds,
                 backend=backend,
                 announce=viewing.announce,

@@ -22,6 +22,7 @@ from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, LoopEnd
 from wbc.viewer.local import LOOPBACK, require_local
 from wbc.viewer.operation import Operation
+from wbc.viewer.pairing import Pairing
 from wbc.viewer.scenery import Scenery
 
 log = logging.getLogger("wbc")
@@ -49,6 +50,7 @@ class Viewer:
         zeromq: str,
         operation: Operation | None = None,
         scenery: Scenery | None = None,
+        pairing: Pairing | None = None,
     ) -> None:
         core = core_of(controller)
         self.operation = Operation(controller) if operation is None else operation
@@ -68,6 +70,7 @@ class Viewer:
             "silence": silence,
             "zeromq": zeromq,
             "scenery": scenery,
+            "pairing": pairing,
         }
         command = [sys.executable, "-m", "wbc.viewer.process"]
         # Output of the process that is no answer goes where this one's errors go
@@ -170,6 +173,7 @@ def show(
     zeromq: str = "",
     operation: Operation | None = None,
     scenery: Scenery | None = None,
+    pairing: Pairing | None = None,
 ) -> Viewer:
     """Show a controller that a loop steps, and let it be driven from a browser.
 
@@ -189,7 +193,7 @@ def show(
         token: what a client must know; made anew where ``host`` is not this machine alone and none is given.
 
         operation: what obeys the page, in place of an :class:`Operation` on the controller.
-        scenery: what stands around the robot.
+        scenery: what stands around the robot. pairing: the pairs of coordinates that an arm is driven by.
         zeromq: address to take the same messages at, such as ``tcp://127.0.0.1:5555``; "" for none.
         silence: while somebody has control, the robot stops where their page, or the viewer, is silent for so long [s].
 
@@ -203,7 +207,7 @@ def show(
     number = validation.integer("port", port, 0, 65535)
     if zeromq:
         require_local(zeromq)
-    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq, operation, scenery)
+    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq, operation, scenery, pairing)
     if open_browser:
         webbrowser.open(viewer.url)
     return viewer

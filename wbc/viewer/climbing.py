@@ -16,6 +16,7 @@ from wbc.viewer.beside import Viewer, show
 from wbc.viewer.bodies import OBSTACLE, Colour, Mesh, indexed
 from wbc.viewer.messages import RATE_LASTS, MessageError
 from wbc.viewer.operation import Operation
+from wbc.viewer.paced import ticks
 from wbc.viewer.scenery import Scenery, checked
 from wbc.walking.modes.drive import Drive
 from wbc.walking.planner.plan import Regrasp
@@ -153,8 +154,7 @@ def climb(
     with show(stack.controller, operation=operation, scenery=scenery_of(walk), **options) as viewer:
         if announce is not None:
             announce(viewer)
-        begin = due = time.monotonic()
-        while viewer.running and (seconds is None or due - begin < seconds):
+        for _ in ticks(viewer, walk.dt, seconds):
             operation.steer()
             try:
                 operation.drive.tick()
@@ -162,12 +162,6 @@ def climb(
                 operation.stop(str(error))
             if walk.step is not None:
                 viewer.update(walk.step, walk.time)
-            due += walk.dt
-            wait = due - time.monotonic()
-            if wait > 0.0:
-                time.sleep(wait)
-            elif wait < -0.25:
-                due = time.monotonic()
 
 
 class _Nobody:

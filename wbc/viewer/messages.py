@@ -6,6 +6,7 @@ A message is one JSON object with ``type``; ``wbc``: 1 is the format, and may be
     {"type": "rate", "item": "hand", "rate": [vx, vy, vz, wx, wy, wz]}       m/s, rad/s, along the world's axes
     {"type": "steer", "rates": [round, along, spin]}    parts of full speed, of a walk; {"type": "go", "hold": "3,4"}
     {"type": "ask", "on": true}    {"type": "approve"}    every lift of a hand waits for a yes
+    {"type": "pair", "name": "xi | alpha"}    {"type": "swap"}    {"type": "drive", "rates": [0.5, 0, 0, 0, 0, 0]}
     {"type": "stop"}    {"type": "resume"}    {"type": "operate"}    {"type": "release"}
 
 Poses are position [m] and quaternion x, y, z, w, rotations a quaternion, everything else the numbers of the input. A
@@ -37,9 +38,14 @@ OBEYED: dict[str, tuple[str, ...]] = {
     "go": ("hold",),
     "ask": ("on",),
     "approve": (),
+    "pair": ("name",),
+    "swap": (),
+    "drive": ("rates",),
 }
 #: Those of them that only a walk obeys
 WALKED = ("steer", "go", "ask", "approve")
+#: Those that only an arm obeys which is driven by pairs of coordinates
+PAIRED = ("pair", "swap", "drive")
 #: Types between a client and its server alone
 SERVED: dict[str, tuple[str, ...]] = {
     "alive": (),

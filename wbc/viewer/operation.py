@@ -16,7 +16,7 @@ from wbc.controller.handles import TaskHandle
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
-from wbc.viewer.messages import RATE_LASTS, WALKED, MessageError, value_of
+from wbc.viewer.messages import PAIRED, RATE_LASTS, WALKED, MessageError, value_of
 
 #: What is dragged and has a velocity goes to where it was dragged at this speed at most [m/s, rad/s]
 FASTEST = (1.0, 4.0)
@@ -67,12 +67,12 @@ class Operation:
         elif kind == "rate":
             self._rate(message["item"], message["rate"])
         else:
-            raise MessageError("message.type", kind, "only a walk obeys it")
+            raise MessageError("message.type", kind, _owner(kind))
 
     def check(self, message: Mapping[str, Any]) -> None:
         """Raise what :meth:`obey` would raise for values, and change nothing."""
-        if message["type"] in WALKED:
-            raise MessageError("message.type", message["type"], "only a walk obeys it")
+        if message["type"] in (*WALKED, *PAIRED):
+            raise MessageError("message.type", message["type"], _owner(message["type"]))
         if message["type"] in ("set", "rate"):
             handle = self._handle(message["item"])
             if message["type"] == "rate":
@@ -231,6 +231,11 @@ class Operation:
         del self._goals[name]
         slot = self._core.layout.blocks[name].slots["velocity"]
         self._core.write(slot, np.zeros(slot.size))
+
+
+def _owner(kind: str) -> str:
+    """Who obeys a message that a stack does not."""
+    return "only a walk obeys it" if kind in WALKED else "only an arm that is driven by pairs obeys it"
 
 
 def _task(handle: Handle) -> TaskHandle:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 from wbc.controller import Controller
 from wbc.simulation import Connection, Plant
-from wbc.viewer.beside import show
+from wbc.viewer.beside import Viewer, show
 
 
 def run(
@@ -45,15 +46,21 @@ def run(
         if announce is not None:
             announce(viewer)
         state = connection.reset(controller.stack.robot.configuration("q", q))
-        begin = due = time.monotonic()
-        while viewer.running and (seconds is None or due - begin < seconds):
+        for _ in ticks(viewer, dt, seconds):
             step = controller.step(state.q)
             viewer.update(step)
             state = connection.drive(step.v)
-            due += dt
-            wait = due - time.monotonic()
-            if wait > 0.0:
-                time.sleep(wait)
-            elif wait < -0.25:
-                # Too late to catch up, as after the machine slept
-                due = time.monotonic()
+
+
+def ticks(viewer: Viewer, dt: float, seconds: float | None) -> Iterator[None]:
+    """One every ``dt`` seconds, while the viewer's process runs and the time has not ended."""
+    begin = due = time.monotonic()
+    while viewer.running and (seconds is None or due - begin < seconds):
+        yield
+        due += dt
+        wait = due - time.monotonic()
+        if wait > 0.0:
+            time.sleep(wait)
+        elif wait < -0.25:
+            # Too late to catch up, as after the machine slept
+            due = time.monotonic()

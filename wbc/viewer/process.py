@@ -35,7 +35,7 @@ def main() -> None:
         stack: Stack = pickle.loads(order["stack"])
         controller = stack.compile(solver=order["solver"], backend=order["backend"])
         link = ViewerEnd(order["file"], order["state"])
-        given = {name: order[name] for name in ("host", "port", "token", "silence", "scenery")}
+        given = {name: order[name] for name in ("host", "port", "token", "silence", "scenery", "pairing")}
         session = Session(controller, link, **given)
     except Exception as error:
         _say(answers, problem=f"{type(error).__name__}: {error}")

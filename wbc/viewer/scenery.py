@@ -10,7 +10,7 @@ import numpy as np
 from wbc import validation
 from wbc.validation import Array
 from wbc.viewer.bodies import Mesh
-from wbc.viewer.messages import MessageError
+from wbc.viewer.messages import PAIRED, MessageError
 
 #: A click counts for the hold that it passes nearer than this [m]
 NEAR = 0.25
@@ -64,5 +64,7 @@ def checked(message: Mapping[str, Any], holds: tuple[str, ...]) -> None:
         validation.one_of("go.hold", message["hold"], holds)
     elif kind == "ask":
         validation.flag("ask.on", message["on"])
+    elif kind in PAIRED:
+        raise MessageError("message.type", kind, "only an arm that is driven by pairs obeys it")
     elif kind in ("set", "rate"):
         raise MessageError("message", message.get("item"), "the walk sets its own targets; steer it")

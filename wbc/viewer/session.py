@@ -22,6 +22,7 @@ from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
 from wbc.viewer.operation import Operation
+from wbc.viewer.pairing import Pairing, PairWatch
 from wbc.viewer.reading import declared, sentences, told
 from wbc.viewer.scenery import Scenery, checked
 from wbc.viewer.self_motion import self_motion
@@ -97,8 +98,10 @@ class Session:
         token: str | None = None,
         silence: float = SILENT,
         scenery: Scenery | None = None,
+        pairing: Pairing | None = None,
     ) -> None:
-        self._scenery = scenery
+        self._scenery, self._pairing = scenery, pairing
+        self._pairs = None if pairing is None else PairWatch(controller.stack.robot, pairing)
         self._controller, self._link = controller, link
         self._checker = Operation(controller)
         self._tick: Tick | None = None
@@ -109,10 +112,12 @@ class Session:
         #: configurations that are shown in place of the robot's own
         self._preview: list[Array] = []
         told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
+        if pairing is not None:
+            told_first |= pairing.declared()
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
         self.server.on_lost(self._operator_lost)
         # The scene after the address: a page that comes early waits for it
-        dragged = None if link is None or scenery is not None else self._dragged
+        dragged = None if link is None or scenery is not None or pairing is not None else self._dragged
         self._drawing = Drawing(self.server.scene, controller, dragged, scenery=scenery, picked=self._picked)
         self._explainer = Explainer()
         if link is not None:
@@ -191,6 +196,8 @@ class Session:
             "previewed": bool(self._preview),
             "waits": bool(self._link is not None and self._link.flags & WAITS),
         }
+        if self._pairs is not None:
+            extra |= self._pairs.told(tick)
         self.server.publish(told(self._controller, tick) | extra)
 
     def _beat(self) -> None:
@@ -248,10 +255,12 @@ class Session:
         """
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
-        if self._scenery is None:
-            self._checker.check(message)
-        else:
+        if self._scenery is not None:
             checked(message, self._scenery.holds)
+        elif self._pairing is not None:
+            self._pairing.checked(message)
+        else:
+            self._checker.check(message)
         if message["type"] in ("set", "rate") and self._link.flags & STOPPED:
             block = core_of(self._controller).layout.blocks[message["item"]]
             if not isinstance(block.entry.item, Constraint):

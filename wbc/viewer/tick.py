@@ -34,6 +34,10 @@ class Tick:
         self._data = robot.model.createData()
         pin.framesForwardKinematics(robot.model, self._data, self.q)
 
+    def block(self, item: str) -> Block:
+        """An item's place in the layout."""
+        return self._layout.blocks[item]
+
     def part(self, name: str) -> Array:
         """A part of the tick's memory."""
         return self._numbers[self._memory[name]]

@@ -119,6 +119,22 @@ class PairController:
         """Whether the task gave way in the last tick because a locus is near."""
         return bool(self.controller[EASE].weight > 0.0)
 
+    def eased_below(self, name: str) -> float:
+        """The least singular value below which a pair's task gives way, see :meth:`sigma`.
+
+        Raises:
+            UnknownNameError: no such pair.
+        """
+        return self._easing.threshold(validation.one_of("pair", name, self.pairs))
+
+    def items_of(self, name: str) -> frozenset[str]:
+        """Names of the stack's items that serve a pair.
+
+        Raises:
+            UnknownNameError: no such pair.
+        """
+        return frozenset(self._made[validation.one_of("pair", name, self.pairs)].items)
+
     def reset(self, q: Any, v: Any = None) -> None:
         """Start anew at a configuration: commands are zero, what the active pair holds is held where it is.
 
@@ -150,6 +166,18 @@ class PairController:
             ShapeError, NotFiniteError: not one finite number a row.
         """
         self._ask("prescribe", self._now.held_rows, rates)
+
+    def halt(self) -> None:
+        """Ask every coordinate for rest from the next tick on, also in the middle of a switch, which has then ended.
+
+        Joints brake within their limits, which come before what is held.
+        """
+        for array in (self._command, self._fading):
+            array[:] = 0.0
+        self.blending, self._fresh = False, True
+        self._integrals.restart(self.pair.task)
+        if self._q is not None:
+            self._latch(self.pair.constraint, self._q)
 
     def switch(self, name: str, seconds: float = 1.0) -> float:
         """Make another pair the active one; returns the time of the blend [s].

@@ -75,7 +75,10 @@ function build() {
     } else $("constraints").append(row);
     rows[item.name] = entry;
   }
-  $("driving").hidden = !$("driven").length || hello.walk;
+  $("driving").hidden = !$("driven").length || hello.walk || !!hello.pairs;
+  $("pairing").hidden = !hello.pairs;
+  if (hello.pairs) $("pair").replaceChildren(...hello.pairs.map((p) => make("option", { value: p.name }, p.name)));
+  commanded = null;
   $("walking").hidden = !hello.walk;
   if (hello.walk) $("stick").hidden = false;
   who();
@@ -111,7 +114,30 @@ function dial(item, target, entry) {
   entry.sliders.push(one); $("postures").prepend(one.element);
 }
 
+// Rates of what the active pair commands, as parts of full speed; a slider that is let go asks for rest
+let commanded = null, driving = [];
+function pairing() {
+  if (commanded !== state.pair) {
+    commanded = state.pair;
+    const about = hello.pairs.find((p) => p.name === commanded);
+    $("pair").value = commanded;
+    $("swap").disabled = !about.swapped;
+    driving = about.rows.map((row, k) => {
+      const unit = about.units[k], full = hello.fastest[unit === "m" ? 0 : 1];
+      const one = slide(row, -1, 1, "", () => { one.out.textContent = `${number(full * one.input.value, unit)}/s`; });
+      one.input.value = 0;
+      one.input.onchange = () => { one.input.value = 0; one.out.textContent = ""; };
+      return one;
+    });
+    $("rows").replaceChildren(...driving.map((one) => one.element));
+  }
+  $("sigma").textContent = `${state.sigma.toPrecision(2)}; the task gives way below ${state.least.toPrecision(2)}`;
+  $("warning").textContent = state.warning;
+  $("warning").hidden = !state.warning;
+}
+
 function show() {
+  if (hello.pairs) pairing();
   const stopped = state.stopped || "";
   if (stopped) pill(`stopped: ${stopped}${state.speed > 1e-4 ? ", braking" : ""}`, "stopped");
   else if (state.previewed) pill("self-motion is shown, not commanded", "relaxed");
@@ -125,6 +151,7 @@ function show() {
     const entry = rows[name];
     if (!entry) continue;
     entry.row.className = `${about.on ? "" : "off"} ${about.binds ? "binds" : ""}`;
+    entry.row.hidden = !!hello.pairs && !about.on;
     if (document.activeElement !== entry.on) entry.on.checked = about.on;
     entry.reading.textContent = about.residual ? Object.entries(about.residual).map(([u, x]) => number(x, u)).join(", ")
       : about.margin !== undefined ? `${number(about.margin, about.unit)}` : about.binds ? "binds" : "";
@@ -162,6 +189,8 @@ for (const what of ["reach", "follow"]) $(what).onchange = () => send({ type: "s
 $("selfmotion").onclick = () => send({ type: "show", what: "self-motion", on: !state.previewed });
 $("ask").onchange = () => send({ type: "ask", on: $("ask").checked });
 $("approve").onclick = () => send({ type: "approve" });
+$("pair").onchange = () => { send({ type: "pair", name: $("pair").value }); $("pair").value = commanded; };
+$("swap").onclick = () => send({ type: "swap" });
 $("live").onclick = () => send({ type: "live" });
 $("showstick").onchange = () => { $("stick").hidden = !$("showstick").checked; };
 
@@ -198,6 +227,12 @@ const dead = (x) => (Math.abs(x) < 0.15 ? 0 : x);
 let rating = false;
 setInterval(() => {
   if (!hello || operator !== me) return;
+  if (hello.pairs) {
+    const rates = driving.map((one) => Number(one.input.value)), some = rates.some((x) => x);
+    if (some || rating) send({ type: "drive", rates });
+    rating = some;
+    return;
+  }
   const pad = (navigator.getGamepads ? [...navigator.getGamepads()] : []).find((p) => p && p.connected);
   const a = pad ? pad.axes.map(dead) : [];
   if (pad && pad.buttons[1] && pad.buttons[1].pressed) send({ type: "stop" });
