@@ -27,8 +27,8 @@ def parts() -> dict[str, Sheet | str]:
     shared, numpy = (f"{_rough(least)} to {_rough(most)}" for least, most in ratios.values())
     return {
         "ticks": Sheet("", ("backend", "what runs", *(f"tick of a {name} [us]" for name in ROBOTS.values())), rows),
-        "factors": f"Compared with `native`, a tick takes {shared} times as long in the shared library, and {numpy} times "
-        "in numpy.",
+        "factors": f"Compared with `native`, a tick takes {shared} times as long in the shared library, and {numpy} "
+        "times in numpy.",
     }
 
 

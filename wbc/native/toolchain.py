@@ -95,7 +95,7 @@ def available() -> bool:
 def fall_back(reason: str) -> None:
     """Say once for each reason that ticks are not native."""
     log.warning(
-        "%s: rows run on CasADi's virtual machine; a tick takes about 5 times as long with the library of `make wheel`, "
+        "%s: rows run on CasADi's virtual machine; a tick takes 3 to 5 times as long with the library of `make wheel`, "
         "and some hundred times as long in numpy",
         reason,
     )
