@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from setuptools import Distribution, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 
 
 class WithLibraries(Distribution):
@@ -12,4 +13,11 @@ class WithLibraries(Distribution):
         return any(Path(__file__).parent.glob("wbc/stack/prebuilt_libraries/*.so"))
 
 
-setup(distclass=WithLibraries)
+class AnyPython(bdist_wheel):
+    """The libraries know nothing of Python, so the wheel is for all its versions."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        return "py3", "none", super().get_tag()[2]
+
+
+setup(distclass=WithLibraries, cmdclass={"bdist_wheel": AnyPython})

@@ -33,6 +33,12 @@ def test_blocks_run(page: Path) -> None:
     assert page.stem != "README" or "EndEffector" in done.stdout
 
 
+@pytest.mark.parametrize("page", ["dynamics_published", "proximity", "trajectory"])
+def test_short_blocks_run(page: str) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    exec(compile("\n".join(re.findall(r"```python\n(.*?)```", text, re.S)), page, "exec"), {})
+
+
 def test_links_exist() -> None:
     for page in PAGES:
         for link in re.findall(r"\]\(([^)#\s]+)", page.read_text()):

@@ -100,6 +100,7 @@ _ALL = (
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
+    Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("clearance", ("wbc/clearance",), 1.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from wbc.cli import completion
-from wbc.cli.app import COMMANDS, CommandGroup, app
+from wbc.cli.app import COMMANDS, CommandGroup, app, command
 
 WBC = [sys.executable, "-c", "import sys; sys.argv[0] = 'wbc'; from wbc.cli import main; main()"]
 
@@ -43,6 +44,45 @@ def test_results_as_json() -> None:
     assert [answer["solved"] for answer in answers] == [True, False]
     assert len(answers[0]["q"]) == 6
     assert "out of reach" in answers[1]["reason"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("advise", "spherical_4r", "--at", "0.3,1.5707963267948966,-0.7,1.1"),
+        ("modes",),
+        ("relative-motion", "--table", "4.6", "--out", "relative"),
+        ("ikor", "--case", "1", "--config", "3x7", "--out", "ikor"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_nothing_but_json_is_printed(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert json.loads(run(*arguments, "--json"))
+
+
+def test_a_run_and_its_replay_as_json(tmp_path: Path) -> None:
+    quick = ("--duration", "0.05", "--rate", "100", "--backend", "python", "--no-plots")
+    assert json.loads(run("track", "panda", *quick, "--out", str(tmp_path), "--force", "--json"))
+    assert json.loads(run("replay", str(tmp_path), "--json"))["tables"]
+
+
+def test_commands_print_only_where_data_is_kept() -> None:
+    """What every command says goes through :mod:`wbc.cli.console`, so that ``--json`` has it."""
+    own = {"app.py", "console.py", "results.py"}
+    folder = Path(completion.__file__).parent
+    found = [
+        f"{path.name}: {line.strip()}"
+        for path in sorted(folder.rglob("*.py"))
+        if path.name not in own
+        for line in path.read_text().splitlines()
+        if re.search(r"(?<![.\w])print\(|echo\(|sys\.stdout|Console\(", line)
+    ]
+    assert found == []
+    for name, entry in COMMANDS.items():
+        assert entry.in_clone or any("--json" in option.opts for option in command(name).params), name
 
 
 def test_the_shell_completes_robots_files_and_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from setuptools.command.egg_info import FileList
 
 from tests.project.layout import ROOT, module_name, pyproject, sources
 
@@ -54,6 +55,21 @@ def test_wheel_holds_type_marker_licence_and_data(wheel: zipfile.ZipFile) -> Non
     data = {p for f in ("wbc", "tasks", "robots") for p in (ROOT / f).rglob("*") if p.suffix in DATA and p.is_file()}
     assert {installed_name(p) for p in data} <= names
     assert not {n.split("/")[0] for n in names} - {"wbc", f"wbc-{pyproject()['project']['version']}.dist-info"}
+
+
+def test_sdist_holds_examples_pages_and_what_makes_them() -> None:
+    """By the rules of MANIFEST.in, which setuptools applies to the tree."""
+    found = FileList()
+    folders = ("examples", "docs", "requirements")
+    found.allfiles = [
+        p.relative_to(ROOT).as_posix()
+        for p in (*ROOT.iterdir(), *(p for folder in folders for p in (ROOT / folder).rglob("*")))
+        if p.is_file() and "__pycache__" not in p.parts
+    ]
+    for line in (ROOT / "MANIFEST.in").read_text().splitlines():
+        found.process_template_line(line)
+    top = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "Makefile", "mkdocs.yml"}
+    assert {name for name in found.allfiles if "/" in name} | top == {*found.files}
 
 
 def test_every_package_is_listed() -> None:

@@ -43,6 +43,9 @@ def test_random_configurations_are_within_the_limits_and_repeat(name: str) -> No
             assert ((some[:, at[k]] >= low) & (some[:, at[k]] <= high)).all()
             assert np.ptp(some[:, at[k]]) > 0.5 * (high - low) or low == high
     np.testing.assert_array_equal(robot.random(7), some[7])
+    drawn = np.random.default_rng(7)
+    np.testing.assert_array_equal(robot.random(drawn), some[7])
+    assert not np.array_equal(robot.random(drawn), some[7])
     for q in some:
         robot.configuration("q", q)
 

@@ -94,7 +94,11 @@ def available() -> bool:
 @functools.cache
 def fall_back(reason: str) -> None:
     """Say once for each reason that ticks are not native."""
-    log.warning("%s: ticks run on the CasADi virtual machine, 50 to 300 times slower", reason)
+    log.warning(
+        "%s: rows run on CasADi's virtual machine; a tick takes 3 to 5 times as long with the library of `make wheel`, "
+        "and some hundred times as long in numpy",
+        reason,
+    )
 
 
 def headers() -> pathlib.Path:

@@ -245,13 +245,19 @@ class Robot:
         """
         return np.asarray(pin.difference(self.model, self.configuration("a", a), self.configuration("b", b)))
 
-    def random(self, seed: int = 0) -> Array:
+    def random(self, seed: int | np.random.Generator = 0) -> Array:
         """A configuration within the position limits; what has none is within half a turn, or a metre, of neutral.
+
+        Args:
+            seed: a whole number, which gives the same configuration each time, or the generator that draws.
 
         Raises:
             RangeError: a seed below 0.
         """
-        rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
+        if isinstance(seed, np.random.Generator):
+            rng = seed
+        else:
+            rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
         reach = np.where(np.array([unit == "rad" for unit in self.dof_units]), np.pi, 1.0)
         out = self.integrate(self.neutral, rng.uniform(-reach, reach))
         for k in np.flatnonzero(self.position_index >= 0).tolist():

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata, resources
 
+from wbc.errors import CompileError
 from wbc.native import cache, toolchain
 from wbc.stack.declaration import COMMANDS
 from wbc.stack.memory import INPUTS, LEVEL_NUMBERS, LEVEL_REPORT, QP_FIELDS, REPORT, REST_INPUTS, TORQUE_REPORT, Field
@@ -122,8 +123,10 @@ def library(variant: Variant) -> pathlib.Path:
         CompileError: there is no compiler, or it fails.
     """
     files = sources(variant)
-    if toolchain.compiler() is None and (shipped := prebuilt(files)).exists():
-        return shipped
+    if toolchain.missing():
+        if (shipped := prebuilt(files)).exists():
+            return shipped
+        raise CompileError("compiler", toolchain.compiler(), f"cannot compile: {', '.join(toolchain.missing())}")
     said = "\n".join((*files.values(), toolchain.identity(), "generic"))
     name = hashlib.sha256(said.encode()).hexdigest()
     folder, _ = cache.fetch(name, lambda place: toolchain.compile_generic(files, place / "generic.so"), library=True)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 from wbc.native import toolchain
 from wbc.stack import generic
 
@@ -11,11 +14,15 @@ def main() -> None:
     generic.PREBUILT.mkdir(exist_ok=True)
     for old in generic.PREBUILT.glob("*.so"):
         old.unlink()
-    for variant in generic.variants():
-        files = generic.sources(variant)
-        toolchain.compile_generic(files, generic.prebuilt(files), portable=True)
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(_compile, generic.variants()))
     found = list(generic.PREBUILT.glob("*.so"))
     print(f"{len(found)} libraries, {sum(path.stat().st_size for path in found) / 1e6:.1f} MB")
+
+
+def _compile(variant: generic.Variant) -> None:
+    files = generic.sources(variant)
+    toolchain.compile_generic(files, generic.prebuilt(files), portable=True)
 
 
 if __name__ == "__main__":

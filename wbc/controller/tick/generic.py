@@ -51,7 +51,7 @@ def generic_tick(program: TickProgram, stack: Declaration, layout: Layout) -> Ge
     try:
         return GenericTick(program, stack, layout)
     except CompileError as error:
-        if toolchain.compiler() is not None:
+        if not toolchain.missing():
             toolchain.fall_back(str(error))
         return None
 
