@@ -32,7 +32,7 @@ def both(seed: int, k: int, ticks: int, levels: bool = False) -> list[tuple[str,
     stack = random_stack(robot, rng)
     if levels:
         stack = with_levels(stack, rng)
-    pair, counts = (stack.compile(backend="native"), stack.compile(backend="vm")), Counter[str]()
+    pair, counts = (stack.compile(backend="native"), stack.compile(backend="python")), Counter[str]()
     q, v = robot.neutral, np.zeros(robot.nv)
     for tick in range(ticks):
         if tick % LENGTH == 0:

@@ -59,14 +59,14 @@ def jumping_clock(controller: Controller, q: Array, v: Array, tick: int, rng: np
 
 
 def one_iteration(seed: int, k: int, backend: str) -> Found:
-    """The QP solver may take one iteration, in all its uses within a native tick or on the virtual machine."""
+    """The QP solver may take one iteration, in all its uses within a compiled tick or in numpy's."""
     rng = np.random.default_rng([seed, 11, k])
     before = daqp.SETTINGS["iter_limit"]
-    if backend == "vm":
+    if backend == "python":
         daqp.SETTINGS["iter_limit"] = 1
     try:
         controller = random_stack(machine(rng), rng).compile(backend=backend)
-        if backend == "native":
+        if backend != "python":
             controller.iteration_cap = 1
         return [(f"one iteration, {backend} {seed}/{k}", episode(controller, Judge(controller), rng))]
     finally:

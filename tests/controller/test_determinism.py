@@ -57,7 +57,7 @@ def digest(backend: str) -> str:
     return hashlib.sha256(b"".join(ticks(arm(backend), 3))).hexdigest()
 
 
-PROGRAM = "from tests.controller.test_determinism import digest; print(*[digest(b) for b in ('vm', 'native')])"
+PROGRAM = f"from tests.controller.test_determinism import digest; print(*[digest(b) for b in {BACKENDS!r}])"
 
 
 def test_the_same_inputs_give_the_same_bits_in_any_process() -> None:

@@ -124,7 +124,7 @@ COMMANDS = {
     "study": Listed(
         "study",
         "study",
-        "Carry out many trials of a scenario, over parameters and seeds, here or on a cluster, and go on after a kill.",
+        "Many trials of a scenario, over parameters and seeds, on this machine or a cluster.",
     ),
     "bench": Listed(
         "bench",
