@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -37,44 +39,23 @@ def play(
     require_viser()
     if zeromq:
         require_local(zeromq)
+    begin: Callable[..., None]
     if preset == CLIMB:
         from wbc.viewer.climbing import climb
 
-        err().print("Steer with W S A D and Q E or the stick, or click a hold. Space stops it, Ctrl-C ends.")
-        with viewing.until_interrupted():
-            climb(
-                seconds,
-                backend=backend,
-                announce=viewing.announce,
-                host=host,
-                port=port,
-                open_browser=browser,
-                zeromq=zeromq,
-            )
-        return
-    if pairs:
+        _say("Steer with W S A D and Q E or the stick, or click a hold.")
+        begin = partial(climb, backend=backend)
+    elif pairs:
         from wbc.viewer.operating import operate
 
-        err().print("Choose a pair, and drive what it commands by its sliders. Space stops it, Ctrl-C ends.")
-        with viewing.until_interrupted():
-            operate(
-                preset,
-                seconds,
-                backend=backend,
-                announce=viewing.announce,
-                host=host,
-                port=port,
-                open_browser=browser,
-                zeromq=zeromq,
-            )
-        return
-    chosen = playground(preset)
-    err().print(f"{escape(chosen.about)} Space stops it, Ctrl-C ends.", soft_wrap=True)
-    controller = viewing.compiled(chosen.stack, backend)
+        _say("Choose a pair, and drive what it commands by its sliders.")
+        begin = partial(operate, preset, backend=backend)
+    else:
+        chosen = playground(preset)
+        _say(chosen.about)
+        begin = partial(run, viewing.compiled(chosen.stack, backend), chosen.start)
     with viewing.until_interrupted():
-        run(
-            controller,
-            chosen.start,
+        begin(
             seconds,
             host=host,
             port=port,
@@ -82,3 +63,7 @@ def play(
             zeromq=zeromq,
             announce=viewing.announce,
         )
+
+
+def _say(about: str) -> None:
+    err().print(f"{escape(about)} Space stops it, Ctrl-C ends.", soft_wrap=True)

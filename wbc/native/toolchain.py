@@ -10,8 +10,9 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import casadi as ca
 
@@ -131,13 +132,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
     Raises:
         CompileError: the compiler failed; its first lines are in the message.
     """
-    cc = compiler()
-    if cc is None:
-        raise CompileError("compiler", None, "no C compiler found; install gcc or wbc[compiler], or use backend='vm'")
-    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
-        place = pathlib.Path(folder)
-        for name, text in files.items():
-            (place / name).write_text(text)
+    with _written(files) as (cc, place):
         include = (f"-I{headers()}",)
         flags = ROWS_FLAGS if len(files["rows.c"]) <= LONG_ROWS else ("-O0",)
         parts = (
@@ -155,22 +150,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         )
         with ThreadPoolExecutor(len(parts)) as pool:
             list(pool.map(lambda part: _run(part, place), parts))
-        _run(
-            [
-                *_command(cc),
-                "-shared",
-                # Of DAQP nothing is seen from outside; zig's linker knows no such option, and -Bsymbolic is enough
-                *(() if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)),
-                "-Wl,-Bsymbolic",
-                "rows.o",
-                "tick.o",
-                str(library()),
-                "-lm",
-                "-o",
-                str(output),
-            ],
-            place,
-        )
+        _run([*_command(cc), "rows.o", "tick.o", *_with_solver(cc, output)], place)
 
 
 def compile_rows(text: str, output: pathlib.Path) -> None:
@@ -190,13 +170,7 @@ def compile_library(
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
-    cc = compiler()
-    if cc is None:
-        raise CompileError("compiler", None, "no C compiler found")
-    with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
-        place = pathlib.Path(folder)
-        for name, text in files.items():
-            (place / name).write_text(text)
+    with _written(files) as (cc, place):
         # What it exports must be seen by who loads the library
         flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
         _run([*_command(cc), *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
@@ -210,17 +184,29 @@ def compile_generic(files: dict[str, str], output: pathlib.Path, portable: bool 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
+    with _written(files) as (cc, place):
+        flags = [flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native")]
+        _run([*_command(cc), *flags, "-O1", f"-I{headers()}", "generic.c", *_with_solver(cc, output)], place)
+
+
+@contextmanager
+def _written(files: dict[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
+    """The compiler, and a folder that has the files while it is used."""
     cc = compiler()
     if cc is None:
-        raise CompileError("compiler", None, "no C compiler found")
+        raise CompileError("compiler", None, "no C compiler found; install gcc or wbc[compiler], or use backend='vm'")
     with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
         place = pathlib.Path(folder)
         for name, text in files.items():
             (place / name).write_text(text)
-        hidden = () if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)
-        link = ("-shared", *hidden, "-Wl,-Bsymbolic", str(library()), "-lm", "-o", str(output))
-        flags = [flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native")]
-        _run([*_command(cc), *flags, "-O1", f"-I{headers()}", "generic.c", *link], place)
+        yield cc, place
+
+
+def _with_solver(cc: str, output: pathlib.Path) -> tuple[str, ...]:
+    """What links a shared library with DAQP, of which nothing is seen from outside."""
+    # zig's linker knows no such option, and -Bsymbolic is enough
+    hidden = () if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)
+    return ("-shared", *hidden, "-Wl,-Bsymbolic", str(library()), "-lm", "-o", str(output))
 
 
 def _output(command: list[str]) -> str:
