@@ -106,8 +106,9 @@ def test_distances_are_those_of_many_points() -> None:
         if isinstance(shape, Box):
             assert (bound >= exact - np.linalg.norm(b - a, axis=1) / (2 * distances.PARTS) - 1e-9).all()
         grid = obstacle.distance(brute(a, b)).min(axis=1)
-        # A segment that enters a mesh is 0 away from it, however deep
-        grid = np.maximum(grid, 0.0) if shape is rock else grid
+        if shape is rock:
+            # A segment that enters a mesh is 0 away from it, however deep; a point inside has its depth
+            exact, grid = np.maximum(exact, 0.0), np.maximum(grid, 0.0)
         assert (exact <= grid + 1e-9).all()
         np.testing.assert_allclose(exact, grid, atol=0.01)
     for surface in (PlaneSurface(place), CylinderSurface(place, 0.4)):
