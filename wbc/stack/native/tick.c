@@ -171,6 +171,7 @@ EXPORT int wbc_tick_safe_step(wbc_tick *t) {
     rewind_tick(t);
     wbc_tick_reset(t);
     flag = wbc_tick_step(t);
+    if (flag == WBC_BRAKED) return flag;
     if (!(flag & WBC_UNSOUND)) return (int)(t->report.flag = WBC_RECOVERED);
     rewind_tick(t);
     wbc_tick_reset(t);
