@@ -147,7 +147,7 @@ class PinocchioPlant:
     def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
         reading = PlantState(q, v, time)
-        self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.scale.copy(), anchors,
+        self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.driven.copy(), anchors,
                              np.random.default_rng(self._seed), reading)  # fmt: skip
         self._hold()
         self._state.first = self._balance.momentum(q, v)
@@ -174,8 +174,7 @@ class PinocchioPlant:
         """
         state, h, drive, balance = self._state, self.time_step, self._drive, self._balance
         for _ in range(round(dt / h)):
-            drive.scale = state.scale
-            self._torque = drive.torque(state.motors, state.command, state.v, state.random)
+            self._torque = state.scale * drive.torque(state.motors, state.command, state.v, state.random)
             if state.slips:
                 self._slide(h)
             if self._touch is not None:
