@@ -16,7 +16,7 @@ from wbc.robot import Robot
 from wbc.simulation.dynamics import AXIS, Grip
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Motors, MotorState
-from wbc.simulation.mujoco_model import mujoco_spec
+from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
 from wbc.simulation.pinocchio_plant import check_reach
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
@@ -25,8 +25,6 @@ from wbc.validation import Array
 #: Points of a frame that its grip holds, as many as the kind needs [m]
 POINTS = AXIS * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
-#: Time constant of a grip, in time steps of MuJoCo: fewer do not hold; and how hard it is, of 1
-SOFT, HARD = 2.0, 0.9999
 
 
 @dataclass(eq=False)
@@ -84,7 +82,7 @@ class GrippingMujocoPlant(MujocoPlant):
             for k in range(len(POINTS)):
                 held = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
                 held.name, held.name1, held.active = f"{name} {k}", body.name, False
-                held.solref, held.solimp = [soft, 1.0], [HARD, HARD, 0.001, 0.5, 2.0]
+                held.solref, held.solimp = [soft, 1.0], HARD
         model = spec.compile()
         self._equality = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         self._rows = {name: [int(model.equality(f"{name} {k}").id) for k in range(len(POINTS))] for name in frames}
