@@ -11,7 +11,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.simulation.dynamics import AXIS, Grip
+from wbc.simulation.dynamics import AXIS, Grip, Slip
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Motors
 from wbc.simulation.mujoco_model import mujoco_spec
@@ -79,7 +79,7 @@ class GrippingMujocoPlant(MujocoPlant):
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
         """At a configuration, at rest or with a velocity, and nothing grasped."""
-        self._grips, self._slips, self._broken = {}, dict[str, tuple[Array, float]](), list[str]()
+        self._grips, self._slips, self._broken = {}, dict[str, Slip](), list[str]()
         super().reset(q, time, v)
         self._torque, self._motors = np.zeros(self.nv), self._drive.fresh()
         self._drive.scale[self._robot.base_nv :] = 1.0
@@ -160,7 +160,7 @@ class GrippingMujocoPlant(MujocoPlant):
         """As :meth:`PinocchioPlant.slip`."""
         validation.one_of("frame", frame, self._grips)
         rate = validation.real_array("velocity", velocity, (3,))
-        self._slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+        self._slips[frame] = Slip(rate, validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
 
     def limp(self, joint: str, scale: float = 0.0) -> None:
         """As :meth:`PinocchioPlant.limp`."""
@@ -201,10 +201,10 @@ class GrippingMujocoPlant(MujocoPlant):
 
     def _slide(self, name: str, h: float) -> None:
         """A grip that slips, a step on."""
-        rate, left = self._slips[name]
-        grip, moved = self._grips[name], rate * min(h, left)
+        grip, (moved, left) = self._grips[name], self._slips[name].on(h)
         self._grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
         self._model.eq_data[self._rows[name], 3:6] += moved
-        self._slips[name] = rate, left - h
-        if left <= h:
+        if left is None:
             del self._slips[name]
+        else:
+            self._slips[name] = left

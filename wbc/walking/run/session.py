@@ -181,6 +181,9 @@ def perform(
         write_whole(folder / PLAN, plan.save)
     if not plan.complete:
         return run
+    unborne = plant.bearing.of_plan(plan, mode.structure) if isinstance(plant, TorqueLoop) else ""
+    if unborne:
+        return replace(run, reason=unborne)
     report("compiling", None)
     begin = clock()
     stack = stack or mode.compiled(backend)

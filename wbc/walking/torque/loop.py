@@ -13,6 +13,7 @@ from wbc import validation
 from wbc.errors import ShapeError
 from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
 from wbc.validation import Array
+from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
 from wbc.walking.torque.stack import TorqueStack
@@ -21,6 +22,8 @@ from wbc.walking.torque.watch import Watch
 
 #: A closed hand that is farther from its hold slips; farther than that the walk ends [m]
 SLIPS, LOST = 3e-4, 2e-3
+#: Torques that do not do what they are to for so long end the walk [s]
+OVERLOAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -52,14 +55,15 @@ class TorqueLoop:
 
     A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
     found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
-    the walk then brings it to rest.
+    the walk then brings it to rest. So it does where holds and motors would not bear the robot (:class:`Bearing`).
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.
         delay: of the torques, which the loop knows [s]. faults: that come in time.
 
     Attributes:
-        watch: what was seen of the plant. about: plain data for a log, which say what it is.
+        watch: what was seen of the plant. bearing: what holds and motors bear. about: plain data for a log, which say
+            what it is.
 
     Raises:
         ShapeError: a plant that takes no torques, or grasps nothing.
@@ -98,7 +102,7 @@ class TorqueLoop:
         self.watch = Watch(stack.rating, [arm.hand for arm in arms])
         self._effort = np.array(stack.walker.robot.limits.effort)
         self._effort[: stack.walker.robot.base_nv] = 0.0
-        self._motors = MotorWatch(self._model, self._effort, self.time_step)
+        self._motors, self.bearing = MotorWatch(self._model, self._effort, self.time_step), Bearing(stack)
         self._data = self._model.createData()
         # Torques on their way, the oldest first, and that which takes hold next at the end
         self._sent = np.zeros((ahead + 1, self.nv))
@@ -112,7 +116,7 @@ class TorqueLoop:
         self._motors.begin(q, np.zeros(self.nv))
         self._sent[:] = 0.0
         self._slipping: dict[str, float] = {}
-        self._failing = ""
+        self._failing, self._overloaded = "", 0
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
@@ -154,6 +158,17 @@ class TorqueLoop:
         self._slipping.pop(frame, None)
         self._let_go(frame)
 
+    def holds_without(self, frame: str) -> bool:
+        """Whether holds and motors bear the robot, at rest where it is, when this closed hand opens; if they do not,
+        :meth:`failing` says what is lacking.
+        """
+        state = self.plant.read()
+        held = {hand: kind for hand, kind in self._closed.items() if hand != frame}
+        short = self.bearing.lacking(state.q, held)
+        if short:
+            self._note(state.time, self.bearing.words(short, held), ends=True)
+        return not short
+
     def lost(self) -> tuple[str, ...]:
         """Hands whose holds have broken off; the stack has done without them since."""
         lost = self._tested.lost()
@@ -189,10 +204,21 @@ class TorqueLoop:
             if len(self._decided):
                 self._decided[:-1] = self._decided[1:]
                 self._decided[-1] = self.step.a
+            self._overloaded = 0 if self.step.status == "solved" else self._overloaded + 1
             self.watch.see(self._tested, self._model, self.step.status)
         off = pin.difference(self._model, self._q, plant.read().q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
         self._feel()
+        self._bear()
+
+    def _bear(self) -> None:
+        """Torques that have given way for long, with what is lacking to stand."""
+        if self._overloaded * self.time_step < OVERLOAD or self._failing:
+            return
+        state = self.plant.read()
+        short = self.bearing.lacking(state.q, self._closed)
+        text = f"motors and holds have given way for {1e3 * OVERLOAD:.0f} ms"
+        self._note(state.time, f"{text}; {self.bearing.words(short, self._closed)}" if short else text, ends=True)
 
     def _find(self) -> None:
         """Motors that have gone limp."""
