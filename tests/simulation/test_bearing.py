@@ -56,7 +56,7 @@ def test_what_it_bears_is_what_a_linear_program_says(seed: int) -> None:
     q[7:] += random.uniform(-0.5, 0.5, robot.nq - 7)
     q[3:7] = pin.Quaternion(pin.exp3(random.uniform(-1.0, 1.0, 3))).coeffs()
     share = most_gravity(q, hands)
-    short = bearing.lacking(q, {hand: GripKind.AXIS for hand in hands})
+    short = bearing.lacking(q, dict.fromkeys(hands, GripKind.AXIS))
     assert (not short) == (share >= 1.0)
 
 

@@ -11,11 +11,12 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
+from wbc.simulation import Command, CommandKind, Encoders, GripKind, Plant, PlantState
 from wbc.validation import Array
 from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
+from wbc.walking.torque.readings import JointFilter
 from wbc.walking.torque.stack import TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
@@ -59,7 +60,8 @@ class TorqueLoop:
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.
-        delay: of the torques, which the loop knows [s]. faults: that come in time.
+        delay: of the torques, which the loop knows [s]. encoders: their noise, which the loop knows; None: none.
+        faults: that come in time.
 
     Attributes:
         watch: what was seen of the plant. bearing: what holds and motors bear. about: plain data for a log, which say
@@ -78,6 +80,7 @@ class TorqueLoop:
         gains: Gains | None = None,
         *,
         delay: float = 0.0,
+        encoders: Encoders | None = None,
         faults: Sequence[Fault] = (),
         about: Mapping[str, Any] | None = None,
     ) -> None:
@@ -104,12 +107,16 @@ class TorqueLoop:
         self._effort[: stack.walker.robot.base_nv] = 0.0
         self._motors, self.bearing = MotorWatch(self._model, self._effort, self.time_step), Bearing(stack)
         self._data = self._model.createData()
+        base, noisy = stack.walker.robot.base_nv, encoders is not None and encoders != Encoders()
+        self._filter = JointFilter(self._model, base, encoders, self.time_step) if encoders and noisy else None
+        self._state = plant.read()
         # Torques on their way, the oldest first, and that which takes hold next at the end
         self._sent = np.zeros((ahead + 1, self.nv))
 
     def reset(self, q: Array, time: float) -> None:
         """At rest, nothing grasped."""
         self.plant.reset(q, time)
+        self._look()
         gains, controller = self._gains, self.stack.controller
         controller.reset(q)
         controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
@@ -129,14 +136,15 @@ class TorqueLoop:
 
     def move(self, v: Array) -> None:
         """See :class:`wbc.simulation.MovingPlant`."""
-        state = self.plant.read()
+        state = self._state
         self._tested.reset(state.q, state.time, v)
+        self._look()
         self._motors.begin(state.q, v)
         self._v, self._next = np.array(v), np.array(v)
 
     def read(self) -> PlantState:
-        """The plant's."""
-        return self.plant.read()
+        """The plant's; of noisy encoders what the filter makes of it."""
+        return self._state
 
     def apply(self, command: Command) -> None:
         """Take velocities, for the next period."""
@@ -146,7 +154,8 @@ class TorqueLoop:
         """The plant's hand closes, and the stack counts on it."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
         self._tested.grasp(frame, pose, kind)
-        state = self.plant.read()
+        self._look(struck=True)
+        state = self._state
         self._motors.struck(state.q, state.v)
         item = self._items[frame, kind]
         item.target, item.enabled = pose, True
@@ -162,7 +171,7 @@ class TorqueLoop:
         """Whether holds and motors bear the robot, at rest where it is, when this closed hand opens; if they do not,
         :meth:`failing` says what is lacking.
         """
-        state = self.plant.read()
+        state = self._state
         held = {hand: kind for hand, kind in self._closed.items() if hand != frame}
         short = self.bearing.lacking(state.q, held)
         if short:
@@ -173,7 +182,7 @@ class TorqueLoop:
         """Hands whose holds have broken off; the stack has done without them since."""
         lost = self._tested.lost()
         for frame in lost:
-            self._note(self.plant.read().time, f"the hold of {frame} broke off")
+            self._note(self._state.time, f"the hold of {frame} broke off")
         return lost
 
     def failing(self) -> str:
@@ -187,7 +196,7 @@ class TorqueLoop:
         plant, reference, command, controller = self.plant, self._reference, self._command, self.stack.controller
         reference.acceleration = ramp / step
         for _ in range(count):
-            state = plant.read()
+            state = self._state
             if self._coming:
                 self._fail(state.time)
             q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
@@ -196,6 +205,7 @@ class TorqueLoop:
             command.values[:] = self.step.torque
             plant.apply(command)
             plant.advance(step)
+            self._look(self._decided[0] if len(self._decided) else self.step.a)
             self._sent[:-1] = self._sent[1:]
             self._sent[-1] = self.step.torque
             self._find()
@@ -206,23 +216,33 @@ class TorqueLoop:
                 self._decided[-1] = self.step.a
             self._overloaded = 0 if self.step.status == "solved" else self._overloaded + 1
             self.watch.see(self._tested, self._model, self.step.status)
-        off = pin.difference(self._model, self._q, plant.read().q)
+        off = pin.difference(self._model, self._q, self._state.q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
         self._feel()
         self._bear()
+        self.watch.period(self._state.time)
+
+    def _look(self, decided: Array | None = None, struck: bool = False) -> None:
+        """Take what is read; ``decided``: the accelerations of the tick that is over; None: there was none."""
+        state, known = self.plant.read(), self._filter
+        if known is not None:
+            state = (
+                known.struck(state) if struck else known.begin(state) if decided is None else known.see(state, decided)
+            )
+        self._state = state
 
     def _bear(self) -> None:
         """Torques that have given way for long, with what is lacking to stand."""
         if self._overloaded * self.time_step < OVERLOAD or self._failing:
             return
-        state = self.plant.read()
+        state = self._state
         short = self.bearing.lacking(state.q, self._closed)
         text = f"motors and holds have given way for {1e3 * OVERLOAD:.0f} ms"
         self._note(state.time, f"{text}; {self.bearing.words(short, self._closed)}" if short else text, ends=True)
 
     def _find(self) -> None:
         """Motors that have gone limp."""
-        state, model, data = self.plant.read(), self._model, self._data
+        state, model, data = self._state, self._model, self._data
         pin.computeJointJacobians(model, data, state.q)
         contacts = np.zeros(self.nv)
         for name, wrench in self._tested.wrenches.items():
@@ -241,7 +261,7 @@ class TorqueLoop:
 
     def _feel(self) -> None:
         """Hands that slip on their holds."""
-        state, model, data = self.plant.read(), self._model, self._data
+        state, model, data = self._state, self._model, self._data
         pin.framesForwardKinematics(model, data, state.q)
         for frame, kind in self._closed.items():
             gap = data.oMf[model.getFrameId(frame)].translation - self._items[frame, kind].target.translation

@@ -10,6 +10,7 @@ import pinocchio as pin
 from wbc.robots import HoldRating
 from wbc.track.summary import Figure
 from wbc.validation import Array
+from wbc.walking.torque.loads import Loads
 from wbc.walking.torque.tested import Tested
 
 
@@ -26,10 +27,12 @@ class Watch:
     def __init__(self, rating: HoldRating, hands: Sequence[str]) -> None:
         self.rating, self._hands = rating, tuple(hands)
         self.drift = self.force = self.moment = 0.0
-        self.given = np.zeros(2)
+        self.given = self._given = np.zeros(2)
         self.ticks = self.unsolved = 0
         self.noted: list[tuple[float, str]] = []
         self._data: pin.Data | None = None
+        # Of the period that goes on: its worst force, moment and distance of each hand; and all before it
+        self._now, self._rows = np.full((3, len(self._hands)), np.nan), list[tuple[float, Array, Array]]()
 
     def see(self, plant: Tested, model: pin.Model, status: str) -> None:
         """After a tick."""
@@ -38,18 +41,40 @@ class Watch:
         data, q, grips = self._data, plant.state.q, plant.grips
         self.ticks += 1
         self.unsolved += status != "solved"
-        for wrench in plant.wrenches.values():
+        for name, wrench in plant.wrenches.items():
             sizes = np.abs(wrench)
-            self.force, self.moment = max(self.force, sizes[:3].max()), max(self.moment, sizes[3:].max())
+            force, moment = float(sizes[:3].max()), float(sizes[3:].max())
+            self.force, self.moment = max(self.force, force), max(self.moment, moment)
+            self._worst(name, slice(0, 2), (force, moment))
         pin.framesForwardKinematics(model, data, q)
         for name, grip in grips.items():
             off = data.oMf[model.getFrameId(name)].translation - grip.pose.translation
-            self.drift = max(self.drift, float(np.sqrt(off @ off)))
+            far = float(np.sqrt(off @ off))
+            self.drift = max(self.drift, far)
+            self._worst(name, slice(2, 3), (far,))
         given: Array = plant.given
         x, y, z = q[:3]
         a, b, c = given[:3]
         turning = given[3:] - (y * c - z * b, z * a - x * c, x * b - y * a)
-        self.given = np.maximum(self.given, (np.abs(given[:3]).max(), np.abs(turning).max()))
+        self._given = np.array([np.abs(given[:3]).max(), np.abs(turning).max()])
+        self.given = np.maximum(self.given, self._given)
+
+    def period(self, time: float) -> None:
+        """A period of the walk is over."""
+        self._rows.append((time, self._now, self._given))
+        self._now = np.full_like(self._now, np.nan)
+
+    def loads(self) -> Loads:
+        """What was seen, period by period."""
+        count = len(self._hands)
+        worst = np.array([row for _, row, _ in self._rows]).reshape(-1, 3, count)
+        given = np.array([row for _, _, row in self._rows]).reshape(-1, 2)
+        time = np.array([time for time, _, _ in self._rows])
+        return Loads(time, *np.moveaxis(worst, 1, 0), given, self.rating, tuple(self.noted))
+
+    def _worst(self, name: str, rows: slice, values: tuple[float, ...]) -> None:
+        at = self._hands.index(name)
+        self._now[rows, at] = np.fmax(self._now[rows, at], values)
 
     def figures(self) -> tuple[Figure, ...]:
         """For the summary."""
