@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import wbc.robots
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy
 from wbc.errors import RangeError, ShapeError, UnknownNameError
-from wbc.simulation import Command, CommandKind, GripKind, KinematicPlant, Motors, PinocchioPlant
+from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPlant, Motors, PinocchioPlant
 from wbc.walking import cylinder
 from wbc.walking.torque.choice import PlantChoice
 from wbc.walking.torque.faults import Fault
@@ -124,6 +125,37 @@ def test_a_hand_that_slips_is_named() -> None:
         loop.advance(0.01)
     assert "arm2_hand has slipped by 2" in loop.failing()
     assert [text for _, text in loop.watch.noted][:1] == ["arm2_hand slips on its hold"]
+    loads = loop.watch.loads()
+    assert loads.force.shape == loads.moment.shape == loads.off.shape == (22, 3)
+    assert loads.time[-1] == pytest.approx(0.22)
+    # 5 mm are past; the grip of the hand is where it slipped to, it is off where it closed
+    assert loads.off[-1, 1] == loop.watch.drift == np.nanmax(loads.off)
+    assert loads.off[-1, 1] > 2e-3 > 1e-4 > loads.off[-1, 0]
+    assert np.nanmax(loads.force) == loop.watch.force
+    assert loads.noted == tuple(loop.watch.noted)
+
+
+def test_loads_are_written_as_they_are(tmp_path: Path) -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT)), HANDS[:2])
+    loop.advance(0.01)
+    file = loop.watch.loads().save(tmp_path)
+    with np.load(file) as read:
+        assert read["rating"].tolist() == [loop.stack.rating.force, loop.stack.rating.torque]
+        assert np.isnan(read["force"][0]).tolist() == [False, False, True]
+
+
+def test_noisy_encoders_are_filtered() -> None:
+    """A still robot is read with noise: the filter's joints keep a third of it, with friction that nobody knows."""
+    noise = Encoders(position=1e-4, velocity=1e-3)
+    plant = PinocchioPlant(ROBOT, encoders=noise, motors=Motors(viscous=0.5), seed=1)
+    loop, off = begun(TorqueLoop(stack(), plant, encoders=noise)), list[np.ndarray]()
+    for _ in range(12):
+        loop.advance(0.01)
+        off.append(np.stack([loop.read().q[7:], plant.read().q[7:]]) - plant.state.q[7:])
+    kept, read = np.std(np.array(off[4:]), axis=(0, 2))
+    assert read == pytest.approx(1e-4, rel=0.15)
+    assert kept < read / 3.0
+    assert loop.watch.unsolved == 0
 
 
 def test_it_goes_on_with_a_velocity() -> None:

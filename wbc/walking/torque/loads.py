@@ -22,7 +22,7 @@ class Loads:
 
     Attributes:
         time: at the end of each ``[n]`` [s]. force, moment: largest component of each grip's wrench ``[n, a]`` [N],
-            [N m]. off: of each held frame from where its grip holds it ``[n, a]`` [m].
+            [N m]. off: of each held frame from where its grip closed ``[n, a]`` [m].
         given: momentum given to the structure, largest component, linear and angular about the body ``[n, 2]`` [N s],
             [N m s].
         rating: of every hold. noted: what the loop found wrong, (time [s], in words).

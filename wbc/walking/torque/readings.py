@@ -9,7 +9,7 @@ from wbc.simulation import Encoders, PlantState
 from wbc.validation import Array
 
 #: Accelerations that are not the decided ones, one standard deviation [rad/s^2]
-UNKNOWN = 5.0
+UNKNOWN = 1.0
 #: Steps of the Riccati equation: the gain is there long before
 STEPS = 2000
 

@@ -18,7 +18,7 @@ class Watch:
     """The worst of every tick of torques.
 
     Attributes:
-        drift: farthest that a held frame was from where its grip holds it [m]. force, moment: largest components of a
+        drift: farthest that a held frame was from where its grip closed [m]. force, moment: largest components of a
             grip's wrench [N], [N m]. given: largest components of the momentum given to the structure, linear [N s] and
             angular about the body's origin [N m s]. unsolved: ticks of torques that gave way or had no answer. noted:
             what the loop found wrong, (time [s], in words).
@@ -32,6 +32,7 @@ class Watch:
         self.noted: list[tuple[float, str]] = []
         self._data: pin.Data | None = None
         # Of the period that goes on: its worst force, moment and distance of each hand; and all before it
+        self._places: dict[str, Array] = {}
         self._now, self._rows = np.full((3, len(self._hands)), np.nan), list[tuple[float, Array, Array]]()
 
     def see(self, plant: Tested, model: pin.Model, status: str) -> None:
@@ -47,8 +48,10 @@ class Watch:
             self.force, self.moment = max(self.force, force), max(self.moment, moment)
             self._worst(name, slice(0, 2), (force, moment))
         pin.framesForwardKinematics(model, data, q)
-        for name, grip in grips.items():
-            off = data.oMf[model.getFrameId(name)].translation - grip.pose.translation
+        # Where each grip was when it closed: one that slips has moved
+        self._places = {name: self._places.get(name, grip.pose.translation) for name, grip in grips.items()}
+        for name, place in self._places.items():
+            off = data.oMf[model.getFrameId(name)].translation - place
             far = float(np.sqrt(off @ off))
             self.drift = max(self.drift, far)
             self._worst(name, slice(2, 3), (far,))
