@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc.robots
@@ -92,7 +93,7 @@ def test_texts_of_faults() -> None:
 
 def test_what_cannot_walk_under_torques_is_refused() -> None:
     assert_refused(lambda: TorqueStack(wbc.robots.walker(), [GripKind.AXIS]), RangeError, "masses")
-    assert_refused(lambda: TorqueStack(heavy(), [GripKind.POSITION]), RangeError, "turning about the line")
+    assert_refused(lambda: TorqueStack(heavy(), [GripKind.POSITION]), RangeError, "about the line through them")
     assert_refused(lambda: TorqueLoop(stack(), KinematicPlant(ROBOT)), ShapeError, "torques")
     assert_refused(lambda: wbc.robots.with_masses(wbc.robots.walker(two_ended=True)), ShapeError, "bodies with arms")
     assert_refused(lambda: PlantChoice("pinochio"), UnknownNameError, "pinocchio")
@@ -100,6 +101,19 @@ def test_what_cannot_walk_under_torques_is_refused() -> None:
     assert_refused(lambda: PlantChoice("pinocchio", faults=("delay 0.02", "delay 0.01")), RangeError, "one delay")
     choice, walker = PlantChoice("pinocchio", faults=("break arm9 at 1",)), wbc.robots.walker()
     assert_refused(lambda: choice.build(walker, cylinder(rigid=True)), UnknownNameError, "arm1")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_why_holds_that_let_two_hands_tilt_are_refused(seed: int) -> None:
+    """What two hands bear on the base has five directions where they may tilt, and six where they may only roll: none
+    of the forces through both origins has a moment about the line between them.
+    """
+    q = pin.integrate(ROBOT.model, ROBOT.neutral, 0.3 * np.random.default_rng(seed).normal(size=ROBOT.nv))
+    wrenches = [ROBOT.jacobian(q, hand)[:, :6].T for hand in HANDS[:2]]
+    tilts = [w[:, 3:] @ ROBOT.pose(q, hand).rotation[:, :2] for w, hand in zip(wrenches, HANDS, strict=False)]
+    forces = [w[:, :3] for w in wrenches]
+    assert np.linalg.matrix_rank(np.hstack(forces), tol=1e-9) == 5
+    assert np.linalg.matrix_rank(np.hstack([*forces, *tilts]), tol=1e-9) == 6
 
 
 def test_a_limp_motor_is_named_and_the_stack_does_without_it() -> None:

@@ -102,7 +102,7 @@ class TorqueLoop:
         self._decided = np.zeros((ahead, self.nv))
         self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
         self.about = dict(about or {"name": type(plant).__name__})
-        self.watch = Watch(stack.rating, [arm.hand for arm in arms])
+        self.watch = Watch(self._model, stack.rating, [arm.hand for arm in arms])
         self._effort = np.array(stack.walker.robot.limits.effort)
         self._effort[: stack.walker.robot.base_nv] = 0.0
         self._motors, self.bearing = MotorWatch(self._model, self._effort, self.time_step), Bearing(stack)
@@ -160,6 +160,7 @@ class TorqueLoop:
         item = self._items[frame, kind]
         item.target, item.enabled = pose, True
         self._closed[frame] = kind
+        self.watch.grasps(self._tested, frame)
 
     def release(self, frame: str) -> None:
         """The plant's hand opens, and the stack does without it."""
@@ -208,19 +209,20 @@ class TorqueLoop:
             self._look(self._decided[0] if len(self._decided) else self.step.a)
             self._sent[:-1] = self._sent[1:]
             self._sent[-1] = self.step.torque
-            self._find()
+            wrenches = self._tested.wrenches
+            self._find(wrenches)
+            self.watch.see(wrenches, self.step.status)
             self._q = pin.integrate(self._model, self._q, (self._v + 0.5 * ramp) * step)
             self._v = self._v + ramp
             if len(self._decided):
                 self._decided[:-1] = self._decided[1:]
                 self._decided[-1] = self.step.a
             self._overloaded = 0 if self.step.status == "solved" else self._overloaded + 1
-            self.watch.see(self._tested, self._model, self.step.status)
         off = pin.difference(self._model, self._q, self._state.q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
         self._feel()
         self._bear()
-        self.watch.period(self._state.time)
+        self.watch.period(self._tested)
 
     def _look(self, decided: Array | None = None, struck: bool = False) -> None:
         """Take what is read; ``decided``: the accelerations of the tick that is over; None: there was none."""
@@ -240,12 +242,12 @@ class TorqueLoop:
         text = f"motors and holds have given way for {1e3 * OVERLOAD:.0f} ms"
         self._note(state.time, f"{text}; {self.bearing.words(short, self._closed)}" if short else text, ends=True)
 
-    def _find(self) -> None:
+    def _find(self, wrenches: Mapping[str, Array]) -> None:
         """Motors that have gone limp."""
         state, model, data = self._state, self._model, self._data
         pin.computeJointJacobians(model, data, state.q)
         contacts = np.zeros(self.nv)
-        for name, wrench in self._tested.wrenches.items():
+        for name, wrench in wrenches.items():
             contacts += pin.getFrameJacobian(model, data, model.getFrameId(name), pin.LOCAL).T @ wrench
         for dof in self._motors.see(state.q, state.v, self._sent[0], contacts):
             robot, share = self.stack.walker.robot, float(self._motors.share[dof])
@@ -296,3 +298,4 @@ class TorqueLoop:
 
     def _let_go(self, frame: str) -> None:
         self._items[frame, self._closed.pop(frame)].enabled = False
+        self.watch.releases(frame)
