@@ -5,7 +5,8 @@ then counts it. The viewer copies the newest slot and keeps the copy only if the
 Messages of the viewer (:mod:`wbc.viewer.messages`) lie in a ring behind two counters, one that each side writes.
 
     words    0 states written   1 bytes of messages written   2 bytes of messages read   3 flags of the loop
-    numbers  4 the viewer's last sign of life   5 the loop's    [s of the machine's monotonic clock]
+             5 the loop's thread, as the kernel numbers it
+    numbers  4 the viewer's last sign of life   [s of the machine's monotonic clock]
     ring     RING bytes of messages: a length of 4 bytes, then JSON
     slots    SLOTS times: number of the state, its time [s], the number again, then the state
 
@@ -17,13 +18,14 @@ from __future__ import annotations
 import mmap
 import os
 import struct
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 HEAD, RING, SLOTS = 64, 1 << 16, 4
 #: Words of the head, and of a slot's
-STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, LOOP_ALIVE = range(6)
+STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, THREAD = range(6)
 SLOT_HEAD = 24
 #: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
 STOPPED, UNHEARD = 1, 2
@@ -86,6 +88,8 @@ class LoopEnd(_Shared):
     def write(self, data: bytes, when: float) -> None:
         """The state of a tick."""
         number = self._count = self._count + 1
+        if number == 1:
+            self._words[THREAD] = threading.get_native_id()
         slot = self._slots[number % SLOTS]
         _STAMP.pack_into(slot, 0, number, when)
         slot[SLOT_HEAD:] = data
@@ -157,3 +161,8 @@ class ViewerEnd(_Shared):
     def flags(self) -> int:
         """What the loop says of itself."""
         return int(self._words[FLAGS])
+
+    @property
+    def thread(self) -> int:
+        """The loop's thread as the kernel numbers it, 0 before its first state."""
+        return int(self._words[THREAD])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import sys
 import threading
 import time
@@ -18,6 +19,7 @@ from wbc.errors import WbcError
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
 from wbc.viewer import messages
+from wbc.viewer.aside import CoreLeft
 from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
@@ -37,6 +39,8 @@ SELF_MOTION = "self-motion"
 DRAWN = (*DEMANDED, SELF_MOTION)
 #: Between two signs of life for the loop [s]
 BEAT = 0.05
+#: Signs of life between two looks where the loop runs
+LOOKS = 10
 
 
 class Explainer(threading.Thread):
@@ -84,7 +88,7 @@ class Session:
 
     Args:
         controller: compiled from the same stack as the loop's; only its names, layout and code are used.
-        link: to the loop; None: ``states`` of a recording.
+        link: to the loop; None: ``states`` of a recording. core: of the loop, which is left to it.
     """
 
     def __init__(
@@ -99,7 +103,9 @@ class Session:
         silence: float = SILENT,
         scenery: Scenery | None = None,
         pairing: Pairing | None = None,
+        core: CoreLeft | None = None,
     ) -> None:
+        self._core = core
         self._scenery, self._pairing = scenery, pairing
         self._pairs = None if pairing is None else PairWatch(controller.stack.robot, pairing)
         self._controller, self._link = controller, link
@@ -202,9 +208,13 @@ class Session:
 
     def _beat(self) -> None:
         """Say that messages are passed on: the server's own thread has to answer in between."""
-        while not self.ended.is_set():
+        for number in itertools.count():
+            if self.ended.is_set():
+                return
             if self._link is not None and self.server.answers():
                 self._link.live()
+            if self._link is not None and self._core is not None and number % LOOKS == 0 and self._link.thread:
+                self._core.look(self._link.thread)
             time.sleep(BEAT)
 
     # From pages
