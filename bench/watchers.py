@@ -1,11 +1,13 @@
 """Pages of a viewer in a process of their own: ``python -m bench.watchers URL COUNT``; they read until it ends.
 
-Each has both sockets of a page, that of states and that of viser's scene, and draws nothing.
+Each has both sockets of a page, that of states and that of viser's scene, and draws nothing. They yield to everybody,
+as pages are drawn on other machines than the loop's.
 """
 
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 
 import viser
@@ -32,6 +34,7 @@ async def watch(url: str, name: str) -> None:
 
 async def main() -> None:
     """All of them at once."""
+    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     pages = (watch(sys.argv[1], f"watcher{k}") for k in range(int(sys.argv[2])))
     await asyncio.gather(*pages, return_exceptions=True)
 

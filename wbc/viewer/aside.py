@@ -1,4 +1,4 @@
-"""The viewer's process stands aside for the loop: it never takes the loop's core, and its waking never interrupts it."""
+"""The viewer's process stands aside: it never takes the core of the loop, and its waking never interrupts a tick."""
 
 from __future__ import annotations
 

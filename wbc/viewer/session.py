@@ -34,6 +34,9 @@ from wbc.viewer.timeline import Timeline
 
 #: States that are drawn and told a second, and explanations, at most
 RATE, EXPLAINED = 40.0, 25.0
+#: More pages than this share what they cost together, as viser writes the scene for each of them anew; none has
+#: fewer states a second than the other
+SHARED, SLOWEST = 3, 20.0
 #: What a page can ask to be drawn
 SELF_MOTION = "self-motion"
 DRAWN = (*DEMANDED, SELF_MOTION)
@@ -158,7 +161,8 @@ class Session:
             if current is not None and fresh:
                 shown, quiet = current.data, now
                 self._show(current, sentence_rate)
-            time.sleep(max(0.002, 1.0 / RATE - (time.monotonic() - now)))
+            rate = max(SLOWEST, RATE * min(1.0, SHARED / max(self.server.watchers, 1)))
+            time.sleep(max(0.002, 1.0 / rate - (time.monotonic() - now)))
         self._explainer.end()
         self.server.tell_all({"type": "ended", "reason": "The loop has ended."})
         time.sleep(0.2)
@@ -177,7 +181,7 @@ class Session:
         if self._tick is None:
             look(self.server.server, self._controller, tick, self._scenery)
         self._tick = tick
-        if not self.server.watched and self._drawn:
+        if not self.server.watchers and self._drawn:
             # Who comes later is told where everything is by the next tick
             return
         self._drawn = True
@@ -186,7 +190,7 @@ class Session:
         self._drawing.follow(self.server.server, tick)
         # Not in a window of up to a sixtieth of a second
         self.server.server.flush()
-        if not self.server.watched:
+        if not self.server.watchers:
             return
         self._explainer.ask(tick)
         stopped = ""
