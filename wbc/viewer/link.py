@@ -5,9 +5,10 @@ then counts it. The viewer copies the newest slot and keeps the copy only if the
 Messages of the viewer (:mod:`wbc.viewer.messages`) lie in a ring behind two counters, one that each side writes.
 
     words    0 states written   1 bytes of messages written   2 bytes of messages read   3 flags of the loop
-             5 the loop's thread, as the kernel numbers it
+             5 the loop's thread, as the kernel numbers it   6 notes begun and ended, odd while one is written
     numbers  4 the viewer's last sign of life   [s of the machine's monotonic clock]
     ring     RING bytes of messages: a length of 4 bytes, then JSON
+    note     NOTE bytes: a length, then JSON: what the loop says of itself beside its ticks, seldom
     slots    SLOTS times: number of the state, its time [s], the number again, then the state
 
 All of it is anonymous memory of Linux (``memfd_create``), which goes when the last process that has it does.
@@ -23,9 +24,9 @@ import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-HEAD, RING, SLOTS = 64, 1 << 16, 4
+HEAD, RING, NOTE, SLOTS = 64, 1 << 16, 1 << 14, 4
 #: Words of the head, and of a slot's
-STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, THREAD = range(6)
+STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, THREAD, NOTES = range(7)
 SLOT_HEAD = 24
 #: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
 STOPPED, UNHEARD = 1, 2
@@ -47,7 +48,7 @@ class State(NamedTuple):
 
 def size_for(state: int) -> int:
     """Bytes of the memory for states of so many bytes."""
-    return HEAD + RING + SLOTS * (SLOT_HEAD + state)
+    return HEAD + RING + NOTE + SLOTS * (SLOT_HEAD + state)
 
 
 class _Shared:
@@ -58,13 +59,21 @@ class _Shared:
         self._words = self._bytes[:HEAD].cast("q")
         self._numbers = self._bytes[:HEAD].cast("d")
         self._ring = self._bytes[HEAD : HEAD + RING]
-        first, step = HEAD + RING, SLOT_HEAD + state
+        self._note = self._bytes[HEAD + RING : HEAD + RING + NOTE]
+        first, step = HEAD + RING + NOTE, SLOT_HEAD + state
         self._slots = [self._bytes[first + k * step : first + (k + 1) * step] for k in range(SLOTS)]
 
     def close(self) -> None:
         """Let the memory go; more calls do nothing."""
         if self.file >= 0:
-            views: list[memoryview[Any]] = [*self._slots, self._ring, self._numbers, self._words, self._bytes]
+            views: list[memoryview[Any]] = [
+                *self._slots,
+                self._note,
+                self._ring,
+                self._numbers,
+                self._words,
+                self._bytes,
+            ]
             for view in views:
                 view.release()
             self._map.close()
@@ -123,6 +132,16 @@ class LoopEnd(_Shared):
         """What the viewer is to know of the loop."""
         self._words[FLAGS] = flags
 
+    def note(self, text: bytes) -> bool:
+        """Say something of the loop beside its ticks; False where it is too long and the last one stays."""
+        if len(text) > NOTE - _LENGTH.size:
+            return False
+        self._words[NOTES] += 1
+        _LENGTH.pack_into(self._note, 0, len(text))
+        self._note[_LENGTH.size : _LENGTH.size + len(text)] = text
+        self._words[NOTES] += 1
+        return True
+
 
 class ViewerEnd(_Shared):
     """The viewer's end, from the number of the file that it inherits. One thread may send, one may read."""
@@ -161,6 +180,15 @@ class ViewerEnd(_Shared):
     def flags(self) -> int:
         """What the loop says of itself."""
         return int(self._words[FLAGS])
+
+    def noted(self, after: int) -> tuple[int, bytes] | None:
+        """(number, text) of the loop's note, None where it is number ``after`` or just being written."""
+        number = self._words[NOTES]
+        if number == after or number % 2:
+            return None
+        (length,) = _LENGTH.unpack_from(self._note)
+        text = bytes(self._note[_LENGTH.size : _LENGTH.size + min(length, NOTE)])
+        return (number, text) if self._words[NOTES] == number else None
 
     @property
     def thread(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import json
 import sys
 import threading
 import time
@@ -118,6 +119,9 @@ class Session:
         self.timeline = Timeline(states)
         self.ended = threading.Event()
         self._stopped, self._drawn = "", False
+        #: what the loop said beside its ticks last, and its number
+        self._note: dict[str, Any] = {}
+        self._noted = 0
         #: configurations that are shown in place of the robot's own
         self._preview: list[Array] = []
         told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
@@ -185,8 +189,12 @@ class Session:
             # Who comes later is told where everything is by the next tick
             return
         self._drawn = True
+        if self._link is not None and (said := self._link.noted(self._noted)) is not None:
+            self._noted, self._note = said[0], json.loads(said[1])
         with self.server.server.atomic():
             self._drawing.show(self._shown(tick))
+            if self._note:
+                self._drawing.note(self._note)
         self._drawing.follow(self.server.server, tick)
         # Not in a window of up to a sixtieth of a second
         self.server.server.flush()
@@ -208,6 +216,9 @@ class Session:
         }
         if self._pairs is not None:
             extra |= self._pairs.told(tick)
+        if self._note:
+            # The way of a hand is drawn; nobody reads its numbers
+            extra["walk"] = {name: value for name, value in self._note.items() if name != "ways"}
         self.server.publish(told(self._controller, tick) | extra)
 
     def _beat(self) -> None:
@@ -270,7 +281,7 @@ class Session:
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
         if self._scenery is not None:
-            checked(message, self._scenery.holds)
+            checked(message, self._scenery.holds, self._scenery.arms)
         elif self._pairing is not None:
             self._pairing.checked(message)
         else:
