@@ -125,6 +125,8 @@ class Session:
         #: configurations that are shown in place of the robot's own
         self._preview: list[Array] = []
         told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
+        if scenery is not None:
+            told_first["arms"] = scenery.arms
         if pairing is not None:
             told_first |= pairing.declared()
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
