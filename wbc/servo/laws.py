@@ -13,7 +13,7 @@ PER_DELAY = {CommandKind.POSITION: 2.5, CommandKind.VELOCITY: 1.5, CommandKind.T
 #: at least so many periods,
 PER_PERIOD = 10.0
 #: and where the response is still to be found, at least so much [s]
-UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.02}
+UNTOLD = {CommandKind.POSITION: 0.05, CommandKind.VELOCITY: 0.02, CommandKind.TORQUE: 0.05}
 #: A velocity servo's error takes so many times its lag longer
 PER_LAG = 2.0
 
@@ -53,7 +53,14 @@ class Feedback:
             self._stay = decay**late
             self._reach, self._slows = lag * (1.0 - self._stay), (1.0 - decay) * decay ** (left - 1.0)
             self._moves = dt - lag * self._slows
+        self._predicted = kind
         self._predicts = late > 0 and kind is not CommandKind.POSITION
+
+    def acceleration(self, rate: Array, most: float) -> Array:
+        """w de/dt of positions, which the compliance to forces of motion answers to; nothing else."""
+        if self._predicted is not CommandKind.POSITION:
+            return np.zeros_like(rate)
+        return np.asarray(self._w * np.clip(rate, -most * self._w, most * self._w))
 
     def correction(self, error: Array, rate: Array, total: Array, sent: Array, most: float) -> Array:
         """d, from e up to ``most``, de/dt up to w most, z, and what was sent within the last D, the oldest first."""
