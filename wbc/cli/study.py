@@ -12,7 +12,7 @@ _HOW, _OUTPUT = "Where it runs", "What it writes"
 What = Annotated[
     str | None, typer.Argument(help="A YAML file, or a built-in scenario: reach, manipulability, layouts, ik.")
 ]
-Seeds = Annotated[int | None, typer.Option(help="Seeds 0, 1, ... Default: those of the file; of a built-in scenario 10.")]
+Seeds = Annotated[int | None, typer.Option(help="Seeds 0, 1, ... Default: the file's; of a built-in scenario 10.")]
 Workers = Annotated[
     int | None, typer.Option(help="Processes of a cluster on this machine. Default: none.", rich_help_panel=_HOW)
 ]

@@ -113,13 +113,15 @@ class Identification:
         self._squares = np.zeros((TERMS, TERMS, joints))
         self._products = np.zeros((TERMS, self._rows, joints))
         self._errors = np.zeros((self._rows, joints))
+        #: Of :meth:`slope`
+        self._v, self._a = np.zeros((2, joints))
         self._next = -1
 
     def slope(self, v: Array) -> Array:
         """dv/dt, smoothed as all is, of velocities that are given once a sample before :meth:`add` [rad/s^2]."""
         if self._next < 0:
             self._v = v
-        self._a: Array = (self._part / self._dt) * (v - self._v)
+        self._a = (self._part / self._dt) * (v - self._v)
         self._v = self._v + self._dt * self._a
         return self._a
 

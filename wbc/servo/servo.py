@@ -139,7 +139,6 @@ class Servo:
             joint = self._robot.dof_names[int(np.argmin(np.isfinite(known)))]
             log.warning("%s has no acceleration limit: its reference may jump, which no servo follows", joint)
         self._most = round(LONGEST_DELAY / self._dt) + 1
-        self._inertia = np.diag(pin.crba(self._model, self._data, self._robot.neutral)).copy()
         self._respond(told)
         self.reset(self._robot.neutral)
 
@@ -190,10 +189,11 @@ class Servo:
         step = self._tick(pace)
         if behind < self._near:
             self._sum += error * self._dt
-        d = self._feedback.correction(error, rate - speed, self._sum, self._sent[self._most - self._late :], self._near)
+        sent = self._sent[self._most - self._late :]
+        d, b = self._feedback.correction(error, rate - speed, self._sum, sent, self._near)
         self._sent[:-1] = self._sent[1:]
         self._sent[-1] = d
-        values = self._values(d, self._feedback.acceleration(rate - speed, self._near))
+        values = self._values(d, b)
         if self._identification is not None and not self._stopped:
             self._learn(self._identification, values, q, speed)
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
@@ -225,15 +225,17 @@ class Servo:
         moved = pin.rnea(self._model, self._data, q, v, a) - gravity
         return np.array([moved, gravity, v / (np.abs(v) + CREEP), v])
 
-    def _values(self, d: Array, push: Array) -> Array:
+    def _values(self, d: Array, b: Array) -> Array:
         """What the servos get."""
         q, v, a = self._ahead(*self._references[-1])
         if self.kind is CommandKind.TORQUE:
             a = self._change + d
-            moved, gravity, *others = loads = self._loads(q, v, a)
-            return np.asarray(moved + gravity + self._armature * a + self._damping * v + (self._yields * loads).sum(axis=0))
+            moved, gravity, *_ = loads = self._loads(q, v, a)
+            own = self._armature * a + self._damping * v
+            return np.asarray(moved + gravity + own + (self._yields * loads).sum(axis=0))
+        a = a + b
         if self._yields.any():
-            d = d + (self._yields * self._loads(q, v, a + push)).sum(axis=0)
+            d = d + (self._yields * self._loads(q, v, a)).sum(axis=0)
         if self.kind is CommandKind.VELOCITY:
             return np.asarray(v + self._lag * a + d)
         return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
@@ -244,9 +246,7 @@ class Servo:
         self._lag, *yields = response.rows(self._robot.nv)
         self._yields = np.array(yields)
         w = quickness(self.kind, self._dt, response, self._delay is not None)
-        # The inertia that a compliant servo of velocities has to accelerate is a lag as well
-        lag = self._lag + self._yields[0] * self._inertia if self.kind is CommandKind.VELOCITY else self._lag
-        self._feedback = Feedback(self.kind, self._dt, lag, self._late, w)
+        self._feedback = Feedback(self.kind, self._dt, self._lag, self._late, w)
 
     def _learn(self, found: Identification, values: Array, q: Array, v: Array) -> None:
         """Find lag and delay while the robot moves, and take them on slowly."""
