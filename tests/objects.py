@@ -47,9 +47,11 @@ def keep(folder: pathlib.Path) -> None:
     def compile_or_take(command: list[str], place: pathlib.Path) -> None:
         if _GENERIC in command:
             command = [_GENERIC_FLAG if word == "-O1" else word for word in command]
-        elif "-c" not in command:
+        elif "rows.o" in command:
             _run(_linked(command) if (place / _PLAIN).exists() else command, place)
             return
+        elif "-c" not in command:
+            command = ["-O1" if word == "-O3" else word for word in command]
         if "tick.o" in command and "-O0" in command:
             (place / _PLAIN).touch()
         made = place / command[command.index("-o") + 1]
@@ -69,7 +71,7 @@ def keep(folder: pathlib.Path) -> None:
 def _made(command: list[str], place: pathlib.Path) -> None:
     """By the compiler, or, where generated rows are not to be optimised, by the assembler."""
     rows = place / "rows.c"
-    if rows.name in command and "-O0" in command:
+    if {rows.name, "-O0", "-c"} <= {*command}:
         text = assembled(rows.read_text())
         if text is not None:
             (place / "rows.s").write_text(text)
