@@ -43,6 +43,8 @@ USUAL, SLACK = 2.1, 0.5
 MOVES, PARTS = 2, 2
 #: Of more arms than FEW_ARMS so many widths of stances are put in order by their conflicts before they are checked
 FEW_ARMS, AHEAD = 3, 12
+#: Of these, searches end where so many re-grasps led no further
+STUCK = 12
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
@@ -116,10 +118,17 @@ class StanceSearch(Generic[S]):
                 self._levels.append(following_level)
                 self._asked.append(asked)
             level = self._levels[len(levels)]
-            if not level:
+            if not level or self._stuck(levels):
                 break
             levels.append(level)
         return self._result(levels, None, False)
+
+    def _stuck(self, levels: Sequence[dict[Key, Node]]) -> bool:
+        """Whether so many re-grasps of many arms led to no stance that lasts longer."""
+        if len(self._by_arm) <= FEW_ARMS or len(levels) <= STUCK:
+            return False
+        furthest = [max(self.until(k, n.sample) for k, n in level.items()) for level in (levels[-1 - STUCK], *levels[-STUCK:])]
+        return max(furthest[1:]) <= furthest[0]
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A move takes another time [s], or is not possible; what was searched without it stays."""
@@ -224,7 +233,8 @@ class StanceSearch(Generic[S]):
         out, first = [], self.first if level[0][1].parent is None else None
         for arm, targets in enumerate(self._by_arm):
             until, end, source = latest[:, arm], ends[:, arm], keys[:, arm]
-            useful = grips.last[targets] > grips.last[source][:, None]
+            # Of many arms one may have to make way for another long before its own grip ends
+            useful = grips.last[targets] > (end if len(self._by_arm) > FEW_ARMS else grips.last[source])[:, None]
             if first:
                 useful = np.repeat(((grips.hold[targets] == first[1]) & (arm == first[0]))[None], len(some), axis=0)
             useful &= (grips.first[targets] < until[:, None]) & (samples <= np.minimum(until, end))[:, None]
