@@ -251,6 +251,7 @@ static int from_last(wbc_tick *t, double angle) {
 static int constrained(wbc_tick *t, double angle) {
     if (!t->factored) {
         invert(t);
+        pack(t);
         image(t);
         for (int i = 0; i < WIDE; i++) t->ldp_v[i] = -t->y[i];
         t->factored = 1;

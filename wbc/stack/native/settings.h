@@ -105,6 +105,12 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef long long four_bits __attribute__((vector_size(32)));
 #define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){LLONG_MAX, LLONG_MAX, LLONG_MAX, LLONG_MAX}))
 
+/* Of NaN the second */
+INLINE four larger_four(four x, four y) {
+    const four_bits first = x > y;
+    return (four)(((four_bits)x & first) | ((four_bits)y & ~first));
+}
+
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
 /* Not fmin and fmax, which are calls; NaN in the first argument gives the second */
