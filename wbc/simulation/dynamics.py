@@ -64,12 +64,22 @@ class Dynamics:
 
     def __init__(self, model: pin.Model, rate: float) -> None:
         self.model, self.data, self._rate = model, model.createData(), rate
+        #: Degrees of freedom that move by themselves
+        self.free = list(range(model.nv))
         self._corrector = pin.BaumgarteCorrectorParameters(rate * rate, 2.0 * rate)
         self._settings = pin.ProximalSettings(1e-12, PROXIMAL, ITERATIONS)
         kinds = ((int(joint.idx_v), TURNING.get(joint.shortname(), 0)) for joint in model.joints)
         #: Where joints begin whose displacements do not commute, and what they are
         self.turning = [(start, size) for start, size in kinds if size]
         self.hold({})
+
+    def reduced(self, matrix: Array) -> Array:
+        """A matrix of forces by motions ``[nv, nv]``, of the motions that joints can make by themselves: all."""
+        return matrix
+
+    def coupled(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """A state in which joints that follow others are where they belong: any."""
+        return q, v
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
         """Hold these frames, and no others."""
