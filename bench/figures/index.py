@@ -128,7 +128,7 @@ _ALL = (
     Figure("symbolic", ("wbc/symbolic",), 0.2),
     Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
     Figure("plant_steps", ("wbc/simulation", "robots/walker_masses.py", "robots/data"), 1.0),
-    Figure("torque_walks", (*WALK, "wbc/simulation"), 8.0),
+    Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
     Figure("two_ended", WALK, 0.5),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from wbc.robots import Walker
 from wbc.simulation import GripKind
 from wbc.support import Lacking, lacking
 from wbc.validation import Array
@@ -68,27 +69,11 @@ class Bearing:
     def of_plan(self, plan: Plan, structure: Structure) -> str:
         """Where a plan first has the robot stand where holds and motors do not bear it, in words; "": nowhere.
 
-        A hand counts as open from the lift to the landing. Plans without grips and laws of their own say nothing.
+        It is looked at where :func:`stances` says.
         """
-        if not self.falls or plan.grips is None or not plan.complete or len(plan.laws) != len(plan.regrasps):
+        if not self.falls:
             return ""
-        table, swings = planned_joints(self._walker, plan), swing_times(plan)
-        names = [arm.name for arm in self._walker.arms]
-        q, looked, before = self._robot.neutral.copy(), -np.inf, dict[str, GripKind]()
-        for time, at, joints in zip(table.time, table.path_time, table.joints, strict=True):
-            on: dict[str, str | None] = dict(zip(names, plan.start, strict=True))
-            for step, (lift, land) in zip(plan.regrasps, swings, strict=True):
-                if time >= lift - SAME:
-                    on[step.arm] = step.target if time >= land - SAME else None
-            held = {
-                arm.hand: GripKind(hold_kind(structure, structure.index(hold)))
-                for arm in self._walker.arms
-                if (hold := on[arm.name]) is not None
-            }
-            if held.keys() == before.keys() and time < looked + EVERY - SAME:
-                continue
-            looked, before = float(time), held
-            q[:7], q[7:] = pin.SE3ToXYZQUAT(plan.path.at(float(at))[0]), joints
+        for time, q, held in stances(self._walker, plan, structure):
             short = self.lacking(q, held)
             if short:
                 return f"{self.words(short, held)}, at {time:.2f} s of the plan"
@@ -101,3 +86,30 @@ class Bearing:
         hand, axis = one.item.partition(" ")[0], one.row.rpartition("/")[2]
         name = self._names.get(hand)
         return one.item if name is None else f"the hold of {name} ({axis})"
+
+
+def stances(
+    walker: Walker, plan: Plan, structure: Structure, every: float = EVERY
+) -> Iterator[tuple[float, Array, dict[str, GripKind]]]:
+    """Time of a plan [s], configuration, and how frames are held, wherever that changes and every so often between.
+
+    A hand is open from the lift to the landing. Of a plan without grips and laws of its own there are none.
+    """
+    if plan.grips is None or not plan.complete or len(plan.laws) != len(plan.regrasps):
+        return
+    table, swings = planned_joints(walker, plan), swing_times(plan)
+    names = [arm.name for arm in walker.arms]
+    looked, before = -np.inf, dict[str, GripKind]()
+    for time, at, joints in zip(table.time, table.path_time, table.joints, strict=True):
+        on: dict[str, str | None] = dict(zip(names, plan.start, strict=True))
+        for step, (lift, land) in zip(plan.regrasps, swings, strict=True):
+            if time >= lift - SAME:
+                on[step.arm] = step.target if time >= land - SAME else None
+        held = {
+            arm.hand: GripKind(hold_kind(structure, structure.index(hold)))
+            for arm in walker.arms
+            if (hold := on[arm.name]) is not None
+        }
+        if held.keys() != before.keys() or time >= looked + every - SAME:
+            looked, before = float(time), held
+            yield looked, np.concatenate([pin.SE3ToXYZQUAT(plan.path.at(float(at))[0]), joints]), held

@@ -80,7 +80,8 @@ class Watch:
         worst = np.array([row for _, row, _ in self._rows]).reshape(-1, 3, count)
         given = np.array([row for _, _, row in self._rows]).reshape(-1, 2)
         time = np.array([time for time, _, _ in self._rows])
-        return Loads(time, *np.moveaxis(worst, 1, 0), given, self.rating, tuple(self.noted))
+        force, moment, off = worst[:, 0], worst[:, 1], worst[:, 2]
+        return Loads(time, force, moment, off, given, self.rating, tuple(self.noted))
 
     def _worst(self, name: str, rows: slice, values: tuple[float, ...]) -> None:
         at = self._hands.index(name)
