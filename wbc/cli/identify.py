@@ -44,7 +44,7 @@ def identify(
     from wbc.trajectory import plot
 
     machine = robots.load(robot)
-    written = ("identified.json", "motion.png", "motion.json")
+    written = ("identified.json", "motion.png", "motion.npz")
     folder = run_folder(out, "identify", written, force, clear=False)
     with progress_bar() as bar:
         task = bar.add_task("motions", total=tries + 1)
@@ -75,6 +75,6 @@ def identify(
     }  # fmt: skip
     with filled(folder, written) as fresh:
         (fresh / "identified.json").write_text(json.dumps(row, indent=1) + "\n")
-        motion.law.save(fresh / "motion.json")
+        motion.law.save(fresh / "motion.npz")
         plot(motion.law, fresh / "motion.png")
     console().print(str(folder))
