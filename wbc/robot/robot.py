@@ -192,7 +192,7 @@ class Robot:
         """A checked float64 copy of a configuration; quaternions and unit circles must have unit length.
 
         Raises:
-            ShapeError, NotFiniteError, RotationError.
+            ShapeError, NotFiniteError, RotationError: it is none.
         """
         out = validation.real_array(field_name, q, (self.nq,))
         if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
@@ -282,7 +282,7 @@ class Robot:
         """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).
 
         Raises:
-            DuplicateNameError, UnknownNameError, ShapeError, NotFiniteError, RotationError.
+            DuplicateNameError, UnknownNameError: of the frames. ShapeError, NotFiniteError, RotationError: no pose.
         """
         validation.name("frame", name)
         if name in self.frame_names:

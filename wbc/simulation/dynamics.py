@@ -29,6 +29,30 @@ class Grip:
     kind: GripKind
 
 
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A grip that slips, by ``velocity`` in the mean over ``duration`` T [m/s, s]. As friction leaves a hand no more
+    than a share of what pulls at it, it speeds up and slows down: v(t) = velocity (1 - cos(2 pi t / T)).
+
+    Attributes:
+        time: since it began [s].
+    """
+
+    velocity: Array
+    duration: float
+    time: float = 0.0
+
+    def on(self, h: float) -> tuple[Array, Slip | None]:
+        """How far it goes in the next h [m, s], and what is left of it."""
+        then = min(self.time + h, self.duration)
+        left = None if then >= self.duration else Slip(self.velocity, self.duration, then)
+        return (self._part(then) - self._part(self.time)) * self.velocity, left
+
+    def _part(self, time: float) -> float:
+        turn = 2.0 * np.pi / self.duration
+        return time - float(np.sin(turn * time)) / turn
+
+
 class Dynamics:
     """M a + h = tau + sum J_k' f_k, with frames that are held: J_k a + dJ_k/dt v = -2 rate J_k v - rate^2 e_k
     (Baumgarte), solved by ``pin.constraintDynamics`` (Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
-from wbc.simulation.dynamics import AXIS, Grip
+from wbc.simulation.dynamics import AXIS, Grip, Slip
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Motors, MotorState
 from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
@@ -38,7 +38,7 @@ class _State:
     first: Array
     fallen: Array = field(default_factory=lambda: np.zeros(6))
     grips: dict[str, Grip] = field(default_factory=dict)
-    slips: dict[str, tuple[Array, float]] = field(default_factory=dict)
+    slips: dict[str, Slip] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)
 
 
@@ -173,7 +173,7 @@ class GrippingMujocoPlant(MujocoPlant):
         """As :meth:`PinocchioPlant.slip`."""
         validation.one_of("frame", frame, self._state.grips)
         rate = validation.real_array("velocity", velocity, (3,))
-        self._state.slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+        self._state.slips[frame] = Slip(rate, validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
 
     def limp(self, joint: str, scale: float = 0.0) -> None:
         """As :meth:`PinocchioPlant.limp`."""
@@ -245,10 +245,10 @@ class GrippingMujocoPlant(MujocoPlant):
 
     def _slide(self, name: str, h: float) -> None:
         """A grip that slips, a step on."""
-        rate, left = self._state.slips[name]
-        grip, moved = self._state.grips[name], rate * min(h, left)
+        grip, (moved, left) = self._state.grips[name], self._state.slips[name].on(h)
         self._state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
         self._model.eq_data[self._rows[name], 3:6] += moved
-        self._state.slips[name] = rate, left - h
-        if left <= h:
+        if left is None:
             del self._state.slips[name]
+        else:
+            self._state.slips[name] = left

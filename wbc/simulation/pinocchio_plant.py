@@ -15,7 +15,7 @@ from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.coupled import CoupledDynamics
-from wbc.simulation.dynamics import Dynamics, Grip, Integrator, step_midpoint, step_rk4
+from wbc.simulation.dynamics import Dynamics, Grip, Integrator, Slip, step_midpoint, step_rk4
 from wbc.simulation.ground import Ground, Touch
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Encoders, Motors, MotorState
@@ -44,7 +44,7 @@ class _State:
     random: np.random.Generator
     reading: PlantState
     grips: dict[str, Grip] = field(default_factory=dict)
-    slips: dict[str, tuple[Array, float]] = field(default_factory=dict)
+    slips: dict[str, Slip] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)
     first: Array = field(default_factory=lambda: np.zeros(6))
     fallen: Array = field(default_factory=lambda: np.zeros(6))
@@ -241,14 +241,16 @@ class PinocchioPlant:
         self._state.broken.append(frame)
 
     def slip(self, frame: str, velocity: Any, duration: float) -> None:
-        """A grip slips: what it holds the frame at moves with a velocity in the world [m/s] for some seconds.
+        """A grip slips: what it holds the frame at moves with a mean velocity in the world [m/s] for some seconds, as
+        of :class:`wbc.simulation.dynamics.Slip`.
 
         Raises:
             UnknownNameError: nothing holds that frame.
         """
         validation.one_of("frame", frame, self._state.grips)
         rate = validation.real_array("velocity", velocity, (3,))
-        self._state.slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+        time = validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
+        self._state.slips[frame] = Slip(rate, time)
 
     def limp(self, joint: str, scale: float = 0.0) -> None:
         """The motor of a joint gives this part of its torque from now on.
@@ -333,13 +335,13 @@ class PinocchioPlant:
     def _slide(self, h: float) -> None:
         """Grips that slip, a step on."""
         state = self._state
-        for name, (rate, left) in list(state.slips.items()):
-            grip = state.grips[name]
-            moved = pin.SE3(grip.pose.rotation, grip.pose.translation + rate * min(h, left))
-            state.grips[name] = Grip(moved, grip.kind)
-            state.slips[name] = rate, left - h
-            if left <= h:
+        for name, slip in list(state.slips.items()):
+            grip, (moved, left) = state.grips[name], slip.on(h)
+            state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
+            if left is None:
                 del state.slips[name]
+            else:
+                state.slips[name] = left
         self._hold()
 
     def _sense(self) -> None:
