@@ -166,6 +166,6 @@ def test_command(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ["identify", "double_pendulum", "--tries", "5", "--out", str(tmp_path)])
     assert run.exit_code == 0, run.output
     assert "parameters can be known" in run.output
-    assert {"identified.json", "motion.json", "motion.png"} <= {file.name for file in tmp_path.iterdir()}
+    assert {"identified.json", "motion.npz", "motion.png"} <= {file.name for file in tmp_path.iterdir()}
     wrong = CliRunner().invoke(app, ["identify", "solo12", "--out", str(tmp_path / "b")])
     assert wrong.exit_code == 2

@@ -26,7 +26,10 @@ from wbc.simulation import (
     level,
 )
 from wbc.simulation.dynamics import Dynamics, step_midpoint, step_rk4
+from wbc.simulation.ground import Distance
 from wbc.simulation.stability import largest_step
+from wbc.walking.holds.built_in import cylinder, plane
+from wbc.walking.holds.structure import Structure
 
 ROBOT = heavy().robot
 
@@ -184,7 +187,9 @@ def test_a_saved_state_goes_on_to_the_same_bits() -> None:
     assert_refused(lambda: PinocchioPlant(wbc.robots.load("panda")).restore(saved), RangeError, "another robot")
 
 
-def ball_on_ground(**ground: float) -> tuple[wbc.robot.Robot, PinocchioPlant]:
+def ball_on_ground(
+    gravity: object = (0.0, 0.0, -9.81), **ground: float | Distance
+) -> tuple[wbc.robot.Robot, PinocchioPlant]:
     """A free body of 2 kg whose frame is a ball of 0.1 m."""
     model = pin.Model()
     model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
@@ -193,7 +198,7 @@ def ball_on_ground(**ground: float) -> tuple[wbc.robot.Robot, PinocchioPlant]:
     walker = wbc.robots.load("walker")
     limits = replace(walker.limits, **{k: getattr(walker.limits, k)[:6] for k in vars(walker.limits) if k != "source"})
     robot = wbc.robot.Robot("ball", model, limits, "floating", pin.neutral(model))
-    return robot, PinocchioPlant(robot, ground=Ground({"ball": 0.1}, **ground), gravity=(0.0, 0.0, -9.81))
+    return robot, PinocchioPlant(robot, ground=Ground({"ball": 0.1}, **ground), gravity=gravity)  # type: ignore[arg-type]
 
 
 def test_a_body_rests_on_the_ground_and_friction_holds_it() -> None:
@@ -205,6 +210,41 @@ def test_a_body_rests_on_the_ground_and_friction_holds_it() -> None:
     assert plant.state.q[2] == pytest.approx(0.1 - 2.0 * 9.81 / 2e4, abs=1e-6)
     q[2] = 0.085
     assert_refused(lambda: plant.reset(q, 0.0), RangeError, "impossible contact")
+
+
+@pytest.mark.parametrize("structure", [cylinder(), plane()], ids=["cylinder", "plane"])
+@pytest.mark.parametrize("friction", [0.4, 0.1])
+def test_a_body_on_the_surface_of_a_structure(structure: Structure, friction: float) -> None:
+    """Beside a hold, with gravity 0.25 rad off the normal: at rest it is mg cos / k deep and mg sin / k aside.
+
+    tan 0.25 is 0.255: on a surface of less friction it slides, and gains speed.
+    """
+    place = structure.positions[int(np.random.default_rng(3).integers(len(structure)))]
+
+    def normal(at: np.ndarray) -> np.ndarray:
+        step = 1e-6 * np.eye(3)
+        slope = structure.clearance(at + step) - structure.clearance(at - step)
+        return np.asarray(slope / np.linalg.norm(slope))
+
+    for _ in range(5):
+        place = place + (0.1 - float(structure.clearance(place))) * normal(place)
+    n = normal(place)
+    side = np.cross(n, np.cross([0.3, 0.5, 0.8], n))
+    side /= np.linalg.norm(side)
+    pull = 9.81 * (np.sin(0.25) * side - np.cos(0.25) * n)
+    robot, plant = ball_on_ground(pull, distance=structure.clearance, stiffness=2e4, damping=200.0, friction=friction)
+    q = robot.neutral
+    q[:3] = place
+    plant.reset(q, 0.0)
+    plant.advance(0.2)
+    moved, speed = plant.state.q[:3] - place, np.linalg.norm(plant.state.v[:3])
+    if friction > np.tan(0.25):
+        assert moved @ n == pytest.approx(-2.0 * 9.81 * np.cos(0.25) / 2e4, rel=0.02)
+        assert moved @ side == pytest.approx(2.0 * 9.81 * np.sin(0.25) / 2e4, rel=0.02)
+        assert speed < 1e-4
+    else:
+        assert speed == pytest.approx(0.2 * 9.81 * (np.sin(0.25) - friction * np.cos(0.25)), rel=0.15)
+    assert plant.given @ np.append(pull, np.zeros(3)) > 0.0
 
 
 def test_a_step_that_is_too_coarse_is_refused_with_the_largest_that_works() -> None:

@@ -62,7 +62,7 @@ def compare_controllers(
     from wbc import robots, validation
     from wbc.cli.console import out as console
     from wbc.cli.console import progress_bar
-    from wbc.cli.folders import run_folder
+    from wbc.cli.folders import filled, run_folder
     from wbc.motion_control.comparison import (
         Condition,
         compare,
@@ -89,31 +89,39 @@ def compare_controllers(
     for condition in conditions:
         loaded(scenario.robot, condition.payload, condition.heavier, scenario.frame)
     names = scenario.names(only or ())
-    folder = run_folder(out, "controllers", ("controllers.json", "controllers-1.png"), force)
-    found, total = [], sum(len(names) * scenario.seconds * condition.rate for condition in conditions)
-    with progress_bar() as bar:
-        task = bar.add_task("controllers", total=total)
-        try:
-            for condition in conditions:
-                for one in compare(scenario, condition, names, plant=plant, tick=lambda: bar.advance(task)):
-                    found.append(one)
-        except KeyboardInterrupt:
-            console().print(f"ended after {len(found)} of {len(names) * len(conditions)} runs")
-            if not found:
-                raise
+    written = ("controllers.json", "controllers-*.png")
+    folder = run_folder(out, "controllers", written, force, clear=False)
+    found: list[Compared] = []
+    total = sum(len(names) * scenario.seconds * condition.rate for condition in conditions)
+    rows: list[dict[str, object]] = []
     console().print(f"{scenario.robot.name}, {scenario.seconds:g} s, {plant}")
     console().print(
         "tip, in mm: largest distance from its place, and over the last tenth; largest torque in N m or N; us:"
     )
     console().print("a command in Python; payload: as learned, and the least standard deviation that the motion allows")
-    rows = []
-    for k, condition in enumerate(dict.fromkeys(one.condition for one in found), start=1):
-        runs = [one for one in found if one.condition is condition]
-        console().print(_table(runs, str(condition)))
-        save_plot(runs, f"{scenario.robot.name}: {condition}", folder / f"controllers-{k}.png")
-        rows += [_row(one) for one in runs]
-    text = json.dumps({"robot": scenario.robot.name, "plant": plant, "rows": rows}, indent=1)
-    (folder / "controllers.json").write_text(text + "\n")
+    with progress_bar() as bar:
+        task = bar.add_task("controllers", total=total)
+        for k, condition in enumerate(conditions, start=1):
+            runs, interrupted = [], False
+            try:
+                for one in compare(scenario, condition, names, plant=plant, tick=lambda: bar.advance(task)):
+                    runs.append(one)
+            except KeyboardInterrupt:
+                interrupted = True
+                if not runs and not found:
+                    raise
+            found += runs
+            if runs:
+                console().print(_table(runs, str(condition)))
+                rows += [_row(one) for one in runs]
+                text = json.dumps({"robot": scenario.robot.name, "plant": plant, "rows": rows}, indent=1)
+                # What is done is kept, whatever comes after
+                with filled(folder, written if k == 1 else ()) as fresh:
+                    save_plot(runs, f"{scenario.robot.name}: {condition}", fresh / f"controllers-{k}.png")
+                    (fresh / "controllers.json").write_text(text + "\n")
+            if interrupted:
+                console().print(f"ended after {len(found)} of {len(names) * len(conditions)} runs")
+                break
     console().print(str(folder))
 
 

@@ -14,7 +14,7 @@ from rich.markup import escape
 from wbc.cli import completion
 from wbc.cli.analysis.advise import configuration_of
 from wbc.cli.console import err, out
-from wbc.cli.folders import run_folder
+from wbc.cli.folders import filled, run_folder
 from wbc.cli.options import Backend
 from wbc.coordinates import Condition, parts
 from wbc.errors import RangeError, UnknownNameError
@@ -98,11 +98,12 @@ def _pages(found: SessionLog, session: Teleoperation, folder: Path) -> list[str]
     from wbc.viewer.errors import ViewerError
     from wbc.viewer.runs import save_motion
 
-    found.write(folder / LOG, session.robot.dof_names)
-    # A session is worth keeping where what draws the page is not installed, and without a tick there is none
-    with contextlib.suppress(ViewerError):
-        save_motion(session.robot, found.time, found.q, folder / REPLAY)
-    save_report(session, found, folder)
+    with filled(folder) as fresh:
+        found.write(fresh / LOG, session.robot.dof_names)
+        # A session is worth keeping where what draws the page is not installed, and without a tick there is none
+        with contextlib.suppress(ViewerError):
+            save_motion(session.robot, found.time, found.q, fresh / REPLAY)
+        save_report(session, found, fresh)
     return [name for name in WRITTEN if (folder / name).is_file()]
 
 

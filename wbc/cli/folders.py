@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from wbc.cli.console import OutputError
 
 
 def run_folder(
-    wanted: Path | None, name: str, written: Sequence[str], force: bool = False, *, field: str = "out"
+    wanted: Path | None,
+    name: str,
+    written: Sequence[str],
+    force: bool = False,
+    *,
+    field: str = "out",
+    clear: bool = True,
 ) -> Path:
     """The folder that was asked for, or a new one ``runs/NAME-TIME``; made, and without the files of an earlier run.
 
     Args:
         wanted: None: a new one. written: names, or patterns, of all files that such a run writes.
         force: write into a folder that has such a file. field: the option, for errors.
+        clear: False: the files of an earlier run stay until :func:`filled` has those of the new one.
 
     Raises:
         OutputError: it has a file of a run and ``force`` is off, or it cannot be written.
@@ -28,7 +37,7 @@ def run_folder(
             reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
             raise OutputError(field, str(folder), reason)
         folder.mkdir(parents=True, exist_ok=True)
-        for file in there:
+        for file in there if clear else ():
             file.unlink()
         # A folder that can be seen but not written says so before anything is computed
         probe = folder / ".probe"
@@ -37,6 +46,27 @@ def run_folder(
     except (OSError, ValueError) as error:
         raise OutputError(field, str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
     return folder
+
+
+@contextlib.contextmanager
+def filled(folder: Path, replaced: Sequence[str] = ()) -> Iterator[Path]:
+    """A folder to write into, whose files are in ``folder`` at the end: whoever is killed leaves no half of a file.
+
+    Args:
+        folder: of a run. replaced: names, or patterns, of files of an earlier run, which then go.
+    """
+    fresh = folder / ".writing"
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir()
+    try:
+        yield fresh
+        for old in [file for pattern in replaced for file in folder.glob(pattern)]:
+            if not (fresh / old.name).exists():
+                old.unlink()
+        for file in sorted(fresh.iterdir()):
+            file.replace(folder / file.name)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
 
 
 def _new(name: str) -> Path:

@@ -39,12 +39,13 @@ def identify(
     from wbc import robots
     from wbc.cli.console import out as console
     from wbc.cli.console import progress_bar
-    from wbc.cli.folders import run_folder
+    from wbc.cli.folders import filled, run_folder
     from wbc.identification.experiment import experiment
     from wbc.trajectory import plot
 
     machine = robots.load(robot)
-    folder = run_folder(out, "identify", ("identified.json", "motion.png", "motion.json"), force)
+    written = ("identified.json", "motion.png", "motion.npz")
+    folder = run_folder(out, "identify", written, force, clear=False)
     with progress_bar() as bar:
         task = bar.add_task("motions", total=tries + 1)
         done = experiment(machine, far=far, noise=noise, tries=tries, seed=seed, tick=lambda: bar.advance(task))
@@ -72,7 +73,8 @@ def identify(
         "inertias": {str(name): np.array(body.toDynamicParameters()).tolist() for name, body in
                      zip(list(found.robot.model.names)[1:], list(found.robot.model.inertias)[1:], strict=True)},
     }  # fmt: skip
-    (folder / "identified.json").write_text(json.dumps(row, indent=1) + "\n")
-    motion.law.save(folder / "motion.json")
-    plot(motion.law, folder / "motion.png")
+    with filled(folder, written) as fresh:
+        (fresh / "identified.json").write_text(json.dumps(row, indent=1) + "\n")
+        motion.law.save(fresh / "motion.npz")
+        plot(motion.law, fresh / "motion.png")
     console().print(str(folder))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wbc.cli.console import say
+from wbc.cli.folders import filled, run_folder
 
 if TYPE_CHECKING:
     from wbc.published.ikor import Run
@@ -130,13 +131,9 @@ def ikor(
     folder = _folder(out, force)
     if path is not None:
         run = driver.run(path)
-        files.write_trajectory(folder / "TrajectoryPts", machine, path, folder / "EulerAngles")
     else:
         with source or _keyboard() as operator:
             run = driver.operate(operator, realtime=keys)
-    files.write_angles(folder / "CheezyAngles", machine, run.q)
-    if spheres:
-        files.write_spheres(folder / "sphere_data", balls)
     figures = {
         "code": int(run.code), "stop": str(run.stop), "message": run.message, "steps": len(run.norms),
         "last_error": float(run.errors[-1]) if len(run.errors) else None,
@@ -145,11 +142,18 @@ def ikor(
         "steps_with_constraints": sum(map(bool, run.acted)), "given_up": sum(map(bool, run.given_up)),
         "assumed": list(machine.assumed),
     }  # fmt: skip
-    _written(folder, figures, {"run": (run, None)})
+    with filled(folder) as fresh:
+        if path is not None:
+            files.write_trajectory(fresh / "TrajectoryPts", machine, path, fresh / "EulerAngles")
+        files.write_angles(fresh / "CheezyAngles", machine, run.q)
+        if spheres:
+            files.write_spheres(fresh / "sphere_data", balls)
+        _written(fresh, figures, {"run": (run, None)})
     if film is not None and len(run.norms):
         from wbc.published.ikor.film import save_film
 
-        save_film(machine, run, balls, folder / f"film.{film}")
+        with filled(folder) as fresh:
+            save_film(machine, run, balls, fresh / f"film.{film}")
     for key, value in figures.items():
         say(f"{key.replace('_', ' '):>23}  {value}")
     say(str(folder))
@@ -240,7 +244,8 @@ def _published(
     console().print("differences: ln(measured / printed)", style="dim")
     if len(runs) == 1:
         _steps(*runs[key])
-    _written(folder, figures, runs)
+    with filled(folder) as fresh:
+        _written(fresh, figures, runs)
     say(str(folder))
     if any(run.code for run, _ in runs.values()):
         raise typer.Exit(PARTIAL)
@@ -258,8 +263,6 @@ def _steps(run: Run, printed: Any) -> None:
 
 
 def _folder(out: Path | None, force: bool) -> Path:
-    from wbc.cli.folders import run_folder
-
     return run_folder(out, "ikor", WRITTEN, force)
 
 

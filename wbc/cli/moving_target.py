@@ -73,7 +73,7 @@ def moving_target(
 
     from wbc import robots, validation
     from wbc.cli.console import err, out, progress_bar
-    from wbc.cli.folders import run_folder
+    from wbc.cli.folders import filled, run_folder
     from wbc.cli.planning import tip_frame
     from wbc.cli.session import INTERRUPTED, Stopper
     from wbc.moving_target import folder as files
@@ -110,13 +110,19 @@ def moving_target(
         if not done:
             raise typer.Exit(INTERRUPTED)
         figures = {kind: outcome(kind, found) for kind, found in done.items()}
-        written = files.save(study, done, figures, folder)
-        bar.update(stage, description="plots", total=None)
-        written += pictures.plot(study, done, folder)
+        with filled(folder) as fresh:
+            written = files.save(study, done, figures, fresh)
+            bar.update(stage, description="plots", total=None)
+            written += pictures.plot(study, done, fresh)
         if film and not stopper():
             pair = {k: done[k][0] for k in (min(done, key=kinds.index), max(done, key=kinds.index))}
             bar.update(stage, description="film", total=1, completed=0)
-            drawn = pictures.film(study, pair, folder / "film", lambda part: bar.update(stage, completed=part), stopper)
+
+            def shown(part: float) -> None:
+                bar.update(stage, completed=part)
+
+            with filled(folder) as fresh:
+                drawn = pictures.film(study, pair, fresh / "film", shown, stopper)
             written += [] if drawn is None else [drawn]
     table = Table(title=f"{machine.name}, {job}, {motion}", title_justify="left", box=None, pad_edge=False)
     for head in ("the object is known by", "done", "rms mm", "largest mm", "degrees", "time s", "rate", "known to mm"):

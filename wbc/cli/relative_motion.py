@@ -29,7 +29,7 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
 
     from wbc.cli.console import out as console
     from wbc.cli.console import say
-    from wbc.cli.folders import run_folder
+    from wbc.cli.folders import filled, run_folder
     from wbc.published.relative_motion import INCH
     from wbc.published.relative_motion import printed as known
     from wbc.validation import one_of
@@ -46,15 +46,16 @@ def relative_motion(table: TableName = None, solves: Solves = 32, out: Out = Non
             rows.append({"table": name, "command": float(size), **worst, "line end": lines[k, 0], "line": lines[k, 1]})
     folder = run_folder(out, "relative-motion", ("summary.json", "tables.csv", "tables.png"), force)
     columns = list(rows[0])
-    with (folder / "tables.csv").open("w", newline="") as stream:
-        writer = csv.DictWriter(stream, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
     largest = {
         name: {key: max(row[key] for row in rows if row["table"] == name) for key in columns[2:]} for name in chosen
     }
-    (folder / "summary.json").write_text(json.dumps({"solves": solves, "inches": largest}, indent=1) + "\n")
-    _plot(folder / "tables.png", {name: known.tables()[name].modified[:, :3] for name in chosen})
+    with filled(folder) as fresh:
+        with (fresh / "tables.csv").open("w", newline="") as stream:
+            writer = csv.DictWriter(stream, columns, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+        (fresh / "summary.json").write_text(json.dumps({"solves": solves, "inches": largest}, indent=1) + "\n")
+        _plot(fresh / "tables.png", {name: known.tables()[name].modified[:, :3] for name in chosen})
     shown = Table(header_style="bold", box=None, pad_edge=False)
     for column in columns if table else [c for c in columns if c != "command"]:
         shown.add_column(column, justify="right", no_wrap=True)

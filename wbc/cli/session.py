@@ -15,7 +15,7 @@ from rich.table import Table
 
 from wbc import validation
 from wbc.cli.console import err, out, progress_bar
-from wbc.cli.folders import run_folder
+from wbc.cli.folders import filled, run_folder
 from wbc.controller import Controller
 from wbc.interrupts import interrupts
 from wbc.record.recording import Recording, RecordingError
@@ -85,12 +85,14 @@ def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
         log = _tracked(plan, bar, stage, stopper, recording, plant)
         with stopper.listening():
             figures = summarise(log)
-            files = [save(log, folder, output.log), save_summary(figures, folder)]
-            if output.record:
-                files.append(folder / RECORDING)
-            if output.plots:
-                files += _drawn(plan, log, folder, bar, stage)
-            files += _pages(log, figures, folder, output, bar, stage)
+            with filled(folder) as fresh:
+                files = [save(log, fresh, output.log), save_summary(figures, fresh)]
+            if recording is not None:
+                files.append(recording)
+            with filled(folder) as fresh:
+                if output.plots:
+                    files += _drawn(plan, log, fresh, bar, stage)
+                files += _pages(log, figures, fresh, recording, output.plots, bar, stage)
     report(plan, log, figures, folder, files)
     for warning in start_warnings(log):
         console.print(f"[yellow]warning[/yellow]: {escape(warning)}", soft_wrap=True)
@@ -128,19 +130,21 @@ def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> 
     return files if picture is None else [*files, picture]
 
 
-def _pages(log: Log, figures: list[Figure], folder: Path, output: Output, bar: Progress, stage: Any) -> list[Path]:
+def _pages(
+    log: Log, figures: list[Figure], folder: Path, recorded: Path | None, plots: bool, bar: Progress, stage: Any
+) -> list[Path]:
     """The report; with a recording also why there were conflicts, and the page that plays the run."""
     bar.update(stage, description="report")
     out: list[Path] = []
     said: dict[int, str] = {}
-    if output.record and len(log):
+    if recorded is not None and len(log):
         from wbc.viewer.errors import ViewerError
         from wbc.viewer.runs import PAGE_RATE, REPLAY, save_page, sentences_of, states_of
 
-        recording = Recording(folder / RECORDING)
+        recording = Recording(recorded)
         if wanted := conflicts(log):
             said = sentences_of(recording, wanted)
-        if output.plots:
+        if plots:
             bar.update(stage, description="replay page")
             # A run is worth keeping where what draws the page is not installed
             with contextlib.suppress(ViewerError):

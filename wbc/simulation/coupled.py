@@ -71,7 +71,7 @@ class CoupledDynamics(Dynamics):
         force = G.T @ (tau - pin.nonLinearEffects(model, data, q, v))
         if not self._grips:
             return np.asarray(G @ np.linalg.solve(mass, force))
-        K, drift = self._rows(q, v)
+        K, drift = self._constraint(q, v)
         solved = np.linalg.solve(mass, np.column_stack([force, K.T]))
         pushes = np.linalg.lstsq(K @ solved[:, 1:], drift - K @ solved[:, 0], rcond=SAME)[0]
         self._forces = np.split(pushes, np.cumsum([len(rows) for *_, rows in self._grips])[:-1])
@@ -81,7 +81,7 @@ class CoupledDynamics(Dynamics):
         """The velocity after the grips have closed on moving frames, without a bounce ``[nv]``."""
         if not self._grips:
             return v
-        K = self._rows(q, v)[0]
+        K = self._constraint(q, v)[0]
         solved = np.linalg.solve(self.reduced(_mass(self.model, self.data, q)), K.T)
         w = v[self.free]
         return np.asarray(self._G @ (w - solved @ np.linalg.lstsq(K @ solved, K @ w, rcond=SAME)[0]))
@@ -94,7 +94,7 @@ class CoupledDynamics(Dynamics):
             out[name][rows] = force
         return out
 
-    def _rows(self, q: Array, v: Array) -> tuple[Array, Array]:
+    def _constraint(self, q: Array, v: Array) -> tuple[Array, Array]:
         """J G of all grips, and what J a is to be."""
         model, data, rate = self.model, self.data, self._rate
         # Jacobians first: the accelerations are to be those of these velocities alone

@@ -377,8 +377,10 @@ class PinocchioPlant:
         if self._touch is not None:
             more = self._touch.stiffness(q)
             stiffness, damping = stiffness + more[0], damping + more[1]
-        masses = (self._dynamics.reduced(x) for x in (pin.crba(model, data, q), stiffness, damping))
-        most = largest_step(*masses, self._rate, self._integrator)
+        mass, stiffness, damping = (
+            self._dynamics.reduced(matrix) for matrix in (pin.crba(model, data, q), stiffness, damping)
+        )
+        most = largest_step(mass, stiffness, damping, self._rate, self._integrator)
         if self.time_step > most:
             raise RangeError(
                 "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"
