@@ -46,29 +46,6 @@ def test_results_as_json() -> None:
     assert "out of reach" in answers[1]["reason"]
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("advise", "spherical_4r", "--at", "0.3,1.5707963267948966,-0.7,1.1"),
-        ("modes",),
-        ("relative-motion", "--table", "4.6", "--out", "relative"),
-        ("ikor", "--case", "1", "--config", "3x7", "--out", "ikor"),
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_nothing_but_json_is_printed(
-    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert json.loads(run(*arguments, "--json"))
-
-
-def test_a_run_and_its_replay_as_json(tmp_path: Path) -> None:
-    quick = ("--duration", "0.05", "--rate", "100", "--backend", "python", "--no-plots")
-    assert json.loads(run("track", "panda", *quick, "--out", str(tmp_path), "--force", "--json"))
-    assert json.loads(run("replay", str(tmp_path), "--json"))["tables"]
-
-
 def test_commands_print_only_where_data_is_kept() -> None:
     """What every command says goes through :mod:`wbc.cli.console`, so that ``--json`` has it."""
     own = {"app.py", "console.py", "results.py"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -17,16 +18,27 @@ class OutputError(WbcError):
     """A file or folder that cannot be written, or a folder that has a run already."""
 
 
+class _Lines(Console):
+    """A line that is printed with ``soft_wrap`` stays one line in a pipe; a terminal gets whole words a row."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """As rich does; see above."""
+        if options.get("soft_wrap") and self.is_terminal:
+            # Words longer than a row, such as paths and joint positions, stay whole, too
+            options |= {"soft_wrap": False, "overflow": "ignore"}
+        super().print(*objects, **options)
+
+
 def out() -> Console:
     """For results. Made when needed, so that redirected streams are honoured; keeps them where `--json` wants data."""
     from wbc.cli import results
 
-    return results.console() or Console(highlight=False)
+    return results.console() or _Lines(highlight=False)
 
 
 def err() -> Console:
     """For progress and errors."""
-    return Console(stderr=True, highlight=False)
+    return _Lines(stderr=True, highlight=False)
 
 
 def say(text: str) -> None:

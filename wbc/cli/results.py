@@ -35,7 +35,7 @@ class _Kept(Console):
         self._kept = found
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Lines as text; a table as a title and one object a row, numbers as numbers."""
+        """Lines as text; a table as a title and one object a row, or one of names and texts; numbers as numbers."""
         for each in objects:
             if isinstance(each, Table):
                 self._kept["tables"].append({"title": _plain(each.title or ""), "rows": _rows(each)})
@@ -44,7 +44,9 @@ class _Kept(Console):
                 self._kept["lines"].append(_plain(each) if markup else str(each))
 
 
-def _rows(table: Table) -> list[dict[str, Any]]:
+def _rows(table: Table) -> list[dict[str, Any]] | dict[str, Any]:
+    if not table.show_header and len(table.columns) == 2:
+        return {_plain(name): _number(cell) for name, cell in zip(*(c.cells for c in table.columns), strict=True)}
     names = [_plain(column.header) or f"column {k + 1}" for k, column in enumerate(table.columns)]
     cells = zip(*(column.cells for column in table.columns), strict=True)
     return [dict(zip(names, map(_number, row), strict=True)) for row in cells]

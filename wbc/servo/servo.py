@@ -71,14 +71,14 @@ class Servo:
             driver.send(servo.step(driver.positions()).command.values)
 
     The controller's ticks are taken at a reference r that nothing disturbs, dr/dt = v, a = dv/dt: limits count from it.
-    With e = r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the correction
-    d of :class:`wbc.servo.laws.Feedback`, the robot gets
+    With e = r(t) (-) q, where r(t) is what was to be reached now when the command of D ago was sent, and the
+    corrections d and b of :class:`wbc.servo.laws.Feedback`, the robot gets
 
-        position   u = r (+) (T v + f + d)          velocity   u = v + T a + f + d
-        torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v
+        position   u = r (+) (T v + f + d)          velocity   u = v + T (a + b) + f + d
+        torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v + f
 
-    at r(t + D), with f = C (M a + c) + S g + F sign(v), see :class:`Response`. z = int e dt makes up for what nobody
-    told.
+    at r(t + D), with f = C (M (a + b) + c) + S g + F sign(v) + B v, see :class:`Response`. z = int e dt makes up for
+    what nobody told.
 
     Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is
     larger than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
@@ -89,8 +89,9 @@ class Servo:
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
         kind: what the servos take: "position", "velocity" or "torque".
-        response: see :func:`wbc.servo.identify`. Default: of positions and velocities it is found while the robot
-            moves; of torques, which show none, only a delay counts, 0 unless it is told.
+        response: see :func:`wbc.servo.identify`. Default: it is found while the robot moves. A delay that is told
+            stays; of torques it should be told, because it shows in accelerations alone.
+        learn: whether the numbers of joints are found while the robot moves. Default: where none is told.
         divergence: distance behind the reference at which it begins to wait, and at which it stops [rad or m].
         armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for
             torques only.

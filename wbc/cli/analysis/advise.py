@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.markup import escape
 from rich.table import Table
@@ -50,7 +51,8 @@ def advise(
         rows.add_column(name)
     for found in adviser.advise(q):
         turn = found.direction * found.distance
-        turns = ", ".join(f"{n} {x:+.2f}" for n, x in zip(machine.dof_names, turn, strict=True) if abs(x) > 0.05)
+        shown = np.abs(turn) >= min(0.05, np.abs(turn).max())
+        turns = ", ".join(f"{n} {x:+.2g}" for n, x, is_ in zip(machine.dof_names, turn, shown, strict=True) if is_)
         where = found.locus or f"{found.basis}: {turns}"
         numbers = f"{found.sigma:.4f}", f"{found.ratio:.3f}", str(found.condition), f"{found.distance:.3f}"
         rows.add_row(escape(found.pair), *numbers, escape(where))

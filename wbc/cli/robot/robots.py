@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wbc import robots
-from wbc.cli import completion
+from wbc.cli import completion, results
 from wbc.cli.console import err, out, print_json
 from wbc.cli.robot.collisions import SAMPLES, Collisions
 from wbc.cli.robot.collisions import show as show_collisions
@@ -31,14 +31,13 @@ def table(
     rows = Table(title="Robots", title_justify="left", header_style="bold", box=None, pad_edge=False)
     rows.add_column("name", style="bold", no_wrap=True)
     rows.add_column("base")
-    rows.add_column("tip frame", no_wrap=True)
     rows.add_column("about")
     count, data = 0, []
     for recipe in robots.table():
         if match.lower() not in recipe.name.lower() or (recipe.problem and not all_):
             continue
         about = f"[red]does not load: {escape(recipe.problem)}[/red]" if recipe.problem else escape(recipe.about)
-        rows.add_row(recipe.name, recipe.base, recipe.frames.get("tip", "-"), about)
+        rows.add_row(recipe.name, recipe.base, about)
         shown = {key: getattr(recipe, key) for key in ("name", "base", "about", "problem")}
         data.append({**shown, "frames": dict(recipe.frames)})
         count += 1
@@ -92,6 +91,8 @@ def show(
     """
     robot = robots.load(name, base=base, shapes=shapes)
     if collisions or samples is not None or any((srdf, pairs, save)):
+        if as_json:
+            results.collect()
         show_collisions(robot, Collisions(samples, seed, clearance, srdf, pairs, save, force))
         return
     if as_json:

@@ -128,7 +128,7 @@ def check_folder(folder: Path) -> None:
     log = WalkLog.load(folder)
     machine = log.meta.get("machine")
     report = check_run(folder, None if machine is None else rules_of(machine_made(machine)))
-    out().print(report)
+    out().print(report.table())
     if not (folder / FILE).is_file():
         text = f"the run was ended at {log.t[-1]:.2f} s; `wbc walk --resume {folder}` goes on with it"
         err().print(f"[yellow]note[/yellow]: {escape(text)}", soft_wrap=True)

@@ -156,14 +156,14 @@ def check(
 
 
 def plans(
-    one: Annotated[Path, typer.Argument(help="A plan.json.")],
+    one: Annotated[Path, typer.Argument(help="A plan.json, or the folder of a run.")],
     other: Annotated[Path, typer.Argument(help="Another one.")],
 ) -> None:
     """Show what two plans do differently, one line each; exit code 1 if there is anything."""
     from wbc.cli.console import out
     from wbc.walking.planner.plan import differences, read_plan
 
-    first, second = (read_plan(path) for path in (one, other))
+    first, second = (read_plan(path / "plan.json" if path.is_dir() else path) for path in (one, other))
     lines = differences(first, second)
     for line in lines:
         out().print(line, markup=False, soft_wrap=True)

@@ -113,9 +113,11 @@ class Report:
         title = f"{state}: {self.ticks} ticks, {self.samples} samples, {self.duration:.2f} s"
         out = Table(title=title, title_justify="left", title_style="bold green" if self.ok else "bold red")
         out.box, out.pad_edge = box.SIMPLE, False
+        out.padding = (0, 1, 0, 0)
         for name, right in (("check", 0), ("worst", 1), ("limit", 1), ("unit", 0), ("at [s]", 1), ("where", 0)):
-            out.add_column(name, justify="right" if right else "left", overflow="fold")
-        out.add_column("violations", justify="right")
+            # Numbers stay whole where there are few columns
+            out.add_column(Text(name), justify="right" if right else "left", no_wrap=right == 1)
+        out.add_column("violated", justify="right")
         for finding in self.findings:
             out.add_row(*_cells(finding), style="" if finding.ok else "red")
         if self.observed:
@@ -188,11 +190,11 @@ def _cells(finding: Finding) -> list[Text]:
     measured = isfinite(finding.time)
     # Where nothing is off, no place is the worst
     placed = measured and (finding.worst != 0.0 or not finding.ok)
-    sign = "at least " if finding.least else ""
+    sign = ">= " if finding.least else ""
     texts = [
         finding.kind,
-        f"{finding.worst * factor:.5g}" if measured else "nothing to check",
-        f"{sign}{finding.limit * factor:.6g}",
+        f"{finding.worst * factor:.4g}" if measured else "-",
+        f"{sign}{finding.limit * factor:.4g}",
         unit,
         f"{finding.time:.3f}" if placed else "",
         finding.where if placed else "",
