@@ -7,12 +7,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc
 from wbc.controller import Controller
 from wbc.controller.step import state_of
-from wbc.tasks import CenterOfMass, EndEffector, Hold, Posture
+from wbc.tasks import CenterOfMass, EndEffector, Hold, PointContact, Posture
 from wbc.viewer.bodies import Mesh
 from wbc.viewer.drawing import AMBER, BLUE, GREEN, GREY, PURPLE, RED, Drawing, size
 from wbc.viewer.link import State
@@ -120,7 +121,7 @@ def test_a_force_is_an_arrow_along_it_from_its_contact() -> None:
     assert np.cross(shaft, along) == pytest.approx(np.zeros(3), abs=1e-9)
     assert shaft @ along > 0.0
     # Half the robot's size for its weight on earth
-    weight = 9.81 * sum(inertia.mass for inertia in robot.model.inertias)
+    weight = 9.81 * pin.computeTotalMass(robot.model)
     assert np.linalg.norm(shaft) == pytest.approx(0.5 * size(robot) * np.linalg.norm(along) / weight, rel=1e-2)
     assert len(lines) == 3
     assert colours == [PURPLE] * 3
