@@ -28,7 +28,7 @@ SIZE, CELL, PAGE, WINDOW = (480, 360), (380, 285), (1280, 807), (960, 810)
 #: Pictures of a loop, its seconds, and colours
 FRAMES, SECONDS, COLOURS = 16, 6.0, 128
 #: Colours of a picture, and of the sheet
-SHADES, FEW = 256, 64
+SHADES, FEW = 256, 192
 #: Part of a page without viser's own bar [pixels]
 CUT = (0, 30, 960, 720)
 #: The page says what is in the way

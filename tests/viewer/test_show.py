@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -42,12 +44,15 @@ def test_a_loop_is_driven_and_its_viewer_lost() -> None:
     assert np.abs(controller.step(q).v).max() < 1e-6
 
 
-def test_a_viewer_that_dies_while_somebody_operates_stops_the_robot() -> None:
+@pytest.mark.parametrize("end", [subprocess.Popen.kill, subprocess.Popen.terminate])
+def test_a_viewer_that_dies_while_somebody_operates_stops_the_robot(
+    end: Callable[[subprocess.Popen[bytes]], None],
+) -> None:
     controller = arms.fresh()
     q = controller.stack.robot.neutral
     with show(controller, open_browser=False, silence=0.3) as viewer:
         viewer.operation.obey({"type": "operate"})
-        viewer._process.kill()
+        end(viewer._process)
         until = time.monotonic() + 10.0
         while not viewer.stopped:
             assert time.monotonic() < until

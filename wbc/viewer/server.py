@@ -192,7 +192,7 @@ class PageServer:
         if parts[0] == SCENE:
             await scene(connection)
             return
-        name = parts[1] if len(parts) > 1 and parts[1] not in self._clients else f"client{next(self._numbers)}"
+        name = parts[1] if len(parts) > 1 and not self._lives(parts[1]) else f"client{next(self._numbers)}"
         client = self._clients[name] = Client(name, connection)
         client.tell(self._hello | {"you": name, "operator": self.operator})
         sender = asyncio.create_task(client.send())
@@ -208,9 +208,15 @@ class PageServer:
                 raise
         finally:
             sender.cancel()
-            del self._clients[name]
-            if self.operator == name:
-                self._operator_lost()
+            if self._clients.get(name) is client:
+                del self._clients[name]
+                if self.operator == name:
+                    self._operator_lost()
+
+    def _lives(self, name: str) -> bool:
+        """A name is somebody's who was heard lately; of one who was not it is free for the page that comes back."""
+        client = self._clients.get(name)
+        return client is not None and time.monotonic() - client.heard < self._silence
 
     def _take(self, client: Client, message: dict[str, Any]) -> None:
         kind = message["type"]
