@@ -125,7 +125,7 @@ static void examine(wbc_tick *t) {
         if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
         if (SOFTENED(t, k) && (HELD(t, k) || t->sense[NV + k] & ACTIVE)) continue;
         const double value = row_at(t, k, v);
-        const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
+        const double below = lower_side(t, k) - value, above = value - upper_side(t, k);
         if (below > out->violation) out->violation = below;
         if (above > out->violation) out->violation = above;
     }
@@ -161,6 +161,9 @@ static void examine_closely(wbc_tick *t) {
     if (t->report.error_bound > GOOD_BOUND) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
 }
 
+/* No refinement is worth its while */
+static int good(const wbc_report *out) { return out->error_bound <= GOOD_BOUND && out->violation <= GOOD_VIOLATION; }
+
 static void tidy(wbc_report *out) {
     replace_nan(out->error, MT, HUGE_VAL);
     replace_nan(out->factor, MT, 0.0);
@@ -177,14 +180,14 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
         return;
     }
     examine_closely(t);
-    for (int step = 0; step < REFINEMENTS && out->error_bound > GOOD_BOUND && (t->factored || t->alone); step++) {
-        const double bound = out->error_bound;
+    for (int step = 0; step < REFINEMENTS && !good(out) && (t->factored || t->alone); step++) {
+        const double bound = out->error_bound, missed = out->violation;
         double v[NV], multipliers[ACTIVE_MAX];
         memcpy(v, out->v, sizeof v);
         memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
         refine(t);
         examine_closely(t);
-        if (!(out->error_bound < bound)) {
+        if (!(out->error_bound < bound || (out->error_bound <= GOOD_BOUND && out->violation < missed))) {
             memcpy(out->v, v, sizeof v);
             memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
             examine_closely(t);

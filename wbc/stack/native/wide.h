@@ -23,18 +23,6 @@ static void push_back(const wbc_tick *t, int i, double f, double *y) {
     for (int j = 0; MC > 0 && i >= NV && j < NV; j++) y[j] += f * t->M[(i - NV) * NV + j];
 }
 
-/* r = (M M')^-1 r for the first `count` active rows, from DAQP's factors L D L' */
-static void solve_factors(const double *L, const double *D, int count, double *r) {
-    for (int a = 0, at = 0; a < count; a++) {
-        for (int b = 0; b < a; b++) r[a] -= L[at++] * r[b];
-        at++;
-    }
-    for (int a = count - 1; a >= 0; a--) {
-        r[a] /= D[a];
-        for (int b = a + 1; b < count; b++) r[a] -= L[b * (b + 1) / 2 + a] * r[b];
-    }
-}
-
 static void solve_gram(const wbc_tick *t, int count, double *r) { solve_factors(t->L, t->D, count, r); }
 
 /* By how much the command misses the bound of active row `a`, moved by what a soft row gives way, as the solver scales it */
