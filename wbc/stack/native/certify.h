@@ -38,7 +38,7 @@ static double sharp_bound(wbc_tick *t, const double *size) {
     for (int i = 0; i < DOFS; i++) {
         four sum = {0};
         for (int at = i & ~7; at < WIDE; at += 4) sum += SIZE_OF_FOUR(GIVEN_FOUR(t->inverse + i * WIDE + at)) * GIVEN_FOUR(image_of_size + at);
-        worst = larger(sum_of_four(sum), worst);
+        worst = larger(SUM_OF_FOUR(sum), worst);
     }
     return worst;
 }
@@ -73,8 +73,8 @@ static void gradient(const wbc_tick *t, const double *v, double *residual, doubl
             FOUR(size + at) += heap;
         }
         for (int r = 0; r < count; r++) {
-            residual[i + r] += sum_of_four(part[r]);
-            size[i + r] += sum_of_four(bulk[r]);
+            residual[i + r] += SUM_OF_FOUR(part[r]);
+            size[i + r] += SUM_OF_FOUR(bulk[r]);
         }
     }
 }

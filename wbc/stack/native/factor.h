@@ -111,12 +111,10 @@ static double chosen_pivot(wbc_pivots *chosen, const double *row, int k) {
     const int from = k & ~7;
     const double unit = chosen->scale[k] * chosen->scale[k], given = row[k] * unit;
     const four_bits here = {k - from, k - from, k - from, k - from};
-    four_bits right = (four_bits){0, 1, 2, 3} > here;
-    four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from) * GIVEN_FOUR(chosen->scale + from)) & right);
-    right = (four_bits){4, 5, 6, 7} > here;
-    most = larger_four((four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from + 4) * GIVEN_FOUR(chosen->scale + from + 4)) & right), most);
-    for (int at = from + 8; at < WIDE; at += 4)
-        most = larger_four(SIZE_OF_FOUR(GIVEN_FOUR(row + at) * GIVEN_FOUR(chosen->scale + at)), most);
+    /* Entries right of the diagonal in its group of 8, then those of the others */
+    four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from) * GIVEN_FOUR(chosen->scale + from)) & ((four_bits){0, 1, 2, 3} > here));
+    RAISE_FOUR(most, (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from + 4) * GIVEN_FOUR(chosen->scale + from + 4)) & ((four_bits){4, 5, 6, 7} > here)));
+    for (int at = from + 8; at < WIDE; at += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(row + at) * GIVEN_FOUR(chosen->scale + at)));
     const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3]));
     chosen->more[k] = 0.0;
     /* A branch, so that the next rows need not wait for what decides it */
@@ -218,8 +216,6 @@ static void solve_transposed(const wbc_tick *t, double *y) {
     for (int i = TALL; i < WIDE; i++) y[i] = 0.0;
 }
 
-INLINE double sum_of_four(four x) { return (x[0] + x[2]) + (x[1] + x[3]); }
-
 /* x = R^-1 y, as above */
 static void solve_upper(const wbc_tick *t, const double *y, double *x) {
     for (int i = TALL; i < WIDE; i++) x[i] = 0.0;
@@ -231,10 +227,10 @@ static void solve_upper(const wbc_tick *t, const double *y, double *x) {
             p0 = MADD(GIVEN_FOUR(s0 + at), known, p0), p1 = MADD(GIVEN_FOUR(s1 + at), known, p1);
             p2 = MADD(GIVEN_FOUR(s2 + at), known, p2), p3 = MADD(GIVEN_FOUR(s3 + at), known, p3);
         }
-        const double x3 = (y[i + 3] - sum_of_four(p3)) * d[3];
-        const double x2 = MADD(-x3, s2[i + 3], y[i + 2] - sum_of_four(p2)) * d[2];
-        const double x1 = MADD(-x2, s1[i + 2], MADD(-x3, s1[i + 3], y[i + 1] - sum_of_four(p1))) * d[1];
-        const double x0 = MADD(-x1, s0[i + 1], MADD(-x2, s0[i + 2], MADD(-x3, s0[i + 3], y[i] - sum_of_four(p0)))) * d[0];
+        const double x3 = (y[i + 3] - SUM_OF_FOUR(p3)) * d[3];
+        const double x2 = MADD(-x3, s2[i + 3], y[i + 2] - SUM_OF_FOUR(p2)) * d[2];
+        const double x1 = MADD(-x2, s1[i + 2], MADD(-x3, s1[i + 3], y[i + 1] - SUM_OF_FOUR(p1))) * d[1];
+        const double x0 = MADD(-x1, s0[i + 1], MADD(-x2, s0[i + 2], MADD(-x3, s0[i + 3], y[i] - SUM_OF_FOUR(p0)))) * d[0];
         x[i] = x0, x[i + 1] = x1, x[i + 2] = x2, x[i + 3] = x3;
     }
 }

@@ -62,6 +62,7 @@ INLINE void along_single(const wbc_tick *t, const double *v, double *out, int ro
 
 /* out = J' diag(weight) x, of the first level's rows. Those without weight must be finite too. */
 static void gather(const wbc_tick *t, const double *x, double *out) {
+    (void)t, (void)x; /* of stacks without task rows */
     for (int i = 0; i < WIDE; i++) out[i] = 0.0;
 #define MANY(t, ...) gather_block(t, x, out, __VA_ARGS__)
 #define SINGLE(t, ...) gather_single(t, x, out, __VA_ARGS__)
@@ -72,6 +73,7 @@ static void gather(const wbc_tick *t, const double *x, double *out) {
 
 /* out = J v, of the first level's rows */
 static void along_all(const wbc_tick *t, const double *v, double *out) {
+    (void)t, (void)v;
     for (int k = 0; k < LEADING; k++) out[k] = 0.0;
 #define MANY(t, ...) along_block(t, v, out, __VA_ARGS__)
 #define SINGLE(t, ...) along_single(t, v, out, __VA_ARGS__)

@@ -105,11 +105,14 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef long long four_bits __attribute__((vector_size(32)));
 #define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){LLONG_MAX, LLONG_MAX, LLONG_MAX, LLONG_MAX}))
 
-/* Of NaN the second */
-INLINE four larger_four(four x, four y) {
-    const four_bits first = x > y;
-    return (four)(((four_bits)x & first) | ((four_bits)y & ~first));
-}
+#define SUM_OF_FOUR(x) (((x)[0] + (x)[2]) + ((x)[1] + (x)[3]))
+/* Macros and no functions: what returns four numbers is called in another way on each processor. */
+#define RAISE_FOUR(most, x) \
+    do { \
+        const four other_ = (x); \
+        const four_bits first_ = other_ > (most); \
+        (most) = (four)(((four_bits)other_ & first_) | ((four_bits)(most) & ~first_)); \
+    } while (0)
 
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
