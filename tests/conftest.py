@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["tests.processes", "tests.slow", "tests.pictures", "tests.browsers", "tests.seeds"]
+pytest_plugins = ["tests.processes", "tests.slow", "tests.pictures", "tests.browsers", "tests.seeds", "tests.backends"]
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.

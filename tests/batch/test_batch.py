@@ -15,6 +15,7 @@ import pytest
 
 from tests.controller.stacks import aim, controller, inside, near_limits, robot
 from tests.levels import arms
+from tests.repeats import covering
 from tests.torque import problems
 from wbc import Controller, Policy, Stack, Status
 from wbc.batch import Batch
@@ -95,8 +96,7 @@ def give(batch: Batch, each: list[dict[str, dict[str, Any]]]) -> None:
     )
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize(("name", "threads"), covering(MADE, [1, 3]))
 def test_ticks_are_those_of_single_controllers(name: str, threads: int) -> None:
     compare(MADE[name]("native"), count=130 if name == "arm" else 9, threads=threads)
 

@@ -35,7 +35,7 @@ from wbc.walking.run.recording import WalkRecorder
 @pytest.mark.parametrize("family", FAMILIES)
 def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> None:
     digests = set()
-    seeds = repeats(2)
+    seeds = repeats(1)
     assert random_structure(family, 0).structure.digest == random_structure(family, 0).structure.digest
     for seed in range(seeds):
         trial = random_structure(family, seed)

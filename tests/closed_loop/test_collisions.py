@@ -29,6 +29,8 @@ def check(loop: Loop, item: str, starts: int) -> None:
     run(loop, item, starts)
 
 
+# Loops of spheres and segments are compiled; as expressions they take twice as long
+@pytest.mark.compiled
 @pytest.mark.parametrize(("item", "name"), covering([*THINGS, *SELF], CONSTRAINT_ROBOTS))
 def test_shapes_keep_clear(item: str, name: str) -> None:
     check(loop(name), item, STARTS if item == "rod" and name != "talos" else FEWER)

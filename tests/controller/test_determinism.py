@@ -13,11 +13,12 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack
 from wbc.tasks import EndEffector, JointLimits, Posture
 
-BACKENDS = ("python", "native")
+BACKENDS = ("python", COMPILED)
 
 
 def arm(backend: str) -> Controller:
@@ -96,7 +97,7 @@ def test_open_loop_reaches_the_target(name: str, seed: int) -> None:
     bot = robot(name)
     stack = Stack(bot, DT).add(EndEffector(FRAMES[name].tip, gain=5.0), name="hand")
     stack.add(Posture(), name="posture", weight=1e-6).add(JointLimits(), name="limits")
-    one = stack.compile(backend="native")
+    one = stack.compile(backend=COMPILED)
     q, goal = reachable(name, np.random.default_rng(seed))
     one["hand"].target = goal
     start, last = distance(name, q, goal), np.zeros(bot.nv)

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, inside, robot
 from tests.controller.twins import BACKENDS, POSE, make, next_ticks, state
 from wbc import Stack
@@ -100,7 +101,7 @@ def test_what_was_given_is_copied(backend: str) -> None:
 
 @pytest.mark.parametrize("item", ["hand", "place", "turn", "plane", "posture"])
 def test_a_value_that_waits_for_the_first_configuration_cannot_be_read(item: str) -> None:
-    controller, twin = make("panda", "native"), make("panda", "native")
+    controller, twin = make("panda", COMPILED), make("panda", COMPILED)
     before = state(controller)
     for read in (lambda: controller[item].target, controller.qp):
         with pytest.raises(SolverError, match="first configuration") as caught:
@@ -148,7 +149,7 @@ def test_step_before_a_target_without_default() -> None:
 
 def test_poses_are_taken_and_refused_alike_by_both_backends() -> None:
     """The native check of a pose that is set every tick, against the one in Python."""
-    native, vm = make("panda", "native"), make("panda", "python")
+    native, vm = make("panda", COMPILED), make("panda", "python")
     slot = core_of(native).layout.blocks["hand"].slots["target"]
     rng, taken = np.random.default_rng(11), 0
     for size in (0.0, 1e-8, 1e-7, 2e-7, 3e-7, 4e-7, 6e-7, 1e-6, 1e-3):

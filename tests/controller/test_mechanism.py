@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
 from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import DuplicateNameError
@@ -67,7 +68,7 @@ def test_rows_are_there_and_hold(name: str) -> None:
 
 def test_a_platform_drives_round_its_sideways_direction() -> None:
     """A wish straight to the side: the base turns and drives, and its lateral velocity stays 0 in its own axes."""
-    tick = build("tiago", "native")
+    tick = build("tiago", COMPILED)
     bot = tick.stack.robot
     q = bot.neutral.copy()
     tick.reset(q)
@@ -84,7 +85,7 @@ def test_a_platform_drives_round_its_sideways_direction() -> None:
     assert data.oMf[frame].translation == pytest.approx(goal.translation, abs=0.02)
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["python", COMPILED])
 def test_a_configuration_that_does_not_fit_is_brought_back(backend: str) -> None:
     bot = wbc.robots.load("talos_full", base="fixed") if backend == "python" else coupled_arm()
     tick = Stack(bot, DT).add(Posture(), name="posture", weight=0.1).compile(backend=backend)

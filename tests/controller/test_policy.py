@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
 from wbc.controller import Controller, Policy, Status, core_of
@@ -22,7 +23,7 @@ from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=("python", COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return conflicting(request.param)
 

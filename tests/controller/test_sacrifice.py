@@ -10,12 +10,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
 from wbc.controller import Controller, Stack, Status, Step, core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Posture, Row, Rows, SacrificeOrder
 
-BACKENDS = ("native", "python")
+BACKENDS = (COMPILED, "python")
 TIP = "panda_hand_tcp"
 
 
@@ -37,7 +38,7 @@ def within_actuators(step: Step, before: np.ndarray, dt: float, bot: object) -> 
 def test_actuator_bounds_hold_whatever_contradicts(backend: str) -> None:
     tick = controller("conflicts", backend=backend)
     bot, rng = tick.stack.robot, np.random.default_rng(2)
-    for _ in range(120 if backend == "native" else 30):
+    for _ in range(120 if backend == COMPILED else 30):
         q, v, dt = near_limits(bot, rng), 1.5 * rng.normal(size=bot.nv), DT * rng.uniform(0.25, 2.0)
         tick.reset(q, v)
         quarrel(tick, rng)
@@ -244,7 +245,7 @@ def test_a_fixed_joint_outside_its_limits_returns(backend: str) -> None:
 
 def test_feasible_again_is_solved_again() -> None:
     """Along a run that passes through conflicts, status follows the rows and nothing lingers."""
-    tick, fresh = controller("conflicts", backend="native"), controller("conflicts", backend="native")
+    tick, fresh = controller("conflicts", backend=COMPILED), controller("conflicts", backend=COMPILED)
     bot, rng = tick.stack.robot, np.random.default_rng(4)
     q = inside(bot, rng)
     seen = []

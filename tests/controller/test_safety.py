@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, aim, controller, near_limits, quarrel, random_configuration, robot
 from tests.controller.test_sacrifice import within_actuators
 from wbc.controller import Stack, Status, Step, core_of
@@ -31,7 +32,7 @@ from wbc.tasks import (
     SacrificeOrder,
 )
 
-BACKENDS = ("native", "python")
+BACKENDS = (COMPILED, "python")
 
 
 def numbers(step: Step) -> np.ndarray:
@@ -45,7 +46,7 @@ seeds = st.integers(0, 2**32 - 1)
 @settings(max_examples=50)
 @given(seed=seeds, reach=st.floats(-2, 6), speed=st.floats(0, 3), factor=st.floats(0.25, 2.0))
 def test_any_state_and_any_target(seed: int, reach: float, speed: float, factor: float) -> None:
-    tick, rng = controller("conflicts", backend="native"), np.random.default_rng(seed)
+    tick, rng = controller("conflicts", backend=COMPILED), np.random.default_rng(seed)
     bot = tick.stack.robot
     q, v, dt = near_limits(bot, rng), speed * rng.normal(size=bot.nv), DT * factor
     if seed % 4 == 0:  # far outside: several turns past the limits
@@ -224,7 +225,7 @@ def test_bounds_that_cross_by_rounding_only_are_one_value(backend: str) -> None:
 
 
 def test_random_robot_states_with_free_bases() -> None:
-    tick, rng = controller("humanoid", backend="native"), np.random.default_rng(6)
+    tick, rng = controller("humanoid", backend=COMPILED), np.random.default_rng(6)
     bot = tick.stack.robot
     for _ in range(40):
         q, v = random_configuration(bot, rng), rng.normal(size=bot.nv)

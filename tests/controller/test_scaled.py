@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.backends import COMPILED
 from tests.controller.softness import Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
 from wbc.controller import Controller, Stack, Status, core_of
@@ -27,7 +28,7 @@ def slow(scaled: bool, calm: bool = True, elbow: int | None = None) -> Stack:
     return out.add(JointLimits(acceleration=calm, position=calm), name="limits")
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=("python", COMPILED))
 def two(request: pytest.FixtureRequest) -> Controller:
     """Two scaled tasks that compete, on velocity limits alone."""
     return slow(True, calm=False, elbow=0).compile(backend=request.param)
@@ -77,7 +78,7 @@ def along_the_line(controller: Controller, ticks: int = 400) -> tuple[float, flo
     return beside, float(np.linalg.norm(start + line - jacobian(bot, q, TIP)[0])), np.array(shares)
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["python", COMPILED])
 def test_a_hand_that_is_asked_for_too_much_goes_straight(backend: str) -> None:
     beside, left, shares = along_the_line(slow(True).compile(backend=backend))
     assert beside < 5e-4, "second order of a step, 0.38 mm when this was written"
@@ -87,7 +88,7 @@ def test_a_hand_that_is_asked_for_too_much_goes_straight(backend: str) -> None:
 
 
 def test_without_the_option_it_leaves_the_line() -> None:
-    beside, _, _ = along_the_line(slow(False).compile(backend="native"))
+    beside, _, _ = along_the_line(slow(False).compile(backend=COMPILED))
     assert beside > 0.03, "41 mm when this was written"
 
 
@@ -143,7 +144,7 @@ def test_weights_masks_and_switches_of_the_task_count_for_its_direction(two: Con
 def test_scaled_tasks_at_strict_levels() -> None:
     out = slow(True, elbow=1)
     bot, q = out.robot, Q
-    both = [out.compile(backend=backend) for backend in ("python", "native")]
+    both = [out.compile(backend=backend) for backend in ("python", COMPILED)]
     targets = {"hand": (TIP, np.array([-0.15, 0.5, 0.1])), "elbow": (MIDDLE, np.array([0.0, 0.0, 0.3]))}
     for c in both:
         c.reset(q)
@@ -197,7 +198,7 @@ def test_an_arm_at_the_end_of_its_line_rests_with_a_posture_at_a_level_below(pla
     stack = Stack(robot("panda"), DT)
     stack.add(EndEffector(TIP, kind="position"), name="hand", scaled=True)
     stack.add(Posture(), name="posture", weight=1e-3, level=1)
-    arm = stack.add(JointLimits(), name="limits").compile(backend="native")
+    arm = stack.add(JointLimits(), name="limits").compile(backend=COMPILED)
     arm.reset(Q)
     arm["hand"].target, arm["hand"].gain = place, gain
     q, speeds = Q.copy(), []

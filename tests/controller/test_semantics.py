@@ -6,13 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack, Step
 from wbc.controller import core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import EndEffector, Hold, Obstacle, PitchPlane, Posture
 
-BACKENDS = ("python", "native")
+BACKENDS = ("python", COMPILED)
 ACCELERATION = 10.0
 FAR = pin.SE3(pin.exp3(np.array([0.3, 2.0, 0.7])), np.array([0.4, 0.2, 0.6]))
 START = np.array([0.1, -0.4, 0.2, -1.9, 0.1, 1.6, 0.4])

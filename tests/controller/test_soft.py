@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
 from wbc.controller import Controller, Stack, Status, core_of
 from wbc.errors import RangeError, ShapeError
@@ -38,7 +39,7 @@ def stack(hard: bool) -> Stack:
     return out.add(Ask(0.01), name="firm").add(Ask(0.03), name="other", hard=hard)
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=("python", COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return stack(hard=False).compile(backend=request.param)
 

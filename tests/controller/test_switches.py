@@ -8,7 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
+from tests.repeats import ALL, MORE
 from wbc.controller import Controller, Stack, core_of
 from wbc.qp import QP
 from wbc.tasks import CenterOfMass, Damping, Elbow, EndEffector, Obstacle, Posture
@@ -50,7 +52,7 @@ def full() -> Controller:
     return controller("linear", "panda")
 
 
-@pytest.mark.parametrize("name", [entry.name for entry in everything("panda").entries])
+@pytest.mark.parametrize("name", [e.name for e in everything("panda").entries][:: 1 if MORE >= ALL else 2])
 def test_disabled_is_as_if_not_declared(full: Controller, name: str) -> None:
     rng = np.random.default_rng(len(name))
     q, v = near_limits(full.stack.robot, rng), rng.normal(size=7)
@@ -110,7 +112,7 @@ def test_masked_rows_are_as_if_not_there(full: Controller) -> None:
         full[name].mask = 1.0
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["python", COMPILED])
 def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
     """One controller with numbers set at run time, one that was declared with them."""
     bot, f = robot("panda"), FRAMES["panda"]
@@ -197,7 +199,7 @@ def test_default_rate_fits_the_longest_tick() -> None:
 
 def test_reset_starts_anew() -> None:
     """After any history a reset gives the bits of a fresh controller with the same values."""
-    for backend in ("python", "native"):
+    for backend in ("python", COMPILED):
         used, fresh = (controller("arm", "panda", backend=backend) for _ in range(2))
         bot, rng = used.stack.robot, np.random.default_rng(2)
         for _ in range(20):
@@ -214,7 +216,7 @@ def test_reset_starts_anew() -> None:
 
 
 def test_acceleration_counts_from_the_last_command_or_from_v() -> None:
-    tick = controller("arm", "panda", backend="native")
+    tick = controller("arm", "panda", backend=COMPILED)
     bot = tick.stack.robot
     q = bot.neutral
     tick.reset(q)

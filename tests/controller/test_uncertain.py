@@ -9,10 +9,11 @@ from scipy.optimize import linprog
 
 from bench.soak import machines, stacks
 from bench.soak.levels import with_levels
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
 from wbc.controller import Controller, Stack, Status, core_of
 from wbc.controller.tick.buffers import BRAKED, SOLVED, UNSOUND
-from wbc.controller.tick.native import NativeTick
+from wbc.controller.tick.native import CompiledTick
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, QPSolution
 from wbc.stack.layout import Layout
@@ -50,7 +51,7 @@ def anywhere(rng: np.random.Generator, share: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("level", [None, 0, 1])
 def test_scaled_hands_are_always_solved(level: int | None) -> None:
-    controller, rng = hand(level).compile(backend="native"), np.random.default_rng(0)
+    controller, rng = hand(level).compile(backend=COMPILED), np.random.default_rng(0)
     q, seen = robot("panda").neutral, []
     for k in range(900):
         if k % 30 == 0:
@@ -61,7 +62,7 @@ def test_scaled_hands_are_always_solved(level: int | None) -> None:
     assert set(seen) == {(Status.SOLVED, "")}
 
 
-def wild(level: int, backend: str = "native") -> Controller:
+def wild(level: int, backend: str = COMPILED) -> Controller:
     """Two tasks, a posture and a soft speed, whose weights are far apart."""
     out = Stack(robot("panda"), DT)
     out.add(EndEffector(TIP), name="hand").add(EndEffector(MIDDLE, kind="position"), name="elbow")
@@ -95,7 +96,7 @@ def feasible(qp: QP) -> bool:
 def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
     controller, rng = wild(0), np.random.default_rng(3)
     tick, places, compared = core_of(controller).tick, Memory(core_of(controller).layout), 0
-    assert isinstance(tick, NativeTick)
+    assert isinstance(tick, CompiledTick)
     for _ in range(120):
         provoke(controller, rng)
         qp = tick.qp()
@@ -116,7 +117,7 @@ def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:
 def test_a_step_without_other_solvers_brakes_and_says_so() -> None:
     controller, rng = wild(1), np.random.default_rng(0)
     tick, places = core_of(controller).tick, Memory(core_of(controller).layout)
-    assert isinstance(tick, NativeTick)
+    assert isinstance(tick, CompiledTick)
     safe = tick._library.wbc_tick_safe_step
     seen = dict.fromkeys((SOLVED, RECOVERED, UNCERTIFIED), 0)
     for _ in range(600):
@@ -151,7 +152,7 @@ def test_soft_rows_add_no_variables() -> None:
     assert Layout(faces(2000, 1.0)).variables == Layout(faces(2000, None)).variables == 7
 
 
-@pytest.mark.parametrize("backend", ["native", "python"])
+@pytest.mark.parametrize("backend", [COMPILED, "python"])
 def test_many_soft_rows_at_once(backend: str) -> None:
     controller, rng = faces(60, 1.0).compile(backend=backend), np.random.default_rng(4)
     offsets, given = controller["planes"].offsets.copy(), 0
@@ -176,7 +177,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
     rng = np.random.default_rng(505)
     bot = machines.machine(rng)
     declared = with_levels(stacks.random_stack(bot, rng), rng)
-    native, vm = declared.compile(backend="native"), declared.compile(backend="python")
+    native, vm = declared.compile(backend=COMPILED), declared.compile(backend="python")
     for _ in range(12):
         q, state = machines.configuration(bot, rng, False), rng.bit_generator.state
         stacks.provoke(native, rng)

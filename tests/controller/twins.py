@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, inside, robot
 from wbc import Controller, Stack
 from wbc.controller import core_of
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, PitchPlane, Posture
 
-BACKENDS = ("python", "native")
+BACKENDS = ("python", COMPILED)
 TURN = pin.exp3(np.array([0.3, -1.2, 0.7]))
 POSE = pin.SE3(TURN, np.array([0.4, 0.1, 0.5]))
 

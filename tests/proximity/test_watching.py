@@ -9,6 +9,7 @@ import pytest
 from tests.evaluation import random_configuration
 from tests.models import robot as bare
 from tests.proximity.world import NAMES, all_pairs, place, robot, sensor, set_pose
+from tests.repeats import covering
 from wbc.proximity import Body, choice
 from wbc.robot import Robot
 from wbc.shapes import Box, HalfSpace, Sphere
@@ -32,8 +33,7 @@ def steps(bot: Robot, rng: np.random.Generator, ticks: int) -> np.ndarray:
     return np.asarray(size[:, None] * (wander + 0.3 * rng.normal(size=(len(size), bot.nv))))
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("name", "seed"), covering(NAMES, [1, 2]))
 def test_rows_are_those_of_measuring_everything(name: str, seed: int) -> None:
     """Tick by tick the rule applied to the distances of all pairs gives the same pairs in the same rows."""
     bot, rng, count = robot(name), np.random.default_rng([20, seed]), 6

@@ -64,7 +64,7 @@ def by_hand(control: Controller, plant: Drives, ticks: int = 750) -> np.ndarray:
     return np.array(off)
 
 
-@pytest.mark.parametrize("seed", range(repeats(3)))
+@pytest.mark.parametrize("seed", range(repeats(2)))
 @pytest.mark.parametrize("kind", ["position", "velocity"])
 def test_random_servos_that_nobody_told_of(control: Controller, kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -15,6 +15,7 @@ import pytest
 
 from tests.constraints.items_forces import NO_VELOCITIES, TILTED
 from tests.evaluation import Numbers, later, numbers, sample, slope
+from tests.repeats import repeats
 from tests.tasks.items import FACTORIES
 from tests.tasks.items_coordination import RATES as COORDINATION
 from tests.tasks.items_pointing import RATES as POINTING
@@ -38,7 +39,8 @@ from wbc.tasks import (
 )
 from wbc.tasks.rolling import FLAT
 
-STATES = 2
+#: States of an item on each of four robots
+STATES = repeats(1)
 DIRECTIONS = 2
 SHIPPED = sorted(name for name, cls in registry().items() if cls.__module__.startswith("wbc.tasks."))
 

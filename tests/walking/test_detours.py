@@ -7,6 +7,7 @@ import pytest
 
 import wbc
 from bench.walk.reference import Rules, fewest_along
+from tests.repeats import ALL, MORE
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.arms.puma import limb_of
@@ -119,7 +120,7 @@ def test_connected_sets_go_on_after_a_full_turn() -> None:
     assert (numbers[~flags] == 0).all()
 
 
-@pytest.mark.parametrize("arms", range(2, 7))
+@pytest.mark.parametrize("arms", range(2, 7) if MORE >= ALL else (2, 5))
 def test_bodies_with_two_to_six_arms_look_for_detours(structure: Structure, arms: int) -> None:
     """As many hands as must hold do, of any number of arms; and where holds end, all of them are refused."""
     machine = wbc.robots.walker(arms, (8 + 3 * arms) * INCH)

@@ -14,7 +14,7 @@ from wbc.walking import Structure
 from wbc.walking.loop.stack import WalkStack
 
 #: Layouts, and how many a test judges; `wbc bench walk` judges 1000
-COUNT, AT_ONCE = repeats(2), 2
+COUNT, AT_ONCE = repeats(1), 1
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,40 @@
+"""What ``backend="auto"`` means in tests: the virtual machine, where compiled code is not the point.
+
+A stack's own library takes half a second to compile, its functions for the virtual machine a tenth of that; both run
+the same C (``tests/stack/test_generic.py``) and give the same answers (``tests/controller/test_backends.py``). Tests
+that are there for the compiled tick ask for ``native``, or are marked ``compiled``; with ``make test REPEATS=3`` all
+tests get what a user gets.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from tests import repeats
+from wbc.controller import stack
+from wbc.native import toolchain
+from wbc.stack.artifact import Artifact, compile_stack
+from wbc.stack.declaration import Declaration
+
+#: With all repeats every stack has a library of its own
+_ALWAYS = repeats.MORE >= repeats.ALL
+#: For tests of the tick's C code: the same, whether it is compiled once or for each stack
+COMPILED = "native" if _ALWAYS else "vm"
+
+#: The test that runs
+_running: list[pytest.Item] = []
+
+
+def _compile(declared: Declaration, backend: str, version: str) -> Artifact:
+    marked = any(item.get_closest_marker("compiled") for item in _running)
+    virtual = backend == "auto" and not _ALWAYS and not marked and not toolchain.missing()
+    return compile_stack(declared, "vm" if virtual else backend, version)
+
+
+stack.compile_stack = _compile
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Also for fixtures that tests of a module share: they are made for the first of them."""
+    _running[:] = [item]
