@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,8 +15,10 @@ from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_rows
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.planner.detours import CellSpacing, find_route
+from wbc.walking.planner.detours import CellSpacing, find_route, route
 from wbc.walking.planner.detours.cell_graph import round_labels
+from wbc.walking.planner.detours.cells import ALONG, WIDE
+from wbc.walking.planner.detours.cells import NARROW as CLOSE
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.planner.swings.curve import ALTERNATIVES
@@ -132,3 +137,19 @@ def test_bodies_with_two_to_six_arms_look_for_detours(structure: Structure, arms
     refused = find_route(machine, few, grid_path([(13, 9), (13, 22)], 2 * INCH), mesh=NARROW)
     assert refused.path is None
     assert refused.separating
+
+
+@pytest.mark.parametrize("touches", [True, False])
+def test_cells_are_closer_only_where_the_body_touches_something_between_them(
+    machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch, touches: bool
+) -> None:
+    looked = list[CellSpacing]()
+
+    def variations(*args: Any) -> Generator[route.BodyRoute, int | None, bool]:
+        looked.append(args[3])
+        yield route.BodyRoute(None, False, (), "none")
+        return touches and args[3] == WIDE
+
+    monkeypatch.setattr(route, "_variations", variations)
+    assert all(one.path is None for one in route.find_routes(machine, structure, grid_path([(13, 9), (13, 10)], 0.1)))
+    assert looked == ([ALONG, WIDE, CLOSE] if touches else [ALONG, WIDE])

@@ -47,13 +47,13 @@ class HoldItems:
     """
 
     def __init__(self, stack: Stack, walker: Walker, structure: Structure, dt: float) -> None:
-        self._names, self._gain = [arm.name for arm in walker.arms], 1.0 / (HOLD_TICKS * dt)
+        self._names, self.gain = [arm.name for arm in walker.arms], 1.0 / (HOLD_TICKS * dt)
         self.kinds = sorted({hold_kind(structure, k) for k in range(len(structure))})
         self._tilts = bool({"position", "roll"} & set(self.kinds))
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
         for arm in walker.arms:
             for kind in self.kinds:
-                item = tasks.Hold(arm.hand, kind=kind, gain=self._gain)
+                item = tasks.Hold(arm.hand, kind=kind, gain=self.gain)
                 stack.add(item, name=f"{arm.name} hold {kind}")
             if self._tilts:
                 stack.add(tasks.AxisCone(arm.hand, half_angle=1.0), name=f"{arm.name} tilt")
@@ -67,7 +67,7 @@ class HoldItems:
         self._cones = [items[f"{name} tilt"] for name in self._names] if self._tilts else []
         self._turned = [items[f"{name} x axis"] for name in self._names] if self._rolls else []
         self.gains = [(turned, ROLL_GAIN) for turned in self._turned]
-        self.gains += [(hold, self._gain) for kinds in self._holds for hold in kinds.values()]
+        self.gains += [(hold, self.gain) for kinds in self._holds for hold in kinds.values()]
         for arm in range(len(self._names)):
             self.release(arm)
 
@@ -89,6 +89,11 @@ class HoldItems:
             cone.enabled, cone.direction = True, structure.axes[hold]
             cone.half_angle = TILT_PART * structure.tilts[hold]
         return tilts
+
+    def follow(self, arm: int, gain: float) -> None:
+        """What a closed hand is off its hold is taken back with a gain [1/s]."""
+        for item in self._holds[arm].values():
+            item.gain = gain
 
     def release(self, arm: int) -> None:
         """A hand opens."""
@@ -116,8 +121,9 @@ DT = 0.01
 BODY, SWING, AXIS, WRIST, UPRIGHT = 1e4, 10.0, 3.0, 1e-3, 100.0
 #: Gains [1/s] of body, swinging hand, its axis and the wrists
 BODY_GAIN, SWING_GAIN, AXIS_GAIN, WRIST_GAIN = 12.0, 25.0, 20.0, 12.0
-#: A hand that has come to lean in its hold becomes upright by a gain that grows to AXIS_GAIN within this time [s]. All
-#: of it at once asks for more than the joints' accelerations, and then the body leaves its path
+#: What a hand is off its hold as it closes, and how it leans in it, is taken back by gains that grow within this time
+#: [s]. All of it at once asks for more than the joints' accelerations, or moves a body whose hands are nearly on one
+#: line by many times as much
 RISING = 0.3
 #: On joints that lag by T no gain is greater than this over T: an error then falls with hardly any overshoot, as from
 #: 1/4 on it begins to swing
@@ -154,7 +160,7 @@ class WalkStack:
         self._mask = np.full(walker.robot.nv - 6, RESTING)
         self._turning = np.zeros(walker.robot.nv)
         self._near = (-1, False)
-        # Row of an arm that holds -> part of the gain of its axis
+        # Row of an arm that has closed of late -> part of the gains of its hold and its axis
         self._rising: dict[int, float] = {}
         items: Any = self.controller
         self._body = InputGroup(core_of(self.controller), [("body", "target", None), ("body", "feedforward", None)])
@@ -176,8 +182,8 @@ class WalkStack:
         self.swing_gain = min(SWING_GAIN, most)
         for item, gain in self._gains:
             item.gain = min(gain, most)
-        for arm, part in self._rising.items():
-            self._axes[arm].gain = part * min(AXIS_GAIN, most)
+        for arm, part in dict(self._rising).items():
+            self._rise(arm, part)
 
     def begin(self, q: Array) -> None:
         """A walk begins at ``q`` ``[nq]``, at rest: nothing is left of the walk that was on this stack before."""
@@ -198,7 +204,8 @@ class WalkStack:
         if tilts:
             axis = self._axes[arm]
             axis.target, axis.feedforward, axis.weight = self.structure.axes[hold], np.zeros(3), UPRIGHT
-            axis.gain, self._rising[arm] = 0.0, 0.0
+        self._rising[arm] = 0.0
+        self._rise(arm, 0.0)
         self._mask[self._joints(arm)] = RESTING
         self._still(arm)
         self._rest.mask = self._mask
@@ -266,9 +273,11 @@ class WalkStack:
         self._rest.mask = self._mask
 
     def _rise(self, arm: int, part: float) -> None:
-        """The gain of a hand's axis becomes a part of what it is to be."""
+        """The gains of a hand's hold and of its axis become a part of what they are to be."""
         if arm in self._rising:
-            self._axes[arm].gain = min(part, 1.0) * min(AXIS_GAIN, CRITICAL / max(self._lag, 1e-9))
+            most = CRITICAL / max(self._lag, 1e-9)
+            self._axes[arm].gain = min(part, 1.0) * min(AXIS_GAIN, most)
+            self._holds.follow(arm, min(part, 1.0) * min(self._holds.gain, most))
             self._rising[arm] = part
             if part >= 1.0:
                 del self._rising[arm]

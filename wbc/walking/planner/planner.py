@@ -38,6 +38,8 @@ SOON = (0.0, 0.25, float("inf"))
 WIDER = 5
 #: So many of the path and its detours are searched that widely, those first on which plans came furthest
 WIDELY = 3
+#: Of more than :data:`USUAL_ARMS` the stances differ in more, and one more search is so many times as wide
+WIDEST = 12
 #: Where so little is left of a detour, it is searched widely at once [s]
 NEARLY = 2.5
 #: With more arms than this detours, along which all but one must hold, come after the wider search
@@ -112,8 +114,9 @@ def _beside(
     hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
     wide = [(DELAYS[-1], WIDER * width)] if width is not None else []
     tried = [(plan.path.duration - plan.reached, path, "")]
-    if wide and len(walker.arms) > USUAL_ARMS:
-        found = drained(search(path, beginning, objective="destination", tries=wide))
+    if width is not None and len(walker.arms) > USUAL_ARMS:
+        widest = (DELAYS[-1], WIDEST * width)
+        found = drained(search(path, beginning, objective="destination", tries=[*wide, widest]))
         if found.complete:
             return found
         tried.clear()

@@ -20,7 +20,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.cell_grips import cell_grips
 from wbc.walking.planner.detours.cell_search import CellNode, CellSearch, Outcome
-from wbc.walking.planner.detours.cells import ALONG, WIDE, Cells, CellSpacing, Ints, cells_about
+from wbc.walking.planner.detours.cells import ALONG, NARROW, WIDE, Cells, CellSpacing, Ints, cells_about
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -37,7 +37,8 @@ DEAR = np.array([0.1, 0.2, 0.1])
 VARIATIONS, STUCK = 4, 3.0
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
 ROOMY = 0.06
-#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too
+#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too; the body may
+#: touch something between them on every route, and pass between closer ones (NARROW)
 MESHES = (ALONG, WIDE)
 
 
@@ -92,11 +93,13 @@ def find_routes(
     Args:
         start, deadline: of :func:`find_route`.
     """
-    limb = limb_of(walker)
+    limb, closed = limb_of(walker), False
     for mesh in MESHES:
         if deadline is not None and time.perf_counter() > deadline:
             return
-        yield from _variations(walker, structure, path, mesh.of(limb), start, deadline)
+        closed = yield from _variations(walker, structure, path, mesh.of(limb), start, deadline)
+    if closed:
+        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline)
 
 
 def _variations(
@@ -106,8 +109,10 @@ def _variations(
     mesh: CellSpacing,
     start: Mapping[int, int] | None,
     deadline: float | None,
-) -> Routes:
-    """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended."""
+) -> Generator[BodyRoute, int | None, bool]:
+    """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended. Returns
+    whether there are some among its cells, but the body touches something between them on each.
+    """
     cells = cells_about(path, structure, mesh)
     grips = cell_grips(walker, structure, cells)
     there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
@@ -118,7 +123,7 @@ def _variations(
         where = f"beyond {', '.join(names)}" if names else "from the start"
         text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
         yield BodyRoute(None, outcome.complete, names, text)
-        return
+        return False
     outcomes, known, seen = [outcome], list[list[int]](), 0
     # Then through cells at which the body has more place than it needs
     roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
@@ -142,6 +147,7 @@ def _variations(
     if not seen:
         text = f"up to {mesh.beside * mesh.side:.2f} m beside the path the body touches something on each route"
         yield BodyRoute(None, False, (), text)
+    return not seen
 
 
 def _clear(
