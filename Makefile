@@ -16,10 +16,11 @@ PEERS_READY := $(PEERS_VENV)/.ready
 SITE_VENV ?= .venv-site
 SITE_READY := $(SITE_VENV)/.ready
 TYPES := build/types
+PUBLIC := build/public
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs site check-export wheel figures bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -56,10 +57,12 @@ types: $(READY)  ## mypy --strict on the package
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs
 
+site-setup: $(SITE_READY)
+
 site: $(SITE_READY)  ## the pages as a site with a reference of all public names, into build/site; warnings are errors
-	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
-	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
-	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build --quiet
+	@rm -rf $(PUBLIC) && mkdir -p $(PUBLIC)/wbc
+	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(PUBLIC)/wbc/
+	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build
 
 check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 states under qemu; says what is not installed
 	$(BIN)/python -m bench.export_machines

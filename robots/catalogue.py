@@ -78,9 +78,9 @@ def load(
             of some hundred vertices), ``spheres`` (at most four around every body), ``convex`` (``exact``, and
             convex parts of every mesh), ``none``. :func:`~wbc.robots.fit_shapes` has more choices.
         package_dirs: folders to look for ``package://NAME/...`` meshes in, besides those above the file.
-        position_lower, position_upper [rad or m], velocity [rad/s or m/s], acceleration [rad/s^2 or m/s^2],
-            effort [N m or N]: limits that replace the description's; one number for all joints but the base, nv
-            numbers, or a mapping from joint (or degree of freedom) to a number; infinite for none.
+        position_lower, position_upper, velocity, acceleration, effort: limits that replace the description's, in SI
+            units (rad or m, s, N m or N); one number for all joints but the base, nv numbers, or a mapping from joint
+            (or degree of freedom) to a number; infinite for none.
 
     Raises:
         UnknownNameError: no such robot (nearest names first), base, joint or frame.
@@ -131,7 +131,7 @@ def from_dh(
         A robot with the frames ``link0`` (base), ``link1`` ... (the rows' frames) and ``tip``. It has no masses.
 
     Raises:
-        ShapeError, DuplicateNameError, UnknownNameError, RangeError, BoundsError.
+        ShapeError, DuplicateNameError, UnknownNameError, RangeError, BoundsError: of rows, names and limits.
     """
     validation.instance("name", name, str, "a string")
     for key in limits:

@@ -33,7 +33,7 @@ class AxisCone(Constraint):
     Inputs:
         direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.
         direction_rate: derivative of the unit vector d [1/s]; w x d for a direction that turns at w. Default 0.
-        half_angle: alpha in [0.001, pi] [rad].
+        half_angle: alpha in 0.001 to pi [rad].
         half_angle_rate: its rate [rad/s]. Default 0.
 
     Example:

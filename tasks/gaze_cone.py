@@ -37,7 +37,7 @@ class GazeCone(Constraint):
     Inputs:
         point: 3 numbers in the axes of ``point_frame`` [m].
         point_velocity: their rate [m/s]. Default 0.
-        half_angle: alpha in [0.001, pi] [rad].
+        half_angle: alpha in 0.001 to pi [rad].
         half_angle_rate: its rate [rad/s]. Default 0.
 
     Example:

@@ -105,7 +105,9 @@ def tried(trial: Trial) -> tuple[tuple[str, ...], WalkLog]:
         plant = PinocchioPlant(
             heavy.robot, integrator="midpoint", motors=motors, encoders=trial.encoders, payloads=payloads
         )
-    loop = TorqueLoop(TorqueStack(heavy, [GripKind.AXIS]), plant, delay=motors.delay, faults=faults)
+    loop = TorqueLoop(
+        TorqueStack(heavy, [GripKind.AXIS]), plant, delay=motors.delay, encoders=trial.encoders, faults=faults
+    )
     walk = Walk(bare, structure, plan, stack=WalkStack(bare, structure, collisions=False), plant=loop)
     end, log, kinds, slip = _walked(walk, bare, structure)
     watch = loop.watch

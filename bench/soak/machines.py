@@ -17,16 +17,18 @@ def machine(rng: np.random.Generator) -> Robot:
     """Three to nine joints in series with a branch now and then; every joint has a frame ``f0``, ``f1``, ..."""
     model = pin.Model()
     model.name = "random"
-    count, parent, joints = int(rng.integers(3, 10)), 0, []
+    count, parent, chain = int(rng.integers(3, 10)), 0, []
     if rng.random() < 0.2:
         base = pin.JointModelFreeFlyer() if rng.random() < 0.5 else pin.JointModelPlanar()
         parent = model.addJoint(0, base, pin.SE3.Identity(), "base")
     for k in range(count):
         kind = _JOINTS[int(rng.choice(len(_JOINTS), p=_SHARES))]
         place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.25, 3))
-        on = int(rng.choice(joints)) if joints and rng.random() < 0.1 else parent
-        parent = model.addJoint(on, kind(), place, f"j{k}")
-        joints.append(parent)
+        if chain and rng.random() < 0.1:
+            chain = chain[: 1 + int(rng.integers(len(chain)))]
+            parent = chain[-1]
+        parent = model.addJoint(parent, kind(), place, f"j{k}")
+        chain.append(parent)
         model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
         tip = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.2, 3))
         model.addFrame(pin.Frame(f"f{k}", parent, 0, tip, pin.FrameType.OP_FRAME))

@@ -34,6 +34,9 @@ from wbc.tasks._contact import Contact, ContactForce
 from wbc.tasks.stopping import stopping_deceleration
 from wbc.validation import Array
 
+#: What accelerations and wrenches take beyond the torques that are sent, at most, of the largest of them
+SENT = 1e-6
+
 
 def strong(rng: np.random.Generator) -> Robot:
     """A random robot with motors from much too weak to more than strong enough."""
@@ -117,8 +120,62 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
             handle.weight = weight(rng)
 
 
+class Needed:
+    """Torques that accelerations and wrenches take, by Pinocchio's recursion and numpy alone."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller, robot = controller, controller.stack.robot
+        self._model, self._data, self._base = robot.model, robot.model.createData(), robot.base_nv
+        items = {e.name: e.item for e in controller.stack.entries}
+        self._contacts = {name: item for name, item in items.items() if isinstance(item, Contact)}
+        self._pushed = [name for name, item in items.items() if isinstance(item, ExternalWrench)]
+        self._rubbing = [(name, item.dofs(robot)) for name, item in items.items() if isinstance(item, JointFriction)]
+        self._frames = {
+            name: self._model.getFrameId(item.frame)
+            for name, item in items.items()
+            if isinstance(item, (Contact, ExternalWrench))
+        }
+
+    def begin(self) -> None:
+        """Take the run-time values of an episode."""
+        given = self._controller
+        self._pushes = [(self._frames[name], given[name].wrench.copy()) for name in self._pushed]
+        self._frictions = [(dofs, given[n].viscous, given[n].coulomb, given[n].slow) for n, dofs in self._rubbing]
+        self._slides = {
+            name: (given[name].target.rotation[:, 2].copy(), float(given[name].friction), float(given[name].slow))
+            for name, item in self._contacts.items()
+            if isinstance(item, SlidingContact)
+        }
+
+    def torques(self, step: Step, q: Array, v: Array) -> Array:
+        """M a + h - J'w - L; what a floating base lacks comes first."""
+        model, data = self._model, self._data
+        found = pin.rnea(model, data, q, v, step.a)
+        for frame, wrench in self._pushes:
+            found -= pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).T @ wrench
+        for dofs, viscous, coulomb, slow in self._frictions:
+            found[dofs] += viscous * v[dofs] + coulomb * np.tanh(v[dofs] / slow)
+        if self._slides:
+            pin.forwardKinematics(model, data, q)
+        for name, force in step.forces.items():
+            if not force.any():
+                continue
+            J = pin.computeFrameJacobian(model, data, q, self._frames[name], pin.LOCAL)
+            if name in self._slides:
+                normal, friction, slow = self._slides[name]
+                turn = pin.updateFramePlacement(model, data, self._frames[name]).rotation
+                speed = turn @ (J[:3] @ v)
+                slip = speed - normal * (normal @ speed)
+                along = normal - friction * slip / np.sqrt(slip @ slip + slow**2)
+                found -= force[0] * (J[:3].T @ (turn.T @ along))
+            else:
+                found -= J[list(self._contacts[name].axes)].T @ force
+        return np.asarray(found)
+
+
 class TorqueJudge(Judge):
-    """The same of torques: their limits hold exactly, and what gives way has a name.
+    """The same of torques: their limits hold exactly, they are what accelerations and wrenches need, and what gives way
+    has a name.
 
     Attributes:
         scale: of the torque limits.
@@ -128,10 +185,19 @@ class TorqueJudge(Judge):
 
     def __init__(self, controller: Controller) -> None:
         super().__init__(controller)
+        self.needed = Needed(controller)
         # as LONGEST of a tick: rows on forces count in their sizes
         core = core_of(controller)
         rows = row_units(controller.stack, core.layout)
         self.longest = max(1.0, *rows, *core.layout.dof_scales(controller.stack))
+
+    def torques(self, step: Step, q: Array, before: Array) -> str:
+        """Whether what is sent is what the accelerations and wrenches of a step need."""
+        if step.status in (Status.BRAKED, Status.CAPPED):
+            return ""
+        needed = self.needed.torques(step, q, before)
+        off = np.abs(needed - step.torque).max()
+        return "" if off <= SENT * max(self.longest, np.abs(needed).max()) else "other torques than a takes"
 
     def step(self, step: Step, before: Array, dt: float) -> str:
         """Numbers, limits of accelerations, velocities and torques, and the certificate."""
@@ -179,6 +245,7 @@ def episode(controller: Controller, judge: TorqueJudge, rng: np.random.Generator
     controller.reset(q, v)
     provoke(controller, rng)
     judge.scale = float(controller["motors"].scale)
+    judge.needed.begin()
     for _ in range(LENGTH):
         dt = DT * float(rng.uniform(0.25, 2.0)) if rng.random() < 0.5 else None
         try:
@@ -189,7 +256,7 @@ def episode(controller: Controller, judge: TorqueJudge, rng: np.random.Generator
         seconds = DT if dt is None else dt
         counts[label(step)] += 1
         counts.update(f"gave way: {kind}" for kind in judge.gave_way(step))
-        wrong = judge.step(step, v, seconds)
+        wrong = judge.step(step, v, seconds) or judge.torques(step, q, v)
         q, v = pin.integrate(robot.model, q, (v + 0.5 * seconds * step.a) * seconds), step.v
         if not wrong and (watch._beyond(q) > 1e-9).any():
             wrong = "beyond a position limit"

@@ -21,7 +21,7 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
 
 def test_published_set_on_screen_and_in_a_file(tmp_path: Path) -> None:
     file = tmp_path / "loci.json"
-    code, out, _ = run("spherical_4r", "--set", "alpha", "--set", "alpha, beta", "--json", file)
+    code, out, _ = run("spherical_4r", "--set", "alpha", "--set", "alpha, beta", "--data", file)
     assert code == 0
     assert "alpha: 4 x 4, incomplete" in out
     assert "det      L3 L4 c2 s4 (L3^2 + 2 L3 L4 c4 + L4^2)" in out
@@ -44,7 +44,7 @@ def test_a_set_of_ones_own(tmp_path: Path) -> None:
 def test_joints_by_their_names_and_times_that_say_what_they_are(tmp_path: Path) -> None:
     """A point near the tip of the Panda, and q1 ... in formulas are its joints."""
     file = tmp_path / "loci.json"
-    code, out, _ = run("panda", "--frame", "panda_link7", "--point", "panda_link5", "--json", file)
+    code, out, _ = run("panda", "--frame", "panda_link7", "--point", "panda_link5", "--data", file)
     assert code == 0
     assert "joints: q1 = panda_joint1, q2 = panda_joint2, " in out
     assert "panda_link5: 9 x 7, incomplete, " in out
@@ -110,7 +110,7 @@ def test_pictures_of_a_locus(tmp_path: Path) -> None:
 
 def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
     file = tmp_path / "tree.json"
-    code, out, _ = run("spdm_on_ssrms", "--set", "arms alpha", "--json", file, "--plot", tmp_path / "pictures")
+    code, out, _ = run("spdm_on_ssrms", "--set", "arms alpha", "--data", file, "--plot", tmp_path / "pictures")
     assert code == 0
     # locus and poses of the carrier and of each arm; the body's joint never loses rank
     assert len([p for p in (tmp_path / "pictures").glob("*.png") if p.stat().st_size > 10_000]) == 6
@@ -134,7 +134,7 @@ def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
 def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
     """`spdm` is one arm, as in the source; with --tree it is all 15 joints."""
     file = tmp_path / "tree.json"
-    code, out, _ = run("spdm", "--tree", "--json", file)
+    code, out, _ = run("spdm", "--tree", "--data", file)
     assert code == 0
     assert "alpha, q1, q7, elbow: 25 x 15, strict" in out
     assert "alpha: 15 x 15, incomplete" in out
@@ -148,7 +148,7 @@ def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
 def test_a_whole_tree_is_certified_by_blocks(tmp_path: Path) -> None:
     """22 joints; the arms are alike and share a certificate."""
     file, states = tmp_path / "tree.json", tmp_path / "states"
-    options = ("--set", "elbow, q1, q2, q7", "--certify", "--resume", states, "--json", file)
+    options = ("--set", "elbow, q1, q2, q7", "--certify", "--resume", states, "--data", file)
     code, out, _ = run("spdm_on_ssrms", *options)
     assert code == 0
     assert "certificate  complete everywhere, by blocks" in out

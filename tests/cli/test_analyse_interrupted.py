@@ -42,7 +42,7 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool
     background of a shell that ignores SIGINT the same with SIGTERM.
     """
     begun, states = tmp_path / "begun", tmp_path / "states"
-    command = ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--resume", str(states), "--json"]
+    command = ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--resume", str(states), "--data"]
     cut, whole = tmp_path / "cut.json", tmp_path / "whole.json"
     child = subprocess.Popen(
         [*(IN_BACKGROUND if background else ()), sys.executable, "-c", CHILD, str(begun), *command, str(cut)],
@@ -67,7 +67,7 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool
     assert CliRunner().invoke(app, [*command, str(whole)]).exit_code == 0
     assert (
         CliRunner()
-        .invoke(app, ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--json", str(cut)])
+        .invoke(app, ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--data", str(cut)])
         .exit_code
         == 0
     )

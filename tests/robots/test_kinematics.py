@@ -50,6 +50,17 @@ def test_random_configurations_are_within_the_limits_and_repeat(name: str) -> No
         robot.configuration("q", q)
 
 
+def test_random_configurations_keep_joints_that_follow_where_they_belong() -> None:
+    robot = wbc.robots.load("talos_full")
+    at, limits = robot.position_index, robot.limits
+    for seed in range(20):
+        q = robot.random(seed)
+        for one in robot.couplings:
+            place = q[at[one.follower]]
+            assert place == pytest.approx(one.ratio * q[at[one.leader]] + one.offset, abs=1e-12)
+            assert limits.position_lower[one.follower] - 1e-9 <= place <= limits.position_upper[one.follower] + 1e-9
+
+
 def test_bad_values_are_refused() -> None:
     robot = wbc.robots.load("talos")
     with pytest.raises(UnknownNameError, match="frame"):

@@ -147,22 +147,30 @@ def test_a_recording_that_says_nothing_is_refused() -> None:
     assert_refused(lambda: Response(delay=np.nan), NotFiniteError, "delay")
 
 
-@pytest.mark.parametrize("kind", ["velocity", "torque"])
 @pytest.mark.parametrize("late", [0, 1, 7])
-def test_an_error_ahead_is_what_pending_corrections_make_of_it(kind: str, late: int) -> None:
+def test_an_error_ahead_is_what_pending_corrections_make_of_it(late: int) -> None:
     """The prediction inside d, against the error dynamics stepped finely."""
-    rng, dt, lag, w = np.random.default_rng(late), 0.002, 0.03, 20.0
-    feedback = Feedback(CommandKind(kind), dt, np.array([lag]), late, w)
+    rng, dt, w = np.random.default_rng(late), 0.002, 20.0
+    feedback = Feedback(CommandKind.TORQUE, dt, np.zeros(1), late, w)
     sent, e, rate = rng.normal(size=(late, 1)), 0.3, -0.7
     for d in sent[:, 0]:
-        for _ in range(2000):
-            h = dt / 2000
-            e += h * rate
-            rate += h * (-(rate + d) / lag if kind == "velocity" else -d)
-    slow = 1.0 / (1.0 / w + 2.0 * lag)
-    wanted = slow * e if kind == "velocity" else 2.0 * w * rate + w * w * e
-    found = feedback.correction(np.array([0.3]), np.array([-0.7]), np.zeros(1), sent, 10.0)
-    assert found[0] == pytest.approx(wanted, rel=2e-3)
+        e += dt * rate - dt * dt * d / 2.0
+        rate -= dt * d
+    found, none = feedback.correction(np.array([0.3]), np.array([-0.7]), np.zeros(1), sent, 10.0)
+    assert found[0] == pytest.approx(2.0 * w * rate + w * w * e, rel=2e-3)
+    assert not none.any()
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity"])
+def test_corrections_cancel_the_response_of_a_servo(kind: str) -> None:
+    """What C M d2/dt2 + T d/dt + 1 makes of the error's own dynamics, for a mode exp(s t) of the error."""
+    s, w, lag, inertia = 3.0, 20.0, 0.03, 0.004
+    feedback = Feedback(CommandKind(kind), 0.002, np.array([lag]), 0, w)
+    d, b = feedback.correction(np.ones(1), np.array([s]), np.array([1.0 / s]), np.zeros((0, 1)), 1.0)
+    if kind == "position":
+        assert d[0] + inertia * b[0] == pytest.approx((inertia * s**2 + lag * s + 1.0) * w / s)
+    else:
+        assert d[0] + (inertia + lag) * b[0] == pytest.approx(((inertia + lag) * s + 1.0) * (w + 0.25 * w**2 / s))
 
 
 def test_a_joint_that_goes_round_is_followed() -> None:

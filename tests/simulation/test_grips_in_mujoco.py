@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -9,7 +11,7 @@ import pytest
 
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy, random_torque
-from wbc.errors import RangeError, UnknownNameError
+from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.simulation import Command, CommandKind, GripKind, GrippingMujocoPlant, Motors, MujocoPlant, PinocchioPlant
 
 ROBOT = heavy().robot
@@ -93,6 +95,44 @@ def test_faults_and_delay() -> None:
     plant.apply(Command(CommandKind.TORQUE, torque))
     plant.advance(0.05)
     assert not plant.read().v.any()
+
+
+def test_a_saved_state_goes_on_to_the_same_bits() -> None:
+    motors = Motors(delay=0.003, lag=0.002, noise=0.5, coulomb=0.2)
+    plant, again = (GrippingMujocoPlant(ROBOT, HANDS, motors=motors, seed=seed) for seed in (2, 99))
+    for hand in HANDS[:2]:
+        plant.grasp(hand, ROBOT.pose(ROBOT.neutral, hand), GripKind.AXIS)
+    plant.apply(Command(CommandKind.TORQUE, random_torque(ROBOT, 5.0)))
+    plant.advance(0.01)
+    plant.slip(HANDS[0], (0.01, 0.0, 0.0), 0.01)
+    plant.limp("arm3_joint1")
+    saved = pickle.loads(pickle.dumps(plant.save()))
+    plant.advance(0.02)
+    end, wrenches, given = plant.read(), plant.wrenches, plant.given
+    plant.release(HANDS[0])
+    for one in (again, plant):
+        one.restore(saved)
+        one.advance(0.02)
+        assert (one.read().q == end.q).all()
+        assert (one.read().v == end.v).all()
+        assert (one.given == given).all()
+        assert list(one.grips) == list(HANDS[:2])
+        for hand in HANDS[:2]:
+            assert (one.wrenches[hand] == wrenches[hand]).all()
+    plain = MujocoPlant(plant._model, ROBOT)
+    assert_refused(lambda: plant.restore(plain.save()), ShapeError, "without grips")
+    fewer = GrippingMujocoPlant(ROBOT, HANDS[1:])
+    assert_refused(lambda: fewer.restore(saved), UnknownNameError, HANDS[0])
+
+
+def test_rotors_of_motors_are_inertia() -> None:
+    plant, other = (one(ROBOT, **more, motors=Motors(gear=10.0, rotor=0.01)) for one, more in
+                    ((GrippingMujocoPlant, {"frames": HANDS}), (PinocchioPlant, {})))  # fmt: skip
+    tau = random_torque(ROBOT, 3.0)
+    for one in (plant, other):
+        one.apply(Command(CommandKind.TORQUE, tau))
+        one.advance(0.001)
+    assert plant.read().v == pytest.approx(other.read().v, abs=1e-4 * np.abs(other.read().v).max())
 
 
 def test_what_cannot_be_grasped_is_refused(plant: GrippingMujocoPlant) -> None:

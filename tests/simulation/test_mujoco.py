@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -9,8 +11,8 @@ import pytest
 
 import wbc
 from tests.refusals import assert_refused
-from wbc.errors import RangeError, UnknownNameError
-from wbc.simulation import Command, CommandKind, MujocoPlant
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.simulation import Command, CommandKind, MujocoPlant, PlantError, mujoco_model
 
 ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 0" timestep="0.001"/>
 <default><joint damping="1"/></default>
@@ -78,8 +80,40 @@ def test_what_does_not_fit_is_refused(tmp_path: object) -> None:
     assert_refused(lambda: MujocoPlant(model, wbc.robots.load("panda")), UnknownNameError, "joint")
     plant = MujocoPlant(model, robot)
     assert_refused(lambda: plant.apply(Command(CommandKind.POSITION, np.zeros(2))), UnknownNameError, "position")
+    assert_refused(lambda: plant.apply(Command(CommandKind.TORQUE, np.zeros(3))), ShapeError, "command")
+    assert_refused(lambda: plant.apply(Command(CommandKind.TORQUE, np.full(2, np.nan))), NotFiniteError, "command")
     plant.data.qvel[:] = np.nan
     assert not plant.read().valid
+    # MuJoCo puts the robot back to where its model begins, and goes on
+    with pytest.raises(PlantError, match="blown up"):
+        plant.advance(0.01)
+    plant.reset(np.zeros(2), 0.0)
+    plant.advance(0.01)
+    assert plant.read().valid
+
+
+def test_a_saved_state_goes_on_to_the_same_bits(tmp_path: object) -> None:
+    """In a user's own model, with an object that flies beside the robot."""
+    text = ARM.format(DRIVES["position"])
+    robot, model = wbc.robots.load(_file(tmp_path, text)), text.replace("<worldbody>", TWIN)
+    plant, again = (MujocoPlant(mujoco.MjModel.from_xml_string(model), robot) for _ in range(2))
+    plant.reset(np.array([0.1, -0.2]), 2.0)
+    plant.data.qvel[:6] = 0.3
+    plant.apply(Command(CommandKind.POSITION, np.array([0.3, -0.5])))
+    plant.advance(0.05)
+    saved = pickle.loads(pickle.dumps(plant.save()))
+    plant.advance(0.1)
+    for one in (again, plant):
+        end = plant.data.qpos.tobytes(), plant.data.qvel.tobytes(), plant.read().time
+        one.restore(saved)
+        assert one.read().time == pytest.approx(2.05)
+        one.advance(0.1)
+        assert (one.data.qpos.tobytes(), one.data.qvel.tobytes(), one.read().time) == end
+    panda = wbc.robots.load("panda")
+    other = MujocoPlant(mujoco_model(panda, drawn=False), panda)
+    assert_refused(lambda: other.restore(saved), RangeError, "another robot")
+    alone = MujocoPlant(mujoco.MjModel.from_xml_string(text), robot)
+    assert_refused(lambda: alone.restore(saved), ShapeError, "another MuJoCo model")
 
 
 def _file(folder: object, text: str) -> str:

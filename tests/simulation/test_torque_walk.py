@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wbc.robots
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy
 from wbc.errors import RangeError, ShapeError, UnknownNameError
-from wbc.simulation import Command, CommandKind, GripKind, KinematicPlant, Motors, PinocchioPlant
+from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPlant, Motors, PinocchioPlant
 from wbc.walking import cylinder
 from wbc.walking.torque.choice import PlantChoice
 from wbc.walking.torque.faults import Fault
@@ -91,7 +93,7 @@ def test_texts_of_faults() -> None:
 
 def test_what_cannot_walk_under_torques_is_refused() -> None:
     assert_refused(lambda: TorqueStack(wbc.robots.walker(), [GripKind.AXIS]), RangeError, "masses")
-    assert_refused(lambda: TorqueStack(heavy(), [GripKind.POSITION]), RangeError, "turning about the line")
+    assert_refused(lambda: TorqueStack(heavy(), [GripKind.POSITION]), RangeError, "about the line through them")
     assert_refused(lambda: TorqueLoop(stack(), KinematicPlant(ROBOT)), ShapeError, "torques")
     assert_refused(lambda: wbc.robots.with_masses(wbc.robots.walker(two_ended=True)), ShapeError, "bodies with arms")
     assert_refused(lambda: PlantChoice("pinochio"), UnknownNameError, "pinocchio")
@@ -99,6 +101,19 @@ def test_what_cannot_walk_under_torques_is_refused() -> None:
     assert_refused(lambda: PlantChoice("pinocchio", faults=("delay 0.02", "delay 0.01")), RangeError, "one delay")
     choice, walker = PlantChoice("pinocchio", faults=("break arm9 at 1",)), wbc.robots.walker()
     assert_refused(lambda: choice.build(walker, cylinder(rigid=True)), UnknownNameError, "arm1")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_why_holds_that_let_two_hands_tilt_are_refused(seed: int) -> None:
+    """What two hands bear on the base has five directions where they may tilt, and six where they may only roll: none
+    of the forces through both origins has a moment about the line between them.
+    """
+    q = pin.integrate(ROBOT.model, ROBOT.neutral, 0.3 * np.random.default_rng(seed).normal(size=ROBOT.nv))
+    wrenches = [ROBOT.jacobian(q, hand)[:, :6].T for hand in HANDS[:2]]
+    tilts = [w[:, 3:] @ ROBOT.pose(q, hand).rotation[:, :2] for w, hand in zip(wrenches, HANDS, strict=False)]
+    forces = [w[:, :3] for w in wrenches]
+    assert np.linalg.matrix_rank(np.hstack(forces), tol=1e-9) == 5
+    assert np.linalg.matrix_rank(np.hstack([*forces, *tilts]), tol=1e-9) == 6
 
 
 def test_a_limp_motor_is_named_and_the_stack_does_without_it() -> None:
@@ -124,6 +139,37 @@ def test_a_hand_that_slips_is_named() -> None:
         loop.advance(0.01)
     assert "arm2_hand has slipped by 2" in loop.failing()
     assert [text for _, text in loop.watch.noted][:1] == ["arm2_hand slips on its hold"]
+    loads = loop.watch.loads()
+    assert loads.force.shape == loads.moment.shape == loads.off.shape == (22, 3)
+    assert loads.time[-1] == pytest.approx(0.22)
+    # 5 mm are past; the grip of the hand is where it slipped to, it is off where it closed
+    assert loads.off[-1, 1] == loop.watch.drift == np.nanmax(loads.off)
+    assert loads.off[-1, 1] > 2e-3 > 1e-4 > loads.off[-1, 0]
+    assert np.nanmax(loads.force) == loop.watch.force
+    assert loads.noted == tuple(loop.watch.noted)
+
+
+def test_loads_are_written_as_they_are(tmp_path: Path) -> None:
+    loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT)), HANDS[:2])
+    loop.advance(0.01)
+    file = loop.watch.loads().save(tmp_path)
+    with np.load(file) as read:
+        assert read["rating"].tolist() == [loop.stack.rating.force, loop.stack.rating.torque]
+        assert np.isnan(read["force"][0]).tolist() == [False, False, True]
+
+
+def test_noisy_encoders_are_filtered() -> None:
+    """A still robot is read with noise: the filter's joints keep a third of it, with friction that nobody knows."""
+    noise = Encoders(position=1e-4, velocity=1e-3)
+    plant = PinocchioPlant(ROBOT, encoders=noise, motors=Motors(viscous=0.5), seed=1)
+    loop, off = begun(TorqueLoop(stack(), plant, encoders=noise)), list[np.ndarray]()
+    for _ in range(12):
+        loop.advance(0.01)
+        off.append(np.stack([loop.read().q[7:], plant.read().q[7:]]) - plant.state.q[7:])
+    kept, read = np.std(np.array(off[4:]), axis=(0, 2))
+    assert read == pytest.approx(1e-4, rel=0.15)
+    assert kept < read / 3.0
+    assert loop.watch.unsolved == 0
 
 
 def test_it_goes_on_with_a_velocity() -> None:

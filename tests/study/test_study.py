@@ -177,7 +177,11 @@ def test_the_command(tmp_path: Path) -> None:
     again = CliRunner().invoke(app, ["study", "--resume", str(folder)])
     assert again.exit_code == 0
     assert "6 of 6 trials" in again.stdout
-    for wrong in ([str(file), "--out", str(folder)], ["reech"], [], ["--resume", str(tmp_path)]):
+    fewer = CliRunner().invoke(app, ["study", str(file), "--seeds", "1", "--out", str(tmp_path / "fewer")])
+    assert "3 of 3 trials" in fewer.stdout
+    resumed = ["--resume", str(folder)]
+    for wrong in ([str(file), "--out", str(folder)], ["reech"], [], ["--resume", str(tmp_path)],
+                  [str(file), "--seeds", "0"], [*resumed, "--seeds", "2"], [*resumed, "--force"]):  # fmt: skip
         refused = CliRunner().invoke(app, ["study", *wrong])
         assert refused.exit_code == 2, wrong
         assert "error:" in refused.stderr

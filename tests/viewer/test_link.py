@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wbc.viewer.link import RING, SLOTS, LoopEnd, ViewerEnd
+from wbc.viewer.link import NOTE, RING, SLOTS, LoopEnd, ViewerEnd
 
 
 def ends(state: int) -> tuple[LoopEnd, ViewerEnd]:
@@ -90,5 +90,20 @@ def test_silence_is_the_time_since_the_last_sign_of_life() -> None:
     assert 0.0 <= loop.silence < 5.0
     loop.put_flags(3)
     assert viewer.flags == 3
+    loop.close()
+    viewer.close()
+
+
+def test_a_note_is_read_once_and_whole() -> None:
+    loop, viewer = ends(8)
+    assert viewer.noted(0) is None
+    assert loop.note(b'{"gone":["1,2"]}')
+    number, text = viewer.noted(0) or (0, b"")
+    assert text == b'{"gone":["1,2"]}'
+    assert viewer.noted(number) is None
+    assert not loop.note(b"x" * NOTE)
+    assert viewer.noted(number) is None
+    assert loop.note(b"{}")
+    assert (viewer.noted(number) or (0, b""))[1] == b"{}"
     loop.close()
     viewer.close()

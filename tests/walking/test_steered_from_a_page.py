@@ -12,7 +12,8 @@ from wbc.viewer.climbing import FASTEST, WalkOperation, scenery_of
 from wbc.viewer.messages import RATE_LASTS
 from wbc.viewer.scenery import Scenery
 from wbc.walking import Structure
-from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.stack import DT, WalkStack
+from wbc.walking.loop.state import Tick
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.planner.plan import Plan
@@ -30,14 +31,17 @@ Begun = tuple[WalkOperation, list[float]]
 @pytest.fixture
 def begun(machine: Walker, structure: Structure, stack: WalkStack, begin: Plan) -> Begun:
     now = [0.0]
-    return WalkOperation(Drive(Walk(machine, structure, begin, stack=stack)), lambda: now[0]), now
+
+    def passes(_tick: Tick) -> None:
+        now[0] += DT
+
+    walk = Walk(machine, structure, begin, stack=stack)
+    return WalkOperation(Drive(walk), lambda: now[0], passes), now
 
 
 def ticks(operation: WalkOperation, now: list[float], count: int) -> None:
     for _ in range(count):
-        operation.steer()
-        operation.drive.tick()
-        now[0] += operation.drive.walk.dt
+        operation.tick()
 
 
 def test_a_body_goes_while_it_is_steered_and_stops_when_nobody_says_so(begun: Begun) -> None:
@@ -108,6 +112,69 @@ def test_lifts_wait_for_a_yes(begun: Begun) -> None:
     assert walk.approve is None
 
 
+def test_one_hand_is_moved_alone_and_closes_on_a_hold(begun: Begun) -> None:
+    operation, now = begun
+    walk = operation.drive.walk
+    body, hold = walk.q[:3].copy(), walk.structure.ids[walk.held[1]]
+    with pytest.raises(WbcError, match="choose one"):
+        operation.obey({"type": "hand", "rates": [0.0, 0.0, 1.0, 0.0]})
+    operation.obey({"type": "arm", "name": "arm2"})
+    first = walk.machine.chain.origins[1].copy()
+    operation.obey({"type": "hand", "rates": [0.0, 0.0, 1.0, 0.0]})
+    begin = now[0]
+    ticks(operation, now, 1)
+    # Nobody renewed it: the hand came to rest within its stop, off the structure
+    assert now[0] - begin < 2.0
+    off = walk.machine.chain.origins[1] - first
+    assert 0.003 < np.linalg.norm(off) < 0.1
+    assert 1 not in walk.held
+    assert np.abs(walk.q[:3] - body).max() < 0.002
+    assert np.abs(walk.v).max() < 1e-2
+    assert operation.note["arm"] == "arm2"
+    with pytest.raises(WbcError, match="the body stands"):
+        operation.obey({"type": "steer", "rates": [0.0, 1.0, 0.0]})
+    # Where the structure is in the way the page is told so, and the hand stays
+    here = walk.machine.chain.origins[1].copy()
+    operation.obey({"type": "hand", "rates": [0.0, 0.0, -1.0, 0.0]})
+    ticks(operation, now, 1)
+    operation.obey({"type": "go", "hold": walk.structure.ids[walk.held[0]]})
+    ticks(operation, now, 2)
+    assert "another hand" in operation.note["reason"]
+    assert np.linalg.norm(walk.machine.chain.origins[1] - here) < 0.05
+    operation.obey({"type": "go", "hold": hold})
+    ticks(operation, now, 1)
+    assert walk.structure.ids[walk.held[1]] == hold
+    operation.obey({"type": "arm", "name": ""})
+    ticks(operation, now, 5)
+    assert operation.note["arm"] == ""
+    assert len(walk.held) == 3
+
+
+def test_a_page_is_told_which_holds_are_reserved_and_gone_and_how_a_hand_goes(begun: Begun) -> None:
+    operation, now = begun
+    walk = operation.drive.walk
+    ticks(operation, now, 1)
+    assert not operation.note["gone"]
+    for _ in range(80):
+        operation.obey({"type": "steer", "rates": [0.0, 1.0, 0.0]})
+        ticks(operation, now, 10)
+        if walk.swinging is not None:
+            break
+    ticks(operation, now, 1)
+    assert walk.swinging is not None
+    target, said = walk.structure.ids[walk.swinging.hold], operation.note
+    assert target in said["reserved"]
+    # The way ends where the hold is
+    end = np.array(said["ways"][0][-1])
+    assert np.linalg.norm(end - walk.structure.positions[walk.swinging.hold]) < 0.02
+    ticks(operation, now, 1)
+    assert operation.note is said
+    free = next(name for k, name in enumerate(walk.structure.ids) if k not in walk.held.values() and name != target)
+    walk.vanish([free])
+    ticks(operation, now, 1)
+    assert operation.note["gone"] == [free]
+
+
 @pytest.mark.parametrize(
     ("message", "said"),
     [
@@ -118,6 +185,9 @@ def test_lifts_wait_for_a_yes(begun: Begun) -> None:
         ({"type": "go", "hold": "nowhere"}, "go.hold"),
         ({"type": "go", "hold": 3}, "go.hold"),
         ({"type": "ask", "on": "yes"}, "ask.on"),
+        ({"type": "arm", "name": "arm9"}, "arm.name"),
+        ({"type": "hand", "rates": [0, 0, 2, 0]}, "full speed"),
+        ({"type": "hand", "rates": [0, 0, 1]}, "hand.rates"),
         ({"type": "set", "item": "body", "values": {}}, "steer"),
     ],
 )
@@ -131,6 +201,6 @@ def test_what_does_not_fit_is_refused(begun: Begun, message: dict, said: str) ->
 
 def test_a_click_beside_all_holds_is_none() -> None:
     empty = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
-    scenery = Scenery((), empty, ("a", "b"), np.array([[0.0, 0, 0], [1.0, 0, 0]]), (0.0, 0.0, 1.0), "body")
+    scenery = Scenery((), empty, ("a", "b"), np.array([[0.0, 0, 0], [1.0, 0, 0]]), (0.0, 0.0, 1.0), "body", ("arm1",))
     assert scenery.hit(np.array([0.5, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])) is None
     assert scenery.hit(np.array([0.9, 0.0, 1.0]), np.array([0.0, 0.0, -3.0])) == "b"

@@ -215,7 +215,7 @@ class SweptScene:
     Raises:
         DuplicateNameError: two bodies of a name. UnknownNameError: no such link or body. ShapeError: a shape without
             end on a link that moves; a pair of which neither is a solid. RangeError: a required distance that is no
-        number.
+            number.
     """
 
     def __init__(self, tree: Tree, bodies: Sequence[SweptBody], pairs: Sequence[Pair]) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from wbc.cli import options
 
-At = Annotated[str, typer.Option(help="Joint coordinates with commas [rad, m]. Default: neutral.")]
+At = Annotated[str, typer.Option(help="Joint coordinates with commas, in rad and m. Default: neutral.")]
 Kind = Annotated[str, typer.Option(help="What the frame holds: position, orientation or pose.")]
 Rates = Annotated[str | None, typer.Option(help="Rates of these rows with commas. Default: it stands still.")]
 Seeds = Annotated[int, typer.Option(help="Random configurations that pieces are searched from.", min=0)]
@@ -18,7 +18,7 @@ Through = Annotated[bool, typer.Option("--through", help="Trace beyond limits, w
 To = Annotated[str | None, typer.Option(help="X,Y,Z: where the frame goes straight to, resolved as a whole.")]
 Points = Annotated[int, typer.Option(help="Targets on the way there.", min=2)]
 Anywhere = Annotated[bool, typer.Option("--anywhere", help="On the way there, start on any branch.")]
-Change = Annotated[float | None, typer.Option(help="What a change of branch on the way costs [rad^2]. Default: none.")]
+Change = Annotated[float | None, typer.Option(help="What a change of branch on the way costs, in rad^2.")]
 Apart = Annotated[bool, typer.Option("--self-collision", help="Links stay apart from each other, too.")]
 Out = Annotated[Path, typer.Option(help="Folder for picture, curves and figures.")]
 

@@ -12,7 +12,7 @@ _HOW, _OUTPUT = "Where it runs", "What it writes"
 What = Annotated[
     str | None, typer.Argument(help="A YAML file, or a built-in scenario: reach, manipulability, layouts, ik.")
 ]
-Seeds = Annotated[int | None, typer.Option(help="Seeds 0, 1, ... of a built-in scenario. Default: 10.")]
+Seeds = Annotated[int | None, typer.Option(help="Seeds 0, 1, ... Default: the file's; of a built-in scenario 10.")]
 Workers = Annotated[
     int | None, typer.Option(help="Processes of a cluster on this machine. Default: none.", rich_help_panel=_HOW)
 ]
@@ -59,13 +59,16 @@ def study(
     if (what is None) == (resume is None):
         raise RangeError("study", what, "expected a file, a scenario, or --resume FOLDER")
     if resume is not None:
+        for option, value in (("seeds", seeds), ("out", out), ("force", force or None)):
+            if value is not None:
+                raise RangeError(option, value, "--resume goes on with the study of its folder as it was asked for")
         if not (resume / STUDY).is_file():
             raise RobotFileError("resume", str(resume), "holds no study")
         asked, folder = Study.read(resume / STUDY), resume
     else:
         assert what is not None
         if validation.is_file("study", what) or Path(what).suffix:
-            asked = Study.read(what)
+            asked = Study.read(what, seeds)
         else:
             asked = Study(scenario=what, seeds=10 if seeds is None else seeds)
         folder = run_folder(out, "study", FILES, force)

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.tick.buffers import (
+    BRAKED,
     CHAIN,
     CHAIN_BRAKED,
     ESCAPED,
@@ -121,6 +122,8 @@ class Fallback:
                 flag = solver.finish(solver.qp())
             if not flag & UNSOUND and flag >= 0:
                 self._tick.reset()
+                if flag == BRAKED:
+                    return flag  # it is proven that there is no answer
                 self._tick.report[self._flag] = RECOVERED + CHAIN.index(link)
                 return flag
         return self._brake(CHAIN_BRAKED)

@@ -34,6 +34,10 @@ SETTLED = 1e-12
 #: Violations up to this (per unit of the row) count as none; rows of finished classes get this much tolerance
 TOLERANCE = 1e-9
 
+#: Variables beyond this times what counts as 1 are none, and by how much a sum of rows has to be broken for a proof
+#: that they contradict each other, per largest multiplier
+FAR_AWAY, _BROKEN = 1e6, 1e-6
+
 #: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
 _PUSHING = 1e-6
 
@@ -109,6 +113,31 @@ class Relaxation:
         high = (found.upper != scaled.upper) & (found.upper == scaled.lower)
         lower, upper = np.where(low, qp.upper, lower), np.where(high, qp.lower, upper)
         return replace(found, x=x, multipliers=found.multipliers / ends, lower=lower, upper=upper)
+
+    def impossible(self, qp: QP, rows: NDArray[np.bool_], unit: Array, size: Array | None = None) -> bool:
+        """Whether it is proven that no x within the simple bounds keeps ``rows`` [m].
+
+        The multipliers y of their least violation add them up to one row y'A x <= y'side; it is a proof if the whole
+        box breaks that (Farkas' lemma), where variables beyond FAR_AWAY times ``size`` count as none.
+        """
+        n, ends = self.n, np.ones(self.n) if size is None else size
+        free = np.where(rows, 0.0, np.inf)
+        with np.errstate(invalid="ignore"):
+            low, high = qp.lower[n:] / unit - free, qp.upper[n:] / unit + free
+        box = qp.lower[:n] / ends, qp.upper[:n] / ends
+        work = QP(qp.H, qp.g, *(np.concatenate(side) for side in zip(box, (low, high), strict=True)), qp.A * ends)
+        work = replace(work, A=work.A / unit[:, None])
+        stage = self._least_violation(work, np.flatnonzero(rows), np.clip(0.0, *box))
+        if stage is None:
+            return False
+        y = np.where(rows, stage.multipliers[-self.m :], 0.0)
+        if not np.isfinite(np.where(y > 0.0, high, low)[y != 0.0]).all():
+            return False
+        at = -y * np.where(y == 0.0, 0.0, np.where(y > 0.0, high, low))
+        total = y @ work.A
+        reach = total * np.where(total > 0.0, np.maximum(box[0], -FAR_AWAY), np.minimum(box[1], FAR_AWAY))
+        rounding = 1e3 * np.finfo(float).eps * float(np.abs(at).sum() + np.abs(reach).sum())
+        return bool(at.sum() + reach.sum() > _BROKEN * np.abs(y).max(initial=0.0) + rounding)
 
     def _solve(self, qp: QP, order: NDArray[np.int_], scale: Array) -> Relaxed:
         plain = self._final.solve(qp)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError, ShapeError, UnsupportedJointError
 from wbc.robot.frames import make_frames_unique, restore_joint_names
 from wbc.robot.limits import Limits
 from wbc.robot.recipe import Recipe, expand
@@ -27,11 +27,13 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
 
     Raises:
         UnknownNameError: a joint, frame or state of the recipe that the description does not have.
-        UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
+        UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover; joints of a branch that
+            do not come one after another.
         RangeError: two ends of a mimic pair locked at values that contradict each other.
     """
     notes = dict(description.notes)
     model = description.model
+    _check_order(model)
     mimics = resolve_mimics(description.mimics, model)
     q, remarks = neutral_configuration(model, mimics, recipe, states)
     if remarks:
@@ -78,6 +80,23 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     for role, frame in recipe.frames.items():
         robot.check_frame(f"frames.{role}", frame)
     return _with_accelerations(robot, {**description.acceleration, **recipe.acceleration}, recipe.source)
+
+
+def _check_order(model: pin.Model) -> None:
+    """Branch by branch, as files are read: else ``pin.crba`` and derivatives of ``pin.rnea`` are silently wrong.
+
+    Raises:
+        UnsupportedJointError: a joint whose parent is neither the one before it nor one that carries that.
+    """
+    for j in range(1, model.njoints):
+        at, parent = j - 1, int(model.parents[j])
+        while at > parent:
+            at = int(model.parents[at])
+        if at != parent:
+            reason = f"its parent {model.names[parent]} does not carry {model.names[j - 1]}, the joint before it"
+            raise UnsupportedJointError(
+                "robot", str(model.names[j]), f"{reason}: Pinocchio wants the joints of a branch one after another"
+            )
 
 
 def _moving(model: pin.Model) -> list[str]:

@@ -192,7 +192,7 @@ class Robot:
         """A checked float64 copy of a configuration; quaternions and unit circles must have unit length.
 
         Raises:
-            ShapeError, NotFiniteError, RotationError.
+            ShapeError, NotFiniteError, RotationError: it is none.
         """
         out = validation.real_array(field_name, q, (self.nq,))
         if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
@@ -248,6 +248,8 @@ class Robot:
     def random(self, seed: int | np.random.Generator = 0) -> Array:
         """A configuration within the position limits; what has none is within half a turn, or a metre, of neutral.
 
+        Joints that follow others are where those put them, within their own limits.
+
         Args:
             seed: a whole number, which gives the same configuration each time, or the generator that draws.
 
@@ -260,17 +262,27 @@ class Robot:
             rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
         reach = np.where(np.array([unit == "rad" for unit in self.dof_units]), np.pi, 1.0)
         out = self.integrate(self.neutral, rng.uniform(-reach, reach))
-        for k in np.flatnonzero(self.position_index >= 0).tolist():
-            low, high = float(self.limits.position_lower[k]), float(self.limits.position_upper[k])
+        lower, upper, index = self.limits.position_lower.copy(), self.limits.position_upper.copy(), self.position_index
+        for one in self.couplings:
+            if one.ratio != 0.0:
+                ends = sorted((bound[one.follower] - one.offset) / one.ratio for bound in (lower, upper))
+                narrowed = max(lower[one.leader], ends[0]), min(upper[one.leader], ends[1])
+                # Limits that contradict each other: the leader's own
+                if narrowed[0] <= narrowed[1]:
+                    lower[one.leader], upper[one.leader] = narrowed
+        for k in np.flatnonzero(index >= 0).tolist():
+            low, high = float(lower[k]), float(upper[k])
             if np.isfinite([low, high]).all():
-                out[int(self.position_index[k])] = rng.uniform(low, high)
+                out[int(index[k])] = rng.uniform(low, high)
+        for one in self.couplings:
+            out[int(index[one.follower])] = one.ratio * out[int(index[one.leader])] + one.offset
         return out
 
     def with_frame(self, name: str, parent: str, placement: Any = None) -> Robot:
         """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).
 
         Raises:
-            DuplicateNameError, UnknownNameError, ShapeError, NotFiniteError, RotationError.
+            DuplicateNameError, UnknownNameError: of the frames. ShapeError, NotFiniteError, RotationError: no pose.
         """
         validation.name("frame", name)
         if name in self.frame_names:

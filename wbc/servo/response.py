@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,16 +10,23 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.simulation import CommandKind
 from wbc.validation import Array
 
 #: Both sides of the equation are smoothed over this time, which makes the derivative one of measured values [s]
 SMOOTHING = 0.02
 #: What is found for each joint
-PER_JOINT = ("lag", "compliance", "sag", "friction")
+PER_JOINT = ("lag", "compliance", "sag", "friction", "damping")
 #: These, and an offset
-TERMS = 5
+TERMS = 6
+#: Of which a servo of a kind shows
+SHOWN = {
+    CommandKind.POSITION: [0, 1, 2, 3, 5],
+    CommandKind.VELOCITY: [0, 1, 2, 3, 4, 5],
+    CommandKind.TORQUE: [1, 2, 3, 4, 5],
+}
 #: Integrals of squares of terms, about which their numbers are said to be half of what fits [rad^2/s, (N m)^2 s, s]
-LITTLE = (1e-4, 1.0, 1.0, 0.1, 1e-9)
+LITTLE = (1e-4, 1.0, 1.0, 0.1, 0.01, 1e-9)
 #: A delay is doubted as long as its squared residual is at most so many times the least one
 AS_GOOD = 1.5
 #: A joint that moves less than this between its extremes says nothing of its lag [rad or m, rad/s or m/s]
@@ -29,15 +37,17 @@ LEAST_MOTION = 1e-3
 class Response:
     """What a servo does with what it is sent, joint by joint, each one number or nv of them:
 
-        T dx/dt + x = u(t - D) - C (M(q) a + c(q, v)) - S g(q) - F sign(v) + offset
+        T dx/dt + x = u(t - D) - C (M(q) a + c(q, v)) - S g(q) - F sign(v) - B v + offset
 
-    with x = q of a position servo and v of a velocity servo; M, c and g are inertia, Coriolis forces and gravity.
+    with x = q of a position servo, v of a velocity servo, and of torques what the model asks for, M a + c + g with T =
+    0; M, c and g are inertia, Coriolis forces and gravity. Of positions B is part of T, and 0.
 
     Attributes:
         lag: T [s]. delay: D, of command and measurement together [s].
         doubt: by how much the delay may be longer, at the cost of the lag; feedback is as slow as that asks for [s].
-        compliance, sag: C and S, of forces of motion and of gravity [rad/(N m), or rad/(N m s) of velocities].
-        friction: F [rad or rad/s].
+        compliance, sag: C and S, of forces of motion and of gravity [rad/(N m), or rad/(N m s) of velocities; of
+            torques the part by which inertia and weight are more than the model's].
+        friction: F [rad, rad/s or N m]. damping: B [1 of velocities, N m s of torques].
 
     Raises:
         ShapeError, NotFiniteError, RangeError: no such numbers, or negative ones.
@@ -49,6 +59,7 @@ class Response:
     compliance: Array | float = 0.0
     sag: Array | float = 0.0
     friction: Array | float = 0.0
+    damping: Array | float = 0.0
 
     def __post_init__(self) -> None:
         for name in PER_JOINT:
@@ -60,13 +71,18 @@ class Response:
         for name in ("delay", "doubt"):
             validation.scalar(f"response.{name}", getattr(self, name), low=0.0, unit="s")
 
+    @property
+    def of_joints(self) -> bool:
+        """Whether it says anything but a delay."""
+        return any(row.any() for row in self.rows())
+
     def towards(self, other: Response, part: float) -> Response:
         """With the delay of another one, and a part of the way to its numbers of joints."""
         lag, *others = (a + min(1.0, part) * (b - a) for a, b in zip(self.rows(), other.rows(), strict=True))
         return Response(lag, other.delay, other.doubt, *others)
 
     def rows(self, joints: int | None = None) -> list[Array]:
-        """T, C, S and F, each for so many joints."""
+        """T, C, S, F and B, each for so many joints."""
         found = [np.asarray(getattr(self, name), dtype=float) for name in PER_JOINT]
         return found if joints is None else [np.broadcast_to(one, (joints,)) for one in found]
 
@@ -74,16 +90,19 @@ class Response:
 class Identification:
     """Least squares over what has been sent and measured so far, for every delay up to a longest one:
 
-        min over D, offset and T, C, S, F >= 0 of  int f |u(t - D) - x - T dx/dt - C .. - S .. - F .. - offset|^2 dt
+        min over D, offset and T, C, S, F, B >= 0 of  int f |u(t - D) - x - T dx/dt - C .. - .. - offset|^2 dt
 
     f forgets the past with a time constant. All is smoothed alike, which leaves the numbers as they are.
 
     Args:
         joints: how many. dt: between samples [s]. longest_delay, memory: of D and of f [s].
+        shown: which of the terms there are.
     """
 
-    def __init__(self, joints: int, dt: float, longest_delay: float, memory: float = np.inf) -> None:
-        self._dt, self._keep = dt, np.exp(-dt / memory)
+    def __init__(
+        self, joints: int, dt: float, longest_delay: float, memory: float = np.inf, shown: Sequence[int] = (0, 5)
+    ) -> None:
+        self._dt, self._keep, self._shown = dt, np.exp(-dt / memory), list(shown)
         self._part = -np.expm1(-dt / SMOOTHING)
         self._rows = round(longest_delay / dt) + 1
         # Written twice, so that the last rows always lie in one piece, the oldest first
@@ -94,10 +113,25 @@ class Identification:
         self._squares = np.zeros((TERMS, TERMS, joints))
         self._products = np.zeros((TERMS, self._rows, joints))
         self._errors = np.zeros((self._rows, joints))
+        #: Of :meth:`slope`
+        self._v, self._a = np.zeros((2, joints))
         self._next = -1
 
-    def add(self, u: Array, x: Array, loads: Array | float = 0.0) -> None:
-        """What is sent now, what is measured now, and the terms of C, S and F now ``[3, joints]``."""
+    def slope(self, v: Array) -> Array:
+        """dv/dt, smoothed as all is, of velocities that are given once a sample before :meth:`add` [rad/s^2]."""
+        if self._next < 0:
+            self._v = v
+        self._a = (self._part / self._dt) * (v - self._v)
+        self._v = self._v + self._dt * self._a
+        return self._a
+
+    def add(self, u: Array, x: Array, loads: Array | float = 0.0, pushes: Array | float = 0.0,
+            asked: Array | float = 0.0) -> None:  # fmt: skip
+        """What is sent now, what is measured now, and the terms of C, S, F and B now ``[4, joints]``.
+
+        Args:
+            pushes, asked: parts of the term of C and of x that are smoothed already.
+        """
         if self._next < 0:
             self._u[:], self._x[:], self._sent[:], self._terms[1:-1] = u, x, u, loads
         self._next = (self._next + 1) % self._rows
@@ -107,7 +141,11 @@ class Identification:
         self._x += self._dt * terms[0]
         terms[1:-1] += self._part * (loads - terms[1:-1])
         self._sent[self._next] = self._sent[self._next + self._rows] = self._u
-        error = self._sent[self._next + 1 : self._next + 1 + self._rows] - self._x
+        error = self._sent[self._next + 1 : self._next + 1 + self._rows] - (self._x + asked)
+        terms = terms.copy()
+        terms[1] += pushes
+        if 0 not in self._shown:
+            terms[0] = self._a
         for sums in (self._squares, self._products, self._errors):
             sums *= self._keep
         self._squares += terms[:, None] * terms
@@ -123,21 +161,25 @@ class Identification:
         squares = self._squares
         return np.asarray(np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0))
 
-    def response(self) -> Response:
-        """What fits best."""
-        squares, products = np.moveaxis(self._squares, -1, 0), np.moveaxis(self._products, -1, 0)
-        found = np.linalg.solve(squares + np.diag(np.array(LITTLE) / self._dt), products)
+    def response(self, delay: float | None = None) -> Response:
+        """What fits best, with a delay that is known where one is given."""
+        shown = self._shown
+        squares = np.moveaxis(self._squares[np.ix_(shown, shown)], -1, 0)
+        products = np.moveaxis(self._products[shown], -1, 0)
+        found = np.linalg.solve(squares + np.diag(np.array(LITTLE)[shown] / self._dt), products)
         found[:, :-1] = np.maximum(found[:, :-1], 0.0)
         # The offset that goes with what was cut off
         rest = products[:, -1] - np.einsum("jt,jtd->jd", squares[:, -1, :-1], found[:, :-1])
         found[:, -1] = rest / np.maximum(squares[:, -1, -1], 1.0)[:, None]
         explained = np.einsum("jtd,jtd->jd", found, 2.0 * products - squares @ found)
         left = ((self._errors.T - explained) / (self._variance() + LITTLE[0] / self._dt)[:, None]).sum(axis=0)
-        row = int(left.argmin())
+        row = int(left.argmin()) if delay is None else self._rows - 1 - round(delay / self._dt)
         # Row 0 is the longest delay
-        doubtful = row - int(np.argmax(left <= AS_GOOD * left[row]))
-        lag, compliance, sag, friction = found[:, :-1, row].T
-        return Response(lag, (self._rows - 1 - row) * self._dt, doubtful * self._dt, compliance, sag, friction)
+        doubtful = row - int(np.argmax(left <= AS_GOOD * left[row])) if delay is None else 0
+        numbers = np.zeros((TERMS, len(found)))
+        numbers[shown] = found[:, :, row].T
+        lag, *others, _ = numbers
+        return Response(lag, (self._rows - 1 - row) * self._dt, doubtful * self._dt, *others)
 
 
 def identify(commands: Any, measured: Any, dt: float, longest_delay: float = 0.05) -> Response:

@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.controller import Controller, Step
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
 from wbc.servo.laws import Feedback, quickness
-from wbc.servo.response import PER_JOINT, Identification, Response
+from wbc.servo.response import PER_JOINT, SHOWN, Identification, Response
 from wbc.simulation import Command, CommandKind
 from wbc.validation import Array
 
@@ -106,6 +106,7 @@ class Servo:
         kind: str | CommandKind,
         *,
         response: Response | None = None,
+        learn: bool | None = None,
         divergence: tuple[float, float] = (0.1, 0.3),
         armature: Any = 0.0,
         damping: Any = 0.0,
@@ -129,7 +130,8 @@ class Servo:
         known = self._robot.limits.acceleration
         self._brake = np.where(np.isfinite(known), known, PLAIN)
         told = validation.instance("response", response or Response(), Response, "a wbc.servo.Response")
-        self._learns = response is None and self.kind is not CommandKind.TORQUE
+        self._delay = None if response is None else told.delay
+        self._learns = not told.of_joints if learn is None else learn
         for name in PER_JOINT:
             _each(f"response.{name}", getattr(told, name), nv)
         validation.scalar("response.delay", told.delay, high=LONGEST_DELAY, unit="s")
@@ -137,7 +139,6 @@ class Servo:
             joint = self._robot.dof_names[int(np.argmin(np.isfinite(known)))]
             log.warning("%s has no acceleration limit: its reference may jump, which no servo follows", joint)
         self._most = round(LONGEST_DELAY / self._dt) + 1
-        self._inertia = np.diag(pin.crba(self._model, self._data, self._robot.neutral)).copy()
         self._respond(told)
         self.reset(self._robot.neutral)
 
@@ -155,7 +156,8 @@ class Servo:
         """
         q, nv = self._robot.configuration("q", validation.ordinary_array("q", q)), self._robot.nv
         self.controller.reset(q)
-        self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY) if self._learns else None
+        shown = SHOWN[self.kind]
+        self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY, shown) if self._learns else None
         self._q: Array = q
         self._v, self._a, self._wanted, self._sum = np.zeros((4, nv))
         self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
@@ -187,12 +189,13 @@ class Servo:
         step = self._tick(pace)
         if behind < self._near:
             self._sum += error * self._dt
-        d = self._feedback.correction(error, rate - speed, self._sum, self._sent[self._most - self._late :], self._near)
+        sent = self._sent[self._most - self._late :]
+        d, b = self._feedback.correction(error, rate - speed, self._sum, sent, self._near)
         self._sent[:-1] = self._sent[1:]
         self._sent[-1] = d
-        values = self._values(d)
+        values = self._values(d, b)
         if self._identification is not None and not self._stopped:
-            self._learn(self._identification, values, speed, self._loads(self._q, self._v, self._change))
+            self._learn(self._identification, values, q, speed)
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
         return ServoStep(Command(self.kind, values), step, following, error)
 
@@ -207,27 +210,32 @@ class Servo:
         # Smoothed over the time that it is extrapolated by
         self._a = self._a + (self._change - self._a) / (self._late + 1.0)
         self._q = np.asarray(pin.integrate(self._model, self._q, self._v * self._dt))
-        self._references.append((self._q, self._v + self._late * self._dt * self._a, self._a))
+        self._references.append((self._q, self._v, self._a))
         del self._references[0]
         return step
 
     def _ahead(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Where a reference is D later, how fast, and its acceleration."""
-        return np.asarray(pin.integrate(self._model, q, self._late * self._dt * v)), v, a
+        late = self._late * self._dt
+        return np.asarray(pin.integrate(self._model, q, late * (v + 0.5 * late * a))), v + late * a, a
 
     def _loads(self, q: Array, v: Array, a: Array) -> Array:
-        """What compliance, sag and friction answer to ``[3, nv]``."""
+        """What compliance, sag, friction and damping answer to ``[4, nv]``."""
         gravity = pin.computeGeneralizedGravity(self._model, self._data, q).copy()
-        return np.array([pin.rnea(self._model, self._data, q, v, a) - gravity, gravity, v / (np.abs(v) + CREEP)])
+        moved = pin.rnea(self._model, self._data, q, v, a) - gravity
+        return np.array([moved, gravity, v / (np.abs(v) + CREEP), v])
 
-    def _values(self, d: Array) -> Array:
+    def _values(self, d: Array, b: Array) -> Array:
         """What the servos get."""
-        q, v, a = state = self._ahead(*self._references[-1])
+        q, v, a = self._ahead(*self._references[-1])
         if self.kind is CommandKind.TORQUE:
             a = self._change + d
-            return np.asarray(pin.rnea(self._model, self._data, q, v, a) + self._armature * a + self._damping * v)
+            moved, gravity, *_ = loads = self._loads(q, v, a)
+            own = self._armature * a + self._damping * v
+            return np.asarray(moved + gravity + own + (self._yields * loads).sum(axis=0))
+        a = a + b
         if self._yields.any():
-            d = d + (self._yields * self._loads(*state)).sum(axis=0)
+            d = d + (self._yields * self._loads(q, v, a)).sum(axis=0)
         if self.kind is CommandKind.VELOCITY:
             return np.asarray(v + self._lag * a + d)
         return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
@@ -237,22 +245,25 @@ class Servo:
         self.response, self._late = response, round(response.delay / self._dt)
         self._lag, *yields = response.rows(self._robot.nv)
         self._yields = np.array(yields)
-        w = quickness(self.kind, self._dt, response, not self._learns)
-        # The inertia that a compliant servo of velocities has to accelerate is a lag as well
-        lag = self._lag + self._yields[0] * self._inertia if self.kind is CommandKind.VELOCITY else self._lag
-        self._feedback = Feedback(self.kind, self._dt, lag, self._late, w)
+        w = quickness(self.kind, self._dt, response, self._delay is not None)
+        self._feedback = Feedback(self.kind, self._dt, self._lag, self._late, w)
 
-    def _learn(self, found: Identification, values: Array, speed: Array, loads: Array) -> None:
+    def _learn(self, found: Identification, values: Array, q: Array, v: Array) -> None:
         """Find lag and delay while the robot moves, and take them on slowly."""
+        a = found.slope(v)
+        loads = self._loads(q, v, np.zeros_like(v))
+        resting = pin.rnea(self._model, self._data, q, np.zeros_like(v), a) - loads[1]
         if self.kind is CommandKind.POSITION:
             self._asked = self._asked + pin.difference(self._model, self._command, values)
             self._command = values
-            found.add(self._asked, self._moved, loads)
+            found.add(self._asked, self._moved, loads, resting)
+        elif self.kind is CommandKind.VELOCITY:
+            found.add(values, v, loads, resting)
         else:
-            found.add(values, speed, loads)
+            found.add(values, loads[0] + loads[1] + self._damping * v, loads, resting, resting + self._armature * a)
         self._ticks += 1
         if self._ticks % EVERY == 0 and found.motion > ENOUGH:
-            self._respond(self.response.towards(found.response(), EVERY * self._dt / TAKEN_ON))
+            self._respond(self.response.towards(found.response(self._delay), EVERY * self._dt / TAKEN_ON))
 
 
 def _each(field: str, value: Any, nv: int) -> Array:

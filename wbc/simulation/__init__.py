@@ -8,13 +8,14 @@ from wbc.simulation.kinematic import KinematicPlant
 from wbc.simulation.motors import Encoders, Motors
 from wbc.simulation.mujoco_grips import GrippingMujocoPlant
 from wbc.simulation.mujoco_model import mujoco_model, mujoco_spec
-from wbc.simulation.mujoco_plant import MujocoPlant
+from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
 from wbc.simulation.pinocchio_plant import PinocchioPlant, SavedState
 from wbc.simulation.plant import (
     Command,
     CommandKind,
     GripKind,
     GrippingPlant,
+    LoadedPlant,
     MovingPlant,
     Plant,
     PlantError,
@@ -34,6 +35,7 @@ __all__ = [
     "GrippingPlant",
     "Ground",
     "KinematicPlant",
+    "LoadedPlant",
     "Motors",
     "MovingPlant",
     "MujocoPlant",
@@ -42,6 +44,7 @@ __all__ = [
     "PlantError",
     "PlantState",
     "RealTime",
+    "SavedMujocoState",
     "SavedState",
     "VelocityDrive",
     "WatchedPlant",

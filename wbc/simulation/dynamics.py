@@ -29,6 +29,30 @@ class Grip:
     kind: GripKind
 
 
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A grip that slips, by ``velocity`` in the mean over ``duration`` T [m/s, s]. As friction leaves a hand no more
+    than a share of what pulls at it, it speeds up and slows down: v(t) = velocity (1 - cos(2 pi t / T)).
+
+    Attributes:
+        time: since it began [s].
+    """
+
+    velocity: Array
+    duration: float
+    time: float = 0.0
+
+    def on(self, h: float) -> tuple[Array, Slip | None]:
+        """How far it goes in the next h [m, s], and what is left of it."""
+        then = min(self.time + h, self.duration)
+        left = None if then >= self.duration else Slip(self.velocity, self.duration, then)
+        return (self._part(then) - self._part(self.time)) * self.velocity, left
+
+    def _part(self, time: float) -> float:
+        turn = 2.0 * np.pi / self.duration
+        return time - float(np.sin(turn * time)) / turn
+
+
 class Dynamics:
     """M a + h = tau + sum J_k' f_k, with frames that are held: J_k a + dJ_k/dt v = -2 rate J_k v - rate^2 e_k
     (Baumgarte), solved by ``pin.constraintDynamics`` (Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of
@@ -40,12 +64,22 @@ class Dynamics:
 
     def __init__(self, model: pin.Model, rate: float) -> None:
         self.model, self.data, self._rate = model, model.createData(), rate
+        #: Degrees of freedom that move by themselves
+        self.free = list(range(model.nv))
         self._corrector = pin.BaumgarteCorrectorParameters(rate * rate, 2.0 * rate)
         self._settings = pin.ProximalSettings(1e-12, PROXIMAL, ITERATIONS)
         kinds = ((int(joint.idx_v), TURNING.get(joint.shortname(), 0)) for joint in model.joints)
         #: Where joints begin whose displacements do not commute, and what they are
         self.turning = [(start, size) for start, size in kinds if size]
         self.hold({})
+
+    def reduced(self, matrix: Array) -> Array:
+        """A matrix of forces by motions ``[nv, nv]``, of the motions that joints can make by themselves: all."""
+        return matrix
+
+    def coupled(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """A state in which joints that follow others are where they belong: any."""
+        return q, v
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
         """Hold these frames, and no others."""

@@ -38,7 +38,7 @@ class Ground:
     Attributes:
         points: frame -> radius of the ball about its origin [m].
         distance: of the surface; default: :func:`level` at 0.
-        stiffness [N/m], damping [N s/m], friction [1].
+        stiffness: [N/m]. damping: [N s/m]. friction: [1].
 
     Raises:
         ShapeError, NotFiniteError, RangeError: numbers that are none.

@@ -63,7 +63,7 @@ class Drive:
 
     Attributes:
         armature: that the gears add ``[nv]``. damping: slope of the friction at rest, the steepest ``[nv]``.
-        scale: of each motor's torque; 0 is a motor that is dead.
+        driven: 1 where a motor is, 0 for a base ``[nv]``.
 
     Raises:
         ShapeError, NotFiniteError, RangeError: numbers that are none.
@@ -88,8 +88,8 @@ class Drive:
         self._viscous, self._coulomb = spread["viscous"], spread["coulomb"]
         self.armature = spread["gear"] ** 2 * spread["rotor"]
         self.damping = self._viscous + self._coulomb / self._slip
-        self.scale = np.ones(robot.nv)
-        self.scale[: robot.base_nv] = 0.0
+        self.driven = np.ones(robot.nv)
+        self.driven[: robot.base_nv] = 0.0
         self._noisy, self._slows = bool(self._noise.any()), bool(np.isfinite(self._no_load).any())
         #: Whether there is friction at all
         self.rubs = bool(self.damping.any())
@@ -123,7 +123,7 @@ class Drive:
         most = self._effort
         if self._slows:
             most = most * np.clip(1.0 - np.sign(command) * v / self._no_load, 0.0, 1.0)
-        return np.minimum(np.maximum(command, -most), most) * self.scale
+        return np.minimum(np.maximum(command, -most), most) * self.driven
 
     def friction(self, v: Array) -> Array:
         """What friction takes from it ``[nv]``."""

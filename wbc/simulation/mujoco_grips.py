@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, UnknownNameError
+from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
-from wbc.simulation.dynamics import AXIS, Grip
+from wbc.simulation.dynamics import AXIS, Grip, Slip
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, Motors
-from wbc.simulation.mujoco_model import mujoco_spec
-from wbc.simulation.mujoco_plant import MujocoPlant
+from wbc.simulation.motors import Drive, Motors, MotorState
+from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
+from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
 from wbc.simulation.pinocchio_plant import check_reach
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
 from wbc.validation import Array
@@ -23,8 +25,21 @@ from wbc.validation import Array
 #: Points of a frame that its grip holds, as many as the kind needs [m]
 POINTS = AXIS * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
-#: Time constant of a grip, in time steps of MuJoCo: fewer do not hold; and how hard it is, of 1
-SOFT, HARD = 2.0, 0.9999
+
+
+@dataclass(eq=False)
+class _State:
+    """All that changes beside MuJoCo's own state."""
+
+    command: Array
+    motors: MotorState
+    scale: Array
+    random: np.random.Generator
+    first: Array
+    fallen: Array = field(default_factory=lambda: np.zeros(6))
+    grips: dict[str, Grip] = field(default_factory=dict)
+    slips: dict[str, Slip] = field(default_factory=dict)
+    broken: list[str] = field(default_factory=list)
 
 
 class GrippingMujocoPlant(MujocoPlant):
@@ -55,6 +70,10 @@ class GrippingMujocoPlant(MujocoPlant):
         import mujoco
 
         spec = mujoco_spec(robot, time_step=time_step, actuators="torque", drawn=False)
+        self._drive = Drive(motors or Motors(), robot, time_step)
+        for start, armature in enumerate(self._drive.armature):
+            if armature:
+                spec.joint(robot.dof_names[start]).armature += armature
         soft = SOFT * time_step if time_constant is None else time_constant
         soft = validation.scalar("time_constant", soft, low=SOFT * time_step, unit="s")
         for name in frames:
@@ -63,7 +82,7 @@ class GrippingMujocoPlant(MujocoPlant):
             for k in range(len(POINTS)):
                 held = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
                 held.name, held.name1, held.active = f"{name} {k}", body.name, False
-                held.solref, held.solimp = [soft, 1.0], [HARD, HARD, 0.001, 0.5, 2.0]
+                held.solref, held.solimp = [soft, 1.0], HARD
         model = spec.compile()
         self._equality = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         self._rows = {name: [int(model.equality(f"{name} {k}").id) for k in range(len(POINTS))] for name in frames}
@@ -71,45 +90,42 @@ class GrippingMujocoPlant(MujocoPlant):
         self._placements = {
             name: np.array(frames_of[robot.model.getFrameId(name)].placement.rotation) for name in frames
         }
-        self._drive = Drive(motors or Motors(), robot, time_step)
         self._balance, self._placed, self._seed = Balance(robot.model), robot.model.createData(), seed
-        self._grips: dict[str, Grip] = {}
         super().__init__(model, robot)
         self.commands: Collection[CommandKind] = (CommandKind.TORQUE,)
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
         """At a configuration, at rest or with a velocity, and nothing grasped."""
-        self._grips, self._slips, self._broken = {}, dict[str, tuple[Array, float]](), list[str]()
         super().reset(q, time, v)
-        self._torque, self._motors = np.zeros(self.nv), self._drive.fresh()
-        self._drive.scale[self._robot.base_nv :] = 1.0
-        self._random, self._fallen = np.random.default_rng(self._seed), np.zeros(6)
-        state = self.read()
-        self._first = self._balance.momentum(state.q, state.v)
+        state, drive = self.read(), self._drive
+        self._state = _State(
+            np.zeros(self.nv), drive.fresh(), drive.driven.copy(), np.random.default_rng(self._seed),
+            self._balance.momentum(state.q, state.v),
+        )  # fmt: skip
 
     def apply(self, command: Command) -> None:
         """Take torques ``[nv]``.
 
         Raises:
-            UnknownNameError: another kind of command.
+            UnknownNameError: another kind of command. ShapeError, NotFiniteError: no numbers.
         """
         validation.one_of("command.kind", str(command.kind), [str(CommandKind.TORQUE)])
-        self._torque = np.array(command.values)
+        self._state.command = validation.real_array("command.values", command.values, (self.nv,))
 
     def advance(self, dt: float) -> None:
         """Whole time steps."""
-        h, drive = self.time_step, self._drive
+        h, drive, state = self.time_step, self._drive, self._state
         for _ in range(round(dt / h)):
-            state = self.read()
-            torque = drive.torque(self._motors, self._torque, state.v, self._random)
+            seen = self.read()
+            torque = state.scale * drive.torque(state.motors, state.command, seen.v, state.random)
             if drive.rubs:
-                torque = torque - drive.friction(state.v)
+                torque = torque - drive.friction(seen.v)
             super().apply(Command(CommandKind.TORQUE, torque))
-            for name in list(self._slips):
+            for name in list(state.slips):
                 self._slide(name, h)
             super().advance(h)
             if self._balance.falls:
-                self._fallen += self._balance.by_gravity(state.q, h)
+                state.fallen += self._balance.by_gravity(seen.q, h)
 
     def grasp(self, frame: str, pose: pin.SE3, kind: GripKind = GripKind.POSE) -> None:
         """A frame is held at a pose of the world.
@@ -120,17 +136,14 @@ class GrippingMujocoPlant(MujocoPlant):
         """
         validation.one_of("frame", frame, self._rows)
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in GripKind]))
-        if frame in self._grips:
+        if frame in self._state.grips:
             raise RangeError("frame", frame, "it is held already")
         model = self._robot.model
         pin.framesForwardKinematics(model, self._placed, self.read().q)
         number = model.getFrameId(frame)
         check_reach(frame, self._placed.oMf[number], pose, kind)
-        self._grips[frame] = Grip(pose, kind)
-        place = model.frames[number].placement
-        for row, point in zip(self._rows[frame][: HELD[kind]], POINTS, strict=False):
-            self._model.eq_data[row, :3], self._model.eq_data[row, 3:6] = place.act(point), pose.act(point)
-            self.data.eq_active[row] = 1
+        self._state.grips[frame] = Grip(pose, kind)
+        self._hold(frame)
 
     def release(self, frame: str) -> None:
         """It is free again.
@@ -138,38 +151,38 @@ class GrippingMujocoPlant(MujocoPlant):
         Raises:
             UnknownNameError: it was not held.
         """
-        if frame not in self._grips:
-            raise UnknownNameError("frame", frame, self._grips)
-        del self._grips[frame]
-        self._slips.pop(frame, None)
+        if frame not in self._state.grips:
+            raise UnknownNameError("frame", frame, self._state.grips)
+        del self._state.grips[frame]
+        self._state.slips.pop(frame, None)
         for row in self._rows[frame]:
             self.data.eq_active[row] = 0
 
     def lost(self) -> tuple[str, ...]:
         """Frames that what held them has let go of, since this was last asked."""
-        out = tuple(self._broken)
-        self._broken.clear()
+        out = tuple(self._state.broken)
+        self._state.broken.clear()
         return out
 
     def lose(self, frame: str) -> None:
         """As :meth:`PinocchioPlant.lose`."""
         self.release(frame)
-        self._broken.append(frame)
+        self._state.broken.append(frame)
 
     def slip(self, frame: str, velocity: Any, duration: float) -> None:
         """As :meth:`PinocchioPlant.slip`."""
-        validation.one_of("frame", frame, self._grips)
+        validation.one_of("frame", frame, self._state.grips)
         rate = validation.real_array("velocity", velocity, (3,))
-        self._slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+        self._state.slips[frame] = Slip(rate, validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
 
     def limp(self, joint: str, scale: float = 0.0) -> None:
         """As :meth:`PinocchioPlant.limp`."""
-        self._drive.scale[self._robot.dofs(joint)] = validation.scalar("scale", scale, low=0.0, high=1.0)
+        self._state.scale[self._robot.dofs(joint)] = validation.scalar("scale", scale, low=0.0, high=1.0)
 
     @property
     def grips(self) -> Mapping[str, Grip]:
         """Frame -> how it is held."""
-        return self._grips
+        return self._state.grips
 
     @property
     def state(self) -> PlantState:
@@ -180,7 +193,7 @@ class GrippingMujocoPlant(MujocoPlant):
     def given(self) -> Array:
         """As of :attr:`PinocchioPlant.given`."""
         state = self.read()
-        return self._first + self._fallen - self._balance.momentum(state.q, state.v)
+        return self._state.first + self._state.fallen - self._balance.momentum(state.q, state.v)
 
     @property
     def wrenches(self) -> dict[str, Array]:
@@ -188,7 +201,7 @@ class GrippingMujocoPlant(MujocoPlant):
         data, out = self.data, dict[str, Array]()
         ours = np.asarray(data.efc_type[: data.nefc]) == self._equality
         numbers, forces = np.asarray(data.efc_id[: data.nefc]), np.asarray(data.efc_force[: data.nefc])
-        for name, grip in self._grips.items():
+        for name, grip in self._state.grips.items():
             total, rows = np.zeros(6), self._rows[name]
             # The frame's own axes: a hand that rolls on its hold turns away from where it closed
             body = data.xmat[self._model.eq_obj1id[rows[0]]].reshape(3, 3)
@@ -199,12 +212,43 @@ class GrippingMujocoPlant(MujocoPlant):
             out[name] = total
         return out
 
+    def save(self) -> SavedMujocoState:
+        """As of :class:`MujocoPlant`, with grips, motors and the generator of noise."""
+        return replace(super().save(), _grips=copy.deepcopy(self._state))
+
+    def restore(self, saved: SavedMujocoState) -> None:
+        """As of :class:`MujocoPlant`.
+
+        Raises:
+            ShapeError: it was saved by a plant without grips.
+        """
+        if not isinstance(saved._grips, _State):
+            raise ShapeError("saved", saved._grips, "of a plant without grips")
+        for name in saved._grips.grips:
+            validation.one_of("saved.grips", name, self._rows)
+        before, self._state = self._state, copy.deepcopy(saved._grips)
+        for name in self._state.grips:
+            self._hold(name)
+        try:
+            super().restore(saved)
+        except WbcError:
+            self._state = before
+            raise
+
+    def _hold(self, frame: str) -> None:
+        """Write a grip into the model, and switch it on."""
+        grip, model = self._state.grips[frame], self._robot.model
+        place = model.frames[model.getFrameId(frame)].placement
+        for row, point in zip(self._rows[frame][: HELD[grip.kind]], POINTS, strict=False):
+            self._model.eq_data[row, :3], self._model.eq_data[row, 3:6] = place.act(point), grip.pose.act(point)
+            self.data.eq_active[row] = 1
+
     def _slide(self, name: str, h: float) -> None:
         """A grip that slips, a step on."""
-        rate, left = self._slips[name]
-        grip, moved = self._grips[name], rate * min(h, left)
-        self._grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
+        grip, (moved, left) = self._state.grips[name], self._state.slips[name].on(h)
+        self._state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
         self._model.eq_data[self._rows[name], 3:6] += moved
-        self._slips[name] = rate, left - h
-        if left <= h:
-            del self._slips[name]
+        if left is None:
+            del self._state.slips[name]
+        else:
+            self._state.slips[name] = left

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import RangeError
+from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.mujoco_joints import MujocoJoints
 from wbc.robot.robot import checked_robot
 from wbc.robot.sources.mjmodel import BALL, FREE, TO_JOINT
-from wbc.simulation.plant import Command, CommandKind, PlantState
-from wbc.validation import Array, one_of
+from wbc.simulation.plant import Command, CommandKind, PlantError, PlantState
+from wbc.validation import Array, one_of, real_array
 
 if TYPE_CHECKING:
     import mujoco
+
+
+@dataclass(frozen=True, eq=False)
+class SavedMujocoState:
+    """A MuJoCo plant's state at one time, see :meth:`MujocoPlant.save`; it may be pickled."""
+
+    robot: str
+    _numbers: Array
+    _grips: object = None
 
 
 class MujocoPlant:
@@ -50,6 +60,11 @@ class MujocoPlant:
         import mujoco
 
         self._step, self._forward, self._clear = mujoco.mj_step, mujoco.mj_forward, mujoco.mj_resetData
+        self._get, self._set = mujoco.mj_getState, mujoco.mj_setState
+        kinds = mujoco.mjtWarning
+        self._blown = [int(k) for k in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)]
+        self._saved = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        self._count = int(mujoco.mj_stateSize(model, self._saved))
         self._model, self._robot = model, checked_robot(robot)
         self.data = mujoco.MjData(model)
         self.nq, self.nv, self.time_step = robot.nq, robot.nv, float(model.opt.timestep)
@@ -97,16 +112,49 @@ class MujocoPlant:
         """Write a command to the actuators of its kind.
 
         Raises:
-            UnknownNameError: no actuator takes such commands.
+            UnknownNameError: no actuator takes such commands. ShapeError, NotFiniteError: no numbers.
         """
         one_of("command.kind", str(command.kind), [str(kind) for kind in self._actuators])
         actuators, dofs, scale = self._actuators[command.kind]
-        values = command.values
-        if command.kind is CommandKind.POSITION:
+        places = command.kind is CommandKind.POSITION
+        values = real_array("command.values", command.values, (self.nq if places else self.nv,))
+        if places:
             values = pin.difference(self._robot.model, pin.neutral(self._robot.model), values)
         self.data.ctrl[actuators] = scale * values[dofs]
 
     def advance(self, dt: float) -> None:
-        """Let whole time steps of the model go by [s]."""
+        """Let whole time steps of the model go by [s].
+
+        Raises:
+            PlantError: the simulation has blown up. MuJoCo itself would put the robot back where its model begins.
+        """
+        warnings = self.data.warning
         for _ in range(round(dt / self.time_step)):
             self._step(self._model, self.data)
+        if any(warnings[kind].number for kind in self._blown):
+            raise PlantError("plant", float(self.data.time), "the simulation has blown up")
+
+    def save(self) -> SavedMujocoState:
+        """Everything that the next step depends on: MuJoCo's ``mjSTATE_INTEGRATION``, objects of the model included.
+
+        What a program has changed in the model itself is not in it.
+        """
+        numbers = np.zeros(self._count)
+        self._get(self._model, self.data, numbers, self._saved)
+        return SavedMujocoState(self._robot.fingerprint, numbers)
+
+    def restore(self, saved: SavedMujocoState) -> None:
+        """Go on from there, to the same bits.
+
+        Raises:
+            RangeError: of another robot. ShapeError: of another MuJoCo model.
+        """
+        if saved.robot != self._robot.fingerprint:
+            raise RangeError("saved", saved.robot, f"it is of another robot than {self._robot.name}")
+        if saved._numbers.shape != (self._count,):
+            reason = f"of another MuJoCo model: this one has {self._count} numbers"
+            raise ShapeError("saved", saved._numbers.shape, reason)
+        # What follows from the state, then the state again: the first changes from where the solver will begin
+        self._set(self._model, self.data, saved._numbers, self._saved)
+        self._forward(self._model, self.data)
+        self._set(self._model, self.data, saved._numbers, self._saved)

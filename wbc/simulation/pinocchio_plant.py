@@ -14,7 +14,8 @@ from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.simulation.dynamics import Dynamics, Grip, Integrator, step_midpoint, step_rk4
+from wbc.simulation.coupled import CoupledDynamics
+from wbc.simulation.dynamics import Dynamics, Grip, Integrator, Slip, step_midpoint, step_rk4
 from wbc.simulation.ground import Ground, Touch
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Drive, Encoders, Motors, MotorState
@@ -43,7 +44,7 @@ class _State:
     random: np.random.Generator
     reading: PlantState
     grips: dict[str, Grip] = field(default_factory=dict)
-    slips: dict[str, tuple[Array, float]] = field(default_factory=dict)
+    slips: dict[str, Slip] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)
     first: Array = field(default_factory=lambda: np.zeros(6))
     fallen: Array = field(default_factory=lambda: np.zeros(6))
@@ -66,8 +67,9 @@ class PinocchioPlant:
         plant.apply(Command(CommandKind.TORQUE, tau))
         plant.advance(0.001)
 
-    It takes torques; those of a base's coordinates do nothing. The same seed and commands give the same bits. Followers
-    of mimic joints are joints with motors of their own.
+    It takes torques; those of a base's coordinates do nothing. The same seed and commands give the same bits. Joints
+    that follow others do so through rigid gears: their motors' torques act on what leads them
+    (:class:`CoupledDynamics`, which takes longer).
 
     Args:
         robot: what moves, with its true masses, its gravity and its limits of effort.
@@ -121,7 +123,8 @@ class PinocchioPlant:
         self.model = model
         _check_inertias(model)
         self._balance = Balance(model)
-        self._dynamics = Dynamics(model, self._rate)
+        follows = bool(robot.couplings) or any("Mimic" in joint.shortname() for joint in model.joints)
+        self._dynamics = CoupledDynamics(robot, model, self._rate) if follows else Dynamics(model, self._rate)
         self._touch = None if ground is None else Touch(ground, robot, model)
         self._check_mass(robot.neutral)
         self._check_step(robot.neutral)
@@ -134,10 +137,12 @@ class PinocchioPlant:
         """At a configuration, at rest or with a velocity, with no command, and nothing grasped.
 
         Raises:
-            RangeError: it is inside of the ground; or there the mass matrix is singular or the time step too coarse.
+            RangeError: it is inside of the ground, or a joint is not where the one that it follows puts it; or there
+                the mass matrix is singular or the time step too coarse.
         """
         q = self.robot.configuration("q", q)
         v = np.zeros(self.nv) if v is None else validation.real_array("v", v, (self.nv,))
+        q, v = self._dynamics.coupled(q, v)
         self._check_mass(q)
         self._check_step(q)
         if self._touch is not None:
@@ -147,7 +152,7 @@ class PinocchioPlant:
     def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
         reading = PlantState(q, v, time)
-        self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.scale.copy(), anchors,
+        self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.driven.copy(), anchors,
                              np.random.default_rng(self._seed), reading)  # fmt: skip
         self._hold()
         self._state.first = self._balance.momentum(q, v)
@@ -174,8 +179,7 @@ class PinocchioPlant:
         """
         state, h, drive, balance = self._state, self.time_step, self._drive, self._balance
         for _ in range(round(dt / h)):
-            drive.scale = state.scale
-            self._torque = drive.torque(state.motors, state.command, state.v, state.random)
+            self._torque = state.scale * drive.torque(state.motors, state.command, state.v, state.random)
             if state.slips:
                 self._slide(h)
             if self._touch is not None:
@@ -237,14 +241,16 @@ class PinocchioPlant:
         self._state.broken.append(frame)
 
     def slip(self, frame: str, velocity: Any, duration: float) -> None:
-        """A grip slips: what it holds the frame at moves with a velocity in the world [m/s] for some seconds.
+        """A grip slips: what it holds the frame at moves with a mean velocity in the world [m/s] for some seconds, as
+        of :class:`wbc.simulation.dynamics.Slip`.
 
         Raises:
             UnknownNameError: nothing holds that frame.
         """
         validation.one_of("frame", frame, self._state.grips)
         rate = validation.real_array("velocity", velocity, (3,))
-        self._state.slips[frame] = rate, validation.scalar("duration", duration, low=0.0, unit="s")
+        time = validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
+        self._state.slips[frame] = Slip(rate, time)
 
     def limp(self, joint: str, scale: float = 0.0) -> None:
         """The motor of a joint gives this part of its torque from now on.
@@ -329,13 +335,13 @@ class PinocchioPlant:
     def _slide(self, h: float) -> None:
         """Grips that slip, a step on."""
         state = self._state
-        for name, (rate, left) in list(state.slips.items()):
-            grip = state.grips[name]
-            moved = pin.SE3(grip.pose.rotation, grip.pose.translation + rate * min(h, left))
-            state.grips[name] = Grip(moved, grip.kind)
-            state.slips[name] = rate, left - h
-            if left <= h:
+        for name, slip in list(state.slips.items()):
+            grip, (moved, left) = state.grips[name], slip.on(h)
+            state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
+            if left is None:
                 del state.slips[name]
+            else:
+                state.slips[name] = left
         self._hold()
 
     def _sense(self) -> None:
@@ -357,10 +363,10 @@ class PinocchioPlant:
         state.reading = PlantState(q, v, state.time)
 
     def _check_mass(self, q: Array) -> None:
-        mass = pin.crba(self.model, self._dynamics.data, q)
+        mass = self._dynamics.reduced(pin.crba(self.model, self._dynamics.data, q))
         values, vectors = np.linalg.eigh(mass)
         if not values[0] > SINGULAR * values[-1]:
-            dof = self.robot.dof_names[int(np.abs(vectors[:, 0]).argmax())]
+            dof = self.robot.dof_names[self._dynamics.free[int(np.abs(vectors[:, 0]).argmax())]]
             raise RangeError(
                 "robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia"
             )
@@ -371,7 +377,8 @@ class PinocchioPlant:
         if self._touch is not None:
             more = self._touch.stiffness(q)
             stiffness, damping = stiffness + more[0], damping + more[1]
-        most = largest_step(pin.crba(model, data, q), stiffness, damping, self._rate, self._integrator)
+        masses = (self._dynamics.reduced(x) for x in (pin.crba(model, data, q), stiffness, damping))
+        most = largest_step(*masses, self._rate, self._integrator)
         if self.time_step > most:
             raise RangeError(
                 "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"

@@ -141,5 +141,15 @@ class WatchedPlant(Protocol):
         """What has failed, by name, so that the robot is to be brought to rest; "": nothing."""
 
 
+@runtime_checkable
+class LoadedPlant(WatchedPlant, Protocol):
+    """What a plant has besides that knows what holds and motors bear."""
+
+    def holds_without(self, frame: str) -> bool:
+        """Whether the robot stays where it is when this frame, which is held, is let go of; if not, :meth:`failing`
+        says why.
+        """
+
+
 class PlantError(WbcError):
     """A plant that has no valid reading, or cannot do what it is to do; it was commanded to rest."""

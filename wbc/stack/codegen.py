@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from importlib import resources
 from typing import Any
@@ -11,9 +12,10 @@ import numpy as np
 
 from wbc.shapes import FAR
 from wbc.stack.declaration import COMMANDS, Declaration
+from wbc.stack.handing_over import hand_over
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
-from wbc.stack.program import TickProgram, sparsity_rows
+from wbc.stack.program import ROWS_OUTPUTS, TickProgram, sparsity_rows
 from wbc.stack.tables import (
     brakes,
     force_scales,
@@ -27,6 +29,8 @@ from wbc.stack.tables import (
 )
 from wbc.symbolic.kinematics import Kinematics
 
+#: Output of the rows before which stands what they hand to the curvature
+HANDED = len(ROWS_OUTPUTS)
 #: Class of rows that have a price in the order of sacrifice: they give way at it, and before any other
 PRICED = 99
 
@@ -35,7 +39,10 @@ def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[st
     """File name -> text of everything that makes the tick of a stack."""
     native = resources.files("wbc.stack") / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
-    functions = [*program.functions.values(), motion(stack)]
+    compiled = program.functions
+    if program.curvature is not None:
+        compiled["rows"], compiled["curvature"] = hand_over(program.rows, program.curvature, HANDED)
+    functions = [*compiled.values(), motion(stack)]
     return {
         "rows.c": _casadi_source(functions),
         "stack.h": header(stack, layout, program, functions),
@@ -52,7 +59,8 @@ def _casadi_source(functions: list[ca.Function]) -> str:
     # The library's are calls; the same here, of NaN the other argument, but for the sign of zeros
     for name, sign in (("fmin", "<"), ("fmax", ">")):
         text = text.replace(f"return {name}(x, y);", f"return x {sign} y || y != y ? x : y;")
-    return text
+    # Helpers of a line; at the level that the rows are compiled at, others are calls
+    return re.sub(r"^(casadi_real casadi_\w+\()", r"static inline \1", text, flags=re.MULTILINE)
 
 
 def header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
@@ -89,6 +97,7 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
                 "SENSED": len(program.sensed.blocks),
                 "FAR": FAR,
                 "NNZK": upper.nnz(),
+                "HANDED": next((f.numel_out("handed") for f in functions if "handed" in f.name_out()), 0),
                 "CALM": int(stack.calm),
                 "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
@@ -238,20 +247,20 @@ def blocks(start: np.ndarray, col: np.ndarray) -> list[tuple[int, int, int, int]
 
 
 def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
-    """BLOCKS: statements that add the task rows to H and g, rows of equal columns together.
+    """BLOCKS: statements that call ``many`` for task rows of equal columns, and ``single`` for rows of one entry.
     DIAGONALS: statements that add the rows of one entry to the diagonal in ``y``.
     """
     build: list[str] = []
     diagonals: list[str] = []
     for row, count, first, columns in blocks(start, col):
         if columns > 1:
-            build.append(f"block(t, {row}, {count}, {first}, {columns});")
+            build.append(f"many(t, {row}, {count}, {first}, {columns});")
             continue
-        build.append(f"diagonal(t, {row}, {count}, {first});")
+        build.append(f"single(t, {row}, {count}, {first});")
         entry = "t->jt[e] * t->jt[e]"
         weight = f"t->weight[{row} + e - {first}] * t->report.factor[{row} + e - {first}]"
         diagonals.append(f"for (int e = {first}; e < {first + count}; e++) t->y[j_col[e]] += {weight} * {entry};")
-    return [f"#define BLOCKS {' '.join(build)}", f"#define DIAGONALS {' '.join(diagonals)}"]
+    return [f"#define BLOCKS(many, single) {' '.join(build)}", f"#define DIAGONALS {' '.join(diagonals)}"]
 
 
 def motion(stack: Declaration) -> ca.Function:

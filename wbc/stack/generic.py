@@ -276,7 +276,7 @@ def _context(variant: Variant) -> str:
         "#include <string.h>",
         f"#define COMMAND {COMMANDS.index(variant.command)}",
         f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
-        *(f"#define {name} 0" for name in ("BALLS", "SEGMENTS", "SENSED", "WORK_W", "WORK_IW")),
+        *(f"#define {name} 0" for name in ("BALLS", "SEGMENTS", "SENSED", "HANDED", "WORK_W", "WORK_IW")),
         *(f"#define HAS_{name} {int(there)}" for name, there in chosen.items()),
         *(f"#define HAS_{name} 1" for name in _ALWAYS),
         "/* Of eight bytes each, in the order that Python writes them in */",
@@ -302,9 +302,9 @@ def _context(variant: Variant) -> str:
 
 
 _BLOCKS = """
-#define BLOCKS for (int n = 0; n < BLOCKED; n++) \\
-    if (block_columns[n] == 1) diagonal(t, block_row[n], block_rows[n], block_first[n]); \\
-    else block(t, block_row[n], block_rows[n], block_first[n], block_columns[n]);
+#define BLOCKS(many, single) for (int n = 0; n < BLOCKED; n++) \\
+    if (block_columns[n] == 1) single(t, block_row[n], block_rows[n], block_first[n]); \\
+    else many(t, block_row[n], block_rows[n], block_first[n], block_columns[n]);
 #define DIAGONALS for (int n = 0; n < BLOCKED; n++) \\
     for (int r = 0; block_columns[n] == 1 && r < block_rows[n]; r++) { \\
         const int e = block_first[n] + r, k = block_row[n] + r; \\

@@ -123,8 +123,8 @@ class Study:
         return out | {"scenario": self.scenario.name}
 
     @classmethod
-    def read(cls, path: str | Path) -> Study:
-        """A study from a YAML file.
+    def read(cls, path: str | Path, seeds: int | None = None) -> Study:
+        """A study from a YAML file, with other seeds than the file's where they are given.
 
             scenario: reach                  # built in; or module:function, or file.py:function
             parameters:
@@ -147,7 +147,7 @@ class Study:
         content = {str(key): value for key, value in content.items()}
         if "beside" in content:
             raise UnknownNameError("beside", content["beside"], _names(_Content))
-        return cls(beside=path.resolve().parent, **content)
+        return cls(beside=path.resolve().parent, **content | ({} if seeds is None else {"seeds": seeds}))
 
 
 def _names(kind: type[Any]) -> tuple[str, ...]:

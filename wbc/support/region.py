@@ -38,7 +38,7 @@ class Region:
 
     Attributes:
         center: the centre of mass of the configuration, in the world [3, m]. axes: two unit vectors across gravity [2,
-        3].
+            3].
         corners: of the inner polygon, in these axes, counted from the origin of the world, counterclockwise [n, 2, m];
             all of them are held. Empty where nothing is.
         outer: of the outer polygon [n, 2, m]; nothing beyond it is held.

@@ -57,7 +57,7 @@ class Viewer:
         self._dt, self._time = controller.stack.dt, 0.0
         size = 8 * core.context.memory.state
         self._link = LoopEnd(size)
-        self._said, self._silence = 0, silence
+        self._said, self._silence, self._noted = 0, silence, self.operation.note
         order = {
             "stack": _pickled(controller),
             "solver": controller.solver,
@@ -123,6 +123,9 @@ class Viewer:
         if flags != self._said:
             self._said = flags
             self._link.put_flags(flags)
+        if operation.note is not self._noted:
+            self._noted = operation.note
+            self._link.note(messages.write(operation.note).encode())
 
     @property
     def running(self) -> bool:

@@ -15,9 +15,11 @@ from wbc.validation import Array
 from wbc.viewer.beside import Viewer, show
 from wbc.viewer.bodies import OBSTACLE, Colour, Mesh, indexed
 from wbc.viewer.messages import RATE_LASTS, MessageError
+from wbc.viewer.one_hand import OneHand
 from wbc.viewer.operation import Operation
 from wbc.viewer.paced import ticks
 from wbc.viewer.scenery import Scenery, checked
+from wbc.walking.loop.state import Tick
 from wbc.walking.modes.drive import Drive
 from wbc.walking.planner.plan import Regrasp
 from wbc.walking.report import surroundings
@@ -28,30 +30,40 @@ from wbc.walking.run.request import DriveRequest, Site
 FASTEST = np.array([0.05, 0.05, 0.04])
 #: A body within this of its destination is there [m]; a course that is off by more than this is set anew [rad]
 THERE, OFF = 0.02, 0.15
+#: Points of a hand's way that are drawn; what a loop without an end gives at its end
+POINTS, END = 24, object()
 #: Colours of the structure and of its holds
 SURFACE: Colour = (204, 213, 223)
 STUD: Colour = (143, 153, 168)
 
 
 class WalkOperation(Operation):
-    """Obeys a page for a walk: its messages are ``steer``, ``go``, ``ask`` and ``approve``.
+    """Obeys a page for a walk: its messages are ``steer``, ``go``, ``ask``, ``approve``, ``arm`` and ``hand``.
 
     A stop is that of the walk: body and hand slow down along their paths, nothing is lifted and nothing planned.
 
+    Args:
+        on_tick: called after every tick. now: a clock [s].
+
     Attributes:
-        waiting: the lift that waits for a yes, "" for none.
+        waiting: the lift that waits for a yes, "" for none. hand: the one that is moved alone, None for none.
     """
 
-    def __init__(self, drive: Drive, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, drive: Drive, now: Callable[[], float] = time.monotonic, on_tick: Callable[[Tick], Any] = lambda _: None
+    ) -> None:
         super().__init__(drive.walk.stack.controller)
-        self.drive, self.waiting, self._now = drive, "", now
+        self.drive, self.waiting, self._now, self._on_tick = drive, "", now, on_tick
+        self.hand: OneHand | None = None
+        self._begins = drive.walk.structure.ids
+        self._said, self._shown = "", tuple[Any, ...]()
         self._steered, self._until, self._goal = np.zeros(3), 0.0, -1
         self._approved = ""
         self._asks = False
 
     def check(self, message: Mapping[str, Any]) -> None:
-        """Raise what :meth:`obey` would raise, and change nothing."""
-        checked(message, self.drive.walk.structure.ids)
+        """Raise what :meth:`obey` would raise for values, and change nothing."""
+        checked(message, self.drive.walk.structure.ids, tuple(arm.name for arm in self.drive.walk.walker.arms))
 
     def obey(self, message: Mapping[str, Any]) -> None:
         """Do what a message says.
@@ -61,9 +73,19 @@ class WalkOperation(Operation):
         """
         self.check(message)
         kind = message["type"]
-        if kind in ("steer", "go") and self.stopped:
+        if kind in ("steer", "go", "arm", "hand") and self.stopped:
             raise MessageError("message", kind, f"the robot is stopped ({self.stopped}); resume first")
-        if kind == "steer":
+        if kind == "arm":
+            self._take_hand(message["name"])
+        elif kind == "hand":
+            if self.hand is None:
+                raise MessageError("message", kind, "no arm is moved alone; choose one first")
+            self.hand.ask(np.array([float(x) for x in message["rates"]]))
+        elif kind == "go" and self.hand is not None:
+            self.hand.go(message["hold"])
+        elif kind == "steer" and self.hand is not None:
+            raise MessageError("message", kind, f"{self.hand.arm} is moved alone, and the body stands")
+        elif kind == "steer":
             self._steered = FASTEST * np.array([float(x) for x in message["rates"]])
             self._until, self._goal = self._now() + RATE_LASTS, -1
         elif kind == "go":
@@ -90,6 +112,17 @@ class WalkOperation(Operation):
             self.stopped = ""
             self.drive.walk.carry_on()
 
+    def tick(self) -> None:
+        """One tick of the walk, or all those of a motion of the hand that is moved alone.
+
+        Raises:
+            WbcError: as of :meth:`wbc.walking.modes.drive.Drive.tick`.
+        """
+        if self.hand is not None and (reason := self.hand.move()):
+            self._said = reason
+        self.steer()
+        self._seen(self.drive.tick())
+
     def steer(self) -> None:
         """Before a tick: the rates that hold now."""
         if self._goal >= 0:
@@ -98,6 +131,47 @@ class WalkOperation(Operation):
             self.drive.steer(0.0, 0.0, 0.0)
         else:
             self.drive.steer(*self._steered)
+
+    def _take_hand(self, name: str) -> None:
+        """This arm is moved alone from now on; "": none is."""
+        self._goal, self._steered, self._said = -1, np.zeros(3), ""
+        if self.hand is not None and self.hand.arm != name:
+            self.hand.leave()
+            self.hand = None
+        if name and self.hand is None:
+            try:
+                self.hand = OneHand(self.drive, name, self._seen, lambda: bool(self.stopped), self._now)
+            except WbcError as error:
+                self._said = str(error)
+                raise
+
+    def _seen(self, tick: Tick) -> None:
+        """After a tick: what a page is told of the walk, where it has changed."""
+        walk, arm = self.drive.walk, "" if self.hand is None else self.hand.arm
+        shown = (walk.swinging, walk.progress.step, walk.structure, arm, self._said, self.drive.reason, self.waiting)
+        if len(shown) != len(self._shown) or any(
+            one is not other for one, other in zip(shown, self._shown, strict=True)
+        ):
+            self._shown = shown
+            ways, reserved = [], set()
+            if (swinging := walk.swinging) is not None:
+                ways.append(_way(swinging.law.places))
+                if swinging.hold >= 0 and not swinging.dropped:
+                    reserved.add(walk.structure.ids[swinging.hold])
+            coming = walk.plan.laws[walk.progress.next :][:1] if swinging is None else ()
+            ways += [_way(law.places) for law in coming]
+            if walk.progress.step is not None:
+                reserved.add(walk.progress.step.target)
+            there = set(walk.structure.ids)
+            self.note = {
+                "arm": arm,
+                "reason": self._said or self.drive.reason,
+                "waiting": self.waiting,
+                "reserved": sorted(reserved),
+                "gone": [hold for hold in self._begins if hold not in there],
+                "ways": ways,
+            }
+        self._on_tick(tick)
 
     def _course(self) -> Array:
         """Straight for the hold that was clicked, until the body is over it."""
@@ -150,18 +224,25 @@ def climb(
     mode = DriveMode(DriveRequest(Site(structure), commands="page"), walker, _Nobody())
     plan, stack = mode.plan(), mode.compiled(backend)
     walk = mode.walk(plan, stack, None)
-    operation = WalkOperation(Drive(walk))
+    operation = WalkOperation(Drive(walk), on_tick=lambda _tick: shown())
     with show(stack.controller, operation=operation, scenery=scenery_of(walk), **options) as viewer:
         if announce is not None:
             announce(viewer)
-        for _ in ticks(viewer, walk.dt, seconds):
-            operation.steer()
-            try:
-                operation.drive.tick()
-            except WbcError as error:
-                operation.stop(str(error))
+        paced = ticks(viewer, walk.dt, seconds)
+
+        def shown() -> None:
+            """In the middle of a hand's motion as well: its page is told, and what it says is obeyed."""
             if walk.step is not None:
                 viewer.update(walk.step, walk.time)
+            if next(paced, END) is END:
+                operation.stop("the viewer has ended")
+
+        while viewer.running and (seconds is None or walk.time < seconds):
+            try:
+                operation.tick()
+            except WbcError as error:
+                operation.stop(str(error))
+                shown()
 
 
 class _Nobody:
@@ -185,8 +266,20 @@ def scenery_of(walk: Any) -> Scenery:
     studs = indexed(surroundings.stud_triangles(structure, rows), STUD)
     up = [float(x) for x in -pin.XYZQUATToSE3(walk.q[:7]).rotation[:, 2]]
     return Scenery(
-        tuple(surfaces), studs, tuple(structure.ids), np.array(structure.positions), (up[0], up[1], up[2]), "body"
+        tuple(surfaces),
+        studs,
+        tuple(structure.ids),
+        np.array(structure.positions),
+        (up[0], up[1], up[2]),
+        "body",
+        tuple(arm.name for arm in walk.walker.arms),
     )
+
+
+def _way(places: Array) -> list[list[float]]:
+    """Some points of a way."""
+    chosen = np.linspace(0, len(places) - 1, POINTS).round().astype(int)
+    return [[float(x) for x in place] for place in places[chosen]]
 
 
 def _flat(off: Array, axis: Array) -> Array:

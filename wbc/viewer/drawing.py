@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import coal
@@ -249,9 +249,27 @@ class Drawing:
                 node = f"/holds/of {item.frame}"
                 held.add(node)
                 self._mark(node, self._scenery.places[self._scenery.nearest(pose.translation)], AMBER)
-        for node in (n for n in self._nodes if n.startswith("/holds/of ")):
-            if bool(self._nodes[node].visible) != (node in held):
-                self._nodes[node].visible = node in held
+        self._only("/holds/of ", held)
+
+    def note(self, said: Mapping[str, Any]) -> None:
+        """Holds that hands go to and that are gone, and the ways of the hands that are lifted, now and next."""
+        assert self._scenery is not None
+        for kind, colour in (("reserved", BLUE), ("gone", RED)):
+            shown = set()
+            for hold in said.get(kind, ()):
+                shown.add(node := f"/holds/{kind} {hold}")
+                self._mark(node, self._scenery.places[self._scenery.holds.index(hold)], colour)
+            self._only(f"/holds/{kind} ", shown)
+        ways = [np.array(way) for way in said.get("ways", ())]
+        pieces = [np.stack([way[:-1], way[1:]], axis=1) for way in ways]
+        shades = [(PURPLE if k == 0 else GREY,) * len(piece) for k, piece in enumerate(pieces)]
+        self._lines("/lines/swings", np.concatenate(pieces) if pieces else [], list(itertools.chain(*shades)))
+
+    def _only(self, prefix: str, shown: set[str]) -> None:
+        """Of the nodes with a prefix these are seen."""
+        for node in (n for n in self._nodes if n.startswith(prefix)):
+            if bool(self._nodes[node].visible) != (node in shown):
+                self._nodes[node].visible = node in shown
 
     def _mark(self, node: str, place: Array, colour: Colour) -> None:
         if node not in self._nodes:

@@ -5,8 +5,10 @@ then counts it. The viewer copies the newest slot and keeps the copy only if the
 Messages of the viewer (:mod:`wbc.viewer.messages`) lie in a ring behind two counters, one that each side writes.
 
     words    0 states written   1 bytes of messages written   2 bytes of messages read   3 flags of the loop
-    numbers  4 the viewer's last sign of life   5 the loop's    [s of the machine's monotonic clock]
+             5 the loop's thread, as the kernel numbers it   6 notes begun and ended, odd while one is written
+    numbers  4 the viewer's last sign of life   [s of the machine's monotonic clock]
     ring     RING bytes of messages: a length of 4 bytes, then JSON
+    note     NOTE bytes: a length, then JSON: what the loop says of itself beside its ticks, seldom
     slots    SLOTS times: number of the state, its time [s], the number again, then the state
 
 All of it is anonymous memory of Linux (``memfd_create``), which goes when the last process that has it does.
@@ -17,13 +19,14 @@ from __future__ import annotations
 import mmap
 import os
 import struct
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-HEAD, RING, SLOTS = 64, 1 << 16, 4
+HEAD, RING, NOTE, SLOTS = 64, 1 << 16, 1 << 14, 4
 #: Words of the head, and of a slot's
-STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, LOOP_ALIVE = range(6)
+STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, THREAD, NOTES = range(7)
 SLOT_HEAD = 24
 #: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
 STOPPED, UNHEARD = 1, 2
@@ -45,7 +48,7 @@ class State(NamedTuple):
 
 def size_for(state: int) -> int:
     """Bytes of the memory for states of so many bytes."""
-    return HEAD + RING + SLOTS * (SLOT_HEAD + state)
+    return HEAD + RING + NOTE + SLOTS * (SLOT_HEAD + state)
 
 
 class _Shared:
@@ -56,13 +59,21 @@ class _Shared:
         self._words = self._bytes[:HEAD].cast("q")
         self._numbers = self._bytes[:HEAD].cast("d")
         self._ring = self._bytes[HEAD : HEAD + RING]
-        first, step = HEAD + RING, SLOT_HEAD + state
+        self._note = self._bytes[HEAD + RING : HEAD + RING + NOTE]
+        first, step = HEAD + RING + NOTE, SLOT_HEAD + state
         self._slots = [self._bytes[first + k * step : first + (k + 1) * step] for k in range(SLOTS)]
 
     def close(self) -> None:
         """Let the memory go; more calls do nothing."""
         if self.file >= 0:
-            views: list[memoryview[Any]] = [*self._slots, self._ring, self._numbers, self._words, self._bytes]
+            views: list[memoryview[Any]] = [
+                *self._slots,
+                self._note,
+                self._ring,
+                self._numbers,
+                self._words,
+                self._bytes,
+            ]
             for view in views:
                 view.release()
             self._map.close()
@@ -86,6 +97,8 @@ class LoopEnd(_Shared):
     def write(self, data: bytes, when: float) -> None:
         """The state of a tick."""
         number = self._count = self._count + 1
+        if number == 1:
+            self._words[THREAD] = threading.get_native_id()
         slot = self._slots[number % SLOTS]
         _STAMP.pack_into(slot, 0, number, when)
         slot[SLOT_HEAD:] = data
@@ -118,6 +131,16 @@ class LoopEnd(_Shared):
     def put_flags(self, flags: int) -> None:
         """What the viewer is to know of the loop."""
         self._words[FLAGS] = flags
+
+    def note(self, text: bytes) -> bool:
+        """Say something of the loop beside its ticks; False where it is too long and the last one stays."""
+        if len(text) > NOTE - _LENGTH.size:
+            return False
+        self._words[NOTES] += 1
+        _LENGTH.pack_into(self._note, 0, len(text))
+        self._note[_LENGTH.size : _LENGTH.size + len(text)] = text
+        self._words[NOTES] += 1
+        return True
 
 
 class ViewerEnd(_Shared):
@@ -157,3 +180,17 @@ class ViewerEnd(_Shared):
     def flags(self) -> int:
         """What the loop says of itself."""
         return int(self._words[FLAGS])
+
+    def noted(self, after: int) -> tuple[int, bytes] | None:
+        """(number, text) of the loop's note, None where it is number ``after`` or just being written."""
+        number = self._words[NOTES]
+        if number == after or number % 2:
+            return None
+        (length,) = _LENGTH.unpack_from(self._note)
+        text = bytes(self._note[_LENGTH.size : _LENGTH.size + min(length, NOTE)])
+        return (number, text) if self._words[NOTES] == number else None
+
+    @property
+    def thread(self) -> int:
+        """The loop's thread as the kernel numbers it, 0 before its first state."""
+        return int(self._words[THREAD])

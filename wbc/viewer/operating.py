@@ -116,6 +116,7 @@ def operate(
     robot: str,
     seconds: float | None = None,
     *,
+    start: Any = None,
     backend: str = "auto",
     announce: Callable[[Viewer], None] | None = None,
     **options: Any,
@@ -124,13 +125,16 @@ def operate(
 
     Args:
         robot: as of :class:`wbc.teleop.Teleoperation`. options: as of :func:`wbc.viewer.show`.
+        start: configuration to begin at; default: the session's own.
 
     Raises:
+        ShapeError, NotFiniteError: ``start`` is none.
         UnknownNameError, MissingPartError: no such robot, or it has no pairs. What :func:`wbc.viewer.show` raises.
     """
     session = Teleoperation(robot, backend=backend, fastest=FASTEST)
     control, pairing = session.control, pairing_of(session)
-    operation, q = PairOperation(session, pairing), session.start()
+    operation = PairOperation(session, pairing)
+    q = session.start() if start is None else session.robot.configuration("start", start)
     session.reset(q)
     connection = Connection(None, session.robot, control.dt)
     with show(control.controller, operation=operation, pairing=pairing, **options) as viewer, connection:

@@ -37,12 +37,14 @@ class Operation:
 
     Attributes:
         stopped: the reason, or "" where the loop is not stopped. operated: somebody has control.
+        note: what a page is told beside the ticks; another object where it has changed.
     """
 
     def __init__(self, controller: Controller) -> None:
         self._core = core_of(controller)
         self._command = self._core.layout.command
         self.stopped, self.operated, self.waiting = "", False, ""
+        self.note: dict[str, Any] = {}
         #: value of each task before a stop: (handle, name, value)
         self._kept: list[tuple[Handle, str, Any]] = []
         self._goals: dict[str, pin.SE3] = {}

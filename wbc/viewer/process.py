@@ -15,19 +15,17 @@ import sys
 import threading
 
 from wbc.controller import Stack
+from wbc.viewer.aside import CoreLeft, step_aside
 from wbc.viewer.link import ViewerEnd
 from wbc.viewer.session import Session
 from wbc.viewer.zeromq import ZeroMqEnd
-
-#: Below the loop where cores are few
-NICE = 5
 
 
 def main() -> None:
     """Serve until the standard input ends."""
     # Ctrl-C is for the loop, whose end ends this
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(NICE)
+    step_aside()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     try:
@@ -36,7 +34,7 @@ def main() -> None:
         controller = stack.compile(solver=order["solver"], backend=order["backend"])
         link = ViewerEnd(order["file"], order["state"])
         given = {name: order[name] for name in ("host", "port", "token", "silence", "scenery", "pairing")}
-        session = Session(controller, link, **given)
+        session = Session(controller, link, core=CoreLeft(os.getppid()), **given)
     except Exception as error:
         _say(answers, problem=f"{type(error).__name__}: {error}")
         raise

@@ -21,7 +21,7 @@ class Scenery(NamedTuple):
 
     Attributes:
         surfaces: what is only seen. studs: what holds look like, all in one. holds: their ids. places: [n x 3] m.
-        up: direction that is up for whoever looks [3]. body: frame that cameras begin at.
+        up: direction that is up for whoever looks [3]. body: frame that cameras begin at. arms: names.
     """
 
     surfaces: tuple[Mesh, ...]
@@ -30,6 +30,7 @@ class Scenery(NamedTuple):
     places: Array
     up: tuple[float, float, float]
     body: str
+    arms: tuple[str, ...]
 
     def hit(self, origin: Array, direction: Array) -> str | None:
         """The first hold that a ray passes near to, None where it passes none."""
@@ -49,17 +50,19 @@ class Scenery(NamedTuple):
         return int(np.linalg.norm(self.places - place, axis=1).argmin())
 
 
-def checked(message: Mapping[str, Any], holds: tuple[str, ...]) -> None:
+def checked(message: Mapping[str, Any], holds: tuple[str, ...], arms: tuple[str, ...]) -> None:
     """Refuse what a walk does not obey.
 
     Raises:
         WbcError: which field does not fit.
     """
     kind = message["type"]
-    if kind == "steer":
-        rates = validation.real_array("steer.rates", message["rates"], (3,))
+    if kind in ("steer", "hand"):
+        rates = validation.real_array(f"{kind}.rates", message["rates"], (3 if kind == "steer" else 4,))
         if np.abs(rates).max() > 1.0 + 1e-9:
-            raise MessageError("steer.rates", message["rates"], "expected parts of full speed, -1 to 1")
+            raise MessageError(f"{kind}.rates", message["rates"], "expected parts of full speed, -1 to 1")
+    elif kind == "arm":
+        validation.one_of("arm.name", message["name"], ("", *arms))
     elif kind == "go":
         validation.one_of("go.hold", message["hold"], holds)
     elif kind == "ask":

@@ -43,7 +43,6 @@ class Client:
     def __init__(self, name: str, connection: ServerConnection) -> None:
         self.name, self.connection = name, connection
         self.heard = time.monotonic()
-        self._latest: str | None = None
         self._queue: list[str] = []
         self._wake = asyncio.Event()
 
@@ -52,22 +51,19 @@ class Client:
         self._queue.append(messages.write(message))
         self._wake.set()
 
-    def show(self, text: str) -> None:
-        """A state; one that was not sent before the next is left out, so that a slow client is late and not behind."""
-        self._latest = text
-        self._wake.set()
+    @property
+    def free(self) -> bool:
+        """What was sent to it is on its way, so that another state would not be behind others."""
+        return not self._queue and not self.connection.transport.get_write_buffer_size()
 
     async def send(self) -> None:
-        """Send until the connection ends."""
+        """Send what must arrive until the connection ends."""
         while True:
             await self._wake.wait()
             self._wake.clear()
             queue, self._queue = self._queue, []
             for text in queue:
                 await self.connection.send(text)
-            latest, self._latest = self._latest, None
-            if latest is not None:
-                await self.connection.send(latest)
 
 
 class PageServer:
@@ -132,9 +128,9 @@ class PageServer:
             self._loop.call_soon_threadsafe(self._tell_all, message)
 
     @property
-    def watched(self) -> bool:
-        """Somebody is connected."""
-        return bool(self._clients)
+    def watchers(self) -> int:
+        """How many are connected."""
+        return len(self._clients)
 
     def answers(self) -> bool:
         """The thread that serves pages does something within a tenth of a second."""
@@ -253,8 +249,10 @@ class PageServer:
                 self._operator_lost()
 
     def _show(self, text: str) -> None:
-        for client in self._clients.values():
-            client.show(text)
+        """One frame for all who are free; a slow client misses states, and is late but not behind."""
+        from websockets.asyncio.server import broadcast
+
+        broadcast([client.connection for client in self._clients.values() if client.free], text)
 
     def _tell_all(self, message: dict[str, Any]) -> None:
         for client in self._clients.values():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import sys
 import threading
 import time
@@ -18,6 +20,7 @@ from wbc.errors import WbcError
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
 from wbc.viewer import messages
+from wbc.viewer.aside import CoreLeft
 from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
@@ -32,11 +35,16 @@ from wbc.viewer.timeline import Timeline
 
 #: States that are drawn and told a second, and explanations, at most
 RATE, EXPLAINED = 40.0, 25.0
+#: More pages than this share what they cost together, as viser writes the scene for each of them anew; none has
+#: fewer states a second than the other
+SHARED, SLOWEST = 3, 20.0
 #: What a page can ask to be drawn
 SELF_MOTION = "self-motion"
 DRAWN = (*DEMANDED, SELF_MOTION)
 #: Between two signs of life for the loop [s]
 BEAT = 0.05
+#: Signs of life between two looks where the loop runs
+LOOKS = 10
 
 
 class Explainer(threading.Thread):
@@ -84,7 +92,7 @@ class Session:
 
     Args:
         controller: compiled from the same stack as the loop's; only its names, layout and code are used.
-        link: to the loop; None: ``states`` of a recording.
+        link: to the loop; None: ``states`` of a recording. core: of the loop, which is left to it.
     """
 
     def __init__(
@@ -99,7 +107,9 @@ class Session:
         silence: float = SILENT,
         scenery: Scenery | None = None,
         pairing: Pairing | None = None,
+        core: CoreLeft | None = None,
     ) -> None:
+        self._core = core
         self._scenery, self._pairing = scenery, pairing
         self._pairs = None if pairing is None else PairWatch(controller.stack.robot, pairing)
         self._controller, self._link = controller, link
@@ -109,9 +119,14 @@ class Session:
         self.timeline = Timeline(states)
         self.ended = threading.Event()
         self._stopped, self._drawn = "", False
+        #: what the loop said beside its ticks last, and its number
+        self._note: dict[str, Any] = {}
+        self._noted = 0
         #: configurations that are shown in place of the robot's own
         self._preview: list[Array] = []
         told_first = declared(controller) | {"live": link is not None, "silence": silence, "walk": scenery is not None}
+        if scenery is not None:
+            told_first["arms"] = scenery.arms
         if pairing is not None:
             told_first |= pairing.declared()
         self.server = PageServer(host, port, token, told_first, self._obey, silence)
@@ -152,7 +167,8 @@ class Session:
             if current is not None and fresh:
                 shown, quiet = current.data, now
                 self._show(current, sentence_rate)
-            time.sleep(max(0.002, 1.0 / RATE - (time.monotonic() - now)))
+            rate = max(SLOWEST, RATE * min(1.0, SHARED / max(self.server.watchers, 1)))
+            time.sleep(max(0.002, 1.0 / rate - (time.monotonic() - now)))
         self._explainer.end()
         self.server.tell_all({"type": "ended", "reason": "The loop has ended."})
         time.sleep(0.2)
@@ -171,16 +187,20 @@ class Session:
         if self._tick is None:
             look(self.server.server, self._controller, tick, self._scenery)
         self._tick = tick
-        if not self.server.watched and self._drawn:
+        if not self.server.watchers and self._drawn:
             # Who comes later is told where everything is by the next tick
             return
         self._drawn = True
+        if self._link is not None and (said := self._link.noted(self._noted)) is not None:
+            self._noted, self._note = said[0], json.loads(said[1])
         with self.server.server.atomic():
             self._drawing.show(self._shown(tick))
+            if self._note:
+                self._drawing.note(self._note)
         self._drawing.follow(self.server.server, tick)
         # Not in a window of up to a sixtieth of a second
         self.server.server.flush()
-        if not self.server.watched:
+        if not self.server.watchers:
             return
         self._explainer.ask(tick)
         stopped = ""
@@ -198,13 +218,20 @@ class Session:
         }
         if self._pairs is not None:
             extra |= self._pairs.told(tick)
+        if self._note:
+            # The way of a hand is drawn; nobody reads its numbers
+            extra["walk"] = {name: value for name, value in self._note.items() if name != "ways"}
         self.server.publish(told(self._controller, tick) | extra)
 
     def _beat(self) -> None:
         """Say that messages are passed on: the server's own thread has to answer in between."""
-        while not self.ended.is_set():
+        for number in itertools.count():
+            if self.ended.is_set():
+                return
             if self._link is not None and self.server.answers():
                 self._link.live()
+            if self._link is not None and self._core is not None and number % LOOKS == 0 and self._link.thread:
+                self._core.look(self._link.thread)
             time.sleep(BEAT)
 
     # From pages
@@ -256,7 +283,7 @@ class Session:
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
         if self._scenery is not None:
-            checked(message, self._scenery.holds)
+            checked(message, self._scenery.holds, self._scenery.arms)
         elif self._pairing is not None:
             self._pairing.checked(message)
         else:

@@ -38,7 +38,7 @@ class SymbolicJacobian:
     """Rows of a Jacobian as polynomials.
 
     Attributes:
-        ring: where the entries live. matrix: [rows][dof]. names: of the rows. axes: frame in whose axes each
+        ring: where the entries live. matrix: rows x dof. names: of the rows. axes: frame in whose axes each
             declaration is expressed, "-" for joint rates.
     """
 

@@ -28,7 +28,7 @@ def advise(
             help="A name of `wbc modes` or `wbc robots`, or a URDF or MJCF file.", autocompletion=completion.robots
         ),
     ],
-    at: Annotated[str, typer.Option(help="Joint coordinates with commas [rad, m]. Default: neutral.")] = "",
+    at: Annotated[str, typer.Option(help="Joint coordinates with commas, in rad and m. Default: neutral.")] = "",
     mode: Annotated[str, typer.Option(help=f"Pairs of this mode: {', '.join(SHORT_NAMES)}.")] = "M1",
     current: Annotated[str | None, typer.Option(help="The pair in use: stay where none is much better.")] = None,
     restrictions: Annotated[bool, typer.Option("--restrictions", help="Only the written restrictions.")] = False,

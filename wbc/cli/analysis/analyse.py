@@ -31,9 +31,10 @@ from wbc.analysis.algebra.locus import Located
 from wbc.analysis.loci.child import Child
 from wbc.analysis.loci.pictures import save_pictures
 from wbc.analysis.published import ROBOTS
+from wbc.cli import results
 from wbc.cli.analysis.certificates import Subdivision, certified, record, show_certificate, winner
 from wbc.cli.analysis.trees import analyse_tree
-from wbc.cli.console import out
+from wbc.cli.console import out, print_json
 from wbc.cli.options import RobotName
 from wbc.cli.planning import tip_frame
 from wbc.coordinates import TREES
@@ -87,7 +88,10 @@ Resume = Annotated[
 ]
 Plot = Annotated[Path | None, typer.Option("--plot", help="Folder for pictures of the loci.", rich_help_panel=_OUTPUT)]
 Latex = Annotated[bool, typer.Option("--latex", help="Formulas as LaTeX.", rich_help_panel=_OUTPUT)]
-Json = Annotated[Path | None, typer.Option("--json", help="File for the results as data.", rich_help_panel=_OUTPUT)]
+Data = Annotated[Path | None, typer.Option("--data", help="JSON file for the results.", rich_help_panel=_OUTPUT)]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print the results as JSON, and nothing else.", rich_help_panel=_OUTPUT)
+]
 
 
 def analyse_(
@@ -107,7 +111,8 @@ def analyse_(
     resume: Resume = None,
     plot: Plot = None,
     latex: Latex = False,
-    json_: Json = None,
+    data: Data = None,
+    as_json: AsJson = False,
 ) -> None:
     """Say where task and constraint coordinates lose rank, and whether they always suffice.
 
@@ -115,6 +120,8 @@ def analyse_(
     blocks. --lock, --point and --plane make a set for any robot.
     """
     validation.one_of("algorithm", algorithm, ALGORITHMS)
+    if as_json:
+        results.collect()
     robot = _meant(robot, tree, full, bool(lock or point or plane))
     how = Subdivision(resume) if certify or full or screen is not None else None
     own = _own(lock, point, plane)
@@ -124,7 +131,7 @@ def analyse_(
         refused = {"approximate": approximate, "full": full, "screen": screen}
         pictures = None if plot is None else functools.partial(_pictures, plot)
         found_sets = analyse_tree(robot, chosen or (), algorithm, latex, refused, pictures, how, minutes)
-        _write(json_, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
+        _write(data, as_json, {"robot": robot, "algorithm": algorithm, "sets": found_sets})
         return
     task: tuple[Rows, ...]
     if own or frame is not None or robot not in ROBOTS:
@@ -158,7 +165,7 @@ def analyse_(
         records.append(entry)
         if plot is not None:
             _pictures(plot, model, found, f"{robot} {name}")
-    _write(json_, {"robot": robot, "algorithm": algorithm, "sets": records})
+    _write(data, as_json, {"robot": robot, "algorithm": algorithm, "sets": records})
 
 
 def _one_set(
@@ -273,10 +280,14 @@ def _record(name: str, found: Analysis) -> dict[str, Any]:
     }
 
 
-def _write(path: Path | None, data: dict[str, Any]) -> None:
+def _write(path: Path | None, as_json: bool, data: dict[str, Any]) -> None:
+    if as_json:
+        # Lines and tables say the same
+        results.taken()
+        print_json(data)
     if path is None:
         return
     try:
         path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
-        raise RobotFileError("json", str(path), f"cannot be written: {error.strerror}") from error
+        raise RobotFileError("data", str(path), f"cannot be written: {error.strerror}") from error

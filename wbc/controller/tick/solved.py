@@ -88,14 +88,6 @@ class SolvedTick(Buffers):
         wide = qp.with_slacks().definite()
         flag, x, answer = self.answer(wide)
         v, levels = self.below(qp, x[: self._nv], answer)
-        slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
-        if self.levels is not None:
-            slack = self.levels.with_soft(qp, v, slack)
-        slack = self._soft.reported(qp, v, self.assembly.row_bounds(), slack) if answer is not None else slack
-        slack = self.lacking(qp, v) if answer is None else slack
-        slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
-        if flag == RELAXED and not slack[self._hard].any():
-            flag = SOLVED  # the rows contradict each other by rounding only
         memory, report = self._memory, self.report
         certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
@@ -115,6 +107,15 @@ class SolvedTick(Buffers):
                 multipliers = levels.multipliers
                 bounded = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
                 certificate = Levels.certified(levels, float(bounded.violation(v).max(initial=0.0)))
+        slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
+        if self.levels is not None:
+            slack = self.levels.with_soft(qp, v, slack)
+        slack = self._soft.reported(qp, v, self.assembly.row_bounds(), slack) if answer is not None else slack
+        slack = self.lacking(qp, v) if answer is None else slack
+        slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
+        if flag == RELAXED and not slack[self._hard].any():
+            flag = SOLVED  # the rows contradict each other by rounding only
+        certificate = replace(certificate, violation=max(certificate.violation, self._broken(qp, v, answer)))
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[memory[name]] = min(getattr(certificate, name), INFINITE)
         report[memory["v"]] = v
@@ -126,8 +127,21 @@ class SolvedTick(Buffers):
         self.assembly.look_ahead()
         self.assembly.commanded(v, answer is not None and self._sound(certificate))
         if answer is None:
-            return BRAKED + UNSOUND if self.assembly.usable else BRAKED
+            return BRAKED + UNSOUND if self.assembly.usable and not self._proven(wide) else BRAKED
         return flag if self._sound(certificate) else flag + UNSOUND
+
+    def _broken(self, qp: QP, v: Array, answer: Relaxed | None) -> float:
+        """By how much an answer breaks rows that never give way, by their own sides whatever it made of them."""
+        firm = self._hard & (self._orders == 0)
+        return 0.0 if answer is None else float(qp.violation(v)[qp.n :][firm].max(initial=0.0))
+
+    def _proven(self, qp: QP) -> bool:
+        """Whether it is proven that rows which never give way contradict each other within the simple bounds."""
+        firm = self._hard & (self._orders == 0)
+        if not firm.any():
+            return False
+        crossed = self._uncrossed(qp)[1][firm].any()
+        return bool(crossed) or self._relaxation.impossible(qp, firm, self._units, self._dof_scales)
 
     def _sound(self, certificate: Certificate) -> bool:
         """Whether a certificate holds, as ``unsound`` in ``native/tick.c`` decides it."""

@@ -37,7 +37,7 @@ class DHRow:
         name: of the joint; default ``joint1``, ``joint2``, ...
 
     Raises:
-        UnknownNameError, NotFiniteError, RangeError, BoundsError.
+        UnknownNameError, NotFiniteError, RangeError, BoundsError: numbers that make no row.
     """
 
     a: float = 0.0

@@ -35,6 +35,18 @@ INLINE double looseness(const wbc_tick *t, int k) {
 #endif
 }
 
+/* r = (M M')^-1 r for the first `count` active rows, from DAQP's factors L D L' */
+static void solve_factors(const double *L, const double *D, int count, double *r) {
+    for (int a = 0, at = 0; a < count; a++) {
+        for (int b = 0; b < a; b++) r[a] -= L[at++] * r[b];
+        at++;
+    }
+    for (int a = count - 1; a >= 0; a--) {
+        r[a] /= D[a];
+        for (int b = a + 1; b < count; b++) r[a] -= L[b * (b + 1) / 2 + a] * r[b];
+    }
+}
+
 /* Put a row into the working set unless it depends on those that are in it; 1 if it went in */
 static int activate(DAQPWorkspace *work, int i, int lower) {
     const int kind = work->sense[i] & (IMMUTABLE | SOFT);
@@ -97,6 +109,46 @@ static int below(const wbc_tick *t, int i) {
 #endif
 }
 
+/* x onto its active rows, of a relaxation whose rows are as `class_rows` makes them: multipliers of slack at a price of
+ * 1 / RHO are so large that what they leave of hard rows is seen, in N m, where those nearly depend on each other. Corrections
+ * with the factors at hand, of residuals in wide arithmetic, leave rounding of x. */
+static void meet_active(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    double mu[ACTIVE_MAX];
+    for (int round = 0; round < MEETINGS && work->n_active > 0; round++) {
+        for (int a = 0; a < work->n_active; a++) {
+            const int i = work->WS[a], k = i - NV;
+            wide gap = t->sense[i] & LOWER ? -(wide)t->low[i] : -(wide)t->high[i];
+            if (k < 0) gap += t->x[i];
+            for (int e = k < 0 ? 0 : a_start[k]; k >= 0 && e < a_end[k]; e++) gap += (wide)t->at[e] * t->x[a_col[e]];
+            mu[a] = (double)gap * t->scaling[i] / (k < 0 ? 1.0 : row_scale[k]);
+            if (t->sense[i] & SOFT) mu[a] -= t->settings.rho_soft * t->scaling[i] * work->lam_star[a];
+        }
+        solve_factors(t->L, t->D, work->n_active, mu);
+        for (int a = 0; a < work->n_active; a++) {
+            const int i = work->WS[a], k = i - NV;
+            work->lam_star[a] += mu[a] * t->scaling[i];
+            if (k < 0) t->x[i] -= mu[a] * dof_scale[i];
+            for (int e = k < 0 ? 0 : a_start[k]; k >= 0 && e < a_end[k]; e++)
+                t->x[a_col[e]] -= mu[a] * t->scaling[i] / row_scale[k] * t->at[e] * dof_scale[a_col[e]] * dof_scale[a_col[e]];
+        }
+    }
+}
+
+/* Whether x keeps what never gives way, bounds and rows of class 0, if that is below `checked`, but for rounding */
+static int firm_rows_hold(const wbc_tick *t, int checked) {
+    for (int i = 0; i < NV; i++) {
+        const double tolerance = FIRMLY * dof_scale[i];
+        if (!(t->x[i] >= t->low[i] - tolerance && t->x[i] <= t->high[i] + tolerance)) return 0;
+    }
+    for (int k = 0; k < MC; k++) {
+        if (row_order[k] != 0 || checked == 0) continue;
+        const double value = row_at(t, k, t->x), tolerance = FIRMLY * row_scale[k];
+        if (!(value >= t->low[NV + k] - tolerance && value <= t->high[NV + k] + tolerance)) return 0;
+    }
+    return 1;
+}
+
 /* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
  * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
  * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
@@ -123,6 +175,10 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     if (flag < 0) return flag;
     ldp2qp_solution(work);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
+    if (base) {
+        meet_active(t);
+        if (!firm_rows_hold(t, checked)) return EXIT_CYCLE;
+    }
     /* Rows that the solver did not look at: dependent equalities and rows that v cannot move. Of those that it did
      * look at, ones that v can hardly move may still be far off in their own units; a relaxation has seen to them. */
     for (int k = 0; k < MC; k++) {
@@ -195,6 +251,7 @@ static int from_last(wbc_tick *t, double angle) {
 static int constrained(wbc_tick *t, double angle) {
     if (!t->factored) {
         invert(t);
+        pack(t);
         image(t);
         for (int i = 0; i < WIDE; i++) t->ldp_v[i] = -t->y[i];
         t->factored = 1;

@@ -5,25 +5,52 @@
 #include "reach.h"
 #include "sensed.h"
 
-/* H += J' diag(w) J, g -= J' diag(w) desired, for `count` rows that share the `cols` columns listed from `first` */
+/* H += J' diag(w) J, g -= J' diag(w) desired, for `count` rows that share the `cols` columns listed from `first`. The rows
+ * are spread to the groups of 8 columns that they have entries in; left of the diagonal numbers are added too. */
 INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
     const int *col = j_col + first;
     const double *J = t->jt + first;
-    for (int a = 0; a < cols; a++) {
-        double f[count], line[WIDE], rhs = 0.0;
-        for (int r = 0; r < count; r++) {
-            f[r] = t->weight[row + r] * t->report.factor[row + r] * J[r * cols + a];
-            rhs += f[r] * t->desired[row + r];
-        }
-        t->g[col[a]] -= rhs;
-        for (int b = a & ~7; b < cols; b++) {
-            double sum = 0.0;
-            for (int r = 0; r < count; r++) sum += f[r] * J[r * cols + b];
-            line[b] = sum;
-        }
-        double *out = t->H + col[a] * WIDE;
-        for (int b = a; b < cols; b++) out[col[b]] += line[b];
+    double spread[count * WIDE], weighted[count * cols], pull[cols];
+    int group[WIDE / 8], groups = 0, place[cols];
+    for (int c = 0; c < cols; c++) {
+        if (groups == 0 || group[groups - 1] != col[c] / 8) group[groups++] = col[c] / 8;
+        place[c] = 8 * groups - 8 + col[c] % 8;
+        pull[c] = 0.0;
     }
+    for (int r = 0; r < count; r++) {
+        const double weight = t->weight[row + r] * t->report.factor[row + r];
+        double *out = spread + r * WIDE;
+        for (int b = 0; b < 8 * groups; b++) out[b] = 0.0;
+        for (int c = 0; c < cols; c++) out[place[c]] = J[r * cols + c];
+        for (int c = 0; c < cols; c++) weighted[r * cols + c] = weight * J[r * cols + c];
+        for (int c = 0; c < cols; c++) pull[c] += weighted[r * cols + c] * t->desired[row + r];
+    }
+    for (int a = 0; a < cols; a++) {
+        double *out = t->H + col[a] * WIDE;
+        t->g[col[a]] -= pull[a];
+        for (int b = place[a] / 8; b < groups; b++) {
+            four p = {0}, q = {0};
+            for (int r = 0; r < count; r++) {
+                const four each = EACH(weighted[r * cols + a]);
+                p = MADD(each, GIVEN_FOUR(spread + r * WIDE + 8 * b), p);
+                q = MADD(each, GIVEN_FOUR(spread + r * WIDE + 8 * b + 4), q);
+            }
+            FOUR(out + 8 * group[b]) += p;
+            FOUR(out + 8 * group[b] + 4) += q;
+        }
+    }
+}
+
+/* The upper triangle of H is given, with zeros left of the diagonal in its group of 8 */
+static void empty_hessian(wbc_tick *t) {
+    const four zero = {0};
+    for (int i = 0; i < NV; i++)
+        for (int at = i & ~7; at < WIDE; at += 4) FOUR(t->H + i * WIDE + at) = zero;
+}
+
+static void only_upper(wbc_tick *t) {
+    for (int i = 0; i < NV; i++)
+        for (int j = i & ~7; j < i; j++) t->H[i * WIDE + j] = 0.0;
 }
 
 /* The same for rows with one non-zero each */
@@ -80,17 +107,22 @@ static void form_bounds(wbc_tick *t) {
 /* `screen`: without rows that no velocity within the bounds could violate */
 static void assemble(wbc_tick *t, int screen) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[13] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
-                       t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor, t->segment, t->screw};
+    double *res[14] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
+                       t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor,
+#if NNZK > 0
+                       t->handed,
+#endif
+                       t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);
-    memset(t->H, 0, sizeof t->H);
+    empty_hessian(t);
     memset(t->g, 0, sizeof t->g);
     /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
     t->unusable = 0.0;
     if (!(all_finite(t->jt, NNZJ) && all_finite(t->desired, MT) && all_finite(t->report.factor, MT)))
         t->unusable = !usable_tasks(t);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = damping[i];
-    BLOCKS
+    BLOCKS(block, diagonal)
+    only_upper(t);
     form_bounds(t);
 #if BALLS > 0
     ball_rows(t, screen);

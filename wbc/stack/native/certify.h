@@ -20,39 +20,62 @@ static double quick_bound(wbc_tick *t, const double *size) {
     return sqrt(dot(size, size, 0)) / floor;
 }
 
-/* |v_i - v*_i| <= |row i of R^-1| (| |R^-T| size | + the part of the active rows) */
+/* |v_i - v*_i| <= |row i of R^-1| (| |R^-T| size | + the part of the active rows); without active rows, which turn what is
+ * between the two, |R^-1| |R^-T| size entry by entry */
 static double sharp_bound(wbc_tick *t, const double *size) {
-    double longest = 0.0, image_of_size[WIDE] = {0};
+    double longest = 0.0, worst = 0.0, image_of_size[WIDE] = {0};
     if (!t->factored) invert(t);
-    for (int i = 0; i < NV; i++) {
-        const double *row = t->inverse + i * WIDE;
-        for (int b = i / 8; b < WIDE / 8; b++)
-            for (int k = 0; k < 8; k++) image_of_size[8 * b + k] += fabs(row[8 * b + k]) * size[i];
-        if (i < DOFS && 1.0 / t->scaling[i] > longest) longest = 1.0 / t->scaling[i];
+    for (int i = 0; i < NV; i += 4)
+        for (int at = i & ~7; at < WIDE; at += 4) {
+            four sum = GIVEN_FOUR(image_of_size + at);
+            for (int r = i; r < TALL && r < i + 4; r++) sum += SIZE_OF_FOUR(GIVEN_FOUR(t->inverse + r * WIDE + at)) * EACH(size[r]);
+            FOUR(image_of_size + at) = sum;
+        }
+    if (t->daqp.n_active > 0) {
+        for (int i = 0; i < DOFS; i++) longest = larger(1.0 / t->scaling[i], longest);
+        return longest * (sqrt(dot(image_of_size, image_of_size, 0)) + active_residual(t));
     }
-    return longest * (sqrt(dot(image_of_size, image_of_size, 0)) + active_residual(t));
+    for (int i = 0; i < DOFS; i++) {
+        four sum = {0};
+        for (int at = i & ~7; at < WIDE; at += 4) sum += SIZE_OF_FOUR(GIVEN_FOUR(t->inverse + i * WIDE + at)) * GIVEN_FOUR(image_of_size + at);
+        worst = larger(sum_of_four(sum), worst);
+    }
+    return worst;
 }
 
-/* residual = H v + g, and the size of the terms that were added up */
+/* Roundings that a term of H v + g and of forces on it goes through in `gradient` and `add_forces` at most: its product, those of
+ * four rows, of the groups of four rows or columns, and what comes after */
+#define SUMMED(t) ((NV < WIDE / 4 + 8 ? NV : WIDE / 4 + 8) + (t)->daqp.n_active + 4)
+
+/* residual = H v + g, and the size of the terms that were added up; four rows at a time */
 static void gradient(const wbc_tick *t, const double *v, double *residual, double *size) {
     for (int i = 0; i < WIDE; i++) {
         residual[i] = t->g[i];
         size[i] = fabs(t->g[i]);
     }
-    for (int i = 0; i < NV; i++) {
-        const double *row = t->H + i * WIDE;
-        const four own = EACH(v[i]);
-        four part = {0}, bulk = {0};
-        for (int at = i & ~3; at < WIDE; at += 4) {
-            const four h = GIVEN_FOUR(row + at), up = h * GIVEN_FOUR(v + at), down = h * own;
-            part += up;
-            bulk += SIZE_OF_FOUR(up);
+    for (int i = 0; i < NV; i += 4) {
+        const int count = NV - i < 4 ? NV - i : 4;
+        four part[4] = {{0}}, bulk[4] = {{0}};
+        for (int at = i; at < WIDE; at += 4) {
+            const four here = GIVEN_FOUR(v + at);
+            four down = {0}, heap = {0};
+            for (int r = 0; r < count; r++) {
+                four h = GIVEN_FOUR(t->H + (i + r) * WIDE + at);
+                const four up = h * here;
+                part[r] += up;
+                bulk[r] += SIZE_OF_FOUR(up);
+                if (at == i) h[r] = 0.0;
+                const four push = h * EACH(v[i + r]);
+                down += push;
+                heap += SIZE_OF_FOUR(push);
+            }
             FOUR(residual + at) += down;
-            FOUR(size + at) += SIZE_OF_FOUR(down);
+            FOUR(size + at) += heap;
         }
-        /* the diagonal went in twice */
-        residual[i] += ((part[0] + part[2]) + (part[1] + part[3])) - row[i] * v[i];
-        size[i] += (bulk[0] + bulk[2]) + (bulk[1] + bulk[3]);
+        for (int r = 0; r < count; r++) {
+            residual[i + r] += sum_of_four(part[r]);
+            size[i + r] += sum_of_four(bulk[r]);
+        }
     }
 }
 
@@ -83,7 +106,7 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
     for (int a = 0; a < work->n_active; a++) {
         const int i = work->WS[a];
         if (i >= NV) continue;
-        const double lambda = -residual[i], rounding = (NV + work->n_active + 4) * EPS * size[i];
+        const double lambda = -residual[i], rounding = SUMMED(t) * EPS * size[i];
         if (t->low[i] != t->high[i] && (t->sense[i] & LOWER ? -lambda : lambda) <= rounding) continue;
         out->lambda[i] = lambda;
         residual[i] = size[i] = 0.0;
@@ -102,7 +125,7 @@ static void examine(wbc_tick *t) {
         if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
         if (SOFTENED(t, k) && (HELD(t, k) || t->sense[NV + k] & ACTIVE)) continue;
         const double value = row_at(t, k, v);
-        const double below = t->low[NV + k] - value, above = value - t->high[NV + k];
+        const double below = lower_side(t, k) - value, above = value - upper_side(t, k);
         if (below > out->violation) out->violation = below;
         if (above > out->violation) out->violation = above;
     }
@@ -110,7 +133,7 @@ static void examine(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         if (fabs(residual[i]) > out->stationarity) out->stationarity = fabs(residual[i]);
         /* residual of the exact sum: what was computed plus the rounding of its terms */
-        size[i] = fabs(residual[i]) + (NV + t->daqp.n_active + 4) * EPS * size[i];
+        size[i] = fabs(residual[i]) + SUMMED(t) * EPS * size[i];
     }
     out->error_bound = t->factored || t->curved ? WBC_INF : quick_bound(t, size);
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
@@ -138,6 +161,9 @@ static void examine_closely(wbc_tick *t) {
     if (t->report.error_bound > GOOD_BOUND) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
 }
 
+/* No refinement is worth its while */
+static int good(const wbc_report *out) { return out->error_bound <= GOOD_BOUND && out->violation <= GOOD_VIOLATION; }
+
 static void tidy(wbc_report *out) {
     replace_nan(out->error, MT, HUGE_VAL);
     replace_nan(out->factor, MT, 0.0);
@@ -154,14 +180,14 @@ EXPORT void wbc_tick_certify(wbc_tick *t) {
         return;
     }
     examine_closely(t);
-    for (int step = 0; step < REFINEMENTS && out->error_bound > GOOD_BOUND && (t->factored || t->alone); step++) {
-        const double bound = out->error_bound;
+    for (int step = 0; step < REFINEMENTS && !good(out) && (t->factored || t->alone); step++) {
+        const double bound = out->error_bound, missed = out->violation;
         double v[NV], multipliers[ACTIVE_MAX];
         memcpy(v, out->v, sizeof v);
         memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
         refine(t);
         examine_closely(t);
-        if (!(out->error_bound < bound)) {
+        if (!(out->error_bound < bound || (out->error_bound <= GOOD_BOUND && out->violation < missed))) {
             memcpy(out->v, v, sizeof v);
             memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
             examine_closely(t);

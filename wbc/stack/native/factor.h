@@ -80,7 +80,7 @@ static void right_side(wbc_tick *t) {
 }
 
 /* Matrices are worked on in blocks of four rows and eight columns, which stay in registers, in loops that are short as
- * code: unrolled they would not fit into the cache of instructions.
+ * code: unrolled they would not fit into the cache of instructions. Rows from NV to TALL are zeros.
  *
  * Four rows of R, columns from `at` on, without what the first `count` rows have of them */
 INLINE void reduce_rows(wbc_tick *t, int k, int count, int at) {
@@ -100,104 +100,98 @@ INLINE void reduce_rows(wbc_tick *t, int k, int count, int at) {
     FOUR(r2) = p2, FOUR(r2 + 4) = q2, FOUR(r3) = p3, FOUR(r3 + 4) = q3;
 }
 
-/* out[0..7] += f[0] rows[0..7] + f[1] rows[WIDE .. WIDE + 7] + ..., `count` of them */
-INLINE void add_rows(double *out, const double *f, const double *rows, int count) {
-    four p = FOUR(out), q = FOUR(out + 4);
-    for (int i = 0; i < count; i++) {
-        const four each = EACH(f[i]);
-        p = MADD(each, GIVEN_FOUR(rows + i * WIDE), p);
-        q = MADD(each, GIVEN_FOUR(rows + i * WIDE + 4), q);
+/* How the modified factorisation of Gill and Murray chooses pivots of v / dof_scale: none is less than `least`, and each is
+ * such that no entry of the factor is larger than those of a definite matrix may be */
+typedef struct {
+    double least, bound, *scale, *more; /* `scale`: dof_scale, padded; `more`: what is added to the diagonal */
+} wbc_pivots;
+
+/* The pivot of row k, whose entries right of the diagonal stand in `row` */
+static double chosen_pivot(wbc_pivots *chosen, const double *row, int k) {
+    const int from = k & ~7;
+    const double unit = chosen->scale[k] * chosen->scale[k], given = row[k] * unit;
+    const four_bits here = {k - from, k - from, k - from, k - from};
+    four_bits right = (four_bits){0, 1, 2, 3} > here;
+    four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from) * GIVEN_FOUR(chosen->scale + from)) & right);
+    right = (four_bits){4, 5, 6, 7} > here;
+    most = larger_four((four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from + 4) * GIVEN_FOUR(chosen->scale + from + 4)) & right), most);
+    for (int at = from + 8; at < WIDE; at += 4)
+        most = larger_four(SIZE_OF_FOUR(GIVEN_FOUR(row + at) * GIVEN_FOUR(chosen->scale + at)), most);
+    const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3]));
+    chosen->more[k] = 0.0;
+    /* A branch, so that the next rows need not wait for what decides it */
+    if (given >= chosen->least && given * chosen->bound >= aside * aside * unit) return row[k];
+    const double pivot = larger(larger(fabs(given), aside * aside * unit / chosen->bound), chosen->least);
+    chosen->more[k] = (pivot - given) / unit;
+    return pivot / unit;
+}
+
+/* Row k + n of the four that begin with k: without what those before it have of it, and its pivot's root taken out. Rows
+ * wait for reciprocals of pivots only, not for their roots. */
+INLINE int finish_row(wbc_tick *t, int k, int n, double *plain, double *shares, wbc_pivots *chosen) {
+    const int from = k & ~7, here = k - from + n;
+    double *out = t->R + (k + n) * WIDE, *row = plain + n * WIDE;
+    const double *f = shares + n;
+    for (int at = from; at < WIDE; at += 4) {
+        four p = GIVEN_FOUR(out + at);
+        if (n > 0) p = MADD(EACH(f[0]), GIVEN_FOUR(plain + at), p);
+        if (n > 1) p = MADD(EACH(f[4]), GIVEN_FOUR(plain + WIDE + at), p);
+        if (n > 2) p = MADD(EACH(f[8]), GIVEN_FOUR(plain + 2 * WIDE + at), p);
+        FOUR(row + at) = p;
     }
-    FOUR(out) = p, FOUR(out + 4) = q;
+    if (chosen) row[k + n] = chosen_pivot(chosen, row, k + n);
+    const double pivot = row[k + n], reciprocal = 1.0 / pivot, scale = t->inverse_diagonal[k + n] = 1.0 / sqrt(pivot);
+    for (int c = n + 1; c < 4; c++) shares[4 * n + c] = -row[k + c] * reciprocal;
+    for (int at = from; at < WIDE; at += 4) FOUR(out + at) = GIVEN_FOUR(row + at) * EACH(scale);
+    for (int c = 0; c < 8; c++) out[from + c] = c < here ? 0.0 : out[from + c];
+    return pivot > 0.0;
 }
 
-/* Largest size of the entries of row k from `from`, the first column of its group, that are right of the diagonal */
-INLINE double largest_aside(const double *row, int k, int from) {
-    double part[8];
-    for (int c = 0; c < 8; c++) part[c] = from + c > k ? fabs(row[from + c]) : 0.0;
-    for (int at = from + 8; at < WIDE; at += 8)
-        for (int c = 0; c < 8; c++) part[c] = larger(fabs(row[at + c]), part[c]);
-    return larger(larger(larger(part[0], part[4]), larger(part[1], part[5])),
-                  larger(larger(part[2], part[6]), larger(part[3], part[7])));
-}
-
-/* The matrix in R into its Cholesky factor, with the inverse of its diagonal; 0 where it is not positive definite. With
- * `more`, what is added to the diagonal, the modified factorisation of Gill and Murray: no pivot is less than `least`, and
- * each is such that no entry of the factor is larger than those of a definite matrix may be. */
-INLINE int factor_rows(wbc_tick *t, double least, double bound, double *more) {
+/* The matrix in R into its Cholesky factor, with the inverse of its diagonal; 0 where it is not positive definite. `chosen`:
+ * NULL, or how pivots are chosen so that there always is one. */
+INLINE int factor_rows(wbc_tick *t, wbc_pivots *chosen) {
     int ok = 1;
-    for (int from = 0; from < WIDE; from += 8) {
-        const int to = from + 8 < NV ? from + 8 : NV;
-        double plain[8 * WIDE], reciprocal[8];
-        int k = from;
-        for (; from > 0 && k + 4 <= to; k += 4)
-            for (int at = from; at < WIDE; at += 8) reduce_rows(t, k, from, at);
-        for (; from > 0 && k < to; k++) {
-            double f[WIDE];
-            for (int i = 0; i < from; i++) f[i] = -t->R[i * WIDE + k];
-            for (int at = from; at < WIDE; at += 8) add_rows(t->R + k * WIDE + at, f, t->R + at, from);
-        }
-        for (k = from; k < to; k++) {
-            double *out = t->R + k * WIDE, *row = plain + (k - from) * WIDE, f[8];
-            /* Rows of the group wait for reciprocals of pivots only, not for their roots */
-            for (int i = from; i < k; i++) f[i - from] = -plain[(i - from) * WIDE + k] * reciprocal[i - from];
-            for (int at = from; at < WIDE; at += 8) {
-                for (int c = 0; c < 8; c++) row[at + c] = out[at + c];
-                add_rows(row + at, f, plain + at, k - from);
-            }
-            double pivot = row[k];
-            if (more != NULL) {
-                const double aside = largest_aside(row, k, from);
-                pivot = larger(larger(fabs(pivot), aside * aside / bound), least);
-                more[k] = pivot - row[k];
-                row[k] = pivot;
-            } else {
-                ok &= pivot > 0.0;
-            }
-            reciprocal[k - from] = 1.0 / pivot;
-            const double scale = t->inverse_diagonal[k] = 1.0 / sqrt(pivot);
-            for (int at = from; at < WIDE; at += 8)
-                for (int c = 0; c < 8; c++) out[at + c] = row[at + c] * scale;
-            for (int j = from; j < k; j++) out[j] = 0.0;
-        }
+    for (int k = 0; k < NV; k += 4) {
+        double plain[4 * WIDE], shares[16];
+        for (int at = k & ~7; k > 0 && at < WIDE; at += 8) reduce_rows(t, k, k, at);
+        ok &= finish_row(t, k, 0, plain, shares, chosen);
+        if (k + 1 < NV) ok &= finish_row(t, k, 1, plain, shares, chosen);
+        if (k + 2 < NV) ok &= finish_row(t, k, 2, plain, shares, chosen);
+        if (k + 3 < NV) ok &= finish_row(t, k, 3, plain, shares, chosen);
     }
     return ok;
 }
 
+/* R = H, upper triangle */
+INLINE void copy_hessian(wbc_tick *t) {
+    for (int i = 0; i < NV; i++)
+        for (int at = i & ~7; at < WIDE; at += 4) FOUR(t->R + i * WIDE + at) = GIVEN_FOUR(t->H + i * WIDE + at);
+}
+
 /* R = H with the equality rows in it, not yet factored */
 static void load(wbc_tick *t) {
-    memcpy(t->R, t->H, sizeof t->R);
+    copy_hessian(t);
     strengthen(t);
 }
 
-static int decompose(wbc_tick *t) { return factor_rows(t, 0.0, 0.0, NULL); }
+static int decompose(wbc_tick *t) { return factor_rows(t, NULL); }
 
 /* H += a diagonal that makes it positive definite, with pivots of v / dof_scale of `least` or more, where it is not (Gill and
- * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. */
-static void decompose_amended(wbc_tick *t, double least) {
-    double more[NV], scale[WIDE] = {0}, unit[WIDE] = {0}, part[8] = {0}, diagonal = 0.0, other = 0.0;
-    for (int i = 0; i < NV; i++) {
-        scale[i] = dof_scale[i];
-        unit[i] = 1.0 / dof_scale[i];
-    }
-    for (int i = 0; i < NV; i++) {
-        double *row = t->R + i * WIDE;
-        const double *from = t->H + i * WIDE, f = scale[i];
-        for (int j = 0; j < WIDE; j++) row[j] = from[j] * f * scale[j];
-        diagonal = larger(diagonal, fabs(row[i]));
-        for (int b = i / 8; b < WIDE / 8; b++)
-            for (int k = 0; k < 8; k++) part[k] = larger(part[k], 8 * b + k > i ? fabs(row[8 * b + k]) : 0.0);
-    }
-    for (int k = 0; k < 8; k++) other = larger(other, part[k]);
-    const double bound = larger(diagonal, other / sqrt(larger((double)NV * NV - 1.0, 1.0)));
-    factor_rows(t, least, bound, more);
-    for (int i = 0; i < NV; i++) {
-        double *row = t->R + i * WIDE;
-        for (int b = i / 8; b < WIDE / 8; b++)
-            for (int j = 8 * b; j < 8 * b + 8; j++) row[j] *= unit[j];
-        t->inverse_diagonal[i] *= dof_scale[i];
-        t->H[i * WIDE + i] += more[i] / (dof_scale[i] * dof_scale[i]);
-    }
+ * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. H without entries as large as `added` is
+ * positive semidefinite. */
+static void decompose_amended(wbc_tick *t, double least, double added) {
+    const double share = 1.0 / sqrt(larger((double)NV * NV - 1.0, 1.0));
+    double diagonal = 0.0, other = 0.0, scale[WIDE] = {0}, more[WIDE];
+    wbc_pivots chosen = {.least = least, .scale = scale, .more = more};
+    memcpy(scale, dof_scale, NV * sizeof(double));
+    copy_hessian(t);
+    for (int i = 0; i < NV; i++) diagonal = larger(diagonal, fabs(t->H[i * WIDE + i]) * dof_scale[i] * dof_scale[i]);
+    /* No entry of a semidefinite matrix is larger than the largest on its diagonal */
+    for (int i = 0; (diagonal + 2.0 * added) * share > diagonal && i < NV; i++)
+        for (int j = i + 1; j < NV; j++) other = larger(other, fabs(t->H[i * WIDE + j]) * dof_scale[i] * dof_scale[j]);
+    chosen.bound = larger(diagonal, other * share);
+    factor_rows(t, &chosen);
+    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i];
 }
 
 /* H = R'R, upper triangle of H only; leaves -g in y */
@@ -207,63 +201,53 @@ static int factor(wbc_tick *t) {
     return decompose(t);
 }
 
-/* y = R^-T y, in place; eight entries at a time, so that few operations wait for each other */
+/* y = R^-T y, in place; four entries at a time, so that few operations wait for each other */
 static void solve_transposed(const wbc_tick *t, double *y) {
-    for (int from = 0; from < WIDE; from += 8) {
-        const int count = NV - from < 8 ? NV - from : 8;
-        const double *rows_of = t->R + from * WIDE;
-        double part[8];
-        for (int c = 0; c < 8; c++) part[c] = y[from + c];
-#pragma GCC unroll 8
-        for (int r = 0; r < count; r++) {
-            part[r] *= t->inverse_diagonal[from + r];
-#pragma GCC unroll 8
-            for (int c = r + 1; c < 8; c++) part[c] = MADD(-part[r], rows_of[r * WIDE + from + c], part[c]);
-        }
-        for (int c = 0; c < 8; c++) y[from + c] = part[c];
-        for (int at = from + 8; at < WIDE; at += 8) {
-            double sum[8];
-            for (int c = 0; c < 8; c++) sum[c] = y[at + c];
-            for (int r = 0; r < count; r++)
-                for (int c = 0; c < 8; c++) sum[c] = MADD(-part[r], rows_of[r * WIDE + at + c], sum[c]);
-            for (int c = 0; c < 8; c++) y[at + c] = sum[c];
+    for (int i = 0; i < TALL; i += 4) {
+        const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
+        const double y0 = y[i] * d[0], y1 = MADD(-y0, s0[i + 1], y[i + 1]) * d[1];
+        const double y2 = MADD(-y1, s1[i + 2], MADD(-y0, s0[i + 2], y[i + 2])) * d[2];
+        const double y3 = MADD(-y2, s2[i + 3], MADD(-y1, s1[i + 3], MADD(-y0, s0[i + 3], y[i + 3]))) * d[3];
+        y[i] = y0, y[i + 1] = y1, y[i + 2] = y2, y[i + 3] = y3;
+        const four f0 = EACH(-y0), f1 = EACH(-y1), f2 = EACH(-y2), f3 = EACH(-y3);
+        for (int at = i + 4; at < WIDE; at += 4) {
+            const four first = MADD(f1, GIVEN_FOUR(s1 + at), MADD(f0, GIVEN_FOUR(s0 + at), GIVEN_FOUR(y + at)));
+            FOUR(y + at) = MADD(f3, GIVEN_FOUR(s3 + at), MADD(f2, GIVEN_FOUR(s2 + at), first));
         }
     }
+    for (int i = TALL; i < WIDE; i++) y[i] = 0.0;
 }
+
+INLINE double sum_of_four(four x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 
 /* x = R^-1 y, as above */
 static void solve_upper(const wbc_tick *t, const double *y, double *x) {
-    for (int i = NV; i < WIDE; i++) x[i] = 0.0;
-    for (int from = WIDE - 8; from >= 0; from -= 8) {
-        const int count = NV - from < 8 ? NV - from : 8;
-        const double *rows_of = t->R + from * WIDE;
-        double part[8];
-        for (int r = 0; r < count; r++) {
-            const double *row = rows_of + r * WIDE;
-            double sum[8] = {0};
-            for (int at = from + 8; at < WIDE; at += 8)
-                for (int c = 0; c < 8; c++) sum[c] = MADD(row[at + c], x[at + c], sum[c]);
-            part[r] = y[from + r] - (((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7])));
+    for (int i = TALL; i < WIDE; i++) x[i] = 0.0;
+    for (int i = TALL - 4; i >= 0; i -= 4) {
+        const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
+        four p0 = {0}, p1 = {0}, p2 = {0}, p3 = {0};
+        for (int at = i + 4; at < WIDE; at += 4) {
+            const four known = GIVEN_FOUR(x + at);
+            p0 = MADD(GIVEN_FOUR(s0 + at), known, p0), p1 = MADD(GIVEN_FOUR(s1 + at), known, p1);
+            p2 = MADD(GIVEN_FOUR(s2 + at), known, p2), p3 = MADD(GIVEN_FOUR(s3 + at), known, p3);
         }
-#pragma GCC unroll 8
-        for (int r = count - 1; r >= 0; r--) {
-            x[from + r] = part[r] *= t->inverse_diagonal[from + r];
-#pragma GCC unroll 8
-            for (int above = 0; above < r; above++)
-                part[above] = MADD(-part[r], rows_of[above * WIDE + from + r], part[above]);
-        }
+        const double x3 = (y[i + 3] - sum_of_four(p3)) * d[3];
+        const double x2 = MADD(-x3, s2[i + 3], y[i + 2] - sum_of_four(p2)) * d[2];
+        const double x1 = MADD(-x2, s1[i + 2], MADD(-x3, s1[i + 3], y[i + 1] - sum_of_four(p1))) * d[1];
+        const double x0 = MADD(-x1, s0[i + 1], MADD(-x2, s0[i + 2], MADD(-x3, s0[i + 3], y[i] - sum_of_four(p0)))) * d[0];
+        x[i] = x0, x[i + 1] = x1, x[i + 2] = x2, x[i + 3] = x3;
     }
 }
 
-#define PACK(i) ((2 * NV - (i) - 1) * (i) / 2)
-
-/* Four rows of R^-1, columns from `at` on: what rows of R from `from` on add, before the division by their pivots */
-INLINE void gather_rows(wbc_tick *t, int i, int from, int at) {
-    const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE;
-    double *out = t->inverse + i * WIDE + at;
-    four p0 = {0}, p1 = {0}, p2 = {0}, p3 = {0}, q0 = {0}, q1 = {0}, q2 = {0}, q3 = {0};
+/* Rows i to i + 3 of R^-1, eight columns from `at` on: R_r^-1 (e_r - the sum of R_rk times row k over later rows k) */
+INLINE void invert_rows(wbc_tick *t, int i, int at) {
+    const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
+    double *out = t->inverse + i * WIDE + at, less[4 * 8] = {0};
+    for (int r = 0; at == (i & ~7) && r < 4; r++) less[8 * r + i - at + r] = -1.0;
+    four p0 = FOUR(less), p1 = FOUR(less + 8), p2 = FOUR(less + 16), p3 = FOUR(less + 24);
+    four q0 = FOUR(less + 4), q1 = FOUR(less + 12), q2 = FOUR(less + 20), q3 = FOUR(less + 28);
     const int to = at + 8 < NV ? at + 8 : NV;
-    for (int k = from; k < to; k++) {
+    for (int k = i + 4; k < to; k++) {
         const double *below = t->inverse + k * WIDE + at;
         const four p = GIVEN_FOUR(below), q = GIVEN_FOUR(below + 4);
         const four f0 = EACH(s0[k]), f1 = EACH(s1[k]), f2 = EACH(s2[k]), f3 = EACH(s3[k]);
@@ -272,31 +256,33 @@ INLINE void gather_rows(wbc_tick *t, int i, int from, int at) {
         p2 = MADD(f2, p, p2), q2 = MADD(f2, q, q2);
         p3 = MADD(f3, p, p3), q3 = MADD(f3, q, q3);
     }
+    p3 *= EACH(-d[3]), q3 *= EACH(-d[3]);
+    p2 = MADD(EACH(s2[i + 3]), p3, p2) * EACH(-d[2]), q2 = MADD(EACH(s2[i + 3]), q3, q2) * EACH(-d[2]);
+    p1 = MADD(EACH(s1[i + 2]), p2, p1), q1 = MADD(EACH(s1[i + 2]), q2, q1);
+    p1 = MADD(EACH(s1[i + 3]), p3, p1) * EACH(-d[1]), q1 = MADD(EACH(s1[i + 3]), q3, q1) * EACH(-d[1]);
+    p0 = MADD(EACH(s0[i + 1]), p1, p0), q0 = MADD(EACH(s0[i + 1]), q1, q0);
+    p0 = MADD(EACH(s0[i + 2]), p2, p0), q0 = MADD(EACH(s0[i + 2]), q2, q0);
+    p0 = MADD(EACH(s0[i + 3]), p3, p0) * EACH(-d[0]), q0 = MADD(EACH(s0[i + 3]), q3, q0) * EACH(-d[0]);
     FOUR(out) = p0, FOUR(out + 4) = q0, FOUR(out + WIDE) = p1, FOUR(out + WIDE + 4) = q1;
     FOUR(out + 2 * WIDE) = p2, FOUR(out + 2 * WIDE + 4) = q2, FOUR(out + 3 * WIDE) = p3, FOUR(out + 3 * WIDE + 4) = q3;
 }
 
-/* R^-1 by rows: full rows in `inverse`; packed for DAQP and divided by their lengths, which go to `scaling` as
- * 1/length, in Rinv */
+/* R^-1 by rows, which are full, and 1 / length of each in `scaling` */
 static void invert(wbc_tick *t) {
-    memset(t->inverse, 0, sizeof t->inverse);
-    for (int from = WIDE - 8; from >= 0; from -= 8) {
-        const int to = from + 8 < NV ? from + 8 : NV;
-        for (int at = from + 8; at < WIDE; at += 8)
-            for (int i = from; i + 4 <= to; i += 4) gather_rows(t, i, from + 8, at);
-        for (int i = to - 1; i >= from; i--) {
-            double *out = t->inverse + i * WIDE;
-            const double *source = t->R + i * WIDE, first = t->inverse_diagonal[i];
-            for (int at = from; at < WIDE; at += 8) {
-                add_rows(out + at, source + i + 1, t->inverse + (i + 1) * WIDE + at, to - i - 1);
-                for (int c = 0; c < 8; c++) out[at + c] *= -first;
-            }
-            out[i] = first;
-        }
-    }
+    for (int i = TALL - 4; i >= 0; i -= 4)
+        for (int at = i & ~7; at < WIDE; at += 8) invert_rows(t, i, at);
     for (int i = 0; i < NV; i++) {
         const double *row = t->inverse + i * WIDE;
-        const double scale = t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
+        t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
+    }
+}
+
+#define PACK(i) ((2 * NV - (i) - 1) * (i) / 2)
+
+/* What DAQP reads of R^-1: rows of length one, packed */
+static void pack(wbc_tick *t) {
+    for (int i = 0; i < NV; i++) {
+        const double *row = t->inverse + i * WIDE, scale = t->scaling[i];
         double *packed = t->Rinv + PACK(i);
         for (int j = i; j < NV; j++) packed[j] = row[j] * scale;
     }

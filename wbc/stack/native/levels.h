@@ -230,7 +230,7 @@ static void sum_up(wbc_tick *t) {
             const double slack = larger(t->free_low[k] - value, value - t->free_high[k]);
             out->slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
         } else {
-            out->violation = larger(out->violation, larger(t->low[NV + k] - value, value - t->high[NV + k]));
+            out->violation = larger(out->violation, larger(lower_side(t, k) - value, value - upper_side(t, k)));
         }
         if (out->dropped[k] < -1.0) out->dropped[k] = fabs(value - t->low[NV + k]);
     }

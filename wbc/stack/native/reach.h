@@ -28,14 +28,56 @@
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
-/* out = J' diag(weight) x */
+/* out += J' diag(weight) x, and out = J v, for rows that share their columns and for rows with one non-zero each, as in
+ * assemble.h */
+INLINE void gather_block(const wbc_tick *t, const double *x, double *out, int row, int count, int first, int cols) {
+    const double *J = t->jt + first;
+    double sum[cols];
+    for (int c = 0; c < cols; c++) sum[c] = 0.0;
+    for (int r = 0; r < count; r++) {
+        const double f = t->weight[row + r] * t->report.factor[row + r] * x[row + r];
+        for (int c = 0; c < cols; c++) sum[c] += f * J[r * cols + c];
+    }
+    for (int c = 0; c < cols; c++) out[j_col[first + c]] += sum[c];
+}
+
+INLINE void gather_single(const wbc_tick *t, const double *x, double *out, int row, int count, int first) {
+    for (int r = 0; r < count; r++)
+        out[j_col[first + r]] += t->weight[row + r] * t->report.factor[row + r] * x[row + r] * t->jt[first + r];
+}
+
+INLINE void along_block(const wbc_tick *t, const double *v, double *out, int row, int count, int first, int cols) {
+    double part[cols];
+    for (int c = 0; c < cols; c++) part[c] = v[j_col[first + c]];
+    for (int r = 0; r < count; r++) {
+        double sum = 0.0;
+        for (int c = 0; c < cols; c++) sum += t->jt[first + r * cols + c] * part[c];
+        out[row + r] = sum;
+    }
+}
+
+INLINE void along_single(const wbc_tick *t, const double *v, double *out, int row, int count, int first) {
+    for (int r = 0; r < count; r++) out[row + r] = t->jt[first + r] * v[j_col[first + r]];
+}
+
+/* out = J' diag(weight) x, of the first level's rows. Those without weight must be finite too. */
 static void gather(const wbc_tick *t, const double *x, double *out) {
     for (int i = 0; i < WIDE; i++) out[i] = 0.0;
-    for (int k = 0; k < LEADING; k++) {
-        const double f = t->weight[k] * t->report.factor[k];
-        if (f == 0.0) continue;
-        for (int e = j_start[k]; e < j_start[k + 1]; e++) out[j_col[e]] += f * x[k] * t->jt[e];
-    }
+#define MANY(t, ...) gather_block(t, x, out, __VA_ARGS__)
+#define SINGLE(t, ...) gather_single(t, x, out, __VA_ARGS__)
+    BLOCKS(MANY, SINGLE)
+#undef MANY
+#undef SINGLE
+}
+
+/* out = J v, of the first level's rows */
+static void along_all(const wbc_tick *t, const double *v, double *out) {
+    for (int k = 0; k < LEADING; k++) out[k] = 0.0;
+#define MANY(t, ...) along_block(t, v, out, __VA_ARGS__)
+#define SINGLE(t, ...) along_single(t, v, out, __VA_ARGS__)
+    BLOCKS(MANY, SINGLE)
+#undef MANY
+#undef SINGLE
 }
 
 /* Row k of J times v */
@@ -64,8 +106,8 @@ static int find_free(const wbc_tick *t, const double *slope, double *free) {
     double steepest = 0.0;
     int blocked = 0;
     for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
+    for (int i = 0; i < WIDE; i++) free[i] = 1.0;
     for (int i = 0; i < NV; i++) {
-        free[i] = 1.0;
         if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
         const double q = t->q[stop_q[i]], slack = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
         const double near = clamp(2.0 - slack / (AT_LIMIT * dof_scale[i]), 0.0, 1.0);
@@ -80,8 +122,10 @@ static int find_free(const wbc_tick *t, const double *slope, double *free) {
 static int cut_off(wbc_tick *t, const double *free, double more) {
     load(t);
     for (int i = 0; i < NV; i++) {
-        for (int j = i + 1; j < NV; j++) t->R[i * WIDE + j] *= free[i] * free[j];
-        t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
+        double *row = t->R + i * WIDE;
+        const double own = row[i];
+        for (int at = i & ~7; at < WIDE; at += 4) FOUR(row + at) *= EACH(free[i]) * GIVEN_FOUR(free + at);
+        row[i] = own + more / (dof_scale[i] * dof_scale[i]);
     }
     t->prepared = 0;
     return decompose(t);
@@ -157,10 +201,8 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     const int found = (!KEPT || cut_off(t, free, 0.0)) && trusted_step(t, free, slope, step, &changed);
     t->firm = 0;
     if (!found) return 0;
-    for (int k = 0; k < LEADING; k++) {
-        const double f = t->weight[k] * t->report.factor[k];
-        force[k] = f == 0.0 ? 0.0 : f * (error[k] - along(t, k, step));
-    }
+    along_all(t, step, force);
+    for (int k = 0; k < LEADING; k++) force[k] = t->weight[k] * t->report.factor[k] * (error[k] - force[k]);
     if (KEPT) without_kept(t, step, force);
     return !changed || cut_off(t, free, 0.0);
 }
@@ -176,7 +218,7 @@ static double least_pivot(const wbc_tick *t) {
 
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
 static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
-    double size = 0.0, whole = 0.0, largest = 0.0;
+    double size = 0.0, whole = 0.0, most[4] = {0};
     for (int k = 0; k < LEADING; k++) {
         size += fabs(force[k]) * force_scale[k];
         whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * force_scale[k];
@@ -184,25 +226,30 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
     const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
     const double share = counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
     if (!(share > 0.0)) return 0.0;
-    const double *arg[5] = {t->q, t->v_last, t->p, &t->dt, force};
+    const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
     double *res[1] = {t->curvature_entries};
     curvature(arg, res, t->work_iw, t->work_w, 0);
     if (!all_finite(t->curvature_entries, NNZK)) return 0.0;
 #if LEVELS > 0
     memset(t->curvature, 0, sizeof t->curvature);
 #endif
-    for (int i = 0; i < NV; i++)
-        for (int j = i + 1; j < NV; j++) t->H[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
+    for (int i = 0; i < NV; i++) {
+        double *row = t->H + i * WIDE;
+        const double own = row[i];
+        for (int at = i & ~7; at < WIDE; at += 4)
+            FOUR(row + at) *= EACH(1.0) - EACH(share) * (EACH(1.0) - EACH(free[i]) * GIVEN_FOUR(free + at));
+        row[i] = own;
+    }
     for (int e = 0; e < NNZK; e++) {
         const int i = k_row[e], j = k_col[e];
         const double entry = share * free[i] * free[j] * t->curvature_entries[e];
-        largest = larger(largest, fabs(entry) * dof_scale[i] * dof_scale[j]);
+        most[e & 3] = larger(fabs(entry) * dof_scale[i] * dof_scale[j], most[e & 3]);
         t->H[i * WIDE + j] += entry;
 #if LEVELS > 0
         t->curvature[i * NV + j] = t->curvature[j * NV + i] = entry;
 #endif
     }
-    return largest;
+    return larger(larger(most[0], most[1]), larger(most[2], most[3]));
 }
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
@@ -210,7 +257,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     double least = least_pivot(t);
     const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
-    decompose_amended(t, larger(LEAST_PIVOT * largest, least));
+    decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);
     /* The factor that is used has equality rows in it, and they are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
@@ -224,7 +271,7 @@ static void following(wbc_tick *t, const double *wanted, double *x) {
     double moved[MT + 1], rest[WIDE], change[WIDE];
     solve_with(t, wanted, x);
     for (int n = 0; n < CORRECTIONS; n++) {
-        for (int k = 0; k < LEADING; k++) moved[k] = along(t, k, x);
+        along_all(t, x, moved);
         gather(t, moved, rest);
         for (int i = 0; i < NV; i++) rest[i] = wanted[i] - rest[i] - damping[i] * x[i];
         for (int i = NV; i < WIDE; i++) rest[i] = 0.0;
@@ -269,7 +316,7 @@ static double stoppable(wbc_tick *t, const double *free, const double *error, do
 
 /* The QP of the linear model becomes the one that is solved */
 static void reach(wbc_tick *t) {
-    double error[MT + 1], slope[WIDE], free[NV], largest = 0.0;
+    double error[MT + 1], slope[WIDE], free[WIDE], largest = 0.0;
     for (int k = 0; k < LEADING; k++) {
         const int counts = t->weight[k] * t->report.factor[k] != 0.0;
         error[k] = counts ? t->report.error[k] : 0.0;

@@ -117,14 +117,13 @@ static int first_slack(wbc_tick *t, int order, const double *base) {
     return !t->spent && least_slack(t, order, base, 0);
 }
 
-/* The least sum of squared slack of one class, with the bounds and the classes before it as they stand; then they are
- * frozen there. The proximal steps take the share of |v| out of the multipliers. `base`: where the classes before met. */
-static int relax_class(wbc_tick *t, int order, double *base) {
+/* The least sum of squared slack of one class, with the bounds and the classes before it as they stand. The proximal steps
+ * take the share of |v| out of the multipliers. `base`: where the classes before met, and where the slack is least. 0 where no
+ * search has an answer. */
+static int least_violation(wbc_tick *t, int order, double *base, char *pushing) {
     DAQPWorkspace *work = &t->daqp;
-    char pushing[M_ALL];
     int found = 0;
     t->factored = 0;
-    if (!class_rows(t, order)) return 1;
     work->Rinv = NULL;
     work->RinvD = (double *)dof_scale;
     work->v = NULL;
@@ -142,11 +141,46 @@ static int relax_class(wbc_tick *t, int order, double *base) {
     work->Rinv = t->Rinv;
     work->RinvD = NULL;
     work->v = t->ldp_v;
-    if (!found) return 0;
+    return found;
+}
+
+/* A class gives way as little as it can, and is frozen there */
+static int relax_class(wbc_tick *t, int order, double *base) {
+    char pushing[M_ALL];
+    if (!class_rows(t, order)) return 1;
+    if (!least_violation(t, order, base, pushing)) return 0;
     memcpy(t->x, base, sizeof t->x);
     freeze(t, order, pushing);
     memcpy(base, t->x, sizeof t->x);
     return 1;
+}
+
+/* Whether nothing within the bounds keeps the rows that never give way: the multipliers y of their least violation add
+ * them up to one row y'A x <= y'side that the whole box breaks, infinite sides counted as FAR_AWAY (Farkas). Bounds and rows
+ * are those before a relaxation. */
+static int impossible(wbc_tick *t) {
+    double base[WIDE] = {0}, sum[NV], most = 0.0, size = 0.0, gap = 0.0;
+    char pushing[M_ALL];
+    if (!class_rows(t, 0) || !least_violation(t, 0, base, pushing)) return 0;
+    for (int i = 0; i < NV; i++) sum[i] = 0.0;
+    for (int a = 0; a < t->daqp.n_active; a++) {
+        const int i = t->daqp.WS[a], k = i - NV;
+        const double y = t->daqp.lam_star[a] / (k < 0 ? 1.0 : row_scale[k]);
+        if (k < 0 || row_order[k] != 0) continue;
+        const double side = y > 0.0 ? t->high[i] : t->low[i];
+        if (fabs(side) >= WBC_INF) return 0;
+        gap -= y * side;
+        size += fabs(y * side);
+        most = larger(most, fabs(y) * row_scale[k]);
+        for (int e = a_start[k]; e < a_end[k]; e++) sum[a_col[e]] += y * t->at[e];
+    }
+    for (int i = 0; i < NV; i++) {
+        const double reach = FAR_AWAY * dof_scale[i];
+        const double x = sum[i] > 0.0 ? larger(t->low[i], -reach) : smaller(t->high[i], reach);
+        gap += sum[i] * x;
+        size += fabs(sum[i] * x);
+    }
+    return gap > SEEN * most + 1e3 * EPS * size;
 }
 
 /* The optimum over what the classes left. The set may be so thin that rounding makes it empty: then its bounds get

@@ -46,6 +46,10 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Proximal steps of a relaxation at most, and the change of a row at which they end */
 #define PROXIMAL_STEPS 12
 #define SETTLED 1e-11
+/* Violations of bounds and rows that never give way which a relaxation may leave, in row units */
+#define FIRMLY 1e-8
+/* Corrections of the point of a relaxation */
+#define MEETINGS 3
 /* Multipliers above this share of the largest one of the class that gives way are not rounding */
 #define PUSHING 1e-6
 /* The cheap error bound is good enough up to here [rad/s] */
@@ -53,6 +57,10 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Above this [rad/s] the bound is found in wide arithmetic, and the solution refined; how often at most */
 #define GOOD_BOUND 1e-7
 #define REFINEMENTS 4
+/* Violations above this are refined as well, in row units */
+#define GOOD_VIOLATION 1e-8
+/* Accelerations and forces beyond this, in their units, are none */
+#define FAR_AWAY 1e6
 /* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
@@ -97,11 +105,26 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef long long four_bits __attribute__((vector_size(32)));
 #define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){LLONG_MAX, LLONG_MAX, LLONG_MAX, LLONG_MAX}))
 
+/* Of NaN the second */
+INLINE four larger_four(four x, four y) {
+    const four_bits first = x > y;
+    return (four)(((four_bits)x & first) | ((four_bits)y & ~first));
+}
+
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 
 /* Not fmin and fmax, which are calls; NaN in the first argument gives the second */
 INLINE double smaller(double x, double y) { return x < y ? x : y; }
 INLINE double larger(double x, double y) { return x > y ? x : y; }
+
+/* The sides of a general row: of what never gives way its own, whatever a relaxation has made of them */
+#define FIRM_ROW(k) (row_order[k] == 0 && !MINIMISED(k))
+INLINE double lower_side(const wbc_tick *t, int k) {
+    return FIRM_ROW(k) && t->free_low[k] > t->low[NV + k] ? t->free_low[k] : t->low[NV + k];
+}
+INLINE double upper_side(const wbc_tick *t, int k) {
+    return FIRM_ROW(k) && t->free_high[k] < t->high[NV + k] ? t->free_high[k] : t->high[NV + k];
+}
 
 /* A v for general row k */
 INLINE double row_at(const wbc_tick *t, int k, const double *v) {

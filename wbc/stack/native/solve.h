@@ -105,7 +105,7 @@ static int report_slack(wbc_tick *t, int flag) {
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
-    t->factored = t->spent = t->alone = 0;
+    t->factored = t->spent = t->alone = t->proven = 0;
     find_idle_rows(t);
     if (t->unusable != 0.0) {
         brake(t);
@@ -121,6 +121,8 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
             stop_early(t, first);
             flag = WBC_CAPPED;
         } else if (exit_flag < 0) {
+            own_sides(t);
+            t->proven = impossible(t) && !t->spent;
             brake(t);
             flag = WBC_BRAKED;
         } else if (t->alone) {

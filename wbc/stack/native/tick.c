@@ -31,7 +31,7 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
 
 static int unsound(const wbc_tick *t, int flag) {
     if (flag == WBC_CAPPED) return 0;
-    if (flag == WBC_BRAKED) return t->unusable == 0.0;
+    if (flag == WBC_BRAKED) return t->unusable == 0.0 && !t->proven;
     const int optimal = t->report.stationarity <= OPTIMAL && t->report.complementarity <= OPTIMAL;
     return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
 }
@@ -107,7 +107,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     assemble(t, 1);
     int flag = wbc_tick_solve(t), nameless = 0;
 #if LEVELS > 0
-    if (t->cap == 0.0 && flag == WBC_BRAKED && t->unusable == 0.0 && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
+    if (t->cap == 0.0 && unsound(t, flag) && flag == WBC_BRAKED && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
 #else
     wbc_tick_certify(t);
@@ -115,6 +115,9 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
         flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
         /* Rows that contradicted each other by rounding only: their frozen bounds are not what is to be certified */
         nameless = flag == WBC_RELAXED && !report_slack(t, flag);
+    } else if (flag == WBC_RELAXED) {
+        /* The certificate may have refined the command */
+        nameless = !report_slack(t, flag);
     }
 #endif
     if (PRICES) report_soft_rows(t);
@@ -168,6 +171,7 @@ EXPORT int wbc_tick_safe_step(wbc_tick *t) {
     rewind_tick(t);
     wbc_tick_reset(t);
     flag = wbc_tick_step(t);
+    if (flag == WBC_BRAKED) return flag;
     if (!(flag & WBC_UNSOUND)) return (int)(t->report.flag = WBC_RECOVERED);
     rewind_tick(t);
     wbc_tick_reset(t);

@@ -11,6 +11,7 @@
  *   COMMAND     0: velocities, 1: accelerations, 2: torques; of the last two the variables are accelerations and the
  *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
+ *   HANDED      numbers that the rows hand to the curvature; with none of both the rows have no such output
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
  *   force_scale  how much curvature a row of unit error may have
@@ -47,6 +48,7 @@
 
 #define M_ALL (NV + MC)
 #define WIDE ((NV + 7) / 8 * 8)
+#define TALL ((NV + 3) / 4 * 4)
 #define PACKED (NV * (NV + 1) / 2)
 #define WBC_INF 1e30
 
@@ -106,10 +108,11 @@ typedef struct {
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
-    /* outputs of the generated rows */
+    /* outputs of the generated rows; `handed` is for the curvature */
+    double handed[HANDED + 1];
     double jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
     /* factorisation */
-    double R[NV * WIDE], inverse[NV * WIDE], inverse_diagonal[NV], y[WIDE];
+    double R[TALL * WIDE], inverse[TALL * WIDE], inverse_diagonal[TALL], y[WIDE];
     double scratch[WIDE], product[WIDE];
     double strength[MC + 1];                    /* what equality rows and soft rows add to the factor, per a a' */
 #if SOFT_ROWS > 0
@@ -124,6 +127,7 @@ typedef struct {
     int warm;                    /* the sense array holds the active set of the last tick */
     int spent;                   /* the cap has ended a search of this tick */
     double met[NV];              /* where the classes of a relaxation met */
+    int proven;                  /* nothing within the bounds keeps the rows that never give way */
     int brief;                   /* iterations of a search that may fail; 0: as many as it takes */
     int alone;                   /* no row binds: R^-1 is all that a refinement needs */
     int factored;                /* R inverse and M of the last tick are in the workspace */

@@ -23,18 +23,6 @@ static void push_back(const wbc_tick *t, int i, double f, double *y) {
     for (int j = 0; MC > 0 && i >= NV && j < NV; j++) y[j] += f * t->M[(i - NV) * NV + j];
 }
 
-/* r = (M M')^-1 r for the first `count` active rows, from DAQP's factors L D L' */
-static void solve_factors(const double *L, const double *D, int count, double *r) {
-    for (int a = 0, at = 0; a < count; a++) {
-        for (int b = 0; b < a; b++) r[a] -= L[at++] * r[b];
-        at++;
-    }
-    for (int a = count - 1; a >= 0; a--) {
-        r[a] /= D[a];
-        for (int b = a + 1; b < count; b++) r[a] -= L[b * (b + 1) / 2 + a] * r[b];
-    }
-}
-
 static void solve_gram(const wbc_tick *t, int count, double *r) { solve_factors(t->L, t->D, count, r); }
 
 /* By how much the command misses the bound of active row `a`, moved by what a soft row gives way, as the solver scales it */
@@ -52,22 +40,13 @@ static double side_gap(const wbc_tick *t, int a) {
 static void wide_forces(const wbc_tick *t, const wide *lambda, wide *residual, double *rounding) {
     const double *v = t->report.v;
     for (int i = 0; i < NV; i++) {
-        residual[i] = t->g[i];
-        rounding[i] = fabs(t->g[i]);
-    }
-    for (int i = 0; i < NV; i++) {
-        const double *row = t->H + i * WIDE, own = v[i];
-        wide sum = residual[i] + (wide)row[i] * own;
-        double bulk = rounding[i] + fabs(row[i] * own);
-        for (int j = i + 1; j < NV; j++) {
-            sum += (wide)row[j] * v[j];
-            residual[j] += (wide)row[j] * own;
-        }
-        for (int j = i + 1; j < NV; j++) {
-            bulk += fabs(row[j] * v[j]);
-            rounding[j] += fabs(row[j] * own);
-        }
-        residual[i] = sum;
+        double row[WIDE], bulk = fabs(t->g[i]);
+        wide part[4] = {t->g[i], 0.0L, 0.0L, 0.0L};
+        for (int j = 0; j < i; j++) row[j] = t->H[j * WIDE + i];
+        for (int j = i; j < WIDE; j++) row[j] = t->H[i * WIDE + j];
+        for (int j = 0; j < NV; j++) part[j & 3] += (wide)row[j] * v[j];
+        for (int j = 0; j < NV; j++) bulk += fabs(row[j] * v[j]);
+        residual[i] = (part[0] + part[2]) + (part[1] + part[3]);
         rounding[i] = bulk;
     }
     for (int a = 0; a < t->daqp.n_active; a++) {

@@ -56,7 +56,7 @@ def jerk_limited_along(
     Raises:
         ShapeError, NotFiniteError, RangeError, BoundsError: of arguments; BoundsError: the path leaves its limits.
         ContinuityError: direction or curvature jump, with the coordinate, and not ``stops``. InfeasibleError: a part
-        of the path between two stops begins without moving, or no speed is found.
+            of the path between two stops begins without moving, or no speed is found.
     """
     if not isinstance(path, Path):
         raise ShapeError("path", path, "expected a path")

@@ -60,10 +60,10 @@ def jerk_limited(
 
     Raises:
         ShapeError, NotFiniteError, UnknownNameError: of arguments. RangeError: limits not positive, a velocity or
-        acceleration at an end beyond its limit, ``none`` with a moving target. BoundsError: start or target outside
-        the position limits, or a joint that leaves them whatever is tried, with the time and the position.
+            acceleration at an end beyond its limit, ``none`` with a moving target. BoundsError: start or target
+            outside the position limits, or a joint that leaves them whatever is tried, with the time and the position.
         InfeasibleError: an end state whose acceleration carries the velocity beyond its limit. ContinuityError:
-        ``straight`` with velocities or accelerations across the line.
+            ``straight`` with velocities or accelerations across the line.
     """
     validation.one_of("synchronisation", synchronisation, ("time", "phase", "none"))
     straight = validation.flag("straight", straight)

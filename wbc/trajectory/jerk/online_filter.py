@@ -112,7 +112,7 @@ class Online:
 
         Raises:
             ShapeError, NotFiniteError: not n finite numbers. BoundsError: a position outside its limits. RangeError: a
-            velocity or an acceleration beyond its limit.
+                velocity or an acceleration beyond its limit.
         """
         rows = [validation.ordinary_array("position", position, (self.dof,))]
         low, high = self._walls.lower, self._walls.upper

@@ -68,7 +68,7 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
 
     Raises:
         ShapeError, NotFiniteError, RotationError: bad poses or via. RangeError: radius not positive; the three points
-        on one line, or two of them equal, which is no circle; half a turn, whose direction is not given.
+            on one line, or two of them equal, which is no circle; half a turn, whose direction is not given.
     """
     radius = validation.scalar("path.radius", radius, low=0.0, open_low=True, unit="m")
     first, last = validation.pose("path.start", start), validation.pose("path.end", end)

@@ -95,7 +95,7 @@ def blend_path(waypoints: Any, deviation: float) -> PolynomialPath:
 
     Raises:
         ShapeError, NotFiniteError: of other shapes, or not finite. RangeError: not positive, or so small that corners
-        vanish in rounding (then the smallest that works is named); waypoints too far apart.
+            vanish in rounding (then the smallest that works is named); waypoints too far apart.
     """
     deviation = validation.scalar("path.deviation", deviation, low=0.0, open_low=True, unit="rad or m")
     points, lengths = joint_waypoints("path.waypoints", waypoints)

@@ -101,7 +101,7 @@ def geodesic_path(start: Any, end: Any, radius: float = RADIUS) -> PosePath:
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no poses. RangeError: half a turn, whose direction is not given;
-        radius not positive.
+            radius not positive.
     """
     return pose_polyline([start, end], 1.0, radius=radius)
 
@@ -126,7 +126,7 @@ def pose_polyline(
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no poses. RangeError: numbers not positive, or deviations so small
-        that corners vanish in rounding; half a turn between neighbours, whose direction is not given.
+            that corners vanish in rounding; half a turn between neighbours, whose direction is not given.
     """
     radius = validation.scalar("path.radius", radius, low=0.0, open_low=True, unit="m")
     deviation = validation.scalar("path.deviation", deviation, low=0.0, open_low=True, unit="m")
@@ -164,7 +164,7 @@ def pose_spline(poses: Sequence[Any], ends: Ends = "not-a-knot", radius: float =
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no poses. UnknownNameError: other ends. RangeError: radius not
-        positive; neighbouring orientations more than 170 degrees apart, or changing too unevenly.
+            positive; neighbouring orientations more than 170 degrees apart, or changing too unevenly.
 
     Cannot do: stay near the straight lines; |(p'; w)| is not constant along s.
     """

@@ -80,7 +80,10 @@ function build() {
   if (hello.pairs) $("pair").replaceChildren(...hello.pairs.map((p) => make("option", { value: p.name }, p.name)));
   commanded = null;
   $("walking").hidden = !hello.walk;
-  if (hello.walk) $("stick").hidden = false;
+  if (hello.walk) {
+    $("stick").hidden = false;
+    $("arm").replaceChildren(make("option", { value: "" }, "the body"), ...hello.arms.map((name) => make("option", { value: name }, name)));
+  }
   who();
   const auto = hello.live && firstControl && operator === "" && !query.has("watch");
   if (auto) { firstControl = false; send({ type: "operate" }); }
@@ -144,6 +147,11 @@ function show() {
   else pill(state.ended ? "the loop has ended" : state.status, state.ended ? "gone" : state.status);
   $("resume").hidden = !stopped;
   $("approve").hidden = !state.waits;
+  if (state.walk) {
+    if (document.activeElement !== $("arm")) $("arm").value = state.walk.arm;
+    $("approve").textContent = state.walk.waiting ? `Lift ${state.walk.waiting}` : "Lift the hand";
+    $("reason").textContent = state.walk.reason;
+  }
   const now = performance.now();
   if (now - seen.since > 1000) { seen.rate = (1e3 * seen.states) / (now - seen.since); seen.states = 0; seen.since = now; }
   $("rates").textContent = `${seen.rate.toFixed(0)} states/s${state.sentence_rate ? `, sentence ${state.sentence_rate.toFixed(0)}/s` : ""}`;
@@ -189,6 +197,7 @@ for (const what of ["reach", "follow"]) $(what).onchange = () => send({ type: "s
 $("selfmotion").onclick = () => send({ type: "show", what: "self-motion", on: !state.previewed });
 $("ask").onchange = () => send({ type: "ask", on: $("ask").checked });
 $("approve").onclick = () => send({ type: "approve" });
+$("arm").onchange = () => { send({ type: "arm", name: $("arm").value }); $("arm").blur(); };
 $("pair").onchange = () => { send({ type: "pair", name: $("pair").value }); $("pair").value = commanded; };
 $("swap").onclick = () => send({ type: "swap" });
 $("live").onclick = () => send({ type: "live" });
@@ -241,7 +250,9 @@ setInterval(() => {
   const any = move.some((x) => x) || turn;
   if (!any && !rating) return;
   rating = !!any;
-  if (hello.walk) { const most = (x) => Math.max(-1, Math.min(1, x)); send({ type: "steer", rates: [most(-move[1]), most(move[0]), most(-turn)] }); return; }
+  const most = (x) => Math.max(-1, Math.min(1, x));
+  if (hello.walk && state && state.walk && state.walk.arm) { send({ type: "hand", rates: [most(-move[1]), most(move[0]), most(move[2]), most(turn)] }); return; }
+  if (hello.walk) { send({ type: "steer", rates: [most(-move[1]), most(move[0]), most(-turn)] }); return; }
   const name = $("driven").value, item = hello.items.find((i) => i.name === name);
   if (!item) return;
   const target = item.inputs.find((i) => i.name === "target");

@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.robots import Walker
-from wbc.simulation import Connection, GripKind, GrippingPlant, MovingPlant, Plant, WatchedPlant
+from wbc.simulation import Connection, GripKind, GrippingPlant, LoadedPlant, MovingPlant, Plant, WatchedPlant
 from wbc.validation import Array
 from wbc.walking.arms.fits import check_fits
 from wbc.walking.holds.structure import Structure
@@ -55,6 +55,7 @@ class Machine:
         self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
         self._moving: MovingPlant | None = plant if isinstance(plant, MovingPlant) else None
         self._watched: WatchedPlant | None = plant if isinstance(plant, WatchedPlant) else None
+        self._loaded: LoadedPlant | None = plant if isinstance(plant, LoadedPlant) else None
         self.q = np.array(walker.robot.neutral)
         self.v = self.rates = np.zeros(walker.robot.nv)
         self.time, self.fixed = 0.0, False
@@ -117,6 +118,10 @@ class Machine:
         self.held[arm] = hold
         self._grasp(arm)
         self.fixed = self.fixed and len(self.held) < self.walker.min_holds
+
+    def may_open(self, arm: int) -> bool:
+        """Whether the other hands bear the robot without this one, as far as the plant knows."""
+        return self._loaded is None or arm in self._broken or self._loaded.holds_without(self.walker.arms[arm].hand)
 
     def open(self, arm: int) -> None:
         """A hand holds nothing."""

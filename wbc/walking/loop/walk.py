@@ -416,6 +416,8 @@ class Walk:
         swinging.wrist = self.leader.wrist(arm)
         if not self._may_swing(swinging, f"{step.arm} from {step.source} to {step.target}"):
             return
+        if not self.machine.may_open(arm):
+            return  # what drives the walk brings it to rest
         self.progress.lift(arm)
         self.hands.open(arm)
         self.hands.swinging = swinging

@@ -157,6 +157,8 @@ class ArmMode:
         if self.arm not in self.walk.held:
             return
         hold = self.walk.held[self.arm]
+        if not self.walk.machine.may_open(self.arm):
+            raise ArmRefused("arm", self.walk.walker.arms[self.arm].name, self.walk.machine.failing())
         self.walk.open_hand(self.arm)
         for _ in range(round(self.walk.hands.data.latch_time / self.walk.dt)):
             self._tick("opening", hold)

@@ -72,14 +72,14 @@ def planned_joints(walker: Walker, plan: Plan) -> PlannedJoints:
     joints = np.empty((len(time), len(names), len(limb.position_limits)))
     for arm in range(len(names)):
         mine = [k for k, step in enumerate(plan.regrasps) if names.index(step.arm) == arm]
-        ends = [*(_ends(plan)[k] for k in mine), (np.inf, np.inf)]
+        ends = [*(swing_times(plan)[k] for k in mine), (np.inf, np.inf)]
         begin = -np.inf
         for grip, end in zip(plan.chain[arm], ends, strict=True):
             rows = (time >= begin) & (time <= end[0])
             joints[rows, arm] = _held(grips, grip, samples[rows])
             begin = end[1]
         for k, source, target in zip(mine, plan.chain[arm], plan.chain[arm][1:], strict=False):
-            lift, land = _ends(plan)[k]
+            lift, land = swing_times(plan)[k]
             rows = (time > lift) & (time < land)
             part = np.clip((time[rows] - lift - latch) / (land - lift - _extra(latch)), 0.0, 1.0)
             joints[rows, arm] = _swung(walker, plan, arm, (source, target), plan.laws[k], part, samples[rows])
@@ -91,7 +91,7 @@ def _extra(latch: float) -> float:
     return 2.0 * latch + SETTLE
 
 
-def _ends(plan: Plan) -> list[tuple[float, float]]:
+def swing_times(plan: Plan) -> list[tuple[float, float]]:
     """Times of the plan at which each hand begins to open and has closed [s]."""
     out, late = list[tuple[float, float]](), 0.0
     for step in plan.regrasps:
@@ -105,7 +105,7 @@ def _ends(plan: Plan) -> list[tuple[float, float]]:
 def _times(latch: float, plan: Plan) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Waypoints: time of the plan, path time, and which stretches between them take the planned time."""
     known, at, spans = [0.0], [0.0], list[tuple[float, bool]]()
-    for (lift, land), step in zip(_ends(plan), plan.regrasps, strict=True):
+    for (lift, land), step in zip(swing_times(plan), plan.regrasps, strict=True):
         known, at = [*known, lift, land], [*at, step.lift, step.land]
         spans += [(lift, False), (lift + latch, True), (land - latch - SETTLE, False), (land, True)]
     known.append(known[-1] + plan.path.duration - at[-1])

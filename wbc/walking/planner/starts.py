@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from heapq import nlargest
 from itertools import combinations, product
 from typing import Any
 
@@ -27,7 +28,7 @@ Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collectio
 NOTHING: Beginning = ({}, {}, {})
 #: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
 STARTS, ALL_STARTS = (10, 24), (24, 200)
-#: Of more arms than this the best grips are tried with each other, and more of them until there are so many stances
+#: Stances of more arms than this are grown arm by arm, from so many that last longest
 FEW_ARMS, ENOUGH = 3, 1000
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
@@ -152,22 +153,36 @@ def _candidates(
     grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
 ) -> Iterator[tuple[int, ...]]:
     """Stances on holds of their own, those whose grips last longest first; see :data:`FEW_ARMS`."""
+    if len(choices) > FEW_ARMS:
+        yield from _lasting_longest(grips, search, choices, sample)
+        return
 
     def fit(one: int, other: int) -> bool:
         return bool(grips.hold[one] != grips.hold[other])
 
-    def lasting(one: int, other: int) -> bool:
-        return fit(one, other) and search.conflicts.first_conflict(one, other, 0) > sample + 1
+    yield from sorted(together(choices, fit), key=lambda stance: -min(int(grips.last[g]) for g in stance))
 
-    found = list[tuple[int, ...]]()
-    if len(choices) <= FEW_ARMS:
-        found += together(choices, fit)
-    longest = max(map(len, choices))
-    for count in range(min(2, longest), longest + 1) if len(choices) > FEW_ARMS else ():
-        found = list(together([mine[:count] for mine in choices], lasting))
-        if len(found) >= ENOUGH:
-            break
-    yield from sorted(found, key=lambda stance: -min(int(grips.last[g]) for g in stance))
+
+def _lasting_longest(
+    grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
+) -> Iterator[tuple[int, ...]]:
+    """Stances that last beyond a sample, grown arm by arm from the :data:`ENOUGH` that last longest."""
+    ends = {
+        frozenset((a, b)): min(int(grips.last[a]), int(grips.last[b]), search.conflicts.first_conflict(a, b, 0) - 1)
+        for one, other in combinations(choices, 2)
+        for a, b in product(one, other)
+        if grips.hold[a] != grips.hold[b]
+    }
+    some = [(int(grips.last[g]), 0, (g,)) for g in choices[0]]
+    for mine in choices[1:]:
+        longer = list[tuple[int, int, tuple[int, ...]]]()
+        for (until, total, stance), g in product(some, mine):
+            each = [ends.get(frozenset((g, other)), -1) for other in stance]
+            if min(each) > sample:
+                longer.append((min(until, *each), total + sum(each), (*stance, g)))
+        # Of those that last as long, the ones whose pairs last longer
+        some = nlargest(ENOUGH, longer)
+    yield from (stance for _, _, stance in some)
 
 
 def _why_no_stance(

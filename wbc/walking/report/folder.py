@@ -25,6 +25,7 @@ from wbc.walking.report.run_report import save_report
 from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.session import WalkRun
+from wbc.walking.torque.loads import LOADS
 from wbc.walking.two_ended import touching_distance
 
 CHECK = "check.txt"
@@ -32,7 +33,11 @@ CHECK = "check.txt"
 WRITTEN = (
     *(BEGUN, FILE, PART, TICKS, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
     *(CHECK, "summary.json", "summary.txt"),
-    *(f"{name}.png" for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time")),
+    *(
+        f"{name}.png"
+        for name in ("holds", "margins", "joints", "rates", "drift", "wrists", "speed", "tick_time", "loads")
+    ),
+    LOADS,
     *("reach_map.png", "walk.png", "still_*.png", "walk.gif", "walk.mp4", "replay.html", REPORT),
 )
 
@@ -55,6 +60,8 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
     if run.log is not None and run.ticks is not None:
         files += [run.ticks.save(folder), run.log.save(folder)]
         (folder / PART).unlink(missing_ok=True)
+        if run.loads is not None:
+            files.append(run.loads.save(folder))
         report = check_run(folder, rules_of(run.walker)) if check else None
         if report is not None:
             text = f"{report}\n"

@@ -22,7 +22,8 @@ Draw = Callable[[Any, WalkRun, WalkLog, TickColumns], Any]
 
 
 def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.Path) -> list[pathlib.Path]:
-    """Writes holds, margins, joints, rates, drift, wrists, speed and tick_time, PNG each; returns the files.
+    """Writes holds, margins, joints, rates, drift, wrists, speed, tick_time and, of a walk under torques, loads, PNG
+    each; returns the files.
 
     Of the two-ended arm no margins and wrists: its hands hold until they swing, and it has no theta5.
     """
@@ -38,6 +39,8 @@ def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.P
     }
     if run.walker.two_ended:
         del draws["margins"], draws["wrists"]
+    if run.loads is not None:
+        draws["loads"] = _loads
     files = []
     with style.pyplot() as plt:
         for name, draw in draws.items():
@@ -182,6 +185,44 @@ def _drift(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     figure.suptitle(
         "Drift: body off its command, held hands off their holds", x=0.01, ha="left", fontweight="bold", fontsize=13
     )
+    return figure
+
+
+def _loads(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
+    """What grips bore beside their rating, how far they gave way, and the momentum that the structure got."""
+    loads = run.loads
+    assert loads is not None
+    panels = (
+        (loads.force, "force [N]", loads.rating.force),
+        (loads.moment, "moment [N m]", loads.rating.torque),
+        (1e3 * loads.off, "hand off its hold [mm]", None),
+    )
+    figure, axes = plt.subplots(4, 1, figsize=(9.2, 8.4), sharex=True, layout="constrained")
+    for panel, (values, label, most) in zip(axes, panels, strict=False):
+        for k, arm in enumerate(run.walker.arms):
+            panel.plot(loads.time, values[:, k], color=arm_colour(k), lw=1.2, label=arm.name)
+        if most is not None:
+            panel.axhline(most, color=style.RED, lw=1.0)
+            panel.annotate("rating", (loads.time[0], most), (4, -11), textcoords="offset points", color=style.RED,
+                           fontsize=9)  # fmt: skip
+        panel.set_ylabel(label)
+        panel.set_ylim(bottom=0.0)
+    for values, label, colour in zip(loads.given.T, ("linear [N s]", "angular [N m s]"), (style.BLUE, style.ORANGE),
+                                     strict=True):  # fmt: skip
+        axes[3].plot(loads.time, values, color=colour, label=label)
+    axes[3].set_ylabel("momentum given")
+    axes[3].set_ylim(bottom=0.0)
+    axes[3].set_xlabel("time [s]")
+    for number, (time, text) in enumerate(loads.noted):
+        for panel in axes:
+            panel.axvline(time, color=style.RED, lw=1.0, ls=(0, (4, 2)))
+        axes[2].annotate(f" {text}", (time, 0.97 - 0.13 * (number % 5)), xycoords=("data", "axes fraction"), va="top",
+                         ha="right" if time > 0.5 * loads.time[-1] else "left", fontsize=8)  # fmt: skip
+    axes[0].margins(x=0.01)
+    for panel in (axes[0], axes[3]):
+        panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    title = "Largest component of every grip, how far it gave way, and what the structure got"
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=13)
     return figure
 
 

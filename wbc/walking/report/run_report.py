@@ -22,6 +22,7 @@ PICTURES = (
     "joints.png",
     "rates.png",
     "drift.png",
+    "loads.png",
 )
 
 

@@ -33,6 +33,7 @@ from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
 from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
 from wbc.walking.run.resume_two_ended import TwoEndedResumeMode
+from wbc.walking.torque.loads import Loads
 from wbc.walking.torque.loop import TorqueLoop
 
 
@@ -45,7 +46,7 @@ class WalkRun:
         plan: None if no stance is possible where the walk begins.
         outcome, reason: how it ended; the reason is "" where all is well.
         log, ticks: None if nothing was carried out.
-        more: figures of its mode, for the summary.
+        more: figures of its mode, for the summary. loads: what hands bore, under torques.
         plan_time, compile_time, walk_time: of the computer [s]; walking has controller, plant and log.
     """
 
@@ -62,6 +63,7 @@ class WalkRun:
     compile_time: float = 0.0
     walk_time: float = 0.0
     more: tuple[Figure, ...] = ()
+    loads: Loads | None = None
 
     @property
     def well(self) -> bool:
@@ -181,6 +183,9 @@ def perform(
         write_whole(folder / PLAN, plan.save)
     if not plan.complete:
         return run
+    unborne = plant.bearing.of_plan(plan, mode.structure) if isinstance(plant, TorqueLoop) else ""
+    if unborne:
+        return replace(run, reason=unborne)
     report("compiling", None)
     begin = clock()
     stack = stack or mode.compiled(backend)
@@ -201,7 +206,7 @@ def perform(
         return replace(run, more=(*run.more, *mode.figures(None)))
     result = mode.result(walk, *recorder.log())
     if isinstance(plant, TorqueLoop):
-        run = replace(run, more=(*run.more, *plant.watch.figures()))
+        run = replace(run, more=(*run.more, *plant.watch.figures()), loads=plant.watch.loads())
     run = replace(run, log=result.log, ticks=result.ticks, more=(*run.more, *result.figures))
     if result.plan is not None:
         run = replace(run, path=result.plan.path, plan=result.plan)

@@ -103,5 +103,6 @@ def hold_kind_of(structure: Structure, hold: int) -> str:
     """
     kind = hold_kind(structure, hold)
     if kind == "roll":
-        raise RangeError(f"hold {structure.ids[hold]}", kind, "torques know holds that fix the tilt of a hand")
+        reason = "torques know holds that fix the tilt of a hand; take holds with max_tilt = 0"
+        raise RangeError(f"hold {structure.ids[hold]}", kind, reason)
     return kind

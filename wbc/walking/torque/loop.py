@@ -11,16 +11,20 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.simulation import Command, CommandKind, GripKind, Plant, PlantState
+from wbc.simulation import Command, CommandKind, Encoders, GripKind, Plant, PlantState
 from wbc.validation import Array
+from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
+from wbc.walking.torque.readings import JointFilter
 from wbc.walking.torque.stack import TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
 
 #: A closed hand that is farther from its hold slips; farther than that the walk ends [m]
 SLIPS, LOST = 3e-4, 2e-3
+#: Torques that do not do what they are to for so long end the walk [s]
+OVERLOAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -52,14 +56,16 @@ class TorqueLoop:
 
     A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
     found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
-    the walk then brings it to rest.
+    the walk then brings it to rest. So it does where holds and motors would not bear the robot (:class:`Bearing`).
 
     Args:
         stack: compiled. plant: takes torques, and grasps. gains: of the reference.
-        delay: of the torques, which the loop knows [s]. faults: that come in time.
+        delay: of the torques, which the loop knows [s]. encoders: their noise, which the loop knows; None: none.
+        faults: that come in time.
 
     Attributes:
-        watch: what was seen of the plant. about: plain data for a log, which say what it is.
+        watch: what was seen of the plant. bearing: what holds and motors bear. about: plain data for a log, which say
+            what it is.
 
     Raises:
         ShapeError: a plant that takes no torques, or grasps nothing.
@@ -74,6 +80,7 @@ class TorqueLoop:
         gains: Gains | None = None,
         *,
         delay: float = 0.0,
+        encoders: Encoders | None = None,
         faults: Sequence[Fault] = (),
         about: Mapping[str, Any] | None = None,
     ) -> None:
@@ -95,24 +102,28 @@ class TorqueLoop:
         self._decided = np.zeros((ahead, self.nv))
         self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
         self.about = dict(about or {"name": type(plant).__name__})
-        self.watch = Watch(stack.rating, [arm.hand for arm in arms])
+        self.watch = Watch(self._model, stack.rating, [arm.hand for arm in arms])
         self._effort = np.array(stack.walker.robot.limits.effort)
         self._effort[: stack.walker.robot.base_nv] = 0.0
-        self._motors = MotorWatch(self._model, self._effort, self.time_step)
+        self._motors, self.bearing = MotorWatch(self._model, self._effort, self.time_step), Bearing(stack)
         self._data = self._model.createData()
+        base, noisy = stack.walker.robot.base_nv, encoders is not None and encoders != Encoders()
+        self._filter = JointFilter(self._model, base, encoders, self.time_step) if encoders and noisy else None
+        self._state = plant.read()
         # Torques on their way, the oldest first, and that which takes hold next at the end
         self._sent = np.zeros((ahead + 1, self.nv))
 
     def reset(self, q: Array, time: float) -> None:
         """At rest, nothing grasped."""
         self.plant.reset(q, time)
+        self._look()
         gains, controller = self._gains, self.stack.controller
         controller.reset(q)
         controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
         self._motors.begin(q, np.zeros(self.nv))
         self._sent[:] = 0.0
         self._slipping: dict[str, float] = {}
-        self._failing = ""
+        self._failing, self._overloaded = "", 0
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
@@ -125,14 +136,15 @@ class TorqueLoop:
 
     def move(self, v: Array) -> None:
         """See :class:`wbc.simulation.MovingPlant`."""
-        state = self.plant.read()
+        state = self._state
         self._tested.reset(state.q, state.time, v)
+        self._look()
         self._motors.begin(state.q, v)
         self._v, self._next = np.array(v), np.array(v)
 
     def read(self) -> PlantState:
-        """The plant's."""
-        return self.plant.read()
+        """The plant's; of noisy encoders what the filter makes of it."""
+        return self._state
 
     def apply(self, command: Command) -> None:
         """Take velocities, for the next period."""
@@ -142,11 +154,13 @@ class TorqueLoop:
         """The plant's hand closes, and the stack counts on it."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
         self._tested.grasp(frame, pose, kind)
-        state = self.plant.read()
+        self._look(struck=True)
+        state = self._state
         self._motors.struck(state.q, state.v)
         item = self._items[frame, kind]
         item.target, item.enabled = pose, True
         self._closed[frame] = kind
+        self.watch.grasps(self._tested, frame)
 
     def release(self, frame: str) -> None:
         """The plant's hand opens, and the stack does without it."""
@@ -154,11 +168,22 @@ class TorqueLoop:
         self._slipping.pop(frame, None)
         self._let_go(frame)
 
+    def holds_without(self, frame: str) -> bool:
+        """Whether holds and motors bear the robot, at rest where it is, when this closed hand opens; if they do not,
+        :meth:`failing` says what is lacking.
+        """
+        state = self._state
+        held = {hand: kind for hand, kind in self._closed.items() if hand != frame}
+        short = self.bearing.lacking(state.q, held)
+        if short:
+            self._note(state.time, self.bearing.words(short, held), ends=True)
+        return not short
+
     def lost(self) -> tuple[str, ...]:
         """Hands whose holds have broken off; the stack has done without them since."""
         lost = self._tested.lost()
         for frame in lost:
-            self._note(self.plant.read().time, f"the hold of {frame} broke off")
+            self._note(self._state.time, f"the hold of {frame} broke off")
         return lost
 
     def failing(self) -> str:
@@ -172,7 +197,7 @@ class TorqueLoop:
         plant, reference, command, controller = self.plant, self._reference, self._command, self.stack.controller
         reference.acceleration = ramp / step
         for _ in range(count):
-            state = plant.read()
+            state = self._state
             if self._coming:
                 self._fail(state.time)
             q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
@@ -181,25 +206,48 @@ class TorqueLoop:
             command.values[:] = self.step.torque
             plant.apply(command)
             plant.advance(step)
+            self._look(self._decided[0] if len(self._decided) else self.step.a)
             self._sent[:-1] = self._sent[1:]
             self._sent[-1] = self.step.torque
-            self._find()
+            wrenches = self._tested.wrenches
+            self._find(wrenches)
+            self.watch.see(wrenches, self.step.status)
             self._q = pin.integrate(self._model, self._q, (self._v + 0.5 * ramp) * step)
             self._v = self._v + ramp
             if len(self._decided):
                 self._decided[:-1] = self._decided[1:]
                 self._decided[-1] = self.step.a
-            self.watch.see(self._tested, self._model, self.step.status)
-        off = pin.difference(self._model, self._q, plant.read().q)
+            self._overloaded = 0 if self.step.status == "solved" else self._overloaded + 1
+        off = pin.difference(self._model, self._q, self._state.q)
         self._q = pin.integrate(self._model, self._q, min(self._gains.leak * dt, 1.0) * off)
         self._feel()
+        self._bear()
+        self.watch.period(self._tested)
 
-    def _find(self) -> None:
+    def _look(self, decided: Array | None = None, struck: bool = False) -> None:
+        """Take what is read; ``decided``: the accelerations of the tick that is over; None: there was none."""
+        state, known = self.plant.read(), self._filter
+        if known is not None:
+            state = (
+                known.struck(state) if struck else known.begin(state) if decided is None else known.see(state, decided)
+            )
+        self._state = state
+
+    def _bear(self) -> None:
+        """Torques that have given way for long, with what is lacking to stand."""
+        if self._overloaded * self.time_step < OVERLOAD or self._failing:
+            return
+        state = self._state
+        short = self.bearing.lacking(state.q, self._closed)
+        text = f"motors and holds have given way for {1e3 * OVERLOAD:.0f} ms"
+        self._note(state.time, f"{text}; {self.bearing.words(short, self._closed)}" if short else text, ends=True)
+
+    def _find(self, wrenches: Mapping[str, Array]) -> None:
         """Motors that have gone limp."""
-        state, model, data = self.plant.read(), self._model, self._data
+        state, model, data = self._state, self._model, self._data
         pin.computeJointJacobians(model, data, state.q)
         contacts = np.zeros(self.nv)
-        for name, wrench in self._tested.wrenches.items():
+        for name, wrench in wrenches.items():
             contacts += pin.getFrameJacobian(model, data, model.getFrameId(name), pin.LOCAL).T @ wrench
         for dof in self._motors.see(state.q, state.v, self._sent[0], contacts):
             robot, share = self.stack.walker.robot, float(self._motors.share[dof])
@@ -215,7 +263,7 @@ class TorqueLoop:
 
     def _feel(self) -> None:
         """Hands that slip on their holds."""
-        state, model, data = self.plant.read(), self._model, self._data
+        state, model, data = self._state, self._model, self._data
         pin.framesForwardKinematics(model, data, state.q)
         for frame, kind in self._closed.items():
             gap = data.oMf[model.getFrameId(frame)].translation - self._items[frame, kind].target.translation
@@ -250,3 +298,4 @@ class TorqueLoop:
 
     def _let_go(self, frame: str) -> None:
         self._items[frame, self._closed.pop(frame)].enabled = False
+        self.watch.releases(frame)

@@ -9,13 +9,13 @@ from wbc.estimation import MomentumObserver
 from wbc.validation import Array
 
 #: Of the observer [1/s]
-GAIN = 50.0
+GAIN = 100.0
 #: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
 #: knows of may take [N m], ...
-ASKED, FRICTION = 0.15, 6.0
+ASKED, FRICTION = 0.08, 6.0
 #: ... and is limp when it gives less than this part of what is asked, for so long [s]: blows of hands
 #: that close pass
-GIVEN, LASTING = 0.3, 0.04
+GIVEN, LASTING = 0.3, 0.015
 
 
 class MotorWatch:

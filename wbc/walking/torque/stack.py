@@ -46,8 +46,11 @@ class TorqueStack:
             raise RangeError("walker", robot.name, "torques need masses: wbc.robots.with_masses(walker)")
         self.walker, self.kinds, self.rating = walker, tuple(dict.fromkeys(kinds)), rating
         if not set(self.kinds) <= set(GRASPS):
-            why = "two hands that may tilt on their holds do not keep a body from turning about the line through them"
-            raise RangeError("kinds", [str(kind) for kind in self.kinds], f"holds that fix the tilt of a hand: {why}")
+            why = (
+                "two hands that may tilt on their holds bear no moment about the line through them, so that no torques "
+                "keep the body from turning about it while the third one swings; take holds with max_tilt = 0, --rigid"
+            )
+            raise RangeError("kinds", [str(kind) for kind in self.kinds], f"expected holds that fix the tilt: {why}")
         stack = Stack(robot, dt=period, calm=False)
         weights = np.where(np.arange(robot.nv) < robot.base_nv, BODY, 1.0)
         follow = tasks.Posture(joints=robot.joint_names, weights=tuple(weights.tolist()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -10,46 +10,81 @@ import pinocchio as pin
 from wbc.robots import HoldRating
 from wbc.track.summary import Figure
 from wbc.validation import Array
+from wbc.walking.torque.loads import Loads
 from wbc.walking.torque.tested import Tested
 
 
 class Watch:
-    """The worst of every tick of torques.
+    """The worst of every tick of torques; of places and momentum the worst at the end of every period.
 
     Attributes:
-        drift: farthest that a held frame was from where its grip holds it [m]. force, moment: largest components of a
+        drift: farthest that a held frame was from where its grip closed [m]. force, moment: largest components of a
             grip's wrench [N], [N m]. given: largest components of the momentum given to the structure, linear [N s] and
             angular about the body's origin [N m s]. unsolved: ticks of torques that gave way or had no answer. noted:
             what the loop found wrong, (time [s], in words).
     """
 
-    def __init__(self, rating: HoldRating, hands: Sequence[str]) -> None:
+    def __init__(self, model: pin.Model, rating: HoldRating, hands: Sequence[str]) -> None:
+        self._model, self._data = model, model.createData()
         self.rating, self._hands = rating, tuple(hands)
         self.drift = self.force = self.moment = 0.0
         self.given = np.zeros(2)
         self.ticks = self.unsolved = 0
         self.noted: list[tuple[float, str]] = []
-        self._data: pin.Data | None = None
+        # Of the period that goes on: its worst force, moment and distance of each hand; and all before it
+        self._places: dict[str, Array] = {}
+        self._now, self._rows = np.full((3, len(self._hands)), np.nan), list[tuple[float, Array, Array]]()
 
-    def see(self, plant: Tested, model: pin.Model, status: str) -> None:
-        """After a tick."""
-        if self._data is None:
-            self._data = model.createData()
-        data, q, grips = self._data, plant.state.q, plant.grips
+    def see(self, wrenches: Mapping[str, Array], status: str) -> None:
+        """After a tick: what the grips exert on the robot, as of :attr:`Tested.wrenches`."""
         self.ticks += 1
         self.unsolved += status != "solved"
-        for wrench in plant.wrenches.values():
+        for name, wrench in wrenches.items():
             sizes = np.abs(wrench)
-            self.force, self.moment = max(self.force, sizes[:3].max()), max(self.moment, sizes[3:].max())
-        pin.framesForwardKinematics(model, data, q)
-        for name, grip in grips.items():
-            off = data.oMf[model.getFrameId(name)].translation - grip.pose.translation
-            self.drift = max(self.drift, float(np.sqrt(off @ off)))
+            self._worst(name, slice(0, 2), (float(sizes[:3].max()), float(sizes[3:].max())))
+
+    def grasps(self, plant: Tested, frame: str) -> None:
+        """A hand has closed; one that slips is off where it did."""
+        self._places[frame] = np.array(plant.grips[frame].pose.translation)
+        self._off(plant.state.q)
+
+    def releases(self, frame: str) -> None:
+        """A hand opens, or its hold breaks off."""
+        self._places.pop(frame, None)
+
+    def period(self, plant: Tested) -> None:
+        """A period of the walk is over."""
+        state = plant.state
+        self._off(state.q)
         given: Array = plant.given
-        x, y, z = q[:3]
+        x, y, z = state.q[:3]
         a, b, c = given[:3]
         turning = given[3:] - (y * c - z * b, z * a - x * c, x * b - y * a)
-        self.given = np.maximum(self.given, (np.abs(given[:3]).max(), np.abs(turning).max()))
+        now = np.array([np.abs(given[:3]).max(), np.abs(turning).max()])
+        self.given = np.maximum(self.given, now)
+        self.force, self.moment, self.drift = np.fmax([self.force, self.moment, self.drift],
+                                                      np.fmax.reduce(self._now, axis=1)).tolist()  # fmt: skip
+        self._rows.append((state.time, self._now, now))
+        self._now = np.full_like(self._now, np.nan)
+
+    def _off(self, q: Array) -> None:
+        model, data = self._model, self._data
+        pin.framesForwardKinematics(model, data, q)
+        for name, place in self._places.items():
+            off = data.oMf[model.getFrameId(name)].translation - place
+            self._worst(name, slice(2, 3), (float(np.sqrt(off @ off)),))
+
+    def loads(self) -> Loads:
+        """What was seen, period by period."""
+        count = len(self._hands)
+        worst = np.array([row for _, row, _ in self._rows]).reshape(-1, 3, count)
+        given = np.array([row for _, _, row in self._rows]).reshape(-1, 2)
+        time = np.array([time for time, _, _ in self._rows])
+        return Loads(time, *np.moveaxis(worst, 1, 0), given, self.rating, tuple(self.noted))
+
+    def _worst(self, name: str, rows: slice, values: tuple[float, ...]) -> None:
+        at = self._hands.index(name)
+        self._now[rows, at] = np.fmax(self._now[rows, at], values)
 
     def figures(self) -> tuple[Figure, ...]:
         """For the summary."""

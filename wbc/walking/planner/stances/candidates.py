@@ -69,10 +69,10 @@ class Outlook:
     slack: float
     spacing: float
 
-    def promise(self, keys: Ints, samples: Ints, delays: Ints) -> Array:
-        """Less is better; keys ``[m, arms]``."""
-        arms = keys.shape[1]
-        ends = np.sort(self.last[keys], axis=1)
+    def promise(self, ends: Ints, samples: Ints, delays: Ints) -> Array:
+        """Less is better; ends of grips ``[m, arms]``."""
+        arms = ends.shape[1]
+        ends = np.sort(ends, axis=1)
         ends = np.where(ends < self.finish, ends, self.finish + self.usual)
         slack = (ends - samples[:, None] - self.usual * np.arange(arms)).min(axis=1)
         out: Array = -(ends.sum(axis=1) / arms + np.minimum(slack, self.slack)) + delays * QUANTUM / self.spacing
@@ -99,7 +99,7 @@ def following(
     new = np.concatenate([[True], (keys[rows[1:]] != keys[rows[:-1]]).any(axis=1)])
     heads, ends = np.nonzero(new)[0], np.append(np.nonzero(new)[0][1:], len(rows))
     first = rows[heads]
-    promise = outlook.promise(keys[first], fan.land[first], delays[first])
+    promise = outlook.promise(outlook.last[keys[first]], fan.land[first], delays[first])
     for place in outlook.order(keys[first], fan.land[first], promise).tolist():
         begin, end = int(heads[place]), int(ends[place])
         mine = rows[begin : end if most is None else min(begin + most, end)].tolist()

@@ -117,6 +117,17 @@ class StanceEnds:
         """Last sample that a stance can hold, from a sample on."""
         return min([*(int(self._last[g]) for g in key), *self._free(key, sample)])
 
+    def by_arm(self, key: Key, sample: int) -> list[int]:
+        """For each arm the last sample that it can hold itself, from a sample on: of two arms that conflict the one
+        whose grip ends sooner has to move first.
+        """
+        ends = [int(self._last[grip]) for grip in key]
+        order = sorted(range(len(key)), key=ends.__getitem__)
+        for k, arm in enumerate(order):
+            later = [self._conflicts.first_conflict(key[arm], key[other], sample) - 1 for other in order[k + 1 :]]
+            ends[arm] = min([ends[arm], *later])
+        return ends
+
     def limits(self, key: Key, sample: int) -> tuple[list[int], list[int]]:
         """For each arm the last sample that the others can hold, less what is spared, and that it can hold itself."""
         pairs, free = list(combinations(key, 2)), self._free(key, sample)

@@ -16,15 +16,15 @@ to the end of the path needs the fewest; of equal stances the one that is earlie
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import chain, combinations, islice
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from wbc.walking.body_path import BodyPath
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import Grips, Ints
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.candidates import QUANTUM, Fan, Outlook, following
 from wbc.walking.planner.stances.nodes import Conflicts, Found, Node, StanceEnds, SwingTable, moves_to
@@ -41,6 +41,10 @@ INSIDE = 1
 USUAL, SLACK = 2.1, 0.5
 #: Moves to one stance that are looked at, and stances that are checked together, in widths
 MOVES, PARTS = 2, 2
+#: Of more arms than FEW_ARMS so many widths of stances are put in order by their conflicts before they are checked
+FEW_ARMS, AHEAD = 3, 12
+#: Of these, searches end where so many re-grasps led no further
+STUCK = 12
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
@@ -114,10 +118,17 @@ class StanceSearch(Generic[S]):
                 self._levels.append(following_level)
                 self._asked.append(asked)
             level = self._levels[len(levels)]
-            if not level:
+            if not level or self._stuck(levels):
                 break
             levels.append(level)
         return self._result(levels, None, False)
+
+    def _stuck(self, levels: Sequence[dict[Key, Node]]) -> bool:
+        """Whether so many re-grasps of many arms led to no stance that lasts longer."""
+        if len(self._by_arm) <= FEW_ARMS or len(levels) <= STUCK:
+            return False
+        furthest = [max(self.until(k, n.sample) for k, n in level.items()) for level in (levels[-1 - STUCK], *levels[-STUCK:])]
+        return max(furthest[1:]) <= furthest[0]
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
         """A move takes another time [s], or is not possible; what was searched without it stays."""
@@ -134,6 +145,8 @@ class StanceSearch(Generic[S]):
             yield None
         self.expanded += len(whole)
         order = following(Fan.joined(parts), whole, self._outlook, MOVES if self.width else None) if parts else iter(())
+        if self.width and len(self._by_arm) > FEW_ARMS:
+            order = yield from self._reordered(order, AHEAD * self.width)
         kept: dict[Key, Node] = {}
         while part := list(islice(order, PARTS * self.width if self.width else None)):
             found = yield from self._prepare(level, part)
@@ -148,14 +161,38 @@ class StanceSearch(Generic[S]):
                 break
         return self._best(kept), asked
 
+    def _reordered(
+        self, order: Iterator[tuple[Key, list[Node]]], most: int
+    ) -> Slices[Iterator[tuple[Key, list[Node]]]]:
+        """The first stances of an order by their promise as conflicts end them, then the others."""
+        some = list(islice(order, most))
+        if not some:
+            return order
+        pairs = [pair for key, _ in some for pair in combinations(key, 2)]
+        for begin in range(0, len(pairs), PAIRS):
+            self.conflicts.prepare(pairs[begin : begin + PAIRS])
+            yield None
+        keys, heads = np.array([key for key, _ in some], dtype=np.int64), [nodes[0] for _, nodes in some]
+        samples, delays = np.array([(node.sample, node.delay) for node in heads], dtype=np.int64).T
+        promise = self._outlook.promise(self._ends(keys, samples), samples, delays)
+        return chain((some[k] for k in self._outlook.order(keys, samples, promise).tolist()), order)
+
+    def _ends(self, keys: Ints, samples: Ints) -> Ints:
+        """Last samples of the arms of stances, as their conflicts end them."""
+        return np.array([self.ends.by_arm(*one) for one in zip(keys.tolist(), samples.tolist(), strict=True)])
+
     def _best(self, kept: dict[Key, Node]) -> dict[Key, Node]:
         """The promising ones of checked stances: arms that conflict end them."""
         if not kept:
             return {}
         keys = np.array(list(kept), dtype=np.int64)
         samples, delays = np.array([(node.sample, node.delay) for node in kept.values()], dtype=np.int64).T
-        until = np.array([self.until(key, node.sample) for key, node in kept.items()])
-        promise = self._outlook.promise(keys, samples, delays) + 2.0 * (self.grips.last[keys].min(axis=1) - until)
+        if keys.shape[1] > FEW_ARMS:
+            promise = self._outlook.promise(self._ends(keys, samples), samples, delays)
+        else:
+            until = np.array([self.until(key, node.sample) for key, node in kept.items()])
+            promise = self._outlook.promise(self.grips.last[keys], samples, delays)
+            promise += 2.0 * (self.grips.last[keys].min(axis=1) - until)
         whole = list(kept.items())
         return dict(whole[k] for k in self._outlook.order(keys, samples, promise).tolist()[: self.width])
 
@@ -196,7 +233,8 @@ class StanceSearch(Generic[S]):
         out, first = [], self.first if level[0][1].parent is None else None
         for arm, targets in enumerate(self._by_arm):
             until, end, source = latest[:, arm], ends[:, arm], keys[:, arm]
-            useful = grips.last[targets] > grips.last[source][:, None]
+            # Of many arms one may have to make way for another long before its own grip ends
+            useful = grips.last[targets] > (end if len(self._by_arm) > FEW_ARMS else grips.last[source])[:, None]
             if first:
                 useful = np.repeat(((grips.hold[targets] == first[1]) & (arm == first[0]))[None], len(some), axis=0)
             useful &= (grips.first[targets] < until[:, None]) & (samples <= np.minimum(until, end))[:, None]

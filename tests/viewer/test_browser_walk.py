@@ -1,0 +1,151 @@
+"""The walker and arms that are driven by pairs, in a browser without a window: what is pressed moves them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wbc.viewer import Viewer
+from wbc.viewer.chromium import Chromium, Page
+from wbc.viewer.climbing import climb
+from wbc.viewer.operating import operate
+
+PICTURES = Path(__file__).parents[2] / "build" / "viewer"
+SIZE = (940, 620)
+#: Longest that a loop runs that nobody ends [s]
+LONGEST = 240.0
+
+
+class Playing(threading.Thread):
+    """One kind of play, as ``wbc play`` starts it."""
+
+    def __init__(self, begin: Callable[..., None], *given: Any) -> None:
+        super().__init__()
+        self._begin, self._given, self.ready = begin, given, threading.Event()
+        self.viewer: Viewer | None = None
+        self.start()
+        assert self.ready.wait(120.0)
+
+    def run(self) -> None:
+        def announce(viewer: Viewer) -> None:
+            self.viewer = viewer
+            self.ready.set()
+
+        self._begin(*self._given, LONGEST, open_browser=False, silence=30.0, announce=announce)
+
+    def end(self) -> None:
+        assert self.viewer is not None
+        self.viewer._process.terminate()
+        self.join()
+
+
+@pytest.fixture
+def browser() -> Iterator[Chromium]:
+    with Chromium(SIZE) as running:
+        yield running
+
+
+def opened(browser: Chromium, playing: Playing) -> Page:
+    assert playing.viewer is not None
+    page = browser.open(playing.viewer.url)
+    page.wait("wbc.state && wbc.operator === wbc.me", 60.0)
+    page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')", 60.0)
+    return page
+
+
+def picture(page: Page, name: str) -> None:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    (PICTURES / f"{name}.png").write_bytes(page.picture())
+
+
+def middle(page: Page, selector: str) -> tuple[float, float]:
+    x, y = page.evaluate(
+        f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect();"
+        " return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+    )
+    return x, y
+
+
+def slide(page: Page, row: int, way: int) -> None:
+    """The slider of a commanded row to one of its ends."""
+    page.evaluate(
+        f"(() => {{ const s = document.querySelectorAll('#rows input')[{row}]; s.value = {way}; s.oninput(); }})()"
+    )
+
+
+def test_the_stick_moves_the_walker_and_a_hand_is_moved_alone(browser: Chromium) -> None:
+    playing = Playing(lambda seconds, **options: climb(seconds, backend="vm", **options))
+    try:
+        page = opened(browser, playing)
+        begin = page.evaluate("wbc.state.q.slice(0, 3)")
+        off = f"Math.hypot(...wbc.state.q.slice(0, 3).map((x, k) => x - {begin}[k]))"
+        x, y = middle(page, "#knob")
+        page.mouse("mouseMoved", x, y)
+        page.mouse("mousePressed", x, y, held=True)
+        page.mouse("mouseMoved", x, y - 50.0, held=True)
+        # Along the structure, with the hold of the next hand told as reserved
+        page.wait(f"{off} > 0.03", 60.0)
+        page.wait("wbc.state.walk.reserved.length > 0", 60.0)
+        time.sleep(1.0)
+        picture(page, "7 walker")
+        page.mouse("mouseReleased", x, y - 50.0)
+        page.wait("wbc.state.speed < 1e-4", 60.0)
+        # One hand alone
+        page.evaluate("document.getElementById('arm').value = 'arm1'")
+        page.evaluate("document.getElementById('arm').onchange()")
+        page.wait("wbc.state.walk.arm === 'arm1' || wbc.state.walk.reason", 60.0)
+        assert page.evaluate("wbc.state.walk.arm") == "arm1", page.evaluate("wbc.state.walk.reason")
+        page.key("KeyR", True)
+        page.wait("wbc.state.speed > 0.01", 60.0)
+        time.sleep(2.0)
+        page.key("KeyR", False)
+        page.wait("wbc.state.speed < 1e-3", 60.0)
+        picture(page, "8 one hand")
+        assert not [line for line in page.console if "Error" in line]
+    finally:
+        playing.end()
+
+
+@pytest.mark.parametrize("robot", ["ssrms", "spdm"])
+def test_an_arm_is_driven_by_pairs_and_warned_in_the_page(browser: Chromium, robot: str) -> None:
+    playing = Playing(lambda seconds, **options: operate(robot, seconds, backend="vm", **options))
+    try:
+        page = opened(browser, playing)
+        first = page.evaluate("wbc.state.pair")
+        # A slider moves the arm, and what is let go comes to rest
+        slide(page, 2, 1)
+        page.wait("wbc.state.speed > 0.003", 60.0)
+        page.evaluate("document.querySelectorAll('#rows input')[2].onchange()")
+        page.wait("wbc.state.speed < 1e-4", 60.0)
+        # Swapped, and back
+        page.wait("!document.getElementById('swap').disabled", 10.0)
+        page.click("#swap")
+        page.wait(f"wbc.state.pair !== {first!r}", 30.0)
+        assert page.evaluate("document.getElementById('pair').value") == page.evaluate("wbc.state.pair")
+        page.click("#swap")
+        page.wait(f"wbc.state.pair === {first!r}", 30.0)
+        # Driven on and on, until the page warns, before the task gives way
+        warned = "!document.getElementById('warning').hidden && document.getElementById('warning').textContent"
+        text = ""
+        for row, way in ((2, 1), (0, 1), (1, 1), (0, -1), (1, -1), (2, -1)):
+            slide(page, row, way)
+            until = time.monotonic() + 25.0
+            while not text and time.monotonic() < until:
+                text = page.evaluate(warned) or ""
+                time.sleep(0.1)
+            if text:
+                break
+            page.evaluate(f"document.querySelectorAll('#rows input')[{row}].onchange()")
+        assert "is near a locus" in text
+        assert page.evaluate("wbc.state.sigma > wbc.state.least") or " now" in text
+        picture(page, f"9 warned {robot}")
+        page.click("#stop")
+        page.wait("wbc.state.stopped && wbc.state.speed < 1e-5", 60.0)
+        assert not [line for line in page.console if "Error" in line]
+    finally:
+        playing.end()

@@ -1,0 +1,121 @@
+"""Accelerations of robots of which some joints follow others through rigid gears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.errors import RangeError
+from wbc.robot import Robot
+from wbc.simulation.dynamics import Dynamics, Grip
+from wbc.simulation.plant import GripKind
+from wbc.validation import Array
+
+#: How far a follower may be from where its leader has it [rad; m], [rad/s; m/s]
+GAP = 1e-6
+#: Rows of a frame's twist that each kind of grip holds
+ROWS = {GripKind.POSE: (0, 1, 2, 3, 4, 5), GripKind.AXIS: (0, 1, 2, 3, 4), GripKind.POSITION: (0, 1, 2)}
+#: Singular values of the grips' rows below this part of the largest say the same twice
+SAME = 1e-10
+
+
+class CoupledDynamics(Dynamics):
+    """v = G w of the joints that lead: G'M G dw/dt = G'(tau - h) + G'J'f, J G dw/dt = drift, by dense matrices.
+
+    A torque of a follower acts on its leader by the ratio. Grips as of :class:`Dynamics`.
+    """
+
+    def __init__(self, robot: Robot, model: pin.Model, rate: float) -> None:
+        super().__init__(model, rate)
+        self._robot = robot
+        followers = {coupling.follower for coupling in robot.couplings}
+        self.free = [dof for dof in range(model.nv) if dof not in followers]
+        self._G = np.eye(model.nv)[:, self.free]
+        for coupling in robot.couplings:
+            self._G[coupling.follower, self.free.index(coupling.leader)] = coupling.ratio
+
+    def reduced(self, matrix: Array) -> Array:
+        """G' X G."""
+        return np.asarray(self._G.T @ matrix @ self._G)
+
+    def coupled(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The state with followers exactly where they belong.
+
+        Raises:
+            RangeError: one is elsewhere.
+        """
+        q, v, index = q.copy(), v.copy(), self._robot.position_index
+        for coupling in self._robot.couplings:
+            name = self._robot.dof_names[coupling.follower]
+            at, leads = int(index[coupling.follower]), int(index[coupling.leader])
+            place, rate = coupling.ratio * q[leads] + coupling.offset, coupling.ratio * v[coupling.leader]
+            for field, found, wanted in (("q", q[at], place), ("v", v[coupling.follower], rate)):
+                if abs(found - wanted) > GAP:
+                    leader = self._robot.dof_names[coupling.leader]
+                    reason = f"{name} follows {leader}, which puts it at {wanted:.9g}"
+                    raise RangeError(f"{field}[{name!r}]", float(found), reason)
+            q[at], v[coupling.follower] = place, rate
+        return q, v
+
+    def hold(self, grips: Mapping[str, Grip]) -> None:
+        """Hold these frames, and no others."""
+        self._grips = [(name, self.model.getFrameId(name), grip, list(ROWS[grip.kind])) for name, grip in grips.items()]
+        self._forces = [np.zeros(len(rows)) for *_, rows in self._grips]
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """a ``[nv]``."""
+        model, data, G = self.model, self.data, self._G
+        mass = self.reduced(_mass(model, data, q))
+        force = G.T @ (tau - pin.nonLinearEffects(model, data, q, v))
+        if not self._grips:
+            return np.asarray(G @ np.linalg.solve(mass, force))
+        K, drift = self._rows(q, v)
+        solved = np.linalg.solve(mass, np.column_stack([force, K.T]))
+        pushes = np.linalg.lstsq(K @ solved[:, 1:], drift - K @ solved[:, 0], rcond=SAME)[0]
+        self._forces = np.split(pushes, np.cumsum([len(rows) for *_, rows in self._grips])[:-1])
+        return np.asarray(G @ (solved[:, 0] + solved[:, 1:] @ pushes))
+
+    def latched(self, q: Array, v: Array) -> Array:
+        """The velocity after the grips have closed on moving frames, without a bounce ``[nv]``."""
+        if not self._grips:
+            return v
+        K = self._rows(q, v)[0]
+        solved = np.linalg.solve(self.reduced(_mass(self.model, self.data, q)), K.T)
+        w = v[self.free]
+        return np.asarray(self._G @ (w - solved @ np.linalg.lstsq(K @ solved, K @ w, rcond=SAME)[0]))
+
+    def wrenches(self) -> dict[str, Array]:
+        """On the robot, in the axes of the frame and about its origin, of the last acceleration ``[6]`` [N, N m]."""
+        out = {}
+        for (name, _, _, rows), force in zip(self._grips, self._forces, strict=True):
+            out[name] = np.zeros(6)
+            out[name][rows] = force
+        return out
+
+    def _rows(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """J G of all grips, and what J a is to be."""
+        model, data, rate = self.model, self.data, self._rate
+        # Jacobians first: the accelerations are to be those of these velocities alone
+        jacobians = [pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL) for _, frame, _, _ in self._grips]
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        pin.updateFramePlacements(model, data)
+        K, drift = [], []
+        for J, (_, frame, grip, rows) in zip(jacobians, self._grips, strict=True):
+            gap = data.oMf[frame].actInv(grip.pose)
+            if grip.kind is GripKind.POSE:
+                error = pin.log6(gap).vector
+                bias = pin.getFrameAcceleration(model, data, frame, pin.LOCAL).vector
+            else:
+                # Of the origin itself, and of the z axis by the turn that brings it to where it is held
+                error = np.concatenate([gap.translation, np.cross([0.0, 0.0, 1.0], gap.rotation[:, 2])])
+                bias = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL).vector
+            K.append(J[rows] @ self._G)
+            drift.append((rate * rate * error - bias)[rows] - 2.0 * rate * J[rows] @ v)
+        return np.vstack(K), np.concatenate(drift)
+
+
+def _mass(model: pin.Model, data: pin.Data, q: Array) -> Array:
+    upper = np.triu(pin.crba(model, data, q))
+    return np.asarray(upper + np.triu(upper, 1).T)
