@@ -44,9 +44,9 @@ MUTATIONS = (
     # Only in libraries of one stack
     Mutation(
         "wbc/stack/codegen.py",
-        "weight[{row} + e - {first}]",
-        "weight[{row}]",
-        ("controller/test_backends.py", "stack/test_generic.py"),
+        "single(t, {row}, {count}, {first});",
+        "single(t, {row}, {count} - 1, {first});",
+        ("stack/test_generic.py",),
     ),
     Mutation(
         "wbc/stack/native/balls.h",
