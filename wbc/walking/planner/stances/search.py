@@ -127,7 +127,9 @@ class StanceSearch(Generic[S]):
         """Whether so many re-grasps of many arms led to no stance that lasts longer."""
         if len(self._by_arm) <= FEW_ARMS or len(levels) <= STUCK:
             return False
-        furthest = [max(self.until(k, n.sample) for k, n in level.items()) for level in (levels[-1 - STUCK], *levels[-STUCK:])]
+        furthest = [
+            max(self.until(k, n.sample) for k, n in level.items()) for level in (levels[-1 - STUCK], *levels[-STUCK:])
+        ]
         return max(furthest[1:]) <= furthest[0]
 
     def correct(self, move: Move, duration: float, possible: bool) -> None:
