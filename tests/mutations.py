@@ -41,6 +41,19 @@ MUTATIONS = (
         "t->H[i * WIDE + i] = 2.0 * damping[i];",
         ("controller/test_qp_referee.py", "controller/test_backends.py"),
     ),
+    # Only in libraries of one stack
+    Mutation(
+        "wbc/stack/codegen.py",
+        "single(t, {row}, {count}, {first});",
+        "single(t, {row}, {count} - 1, {first});",
+        ("stack/test_generic.py",),
+    ),
+    Mutation(
+        "wbc/stack/native/balls.h",
+        "center[1] * n[2] - center[2] * n[1]",
+        "center[1] * n[2] + center[2] * n[1]",
+        ("controller/test_balls.py",),
+    ),
     Mutation(
         "wbc/qp/certificate.py",
         "total = np.abs(exact - x)",

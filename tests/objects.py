@@ -47,10 +47,11 @@ def keep(folder: pathlib.Path) -> None:
     def compile_or_take(command: list[str], place: pathlib.Path) -> None:
         if _GENERIC in command:
             command = [_GENERIC_FLAG if word == "-O1" else word for word in command]
-        elif "rows.o" in command:
+        elif {"rows.o", "tick.o"} <= {*command}:
             _run(_linked(command) if (place / _PLAIN).exists() else command, place)
             return
         elif "-c" not in command:
+            # A hand-written library
             command = ["-O1" if word == "-O3" else word for word in command]
         if "tick.o" in command and "-O0" in command:
             (place / _PLAIN).touch()

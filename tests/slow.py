@@ -14,7 +14,7 @@ import pytest
 
 LIST = Path(__file__).with_name("slow.txt")
 #: Processor time of a test with all its cases, or of what it shares with others, from which on it is slow [s]
-LIMIT = 0.4
+LIMIT = 0.2
 
 _times: dict[str, float] = {}
 

@@ -94,10 +94,18 @@ def test_what_needs_a_clone_is_hidden_elsewhere(monkeypatch: pytest.MonkeyPatch)
     assert {name for name, one in CommandGroup().commands.items() if one.hidden} == hidden
 
 
+def processor_time(process: int) -> float:
+    """What a process has used [s]."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 @pytest.mark.parametrize("wait", [0.5, 1.0])
 def test_ctrl_c_while_a_command_starts_is_quiet(wait: float) -> None:
+    """After so many seconds of its processor time, whatever else the machine does."""
     process = subprocess.Popen([*WBC, "robot", "talos"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(wait)
+    while process.poll() is None and processor_time(process.pid) < wait:
+        time.sleep(0.005)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     # Before Python has a handler of its own the signal ends the process

@@ -24,6 +24,8 @@ def reports(controller: wbc.Controller, robot: Robot) -> list[np.ndarray]:
     """Of ticks towards a pose that is far, with the box in the way."""
     controller["hand"].target = robot.pose(robot.random(5), "panda_hand_tcp")
     controller["box"].pose = robot.pose(robot.random(5), "panda_link7")
+    # Rows of one entry that are unlike each other
+    controller["posture"].mask = np.linspace(0.4, 1.0, 7)
     q, out = robot.random(3), []
     for _ in range(8):
         q = robot.integrate(q, controller.step(q).v, 0.005)

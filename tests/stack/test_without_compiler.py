@@ -17,6 +17,9 @@ from tests.stack import small
 from tests.stack.fallback import found
 from wbc.native import toolchain
 
+#: What happens where a user's own compiler fails
+pytestmark = pytest.mark.compiled
+
 ROOT = pathlib.Path(__file__).parents[2]
 Here = Callable[..., dict[str, Any]]
 
