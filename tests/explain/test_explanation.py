@@ -17,7 +17,7 @@ from tests.torque.problems import controller
 from wbc.controller import Controller, Stack, Status, core_of
 from wbc.controller.outcome import Binding
 from wbc.errors import SolverError
-from wbc.explain.explanation import Bound, Contradiction, Give
+from wbc.explain.explanation import Bound, Contradiction, Give, Price, by_item, by_task
 from wbc.explain.naming import Naming
 from wbc.explain.past import past_of
 from wbc.shapes import Sphere
@@ -235,3 +235,16 @@ def test_wrenches_among_what_binds_have_names() -> None:
     naming = Naming(past_of(step._data, step._context))
     names = [(bound.row, bound.unit) for bound in (naming.bound(row, True) for row in (24, 29, 35))]
     assert names == [("grip 1.fx", "N"), ("grip 1.mz", "N m"), ("grip 2.mz", "N m")]
+
+
+def test_many_bounds_are_told_by_item_and_many_prices_by_task() -> None:
+    """A humanoid's torque tick has dozens of each: every bound is named once, of the prices the highest of a kind."""
+    bounds = tuple(Bound("foot", row, "equal", 0.0, unit) for unit, row in (("m/s^2", "x"), ("m/s^2", "y"), ("N", "z")))
+    motor = Bound("motors", "knee", "upper", 17.0, "N m")
+    assert by_item((*bounds, motor)) == "foot (x, y exactly 0 m/s^2; z exactly 0 N), motors (knee at most 17 N m)"
+    prices = [Price(b, "hand", cost, "m/s^2") for b, cost in zip((*bounds, motor), (1.0, -2.0, 3.0, 4.0), strict=True)]
+    told = (
+        "Of 4 active bounds these cost hand most: foot/y -2 m/s^2 per m/s^2, foot/z 3 m/s^2 per N, "
+        "motors/knee 4 m/s^2 per N m."
+    )
+    assert by_task(tuple(prices)) == [told]

@@ -13,6 +13,8 @@ RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
 #: The text names each member of a conflict up to this many; of larger ones so many items, and so many rows of each
 _LONG, _GROUPS, _MEMBERS = 12, 6, 3
+#: More prices are told task by task
+_PRICES = 24
 
 
 def listed(bounds: tuple[Bound, ...]) -> str:
@@ -44,6 +46,32 @@ def summary(bounds: tuple[Bound, ...], shares: tuple[float, ...]) -> str:
     return ", ".join(parts)
 
 
+def by_item(bounds: tuple[Bound, ...]) -> str:
+    """Many bounds as text, all of them: those of an item together, its rows of one value too."""
+    items: dict[str, dict[str, list[str]]] = {}
+    for bound in bounds:
+        items.setdefault(bound.item, {}).setdefault(bound.said, []).append(bound.row)
+    parts = []
+    for item, rows in items.items():
+        same = "; ".join(f"{', '.join(names)} {said}" for said, names in rows.items())
+        parts.append(f"{item} ({same})")
+    return ", ".join(parts)
+
+
+def by_task(prices: tuple[Price, ...]) -> list[str]:
+    """Many prices as text: of every task the highest per unit of each kind of bound."""
+    tasks: dict[tuple[str, str], dict[str, list[Price]]] = {}
+    for price in prices:
+        tasks.setdefault((price.task, price.unit), {}).setdefault(price.bound.unit, []).append(price)
+    lines = []
+    for (task, unit), kinds in tasks.items():
+        count = sum(map(len, kinds.values()))
+        most = [max(found, key=lambda p: abs(p.amount)) for found in kinds.values()]
+        named = ", ".join(f"{p.bound.name} {amount(p.amount, unit)} per {p.bound.unit}" for p in most)
+        lines.append(f"Of {count} active bounds these cost {task} most: {named}.")
+    return lines
+
+
 @dataclass(frozen=True)
 class Bound:
     """A lower or upper bound of a row or of a degree of freedom, or the value of an equality.
@@ -73,12 +101,17 @@ class Bound:
         """``item/row``."""
         return f"{self.item}/{self.row}"
 
-    def __str__(self) -> str:
-        relation, kind = RELATIONS[self.which], self.kind + " limit: " if self.kind else ""
-        text = f"{self.name} ({kind}{relation} {amount(self.value, self.unit)}"
+    @property
+    def said(self) -> str:
+        """What it says about its row."""
+        kind = self.kind + " limit: " if self.kind else ""
+        text = f"{kind}{RELATIONS[self.which]} {amount(self.value, self.unit)}"
         if self.margin is not None:
             text += f", {amount(self.margin, self.unit.removesuffix('^2').removesuffix('/s'))} to spare"
-        return text + ")"
+        return text
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.said})"
 
 
 @dataclass(frozen=True)
@@ -248,11 +281,12 @@ class Explanation:
         if self.gave_way:
             lines.append("What gave way here: " + ", ".join(str(g) for g in self.gave_way) + ".")
         if self.binding:
-            lines.append(f"Binding: {listed(self.binding)}.")
+            many = len(self.binding) > _LONG
+            lines.append(f"Binding: {by_item(self.binding) if many else listed(self.binding)}.")
         lines += [f"{task} keeps its direction at {share:.3g} of its rates." for task, share in self.scales]
         lines += [str(reason) for reason in self.reasons]
         lines += [str(loss) for loss in self.losses]
-        lines += [f"{price}." for price in self.prices]
+        lines += by_task(self.prices) if len(self.prices) > _PRICES else [f"{price}." for price in self.prices]
         if np.isfinite(self.dual.amount):
             lines.append(
                 f"Residuals: rows {self.primal}, optimality {self.dual}, active rows off their bound "
