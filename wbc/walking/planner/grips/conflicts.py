@@ -182,7 +182,9 @@ class ArmClearance:
             self._between(points, there, less, clear)
             return clear
         given = [compiled.packed(array) for array in (points, samples, shapes.bases[grips.arm[others]])]
-        where = [compiled.at(array) for array in (*given, others, shapes.least - less, out)]
+        # Named, so that they outlive the call
+        given += [others, shapes.least - less, out]
+        where = [compiled.at(array) for array in given]
         sizes = (ctypes.c_long(size) for size in samples.shape)
         library.swings_clear(compiled.arm_of(shapes.limb), ctypes.byref(grips.table), *sizes, *where)
         return out
