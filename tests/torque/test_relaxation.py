@@ -40,7 +40,7 @@ def test_bounds_hold_where_a_search_of_the_relaxation_ends_without_numbers() -> 
 
 
 def test_a_relaxed_tick_needs_the_torques_that_are_sent() -> None:
-    """The accelerations took 2.5e-3 N m more (of other such stacks 40): hard rows that nearly depended on each other were missed."""
+    """The accelerations took 2.5e-3 N m more: hard rows that nearly depended on each other were missed."""
     tick = drawn(14, "vm")
     step = again(tick, "torques_beyond_limits.npz")
     core, needed = core_of(tick), Needed(tick)

@@ -125,8 +125,8 @@ class Relaxation:
         with np.errstate(invalid="ignore"):
             low, high = qp.lower[n:] / unit - free, qp.upper[n:] / unit + free
         box = qp.lower[:n] / ends, qp.upper[:n] / ends
-        work = QP(qp.H, qp.g, *(np.concatenate(side) for side in zip(box, (low, high), strict=True)), qp.A * ends)
-        work = replace(work, A=work.A / unit[:, None])
+        lower, upper = np.concatenate((box[0], low)), np.concatenate((box[1], high))
+        work = QP(qp.H, qp.g, lower, upper, qp.A * ends / unit[:, None])
         stage = self._least_violation(work, np.flatnonzero(rows), np.clip(0.0, *box))
         if stage is None:
             return False

@@ -173,9 +173,9 @@ def _lasting_longest(
         for a, b in product(one, other)
         if grips.hold[a] != grips.hold[b]
     }
-    some = [(int(grips.last[g]), 0, (g,)) for g in choices[0]]
+    some: list[tuple[int, int, tuple[int, ...]]] = [(int(grips.last[g]), 0, (g,)) for g in choices[0]]
     for mine in choices[1:]:
-        longer = list[tuple[int, int, tuple[int, ...]]]()
+        longer = []
         for (until, total, stance), g in product(some, mine):
             each = [ends.get(frozenset((g, other)), -1) for other in stance]
             if min(each) > sample:

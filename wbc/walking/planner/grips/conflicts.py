@@ -181,10 +181,10 @@ class ArmClearance:
             clear: Flags = np.asarray(np.logical_not(near.any(axis=1)))
             self._between(points, there, less, clear)
             return clear
-        given = [compiled.packed(array) for array in (points, samples, shapes.bases[grips.arm[others]])]
         # Named, so that they outlive the call
-        given += [others, shapes.least - less, out]
-        where = [compiled.at(array) for array in given]
+        moving, at, bases = map(compiled.packed, (points, samples, shapes.bases[grips.arm[others]]))
+        least = shapes.least - less
+        where = [compiled.at(array) for array in (moving, at, bases, others, least, out)]
         sizes = (ctypes.c_long(size) for size in samples.shape)
         library.swings_clear(compiled.arm_of(shapes.limb), ctypes.byref(grips.table), *sizes, *where)
         return out
