@@ -65,8 +65,9 @@ def parts() -> dict[str, Sheet | str]:
     with_one, with_ten, stranger = (changes[name] for name in ("one client", "ten clients", "no viewer, a stranger"))
     text = (
         f"The 99th percentile of how late a tick begins changes by {with_one[1]} with a viewer and one client and by "
-        f"{with_ten[1]} with ten, that of how long it takes by {with_one[0]} and {with_ten[0]}. Beside a process "
-        f"without a viewer, which works on 8 MB a third of the time, the two change by {stranger[1]} and {stranger[0]}. "
+        f"{with_ten[1]} with ten, that of how long it takes by {with_one[0]} and {with_ten[0]}. Beside a "
+        f"process without a viewer, which works on 8 MB a third of the time, they change by {stranger[1]} and "
+        f"{stranger[0]}. "
         f"The address is there after {ready:.1f} s, with compiled code cached."
     )
     delay = Sheet(
