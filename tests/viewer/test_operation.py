@@ -14,7 +14,7 @@ from tests.viewer.arms import ACCELERATION, DT, fresh
 from wbc.controller import Controller
 from wbc.errors import WbcError
 from wbc.viewer.messages import RATE_LASTS
-from wbc.viewer.operation import FASTEST, Operation
+from wbc.viewer.operation import FASTEST, Operation, turned
 
 
 def driven(controller: Controller, operation: Operation, q: np.ndarray, ticks: int) -> tuple[np.ndarray, list]:
