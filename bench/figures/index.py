@@ -130,6 +130,7 @@ _ALL = (
     Figure("plant_steps", ("wbc/simulation", "robots/walker_masses.py", "robots/data"), 1.0),
     Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
+    Figure("tick_profile", TICK, 1.5),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
