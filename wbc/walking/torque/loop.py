@@ -56,8 +56,8 @@ class TorqueLoop:
     and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
     read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
 
-    What acts on a joint and is not known, such as friction, is the residual r of the robot's momentum; -r is added to the
-    stack's torques, within :attr:`Gains.friction` and what the motors have (a disturbance observer).
+    What acts on a joint and is not known, such as friction, is the residual r of the robot's momentum; -r is added to
+    the stack's torques, within :attr:`Gains.friction` and what the motors have (a disturbance observer).
 
     A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
     found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
