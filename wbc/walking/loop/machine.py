@@ -145,8 +145,8 @@ class Machine:
 
     @property
     def lasting(self) -> Array:
-        """Rates with which it goes on when commands end ``[nv]``: none where the plant does as it is commanded, those of
-        the last period where its bodies have masses.
+        """Rates with which it goes on when commands end ``[nv]``: none where the plant does as it is commanded, those
+        of the last period where its bodies have masses.
         """
         return np.zeros(len(self.v)) if self._moving is None else self.rates.copy()
 
