@@ -17,7 +17,7 @@ from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
 from wbc.walking.torque.readings import JointFilter
-from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.stack import STEADY, TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
 
@@ -42,6 +42,13 @@ class Gains:
     leak: float = 2.0
     grip: float = 20.0
     friction: float = 8.0
+
+
+def turns(held: Mapping[str, GripKind]) -> str:
+    """Why these hands do not keep the body from turning, in words; "": they do."""
+    if len(held) >= STEADY or any(kind is not GripKind.POSITION for kind in held.values()):
+        return ""
+    return f"{len(held)} hands that may tilt on their holds do not keep the body from turning, {STEADY} do"
 
 
 class TorqueLoop:
@@ -182,15 +189,17 @@ class TorqueLoop:
         state = self._state
         held = {hand: kind for hand, kind in self._closed.items() if hand != frame}
         short = self.bearing.lacking(state.q, held)
-        if short:
-            self._note(state.time, self.bearing.words(short, held), ends=True)
-        return not short
+        why = self.bearing.words(short, held) if short else turns(held)
+        if why:
+            self._note(state.time, why, ends=True)
+        return not why
 
     def lost(self) -> tuple[str, ...]:
         """Hands whose holds have broken off; the stack has done without them since."""
         lost = self._tested.lost()
         for frame in lost:
-            self._note(self._state.time, f"the hold of {frame} broke off")
+            why = turns(self._closed)
+            self._note(self._state.time, f"the hold of {frame} broke off{f'; {why}' if why else ''}", ends=bool(why))
         return lost
 
     def failing(self) -> str:
