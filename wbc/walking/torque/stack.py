@@ -31,7 +31,7 @@ class TorqueStack:
         kinds: how holds may be held. rating: of every hold. backend: as of ``Stack.compile``.
 
     Raises:
-        RangeError: a robot without masses, or holds that let hands tilt.
+        RangeError: a robot without masses; holds that let hands tilt, and not roll or with fewer than four arms.
     """
 
     def __init__(
