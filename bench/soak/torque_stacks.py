@@ -42,9 +42,10 @@ from wbc.validation import Array
 AXES = {"RX": (1.0, 0.0, 0.0), "RY": (0.0, 1.0, 0.0), "RZ": (0.0, 0.0, 1.0)}
 
 
-def strong(rng: np.random.Generator) -> Robot:
-    """A random robot with motors from much too weak to more than strong enough, some joints led by others, and a frame
-    ``w0``, ``w1``, ... in the origin of every hinge.
+def strong(rng: np.random.Generator, more: bool = True) -> Robot:
+    """A random robot with motors from much too weak to more than strong enough, and a frame ``w0`` ... in every hinge.
+
+    With ``more`` some joints may follow another.
     """
     robot = machine(rng)
     effort = 10.0 ** rng.uniform(0.0, 3.0, robot.nv)
@@ -61,7 +62,8 @@ def strong(rng: np.random.Generator) -> Robot:
     limits = {name: getattr(robot.limits, name) for name in kept}
     made = wbc.robots.load(robot.model).with_shapes(robot.shapes)
     made = made.with_limits(**limits, acceleration=acceleration, effort=effort)
-    return led(made, rng) if rng.random() < 0.3 else made
+    (other,) = rng.spawn(1)
+    return led(made, other) if more and other.random() < 0.3 else made
 
 
 def plain(robot: Robot) -> list[int]:
@@ -116,8 +118,13 @@ def drives(robot: Robot, rng: np.random.Generator) -> tuple[Robot, DriveTorqueLi
     return robot.with_limits(effort=effort), DriveTorqueLimits(made, torque=most)
 
 
-def torque_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
-    """Limits of joints, torques and drives, and a random choice of contacts, loads, margins and tasks."""
+def torque_stack(robot: Robot, rng: np.random.Generator, more: bool = True) -> wbc.Stack:
+    """Limits of joints and torques, and a random choice of contacts, loads, margins and tasks.
+
+    With ``more`` there are drives, slew rates, wheels, sums of wrenches and tasks of momentum; without them the same
+    seeds give the other items all the same.
+    """
+    (other,) = rng.spawn(1)
     names = [str(frame.name) for frame in robot.model.frames if str(frame.name).startswith("f")]
 
     def frame() -> str:
@@ -126,32 +133,35 @@ def torque_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
     def some(probability: float) -> bool:
         return bool(rng.random() < probability)
 
-    robot, wrist = drives(robot, rng) if some(0.3) else (robot, None)
+    def also(probability: float) -> bool:
+        return more and bool(other.random() < probability)
+
+    robot, wrist = drives(robot, other) if also(0.3) else (robot, None)
     stack = wbc.Stack(robot, dt=DT)
     for k in range(int(rng.integers(1, 3))):
         kind = str(rng.choice(["pose", "position", "orientation"]))
         stack.add(EndEffector(frame(), kind=kind), name=f"hand{k}", weight=weight(rng))
     stack.add(Posture(), name="posture", weight=weight(rng), level=int(some(0.2)))
-    slew = float(10.0 ** rng.uniform(1.0, 5.0)) if some(0.4) else None
+    slew = float(10.0 ** other.uniform(1.0, 5.0)) if also(0.4) else None
     stack.add(JointLimits(), name="limits").add(TorqueLimits(slew=slew), name="motors")
     if wrist is not None:
         stack.add(wrist, name="wrist")
     made = []
     for k in range(int(rng.choice([0, 1, 2, 3]))):
         at = frame()
-        contact: Contact | None = [
+        contact: Contact = [
             RigidGrasp(at, force=float(10.0 ** rng.uniform(0, 3)), torque=float(10.0 ** rng.uniform(0, 2))),
             PointContact(at, friction=float(rng.uniform(0.0, 1.5)), least=float(rng.choice([0.0, 5.0]))),
             SurfaceContact(at, half_lengths=(0.1, 0.05), friction=float(rng.uniform(0.0, 1.5))),
             LineContact(at, half_length=0.1, friction=float(rng.uniform(0.0, 1.5))),
             SlidingContact(at, friction=float(rng.uniform(0.0, 0.5))),
-            wheel(robot, rng),
-        ][int(rng.integers(6))]
-        if contact is not None:
-            made.append(f"contact{k}")
-            stack.add(contact, name=made[-1])
-    if len(made) >= 2 and some(0.5):
-        stack.add(WrenchSum(tuple(made[:2])), name="sum", soft=weight(rng) if some(0.5) else None)
+        ][int(rng.integers(5))]
+        if also(0.2):
+            contact = wheel(robot, other) or contact
+        made.append(f"contact{k}")
+        stack.add(contact, name=made[-1])
+    if len(made) >= 2 and also(0.5):
+        stack.add(WrenchSum(tuple(made[:2])), name="sum", soft=weight(other) if also(0.5) else None)
     if some(0.3):
         stack.add(ExternalWrench(frame()), name="push")
     if some(0.3):
@@ -165,13 +175,13 @@ def torque_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
         ("capture", DivergentComponent(omega=3.0)),
         ("spin", Momentum("angular")),
     ):
-        if some(0.15):
-            stack.add(item, name=name, weight=weight(rng))
-    if some(0.2):
+        if also(0.15):
+            stack.add(item, name=name, weight=weight(other))
+    if also(0.2):
         joints = [robot.dof_names[i] for i in plain(robot)]
         if len(joints) >= 2:
-            one, other = (str(name) for name in rng.choice(joints, 2, replace=False))
-            stack.add(JointCoupling({one: 1, other: -2}), name="geared", weight=weight(rng))
+            one, two = (str(name) for name in other.choice(joints, 2, replace=False))
+            stack.add(JointCoupling({one: 1, two: -2}), name="geared", weight=weight(other))
     return stack
 
 
