@@ -10,10 +10,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import multiprocessing
 import os
 import threading
 import time
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 
 import numpy as np
 from websockets.sync.client import ClientConnection, connect
@@ -92,6 +94,24 @@ def stopped_after(seen: Seen, began: float) -> float:
     return time.monotonic() - began if seen.stopped.wait(5.0) else np.inf
 
 
+def client(address: str, orders: Connection) -> None:
+    """A process that drives: of each order (drive for so long, then stop by button or not) when the stop was sent."""
+    random = np.random.default_rng(0)
+    while (order := orders.recv()) is not None:
+        seconds, by_button = order
+        with connect(address, max_size=None) as socket:
+            drive(socket, seconds, random)
+            at = time.monotonic()
+            if by_button:
+                socket.send('{"type": "stop"}')
+                orders.send(at)
+                # The connection stays until the loop has stopped, so that it is the button that stops it
+                orders.recv()
+                socket.send('{"type": "release"}')
+        if not by_button:
+            orders.send(at)
+
+
 def drive(socket: ClientConnection, seconds: float, random: np.random.Generator) -> None:
     """Random rates of the hand."""
     until = time.monotonic() + seconds
@@ -116,7 +136,7 @@ def main() -> None:
     chosen = playground("panda")
     controller = chosen.stack.compile()
     controller.reset(chosen.start)
-    seen, random = Seen(), np.random.default_rng(0)
+    seen = Seen()
     delays: dict[str, list[float]] = {"button": [], "connection": []}
     grown: list[tuple[float, float, float]] = []
     alone = growth(controller, chosen.start)
@@ -125,19 +145,19 @@ def main() -> None:
         runner = threading.Thread(target=loop, args=(viewer, seen, controller, chosen.start))
         runner.start()
         address, began, looked = viewer.url.replace("http", "ws") + "wbc", time.monotonic(), 0.0
+        ours, theirs = multiprocessing.Pipe()
+        driver = multiprocessing.get_context("spawn").Process(target=client, args=(address, theirs), daemon=True)
+        driver.start()
         number = 0
         try:
             while time.monotonic() - began < 60.0 * given.minutes:
                 number += 1
-                with connect(address, max_size=None) as socket:
-                    drive(socket, EVERY, random)
-                    at = time.monotonic()
-                    if number % 3:
-                        socket.send('{"type": "stop"}')
-                        delays["button"].append(stopped_after(seen, at))
-                        socket.send('{"type": "release"}')
-                if not number % 3:
-                    delays["connection"].append(stopped_after(seen, at))
+                by_button = bool(number % 3)
+                ours.send((EVERY, by_button))
+                at = ours.recv()
+                delays["button" if by_button else "connection"].append(stopped_after(seen, at))
+                if by_button:
+                    ours.send("stopped")
                 now = time.monotonic() - began
                 if now - looked > LOOK:
                     looked = now
@@ -145,6 +165,7 @@ def main() -> None:
         finally:
             seen.over.set()
             runner.join()
+            driver.kill()
     rows = np.array(grown)
     kept = rows[rows[:, 0] >= WARM * rows[-1, 0]]
     slopes = [float(np.polyfit(kept[:, 0] / 3600.0, kept[:, k], 1)[0]) for k in (1, 2)]
@@ -155,7 +176,7 @@ def main() -> None:
             ("minutes, watchers", f"{rows[-1, 0] / 60.0:.1f}, {given.watchers}"),
             ("ticks, of them later than a period", f"{seen.ticks}, {seen.late}"),
             ("viewer's memory at the first look, after the warm-up, at the end", memory_row(rows, kept, 1)),
-            ("loop's memory with the client that drives, the same", memory_row(rows, kept, 2)),
+            ("loop's memory, the same", memory_row(rows, kept, 2)),
             (f"loop's memory alone, growth in the last {FAST - FAST // 5} of {FAST} ticks", f"{alone:+.2f} MiB"),
             ("slopes after the warm-up", f"{slopes[0]:+.1f} and {slopes[1]:+.1f} MiB/h"),
             *((f"stops by {name}: sent, dropped, slowest", told(times)) for name, times in delays.items()),

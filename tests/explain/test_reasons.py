@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -254,3 +255,24 @@ def test_an_escape_leaves_a_singular_start_and_arrives(name: str) -> None:
         assert off < 5e-3 if policy.escape else off > 0.09
     tick.policy, tick["hand"].gain = Policy(), 2.0
     np.testing.assert_array_equal(ends[1], ends[-1])
+
+
+def test_a_wall_that_stops_a_moving_target_is_named() -> None:
+    """The hand is where its target is, which goes on at 0.1 m/s into the wall."""
+    robot = limited_robot("panda")
+    q = robot.neutral
+    tick, here = fresh(q), robot.pose(q, "panda_hand_tcp").translation
+    tick["box"].upper = [9.0, 9.0, here[2]]
+    tick["hand"].target, tick["hand"].feedforward = here + [0.0, 0.0, 1e-5], [0.0, 0.0, 0.1]
+    found = reason(tick.step(q, np.zeros(7)))
+    tick["hand"].feedforward = np.zeros(3)
+    assert (found.kind, found.follows) == ("held", pytest.approx(0.0, abs=0.01))
+    assert any(name.startswith("box/") for name in found.by)
+    assert "hand follows its moving target at" in str(found)
+
+
+def test_of_many_that_hold_a_task_the_names_are_told() -> None:
+    many = tuple(f"grip/{axis} (exactly 1 um/s)" for axis in "xyz")
+    found = Reason("hand", "held", ((0.1, "m"),), ((0.0, "m"),), 1.0, by=(*many, "posture", "box/x (at most 0 m/s)"))
+    assert str(found).endswith("held back by grip (x, y, z), posture, box (x).")
+    assert str(replace(found, by=many)).endswith(f"held back by {', '.join(many)}.")

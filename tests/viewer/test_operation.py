@@ -14,7 +14,7 @@ from tests.viewer.arms import ACCELERATION, DT, fresh
 from wbc.controller import Controller
 from wbc.errors import WbcError
 from wbc.viewer.messages import RATE_LASTS
-from wbc.viewer.operation import FASTEST, Operation
+from wbc.viewer.operation import FASTEST, Operation, turned
 
 
 def driven(controller: Controller, operation: Operation, q: np.ndarray, ticks: int) -> tuple[np.ndarray, list]:
@@ -148,3 +148,11 @@ def test_a_dragged_obstacle_goes_there_at_a_speed_that_it_tells(goal: tuple[floa
     assert places[-1] == pytest.approx(sent[:3], abs=1e-5)
     assert not operation.moving
     assert np.abs(controller["ball"].velocity).max() == 0.0
+
+
+def test_a_target_that_turns_for_long_stays_a_rotation() -> None:
+    turn, step = np.eye(3), np.array([1e-3, -2e-3, 5e-4])
+    for _ in range(2000):
+        turn = turned(turn, step)
+    assert np.abs(turn.T @ turn - np.eye(3)).max() < 1e-14
+    assert np.allclose(turn, pin.exp3(2000 * step), atol=1e-11)

@@ -8,6 +8,9 @@ import numpy as np
 
 from wbc.validation import Array
 
+#: More that hold a task are told by name alone
+_MANY = 4
+
 
 def amount(value: float, unit: str) -> str:
     """A number with its unit, lengths below a metre in millimetres or micrometres: ``31 mm/s``."""
@@ -42,6 +45,7 @@ class Reason:
             moves most along the steepest way out, empty where the error has no slope downhill from here.
         by: items and bounds that hold it, the strongest first. without: what puts it out of
             reach, position limits or holds; without them it is within.
+        follows: of a task at a moving target, the part of the rate it asks for that it has; None for others.
     """
 
     task: str
@@ -59,6 +63,7 @@ class Reason:
     restores: str = ""
     by: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    follows: float | None = None
 
     def __str__(self) -> str:
         say = {
@@ -98,15 +103,30 @@ class Reason:
         return " and ".join(words)
 
     def _limited(self) -> str:
-        return f"{self.task} is {amounts(self.error)} off and {self._comes()}; slowed by {', '.join(self.by)}"
+        return f"{self._goes()}; slowed by {self._held_by()}"
 
     def _held(self) -> str:
-        return f"{self.task} is {amounts(self.error)} off and {self._comes()}; held back by {', '.join(self.by)}"
+        return f"{self._goes()}; held back by {self._held_by()}"
+
+    def _goes(self) -> str:
+        if self.follows is None:
+            return f"{self.task} is {amounts(self.error)} off and {self._comes()}"
+        return f"{self.task} follows its moving target at {100.0 * self.follows:.2g} % of the rate that this takes"
+
+    def _held_by(self) -> str:
+        """What holds it; of many the names, with the rows of an item together."""
+        if len(self.by) <= _MANY:
+            return ", ".join(self.by)
+        items: dict[str, list[str]] = {}
+        for text in self.by:
+            item, _, row = text.partition(" (")[0].partition("/")
+            items.setdefault(item, []).extend([row] if row else [])
+        return ", ".join(f"{item} ({', '.join(rows)})" if rows else item for item, rows in items.items())
 
     def _minimum(self) -> str:
         text = f"{self.task} is at a local minimum, {amounts(self.error)} off: no velocity"
         if self.by:
-            return f"{text} that {', '.join(self.by)} would allow brings it nearer, though its target can be reached"
+            return f"{text} that {self._held_by()} would allow brings it nearer, though its target can be reached"
         return f"{text} brings it nearer, though another configuration reaches its target"
 
     def _singular(self) -> str:

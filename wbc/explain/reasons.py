@@ -19,6 +19,8 @@ from wbc.validation import Array
 _SERVED = 0.9
 #: A task that moves at less than this share of its rates is at rest
 _RESTS = 0.02
+#: Of a task that asks for so many times what its error alone would, the target moves
+_MOVES = 3.0
 #: Slower than this a task asks for nothing [1/s times radians or characteristic lengths]
 _ASKS = 1e-6
 
@@ -69,6 +71,11 @@ class _Finder:
 
     def _moving(self, share: float, binding: tuple[Bound, ...], losses: list[Loss]) -> Reason:
         """A task that can be met and is not served."""
+        names = self._holders(binding, losses)
+        only = [bound for bound in binding if str(bound) in names]
+        limits = len(only) == len(names) and all(bound.kind in ("velocity", "acceleration") for bound in only)
+        if names and np.linalg.norm(self.asked) > _MOVES * self.gain * np.linalg.norm(self.here.e):
+            return replace(self._say("limited" if limits else "held", by=names), follows=share)
         lost, least = self.here.lost(self.alone.free(self.q, self.here), SINGULAR)
         if np.linalg.norm(lost) > LOST * np.linalg.norm(self.here.e) and share < _SERVED:
             return self._singular(lost, least)
@@ -77,11 +84,9 @@ class _Finder:
         scales = self.past.layout.dof_scales(self.past.stack)[: self.past.layout.nv]
         free = float(self._towards(self.here.J @ (v[: len(scales)] / scales)))
         now = float(self._towards(self.rates))
-        names = self._holders(binding, losses)
         if (now >= _SERVED * free and free > 0.0) or not names:
             return self._say("slow" if now > 0.0 else "minimum")
-        only = [bound for bound in binding if str(bound) in names]
-        if len(only) == len(names) and all(bound.kind in ("velocity", "acceleration") for bound in only):
+        if limits:
             return self._say("limited", by=names)
         return self._say("minimum" if now <= _RESTS * max(free, 1e-12) else "held", by=names)
 

@@ -100,5 +100,6 @@ def indexed(triangles: Array, colour: Colour) -> Mesh:
 
 def wxyz(rotation: Array) -> Array:
     """A rotation as viser takes it."""
-    x, y, z, w = pin.Quaternion(rotation).coeffs()
+    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
+    x, y, z, w = pin.SE3ToXYZQUAT(pin.SE3(rotation, np.zeros(3)))[3:]
     return np.array([w, x, y, z])

@@ -198,10 +198,10 @@ class Operation:
         handle, slot = self._core.handles[name], self._core.layout.blocks[name].slots["target"]
         target, kind = handle.get("target"), slot.input.kind
         if kind == "pose":
-            turn = pin.exp3(rate[3:] * dt) @ target.rotation
-            target = pin.SE3(pin.Quaternion(turn).normalized().matrix(), target.translation + rate[:3] * dt)
+            turn = turned(target.rotation, rate[3:] * dt)
+            target = pin.SE3(turn, target.translation + rate[:3] * dt)
         elif kind == "rotation":
-            target = pin.Quaternion(pin.exp3(rate * dt) @ target).normalized().matrix()
+            target = turned(target, rate * dt)
         elif kind == "configuration":
             target = self._core.stack.robot.integrate(target, rate, dt)
         else:
@@ -243,3 +243,10 @@ def _owner(kind: str) -> str:
 def _task(handle: Handle) -> TaskHandle:
     """A handle that has a weight."""
     return validation.instance(handle.item_name, handle, TaskHandle, "a task")
+
+
+def turned(rotation: Array, angles: Array) -> Array:
+    """exp([angles]) R, orthonormal again after any number of turns: X (3 I - X'X) / 2 squares what is missing."""
+    turn: Array = pin.exp3(angles) @ rotation
+    polished: Array = 0.5 * turn @ (3.0 * np.eye(3) - turn.T @ turn)
+    return polished

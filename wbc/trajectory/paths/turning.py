@@ -148,7 +148,8 @@ def matrices(quaternions: Array) -> Array:
 
 def quaternion(rotation: Any) -> Array:
     """Unit quaternion x, y, z, w of a rotation matrix that may be off by rounding."""
-    q = np.asarray(pin.Quaternion(np.asarray(rotation)).coeffs(), dtype=np.float64)
+    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
+    q = np.asarray(pin.SE3ToXYZQUAT(pin.SE3(np.asarray(rotation), np.zeros(3)))[3:], dtype=np.float64)
     return np.asarray(q / np.linalg.norm(q))
 
 
