@@ -59,7 +59,7 @@ def film(run: dict[str, Any], file: Path) -> None:
     corners = np.array(list(product(*np.stack([low, high], axis=1))))
     frames = []
     for k in np.linspace(0, len(hands) - 1, FRAMES, endpoint=False).astype(int):
-        scene = Scene(run["robot"], dark=[run["tip"]], detail=0.02)
+        scene = Scene(run["robot"], dark=[run["tip"]], detail=0.006)
         scene.add_robot(run["path"][k][0])
         scene.add_path(hands, "path of the hand", radius=0.012)
         for corner in corners:
