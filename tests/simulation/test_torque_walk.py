@@ -17,7 +17,7 @@ from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPl
 from wbc.walking import cylinder
 from wbc.walking.torque.choice import PlantChoice
 from wbc.walking.torque.faults import Fault
-from wbc.walking.torque.loop import TorqueLoop
+from wbc.walking.torque.loop import Gains, TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
 
 ROBOT = heavy().robot
@@ -55,6 +55,23 @@ def test_it_follows_the_rates_of_a_walk(delay: float) -> None:
     assert loop.watch.drift < 1e-6
     assert 0.0 < loop.watch.force < loop.stack.rating.force
     assert loop.watch.figures()[0].value == loop.watch.drift
+
+
+def test_friction_that_nobody_knows_is_compensated() -> None:
+    """A wrist of 20 N m that rubs with 3 N m: with what the residual adds it moves, without it it stays behind."""
+    wrist, off = ROBOT.dofs("arm3_joint4"), list[float]()
+    for most in (8.0, 0.0):
+        plant = PinocchioPlant(ROBOT, motors=Motors(coulomb=3.0, viscous=1.0))
+        loop = begun(TorqueLoop(stack(), plant, Gains(friction=most)), HANDS[:2])
+        v = np.zeros(ROBOT.nv)
+        v[wrist] = 0.3
+        for _ in range(12):
+            loop.apply(Command(CommandKind.VELOCITY, v))
+            loop.advance(0.01)
+        off.append(abs(float(loop.read().v[wrist][0]) - 0.3))
+        assert loop.failing() == ""
+    assert off[0] < 0.01
+    assert off[1] > 0.05
 
 
 def test_an_opened_hand_moves_alone() -> None:
