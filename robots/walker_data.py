@@ -147,7 +147,7 @@ class WalkerData(_Numbers):
     body_tilt: float
     body_shift: float
 
-    @property
+    @functools.cached_property
     def joint_accelerations(self) -> tuple[float, ...]:
         """Largest accelerations: rate / ``acceleration_time`` [rad/s^2]."""
         return tuple(rate / self.acceleration_time for rate in self.joint_rates)

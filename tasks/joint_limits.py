@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.robot import Limits
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
 from wbc.tasks.base import Bounds, Constraint, Input, Row, SacrificeOrder, Values
@@ -22,6 +23,9 @@ from wbc.tasks.stopping import allowed_accelerations
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
+
+#: Of a coordinate that goes on without end, or none
+FREE = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,9 @@ class JointLimits(Constraint):
     and the position limit is not passed, whatever is commanded and however dt varies (at or above ``shortest_dt``
     where that is given). From outside the joint brakes at A, then returns at ``return_rate`` times the violation
     at least, and the violation does not grow again.
+
+    Joints that follow others have one interval with their leaders, so that these do not contradict each other either:
+    :meth:`wbc.robot.Robot.coupled`.
 
     A stack that commands accelerations has the same limits as bounds on these: :mod:`wbc.tasks.stopping`.
 
@@ -111,22 +118,28 @@ class JointLimits(Constraint):
         """One row a degree of freedom of the robot, limited or not."""
         return dof_rows(robot)
 
-    def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
-        """The description's, of the chosen joints."""
-        limits = np.full(robot.nv, np.inf)
+    def limits(self, robot: Robot) -> Limits:
+        """Those that are kept, infinite for the others: the chosen joints' less the margin, coupled ones as one."""
+        known, dofs = robot.limits, list(joint_dofs(robot, "JointLimits.joints", self.joints))
+        kept = {name: np.full(robot.nv, np.inf) for name in ("velocity", "acceleration", "upper", "lower")}
+        kept["lower"] *= -1.0
+        here = [i for i in dofs if robot.position_index[i] >= 0] if self.position else []
+        kept["lower"][here] = known.position_lower[here] + self.margin
+        kept["upper"][here] = known.position_upper[here] - self.margin
+        if self.velocity:
+            kept["velocity"][dofs] = known.velocity[dofs]
         if self.acceleration:
-            dofs = list(joint_dofs(robot, "JointLimits.joints", self.joints))
-            limits[dofs] = robot.limits.acceleration[dofs]
-        return limits
+            kept["acceleration"][dofs] = known.acceleration[dofs]
+        return robot.coupled(Limits(kept["lower"], kept["upper"], kept["velocity"], kept["acceleration"], known.effort))
+
+    def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
+        """The description's, of the chosen joints and of what follows or leads them."""
+        return self.limits(robot).acceleration
 
     def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The description's less the margin, of the chosen joints that have one coordinate."""
-        lower, upper = np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-        for i in joint_dofs(robot, "JointLimits.joints", self.joints) if self.position else ():
-            if robot.position_index[i] >= 0:
-                lower[i] = robot.limits.position_lower[i] + self.margin
-                upper[i] = robot.limits.position_upper[i] - self.margin
-        return lower, upper
+        limits = self.limits(robot)
+        return limits.position_lower, limits.position_upper
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
         """See the class."""
@@ -140,20 +153,16 @@ class JointLimits(Constraint):
         self, robot: Robot, kin: Tracer, inputs: Values, interval: Callable[..., tuple[ca.SX, ca.SX]]
     ) -> Bounds:
         """What ``interval`` allows each chosen degree of freedom."""
-        limits, count = robot.limits, robot.nv
+        limits, count = self.limits(robot), robot.nv
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
-        for i in joint_dofs(robot, "JointLimits.joints", self.joints):
+        for i in range(count):
             k = int(robot.position_index[i])
-            here = self.position and k >= 0
             lower[i], upper[i] = interval(
-                kin.q[k] if here else ca.SX(0),
+                kin.q[k] if k >= 0 else ca.SX(0),
                 kin.v[i],
-                position=(
-                    float(limits.position_lower[i]) + self.margin if here else -np.inf,
-                    float(limits.position_upper[i]) - self.margin if here else np.inf,
-                ),
-                velocity=float(limits.velocity[i]) if self.velocity else np.inf,
-                acceleration=float(limits.acceleration[i]) if self.acceleration else np.inf,
+                position=(float(limits.position_lower[i]), float(limits.position_upper[i])) if k >= 0 else FREE,
+                velocity=float(limits.velocity[i]),
+                acceleration=float(limits.acceleration[i]),
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from bench.pool import ROOT
 from bench.sheet import Sheet
 from bench.walk import layout_tables, planning_tables
 from bench.walk import tables as walks
+from bench.walk.trial_parts import PARTS as TRIALS
 from bench.walk.trial_parts import trial_sheet
 
 View = Callable[[Any], str]
@@ -94,9 +96,9 @@ _ALL = (
     ),
     Figure(
         "trials", (*WALK, "bench/walk"), 600.0,
-        ("python", "-m", "bench.walk", "--parts", "structures", "--resume", "--output", "bench/data"),
+        ("python", "-m", "bench.walk", "--parts", *TRIALS, "--resume", "--output", "bench/data"),
         "bench/data/trials.json",
-        {"structures": walk_view("structures", lambda records: trial_sheet("structures", records))},
+        {part: walk_view(part, functools.partial(trial_sheet, part)) for part in TRIALS},
     ),
     Figure("soak", (*TICK, "bench/soak"), 20.0),
     Figure("analysis", ("wbc/analysis",), 2.0),
@@ -132,6 +134,7 @@ _ALL = (
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
     Figure("tick_profile", TICK, 1.5),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
+    Figure("formulations", (*TICK, "bench/measured/torques.py"), 0.2),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from websockets.sync.client import connect
@@ -17,6 +18,7 @@ from bench.pool import ROOT
 from bench.sheet import Sheet, us
 from wbc.controller import Controller
 from wbc.viewer import Viewer, show
+from wbc.viewer.chromium import Chromium, program
 from wbc.viewer.presets import playground
 
 #: Ticks of a block at the preset's rate, and blocks of each kind, taken in turn
@@ -67,8 +69,7 @@ def parts() -> dict[str, Sheet | str]:
         f"The 99th percentile of how late a tick begins changes by {with_one[1]} with a viewer and one client and by "
         f"{with_ten[1]} with ten, that of how long it takes by {with_one[0]} and {with_ten[0]}. Beside a "
         f"process without a viewer, which works on 8 MB a third of the time, they change by {stranger[1]} and "
-        f"{stranger[0]}. "
-        f"The address is there after {ready:.1f} s, with compiled code cached."
+        f"{stranger[0]}. The address is there after {ready:.1f} s, with compiled code cached."
     )
     delay = Sheet(
         "",
@@ -78,8 +79,33 @@ def parts() -> dict[str, Sheet | str]:
             ("is back in a state after", *(f"{1e3 * np.percentile(back, p):.1f} ms" for p in (50, 95))),
         ],
     )
+    drag = first_drag()
     rates = f"A client gets {rate:.0f} states a second, and {explained:.0f} explanations a second while a row binds."
-    return {"jitter": Sheet("", columns, rows), "cost": text, "delay": delay, "rates": rates}
+    return {"jitter": Sheet("", columns, rows), "cost": text, "delay": delay, "rates": rates, "drag": drag}
+
+
+def first_drag() -> str:
+    """From the command to a hand that moves because a key is held down in a page."""
+    if program() is None:
+        return "How long it takes from `wbc play` to a hand that is moved was not measured, for want of Chromium."
+    began = time.perf_counter()
+    command = [str(Path(sys.executable).with_name("wbc")), "play", "--no-browser", "--seconds", "60"]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as playing:
+        assert playing.stdout is not None
+        url = next(line.strip() for line in playing.stdout if line.startswith("http"))
+        there = time.perf_counter() - began
+        with Chromium() as browser:
+            page = browser.open(url)
+            page.wait("wbc.state && wbc.operator === wbc.me")
+            page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')")
+            page.key("KeyR", True)
+            page.wait("wbc.state.speed > 0.01")
+            moved = time.perf_counter() - began
+        playing.terminate()
+    return (
+        f"With compiled code cached, `wbc play` says its address after {there:.1f} s. After {moved:.1f} s Chromium, "
+        "started then, has drawn the scene by software, and the hand moves by a key that is held down."
+    )
 
 
 def block(controller: Controller, q: np.ndarray, dt: float, viewer: Viewer | None) -> np.ndarray:

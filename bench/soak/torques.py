@@ -1,123 +1,36 @@
-"""Random stacks that command torques: contacts, loads and motors of any strength, in open loop, every step judged."""
+"""Stacks that command torques, in open loop, every step judged: limits, torques by Pinocchio alone, certificates."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
-import wbc
 from bench.soak.episodes import LENGTH, label
 from bench.soak.judge import Judge, Outside
-from bench.soak.machines import configuration, machine
-from bench.soak.stacks import DT, pose, weight
+from bench.soak.machines import configuration
+from bench.soak.stacks import DT
+from bench.soak.torque_stacks import followed, provoke, strong, torque_stack
 from wbc.controller import Controller, Status, Step, core_of
 from wbc.robot import Robot
-from wbc.shapes import HalfSpace, Sphere
 from wbc.stack.codegen import row_units
 from wbc.tasks import (
-    EndEffector,
+    DriveTorqueLimits,
     ExternalWrench,
     JointFriction,
-    JointLimits,
-    LineContact,
-    Obstacle,
-    PointContact,
-    Posture,
-    RigidGrasp,
+    RollingContact,
     SlidingContact,
-    SurfaceContact,
     TorqueLimits,
 )
-from wbc.tasks._contact import Contact, ContactForce
+from wbc.tasks._contact import Contact
+from wbc.tasks.rolling import FLAT
 from wbc.tasks.stopping import stopping_deceleration
 from wbc.validation import Array
 
 #: What accelerations and wrenches take beyond the torques that are sent, at most, of the largest of them
 SENT = 1e-6
-
-
-def strong(rng: np.random.Generator) -> Robot:
-    """A random robot with motors from much too weak to more than strong enough."""
-    robot = machine(rng)
-    effort = 10.0 ** rng.uniform(0.0, 3.0, robot.nv)
-    effort[: robot.base_nv] = np.inf
-    acceleration = robot.limits.acceleration.copy()
-    acceleration[: robot.base_nv] = np.inf
-    limits = robot.limits.override(effort=effort, acceleration=acceleration)
-    if rng.random() < 0.3:
-        robot.model.gravity.linear = np.zeros(3)
-    return (
-        wbc.robots.load(robot.model)
-        .with_shapes(robot.shapes)
-        .with_limits(
-            **{
-                name: getattr(limits, name) for name in ("position_lower", "position_upper", "velocity", "acceleration")
-            },
-            effort=effort,
-        )
-    )
-
-
-def torque_stack(robot: Robot, rng: np.random.Generator) -> wbc.Stack:
-    """Limits of joints and torques, and a random choice of contacts, loads, margins and tasks."""
-    names = [frame.name for frame in robot.model.frames if str(frame.name).startswith("f")]
-    stack = wbc.Stack(robot, dt=DT)
-
-    def frame() -> str:
-        return str(rng.choice(names))
-
-    def some(probability: float) -> bool:
-        return bool(rng.random() < probability)
-
-    for k in range(int(rng.integers(1, 3))):
-        kind = str(rng.choice(["pose", "position", "orientation"]))
-        stack.add(EndEffector(frame(), kind=kind), name=f"hand{k}", weight=weight(rng))
-    stack.add(Posture(), name="posture", weight=weight(rng), level=int(some(0.2)))
-    stack.add(JointLimits(), name="limits").add(TorqueLimits(), name="motors")
-    most = int(rng.choice([0, 1, 2, 3]))
-    for k in range(most):
-        at = frame()
-        contact: Contact = [
-            RigidGrasp(at, force=float(10.0 ** rng.uniform(0, 3)), torque=float(10.0 ** rng.uniform(0, 2))),
-            PointContact(at, friction=float(rng.uniform(0.0, 1.5)), least=float(rng.choice([0.0, 5.0]))),
-            SurfaceContact(at, half_lengths=(0.1, 0.05), friction=float(rng.uniform(0.0, 1.5))),
-            LineContact(at, half_length=0.1, friction=float(rng.uniform(0.0, 1.5))),
-            SlidingContact(at, friction=float(rng.uniform(0.0, 0.5))),
-        ][int(rng.integers(5))]
-        stack.add(contact, name=f"contact{k}")
-    if some(0.3):
-        stack.add(ExternalWrench(frame()), name="push")
-    if some(0.3):
-        stack.add(JointFriction(viscous=0.1, coulomb=0.2), name="gears")
-    if some(0.3):
-        stack.add(Obstacle(Sphere(0.1), margin=0.01), name="ball")
-    if some(0.2):
-        stack.add(Obstacle(HalfSpace()), name="floor", soft=weight(rng) if some(0.5) else None)
-    return stack
-
-
-def provoke(controller: Controller, rng: np.random.Generator) -> None:
-    """Other run-time values."""
-    for entry in controller.stack.entries:
-        handle, item = controller[entry.name], entry.item
-        if isinstance(item, EndEffector):
-            place = pose(rng, 0.5 if rng.random() < 0.8 else 50.0)
-            handle.target = {"pose": place, "orientation": place.rotation, "position": place.translation}[item.kind]
-        elif isinstance(item, Contact):
-            handle.enabled = bool(rng.random() < 0.8)
-        elif isinstance(item, ContactForce):
-            handle.weight = weight(rng)
-            handle.target = 10.0 ** rng.uniform(-1.0, 3.0) * rng.normal(size=item.contact.components)
-        elif isinstance(item, TorqueLimits):
-            handle.scale = float(rng.choice([1.0, 1.0, 1.0, 0.3, 0.0]))
-        elif isinstance(item, ExternalWrench):
-            handle.wrench = 10.0 ** rng.uniform(-1.0, 2.0) * rng.normal(size=6)
-        elif isinstance(item, Obstacle):
-            handle.pose = pose(rng, 0.6)
-        if entry.is_task and entry.name != "rest" and not isinstance(item, ContactForce):
-            handle.weight = weight(rng)
 
 
 class Needed:
@@ -126,6 +39,7 @@ class Needed:
     def __init__(self, controller: Controller) -> None:
         self._controller, robot = controller, controller.stack.robot
         self._model, self._data, self._base = robot.model, robot.model.createData(), robot.base_nv
+        self._couplings = robot.couplings
         items = {e.name: e.item for e in controller.stack.entries}
         self._contacts = {name: item for name, item in items.items() if isinstance(item, Contact)}
         self._pushed = [name for name, item in items.items() if isinstance(item, ExternalWrench)]
@@ -146,6 +60,11 @@ class Needed:
             for name, item in self._contacts.items()
             if isinstance(item, SlidingContact)
         }
+        self._grounds = {
+            name: given[name].target.rotation[:, 2].copy()
+            for name, item in self._contacts.items()
+            if isinstance(item, RollingContact)
+        }
 
     def torques(self, step: Step, q: Array, v: Array) -> Array:
         """M a + h - J'w - L; what a floating base lacks comes first."""
@@ -155,13 +74,23 @@ class Needed:
             found -= pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).T @ wrench
         for dofs, viscous, coulomb, slow in self._frictions:
             found[dofs] += viscous * v[dofs] + coulomb * np.tanh(v[dofs] / slow)
-        if self._slides:
+        if self._slides or self._grounds:
             pin.forwardKinematics(model, data, q)
         for name, force in step.forces.items():
             if not force.any():
                 continue
             J = pin.computeFrameJacobian(model, data, q, self._frames[name], pin.LOCAL)
-            if name in self._slides:
+            if name in self._grounds:
+                wheel, normal = self._contacts[name], self._grounds[name]
+                turn = pin.updateFramePlacement(model, data, self._frames[name]).rotation
+                axis = turn @ np.array(wheel.axis)
+                upright = normal - axis * (axis @ normal)
+                upright /= np.sqrt(upright @ upright + FLAT**2)
+                forwards = np.cross(axis, upright)
+                along = turn.T @ np.column_stack([forwards, np.cross(normal, forwards), normal]) @ force
+                arm = turn.T @ (-wheel.radius * upright)
+                found -= J[:3].T @ along + J[3:].T @ np.cross(arm, along)
+            elif name in self._slides:
                 normal, friction, slow = self._slides[name]
                 turn = pin.updateFramePlacement(model, data, self._frames[name]).rotation
                 speed = turn @ (J[:3] @ v)
@@ -170,18 +99,16 @@ class Needed:
                 found -= force[0] * (J[:3].T @ (turn.T @ along))
             else:
                 found -= J[list(self._contacts[name].axes)].T @ force
+        for one in self._couplings:
+            found[one.leader] += one.ratio * found[one.follower]
+            found[one.follower] = 0.0
         return np.asarray(found)
 
 
 class TorqueJudge(Judge):
     """The same of torques: their limits hold exactly, they are what accelerations and wrenches need, and what gives way
     has a name.
-
-    Attributes:
-        scale: of the torque limits.
     """
-
-    scale = 1.0
 
     def __init__(self, controller: Controller) -> None:
         super().__init__(controller)
@@ -190,6 +117,36 @@ class TorqueJudge(Judge):
         core = core_of(controller)
         rows = row_units(controller.stack, core.layout)
         self.longest = max(1.0, *rows, *core.layout.dof_scales(controller.stack))
+        self._robot = controller.stack.robot
+        self._motors = controller["motors"]
+        entries = controller.stack.entries
+        (item,) = (e.item for e in entries if isinstance(e.item, TorqueLimits))
+        self._driven, self._slews = list(item.dofs(self._robot)), item.slew is not None
+        self._wrists = [(controller[e.name], e.item) for e in entries if isinstance(e.item, DriveTorqueLimits)]
+        self._last: Array | None = None
+
+    def begin(self) -> None:
+        """Another episode: nothing is known of the last torques."""
+        self._last = None
+
+    def motors(self, step: Step, dt: float) -> str:
+        """Torques, how fast they change, and those of drives, are within their limits, whatever became of the tick."""
+        most = np.full(self._robot.nv, np.inf)
+        most[self._driven] = self._motors.scale * self.limits.effort[self._driven]
+        if (np.abs(step.torque) > most * (1 + 1e-15)).any():
+            return "beyond a torque limit"
+        last, self._last = self._last, step.torque.copy()
+        if self._slews and last is not None:
+            at, change = self._driven, self._motors.slew * dt
+            low, high = (np.clip(last[at] + s * change, -most[at], most[at]) for s in (-1.0, 1.0))
+            room = 1e-12 * np.maximum(1.0, np.abs(last[at]))
+            if ((step.torque[at] < low - room) | (step.torque[at] > high + room)).any():
+                return "torques change too fast"
+        for handle, item in self._wrists:
+            given = item.transmission.inverse.T @ step.torque[list(item.dofs(self._robot))]
+            if (np.abs(given) > handle.scale * handle.torque * (1 + 1e-9) + 1e-12).any():
+                return "beyond a limit of a drive"
+        return ""
 
     def torques(self, step: Step, q: Array, before: Array) -> str:
         """Whether what is sent is what the accelerations and wrenches of a step need."""
@@ -204,9 +161,9 @@ class TorqueJudge(Judge):
         numbers = np.frombuffer(step._data, count=step._context.memory.report)
         if np.isnan(numbers).any() or not (np.isfinite(step.a).all() and np.isfinite(step.torque).all()):
             return "NaN"
-        limits, scale = self.limits, self.scale
-        if (np.abs(step.torque) > scale * limits.effort * (1 + 1e-15)).any():
-            return "beyond a torque limit"
+        limits, wrong = self.limits, self.motors(step, dt)
+        if wrong:
+            return wrong
         if (np.abs(step.a) > limits.acceleration * (1 + 1e-12) + 1e-12).any():
             return "beyond an acceleration limit"
         within = np.abs(before) <= limits.velocity * (1 + 1e-12)
@@ -238,15 +195,20 @@ def viable(robot: Robot, q: Array, rng: np.random.Generator, longest: float) -> 
 
 def episode(controller: Controller, judge: TorqueJudge, rng: np.random.Generator) -> Counter[str]:
     """Counts of how steps ended and of what was wrong, from a state that limits can be kept from."""
-    robot, counts = controller.stack.robot, Counter[str]()
+    robot, counts, change = controller.stack.robot, Counter[str](), LENGTH
     watch = Outside(robot)
-    q = configuration(robot, rng, False)
-    v = viable(robot, q, rng, controller.stack.dt_range[1]) * float(rng.choice([0.0, 0.3, 1.0]))
+    together = replace(robot, limits=robot.coupled(robot.limits))
+    q = configuration(together, rng, False)
+    v = viable(together, q, rng, controller.stack.dt_range[1]) * float(rng.choice([0.0, 0.3, 1.0]))
+    q, v = followed(robot, q, v)
     controller.reset(q, v)
-    provoke(controller, rng)
-    judge.scale = float(controller["motors"].scale)
-    judge.needed.begin()
-    for _ in range(LENGTH):
+    judge.begin()
+    if rng.random() < 0.5:
+        change = int(rng.integers(1, LENGTH))
+    for k in range(LENGTH):
+        if k in (0, change):
+            provoke(controller, rng)
+            judge.needed.begin()
         dt = DT * float(rng.uniform(0.25, 2.0)) if rng.random() < 0.5 else None
         try:
             step = controller.step(q, v, dt)

@@ -88,10 +88,9 @@ class Spent:
     def times(self, planned: bool) -> Record:
         """Of the plan, and of walking with its log."""
         begun, stages = [*self._begun.values()], [*self._begun]
-        if not planned:
+        if not planned or len(begun) < 3:
+            # Refused, some of it with a plan for a part of the way
             return {"plan_s": time.process_time() - begun[0]}
-        if len(begun) < 3:
-            return {}
         return {"plan_s": begun[1] - begun[0], "walking_s": self._ended - begun[stages.index(stages[2])]}
 
 

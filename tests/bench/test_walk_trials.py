@@ -17,7 +17,7 @@ from bench.walk import second_checker, trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, capsule_between, random_structure
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
-from bench.walk.trials import names, tried
+from bench.walk.trials import Spent, names, tried
 from tests.repeats import repeats
 from wbc.clearance import SweptBody
 from wbc.errors import UnknownNameError
@@ -61,6 +61,17 @@ def test_an_unknown_family_is_refused() -> None:
 def test_names_of_trials() -> None:
     assert names("structures", 9) == [*(f"{family} 0" for family in FAMILIES), "posts 1", "bars 1"]
     assert [len(names(part, 500)) for part in ("structures", "velocity", "resume", "vanish")] == [500, 200, 200, 100]
+
+
+def test_a_refusal_counts_processor_time_also_where_a_part_of_the_way_was_planned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = iter([1.0, 3.0, 10.0])
+    monkeypatch.setattr("time.process_time", lambda: next(clock))
+    spent = Spent()
+    for stage in ("plan", "check"):
+        spent(stage, None)
+    assert spent.times(planned=True) == {"plan_s": 9.0}
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import wbc.robots
 from tests.constraints.robots import robot as limited_robot
@@ -102,6 +103,28 @@ def test_far_beyond_reach_the_distance_is_that_of_the_nearest_pose_from_anywhere
     found = reason(tick.step(q))
     assert found.kind == "reach"
     assert found.beyond[0][0] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_the_nearest_pose_is_the_least_of_several_minima() -> None:
+    """A target beside the waist of a Z1, whose limits leave three minima; the first four searches end in the second."""
+    robot = wbc.robots.load("z1", shapes="none")
+    tip, q = robot.frames["tip"], robot.random(9)
+    stack = Stack(robot, DT).add(EndEffector(tip, kind="position"), name="hand").add(JointLimits())
+    tick = stack.compile(backend="vm")
+    target = np.array([-0.4333, -0.0540, -0.0195])
+    tick.reset(q)
+    tick["hand"].target = target
+    found = reason(tick.step(q))
+    random, limits = np.random.default_rng(0), robot.limits
+    lower, upper = limits.position_lower, limits.position_upper
+    best = min(
+        least_squares(
+            lambda x: robot.pose(x, tip).translation - target, random.uniform(lower, upper), bounds=(lower, upper)
+        ).cost
+        for _ in range(12)
+    )
+    assert found.kind == "reach"
+    assert found.beyond[0][0] == pytest.approx(np.sqrt(2.0 * best), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -47,7 +47,7 @@ def test_a_limp_motor_is_found_by_its_joint(scale: float, found: list[int]) -> N
     plant.limp(LIMP, scale)
     for _ in range(100):
         plant.advance(0.001)
-        watch.see(plant.state.q, plant.state.v, tau, np.zeros(ROBOT.nv))
+        watch.see(plant.state.q, plant.state.v, tau, np.zeros(ROBOT.nv), np.zeros(ROBOT.nv))
     assert watch.limp == found
 
 

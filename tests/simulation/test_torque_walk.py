@@ -13,11 +13,12 @@ import wbc.robots
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.robots import with_masses
 from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPlant, Motors, PinocchioPlant
 from wbc.walking import cylinder
 from wbc.walking.torque.choice import PlantChoice
 from wbc.walking.torque.faults import Fault
-from wbc.walking.torque.loop import TorqueLoop
+from wbc.walking.torque.loop import Gains, TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
 
 ROBOT = heavy().robot
@@ -55,6 +56,23 @@ def test_it_follows_the_rates_of_a_walk(delay: float) -> None:
     assert loop.watch.drift < 1e-6
     assert 0.0 < loop.watch.force < loop.stack.rating.force
     assert loop.watch.figures()[0].value == loop.watch.drift
+
+
+def test_friction_that_nobody_knows_is_compensated() -> None:
+    """A wrist of 20 N m that rubs with 3 N m: with what the residual adds it moves, without it it stays behind."""
+    wrist, off = ROBOT.dofs("arm3_joint4"), list[float]()
+    for most in (8.0, 0.0):
+        plant = PinocchioPlant(ROBOT, motors=Motors(coulomb=3.0, viscous=1.0))
+        loop = begun(TorqueLoop(stack(), plant, Gains(friction=most)), HANDS[:2])
+        v = np.zeros(ROBOT.nv)
+        v[wrist] = 0.3
+        for _ in range(12):
+            loop.apply(Command(CommandKind.VELOCITY, v))
+            loop.advance(0.01)
+        off.append(abs(float(loop.read().v[wrist][0]) - 0.3))
+        assert loop.failing() == ""
+    assert off[0] < 0.01
+    assert off[1] > 0.05
 
 
 def test_an_opened_hand_moves_alone() -> None:
@@ -114,6 +132,32 @@ def test_why_holds_that_let_two_hands_tilt_are_refused(seed: int) -> None:
     forces = [w[:, :3] for w in wrenches]
     assert np.linalg.matrix_rank(np.hstack(forces), tol=1e-9) == 5
     assert np.linalg.matrix_rank(np.hstack([*forces, *tilts]), tol=1e-9) == 6
+
+
+@cache
+def four() -> TorqueStack:
+    return TorqueStack(with_masses(wbc.robots.walker(4)), [GripKind.POSITION], backend="vm")
+
+
+def test_four_arms_stand_on_holds_that_let_hands_tilt() -> None:
+    robot = four().walker.robot
+    hands, q = [arm.hand for arm in four().walker.arms], robot.neutral
+    loop = TorqueLoop(four(), PinocchioPlant(robot))
+    loop.reset(q, 0.0)
+    for hand in hands:
+        loop.grasp(hand, robot.pose(q, hand), GripKind.POSITION)
+    assert loop.holds_without(hands[3])
+    loop.release(hands[3])
+    v = np.zeros(robot.nv)
+    v[robot.dofs("arm4_joint1")] = 0.2
+    for _ in range(6):
+        loop.apply(Command(CommandKind.VELOCITY, v))
+        loop.advance(0.01)
+    assert loop.read().v == pytest.approx(v, abs=0.05)
+    assert loop.watch.drift < 1e-6
+    assert loop.watch.moment == 0.0
+    assert not loop.holds_without(hands[2])
+    assert "2 hands that may tilt on their holds do not keep the body from turning" in loop.failing()
 
 
 def test_a_limp_motor_is_named_and_the_stack_does_without_it() -> None:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import wbc.robots
 from tests.repeats import repeats
 from tests.torque.problems import controller, robot
 from tests.torque.referee import acceleration_interval
 from wbc.controller import Stack, core_of
+from wbc.robot import Coupling, Robot
 from wbc.tasks import JointLimits, Posture
 from wbc.tasks.stopping import allowed_accelerations, stopping_deceleration
 
@@ -193,3 +198,38 @@ def test_a_joint_whose_limit_of_velocity_is_zero_comes_to_rest() -> None:
     step = tick.step(bot.neutral, v)
     assert step.status == "solved"
     assert abs(v[0] + 0.002 * step.a[0]) < 1e-12
+
+
+def geared() -> Robot:
+    """Three hinges of which the last follows the second, runs further and brakes five times slower."""
+    model, parent = pin.Model(), 0
+    for k, kind in enumerate((pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRY())):
+        parent = model.addJoint(parent, kind, pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0])), f"j{k}")
+        inertia = pin.Inertia(1.0, np.array([0.1, 0.0, 0.0]), 0.01 * np.eye(3))
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    most = np.array([1.0, 1.0, 10.0])
+    bot = wbc.robots.load(model).with_limits(position_lower=-most, position_upper=most, velocity=(2.0, 3.0, 3.0))
+    bot = bot.with_limits(acceleration=(30.0, 30.0, 6.0), effort=200.0)
+    return replace(bot, couplings=(Coupling(follower=2, leader=1, ratio=-1.7, offset=0.1),))
+
+
+@pytest.mark.parametrize("command", ["velocity", "acceleration", "torque"])
+def test_a_joint_that_follows_slower_than_its_leader_brakes_with_it(command: str) -> None:
+    """With intervals of their own the two contradicted each other, and the coupling gave way in every fourth tick."""
+    bot, rng = geared(), np.random.default_rng(0)
+    made = Stack(bot, dt=LONGEST).add(Posture(gain=30.0), name="posture").add(JointLimits())
+    tick = made.compile(command=command, backend="vm")
+    q, v, reached = np.array([0.0, 0.0, 0.1]), np.zeros(3), 0.0
+    tick.reset(q)
+    for k in range(240):
+        if k % 80 == 0:
+            tick["posture"].target = np.array([0.0, 3.0, -5.1]) * (-1.0) ** (k // 80)
+        dt = LONGEST * rng.uniform(0.25, 2.0)
+        step = tick.step(q, dt=dt) if command == "velocity" else tick.step(q, v, dt)
+        assert step.status == "solved"
+        mean = step.v if command == "velocity" else v + 0.5 * dt * step.a
+        q, v = q + mean * dt, step.v
+        assert abs(q[1]) <= 1.0 + 1e-12
+        assert q[2] == pytest.approx(0.1 - 1.7 * q[1], abs=1e-9)
+        reached = max(reached, abs(q[1]))
+    assert reached > 0.99

@@ -54,6 +54,15 @@ def test_torques_change_no_faster_and_drives_give_no_more_than_they_can() -> Non
     assert most == pytest.approx([2.0, 1.0], rel=1e-9)
 
 
+def test_a_slew_rate_of_motors_without_limits_is_that_of_none() -> None:
+    bot = robot("panda").with_limits(effort=np.inf)
+    made = Stack(bot, dt=DT).add(Posture()).add(JointLimits()).add(TorqueLimits(slew=10.0), name="motors")
+    tick = made.compile(command="torque", backend="vm")
+    tick.reset(bot.neutral)
+    assert tick.step(bot.neutral, np.zeros(7)).status == "solved"
+    assert "slew" not in tick["motors"].names
+
+
 def test_a_reset_forgets_the_last_torques() -> None:
     tick, bot = controller().clone(), robot("panda")
     tick.reset(bot.neutral)

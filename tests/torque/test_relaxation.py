@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import wbc
-from bench.soak.torques import Needed, strong, torque_stack
+from bench.soak.torque_stacks import strong, torque_stack
+from bench.soak.torques import Needed
 from tests.torque.problems import controller
 from wbc import Status
 from wbc.controller import Controller, Step, core_of
@@ -19,7 +20,7 @@ DATA = Path(__file__).parent / "data"
 def drawn(k: int, backend: str) -> Controller:
     """A stack of the soak."""
     rng = np.random.default_rng([0, True, k, 2])
-    return torque_stack(strong(rng), rng).compile(backend=backend, command="torque")
+    return torque_stack(strong(rng, False), rng, False).compile(backend=backend, command="torque")
 
 
 def again(tick: Controller, name: str) -> Step:

@@ -225,6 +225,38 @@ def test_a_walk_whose_plant_fails_leaves_what_there_is(machine: Walker, stack: W
         Machine(machine, run.structure, DT, plant).move(np.zeros(machine.robot.nv))
 
 
+class Heavy(LaggingPlant):
+    """Has masses, and says after a while that something has failed; one joint does not stop."""
+
+    def move(self, v: np.ndarray) -> None:
+        self.v = v.copy()
+
+    def failing(self) -> str:
+        return "a motor is dead" if self.time > 0.3 else ""
+
+    def advance(self, dt: float) -> None:
+        before = self.q[-1]
+        super().advance(dt)
+        if self.failing():
+            self.q[-1], self.v[-1] = before + 0.2 * dt, 0.2
+            self._read = PlantState(self.q, self.v, self.time)
+
+
+def test_what_has_not_come_to_rest_is_named_and_logged(machine: Walker, stack: WalkStack) -> None:
+    from wbc.walking.run import PathRequest, Site, perform_walk
+
+    plant = Heavy(machine.robot, 0.01, 0, 0.0)
+    run = perform_walk(PathRequest(Site(rigid=True), "13,9", ("13,10",)), machine, stack=stack, plant=plant)
+    assert run.outcome == "plant failed"
+    name = machine.robot.dof_names[-1]
+    assert "a motor is dead; not all of it came to rest" in run.reason
+    assert f"{name} at " in run.reason
+    assert run.log is not None
+    # It goes on as it did: the log does not claim that it stands
+    assert run.log.v[-1] == pytest.approx(run.log.v[-2])
+    assert run.log.v[-1, -1] > 0.1
+
+
 def test_a_two_ended_arm_goes_where_a_path_ends(machine: Walker) -> None:
     from wbc.robots import walker
     from wbc.walking.two_ended import TwoEndedWalk, grapple_row, plan_two_ended

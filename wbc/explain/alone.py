@@ -23,8 +23,8 @@ MET = 1e-5
 _STARTS, _STEPS = 16, 40
 #: How far the second start is from the first [rad, characteristic lengths]
 _ASIDE = 0.05
-#: A search ends where this many starts came equally near
-_AGREED = 4
+#: A search ends where all starts came equally near, and these are so many; the first two count as one
+_AGREED = 6
 #: Singular values below this do not count [rows and joints in radians or characteristic lengths]
 SINGULAR = 1e-4
 
@@ -213,7 +213,9 @@ class Alone:
             found.append(off)
             if off < best[0]:
                 best = off, q, e
-            if np.abs(e).max(initial=0.0) < MET or sum(x < best[0] * (1.0 + 1e-3) for x in found) >= _AGREED:
+            # One that ended elsewhere says that there are several minima, of which the first ones need not be the least
+            agreed = len(found) > _AGREED and max(found) < best[0] * (1.0 + 1e-3)
+            if np.abs(e).max(initial=0.0) < MET or agreed:
                 break
         return Nearest(best[1], best[2], len(found))
 

@@ -262,14 +262,8 @@ class Robot:
             rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
         reach = np.where(np.array([unit == "rad" for unit in self.dof_units]), np.pi, 1.0)
         out = self.integrate(self.neutral, rng.uniform(-reach, reach))
-        lower, upper, index = self.limits.position_lower.copy(), self.limits.position_upper.copy(), self.position_index
-        for one in self.couplings:
-            if one.ratio != 0.0:
-                ends = sorted((bound[one.follower] - one.offset) / one.ratio for bound in (lower, upper))
-                narrowed = max(lower[one.leader], ends[0]), min(upper[one.leader], ends[1])
-                # Limits that contradict each other: the leader's own
-                if narrowed[0] <= narrowed[1]:
-                    lower[one.leader], upper[one.leader] = narrowed
+        limits, index = self.coupled(self.limits), self.position_index
+        lower, upper = limits.position_lower, limits.position_upper
         for k in np.flatnonzero(index >= 0).tolist():
             low, high = float(lower[k]), float(upper[k])
             if np.isfinite([low, high]).all():
@@ -277,6 +271,36 @@ class Robot:
         for one in self.couplings:
             out[int(index[one.follower])] = one.ratio * out[int(index[one.leader])] + one.offset
         return out
+
+    def coupled(self, limits: Limits) -> Limits:
+        """The same limits with those of followers taken over by their leaders, and theirs by followers:
+
+            q_f = ratio q_l + offset,   v_f = ratio v_l,   a_f = ratio a_l
+
+        so that one interval of the leader, times the ratio, is that of each follower. Where ranges exclude each other
+        it is the leader's own. Efforts stay as they are.
+        """
+        if not self.couplings:
+            return limits
+        low, high = limits.position_lower.copy(), limits.position_upper.copy()
+        rates = [limits.velocity.copy(), limits.acceleration.copy()]
+        index, moved = self.position_index, [one for one in self.couplings if one.ratio != 0.0]
+        # as often as there are couplings: a follower may lead another
+        for one in moved * len(moved):
+            if index[one.leader] >= 0:
+                ends = sorted((bound[one.follower] - one.offset) / one.ratio for bound in (low, high))
+                narrow = max(low[one.leader], ends[0]), min(high[one.leader], ends[1])
+                if narrow[0] <= narrow[1]:
+                    low[one.leader], high[one.leader] = narrow
+            for most in rates:
+                most[one.leader] = min(most[one.leader], most[one.follower] / abs(one.ratio))
+        for one in moved * len(moved):
+            if index[one.leader] >= 0:
+                ends = sorted(one.ratio * bound[one.leader] + one.offset for bound in (low, high))
+                low[one.follower], high[one.follower] = ends
+            for most in rates:
+                most[one.follower] = most[one.leader] * abs(one.ratio)
+        return limits.override(position_lower=low, position_upper=high, velocity=rates[0], acceleration=rates[1])
 
     def with_frame(self, name: str, parent: str, placement: Any = None) -> Robot:
         """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).

@@ -44,9 +44,7 @@ class Connection:
         # One command for all ticks, written anew in each
         self._command = Command(CommandKind.VELOCITY, np.zeros(robot.nv))
         self._values = self._command.values
-        # q and v as they are read, in one piece
-        self._read = np.zeros(robot.nq + robot.nv)
-        self._read_q, self._read_v = self._read[: robot.nq], self._read[robot.nq :]
+        self._nq = robot.nq
 
     def __enter__(self) -> Connection:
         return self
@@ -111,11 +109,11 @@ class Connection:
         if isinstance(state, PlantState) and state.valid:
             q, v, time = state.q, state.v, state.time
             if type(q) is type(v) is np.ndarray and q.shape == self._q_shape and v.shape == self._v_shape:
-                self._read_q[:], self._read_v[:] = q, v
+                read = np.concatenate((q, v), dtype=np.float64)
                 # A sum of squares is a number where all are
-                if time >= self._time and isfinite(self._read.dot(self._read)) and isfinite(time):
+                if time >= self._time and isfinite(read.dot(read)) and isfinite(time):
                     self._time = time
-                    return PlantState(self._read_q.copy(), self._read_v.copy(), float(time))
+                    return PlantState(read[: self._nq], read[self._nq :], float(time))
         self.rest()
         raise PlantError("plant.state", state, self._fault(state))
 

@@ -152,7 +152,7 @@ class Layout:
             size = inputs.size(robot, declared_input)
             slots[declared_input.name] = Slot(declared_input, self.parameters, size)
             self.parameters += size
-        if isinstance(item, TorqueLimits) and item.slew is not None:
+        if isinstance(item, TorqueLimits) and "last" in slots:
             last = slots["last"]
             self.slewed[0].extend(range(last.start, last.start + last.size))
             self.slewed[1].extend(item.dofs(robot))

@@ -247,5 +247,6 @@ def _task(handle: Handle) -> TaskHandle:
 
 def turned(rotation: Array, angles: Array) -> Array:
     """exp([angles]) R, orthonormal again after any number of turns: X (3 I - X'X) / 2 squares what is missing."""
-    turn = pin.exp3(angles) @ rotation
-    return 0.5 * turn @ (3.0 * np.eye(3) - turn.T @ turn)
+    turn: Array = pin.exp3(angles) @ rotation
+    polished: Array = 0.5 * turn @ (3.0 * np.eye(3) - turn.T @ turn)
+    return polished

@@ -23,25 +23,28 @@ TARGET, AFTER, POSE = slice(0, 18), slice(18, 30), slice(30, 37)
 
 @functools.cache
 def pose_function() -> ca.Function:
-    """f(now, sample, bend, rate), poses as 12 numbers: the rotation by columns, the position.
+    """f(now, sample, around, part, rate), poses as 12 numbers: the rotation by columns, the position.
 
-    At the end of the tick the body is at M exp(bend), see :meth:`wbc.walking.body_path.BodyPath.at`; its rate from
-    where it is now on is (p' - p, R log(R' R')) / dt in the structure's axes.
+    At the end of the tick the body is at M exp(s^2 / 2 after - (1 - s)^2 / 2 before), see
+    :meth:`wbc.walking.body_path.BodyPath.at`; its rate from where it is now on is (p' - p, R log(R' R')) / dt in the
+    structure's axes.
 
     Args:
-        now: at the beginning of the tick. sample: M. bend: (linear; angular) ``[6]``. rate: 1 / dt [1/s].
+        now: at the beginning of the tick. sample: M. around: the steps before and after it, each (linear; angular)
+            ``[12]``. part: s. rate: 1 / dt [1/s].
 
     Returns:
         now, its rate ``[6]``, the pose afterwards ``[12]``, and its position and quaternion x, y, z, w ``[7]``.
     """
-    sizes = {"now": 12, "sample": 12, "bend": 6, "rate": 1}
-    now, sample, bend, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
+    sizes = {"now": 12, "sample": 12, "around": 12, "part": 1, "rate": 1}
+    now, sample, around, part, rate = (ca.SX.sym(name, size) for name, size in sizes.items())
+    bend = 0.5 * part**2 * around[6:] - 0.5 * (1.0 - part) ** 2 * around[:6]
     turns, places = zip(*((ca.reshape(pose[:9], 3, 3), pose[9:]) for pose in (now, sample)), strict=True)
     turned = turns[1] @ from_quaternion(exp3(bend[3:]))
     moved = places[1] + turns[1] @ (left_jacobian(bend[3:]) @ bend[:3])
     speed = ca.vertcat(moved - places[0], turns[0] @ log3(turns[0].T @ turned)) * rate
     out = ca.vertcat(now, speed, ca.vec(turned), moved, moved, to_quaternion(turned))
-    return compiled(ca.Function("pose", [now, sample, bend, rate], [out]))
+    return compiled(ca.Function("pose", [now, sample, around, part, rate], [out]))
 
 
 class BodyCommand:
@@ -56,11 +59,10 @@ class BodyCommand:
 
     def __init__(self, dt: float) -> None:
         self._step = SingleState(pose_function())
-        self._now, self._sample, self._bend, rate = self._step.inputs
+        self._now, self._sample, self._around, self._part, rate = self._step.inputs
         rate[0] = 1.0 / dt
         self._path: BodyPath | None = None
         self._place, self._row = np.nan, -1
-        self._around = np.zeros(6), np.zeros(6)
         self.pose: Array = np.zeros(7)
 
     def go(self, path: BodyPath, begin: float, end: float) -> Array:
@@ -78,12 +80,10 @@ class BodyCommand:
             self._now[:] = pose_numbers(path.at(begin)[0])
         else:
             self._now[:] = out[AFTER]
-        row, part = path.place(end)
+        row, self._part[0] = path.place(end)
         if row != self._row:
             self._sample[:], self._row = path.numbers[row], row
-            self._around = path.step(row - 1), path.step(row)
-        before, after = self._around
-        self._bend[:] = 0.5 * part**2 * after - 0.5 * (1.0 - part) ** 2 * before
+            self._around[:6], self._around[6:] = path.step(row - 1), path.step(row)
         self._step.run()
         self._place = end
         self.pose = out[POSE].copy()

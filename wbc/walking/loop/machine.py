@@ -143,6 +143,13 @@ class Machine:
         """What the plant says of itself that has failed; "": nothing."""
         return "" if self._watched is None else self._watched.failing()
 
+    @property
+    def lasting(self) -> Array:
+        """Rates with which it goes on when commands end ``[nv]``: none where the plant does as it is commanded, those
+        of the last period where its bodies have masses.
+        """
+        return np.zeros(len(self.v)) if self._moving is None else self.rates.copy()
+
     def hand(self, arm: int) -> tuple[Array, Array, Array]:
         """Origin [m], z axis and x axis of a hand in the structure."""
         return self.chain.origins[arm], self.chain.axes[arm], self.chain.x_axes[arm]

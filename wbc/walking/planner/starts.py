@@ -21,7 +21,6 @@ from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.search import PAIRS, StanceSearch
-from wbc.walking.planner.stances.together import together
 
 #: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
 Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
@@ -157,10 +156,9 @@ def _candidates(
         yield from _lasting_longest(grips, search, choices, sample)
         return
 
-    def fit(one: int, other: int) -> bool:
-        return bool(grips.hold[one] != grips.hold[other])
-
-    yield from sorted(together(choices, fit), key=lambda stance: -min(int(grips.last[g]) for g in stance))
+    hold, last = ({g: int(of[g]) for mine in choices for g in mine} for of in (grips.hold, grips.last))
+    apart = (stance for stance in product(*choices) if len({hold[g] for g in stance}) == len(stance))
+    yield from sorted(apart, key=lambda stance: -min(last[g] for g in stance))
 
 
 def _lasting_longest(

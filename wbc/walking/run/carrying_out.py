@@ -38,6 +38,10 @@ Progress = Callable[[str, float | None], None]
 STRIDE = 25
 #: Ticks that are made after a stop, in which everything comes to rest
 REST = 10
+#: Slower than this counts as at rest, where bodies have masses: the body [m/s] and joints [rad/s]
+CREEP, TURN = 0.01, 0.05
+#: So many joints that move are named
+NAMED = 3
 
 
 class CarryingOut:
@@ -83,6 +87,8 @@ class CarryingOut:
             self.recorder.tick(self._tick(), command)
         except HoldLost as error:
             self.outcome, self.reason = "hold lost", str(error)
+            if goes_on := self._goes_on():
+                self.reason += f"; still in motion as the log ends: {goes_on}"
         except NoPlanError as error:
             self.outcome, self.reason = "refused", str(error)
         except PlantError as error:
@@ -92,7 +98,9 @@ class CarryingOut:
             self.outcome, self.reason = "refused", str(error)
         failing = self.walk.machine.failing()
         if failing and self.outcome is None:
-            self.abort("plant failed", f"{failing}; it was brought to rest")
+            self.abort("plant failed", failing)
+            goes_on = self._goes_on()
+            self.reason += f"; not all of it came to rest: {goes_on}" if goes_on else "; it was brought to rest"
         if len(self.recorder) % STRIDE == 0:
             self._report("walking", None if part is None else min(part, 1.0))
         return self.outcome is None
@@ -105,6 +113,18 @@ class CarryingOut:
         """Take a new plan into account."""
         self._seen = self.walk.plan
         self._most = np.maximum(self._most, self.walk.leader.stops.longest(self._seen))
+
+    def _goes_on(self) -> str:
+        """What of a robot with masses still moves, in words; "": nothing."""
+        robot, rates = self.walk.walker.robot, self.walk.machine.lasting
+        speed = float(np.linalg.norm(rates[:3]))
+        parts = [f"the body moves at {1e3 * speed:.0f} mm/s"] if speed > CREEP else []
+        sizes = np.abs(rates) * (np.arange(robot.nv) >= robot.base_nv)
+        moves = [int(k) for k in np.argsort(-sizes) if sizes[k] > TURN]
+        parts += [f"{robot.dof_names[k]} at {rates[k]:.2f} rad/s" for k in moves[:NAMED]]
+        if len(moves) > NAMED:
+            parts.append(f"{len(moves) - NAMED} more joints")
+        return ", ".join(parts)
 
     def abort(self, outcome: Outcome, reason: str) -> None:
         """Bring everything to rest, and keep how far it went beside what was said before."""

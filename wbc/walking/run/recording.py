@@ -43,8 +43,9 @@ class Before:
 class WalkRecorder:
     """Records a :class:`Walk` from where it is; call :meth:`tick` after each of its ticks.
 
-    A row of the log is the state as a tick begins and the rates that it commands; :meth:`log` adds the last state with
-    rates 0. An opening hand is logged on the hold that it leaves.
+    A row of the log is the state as a tick begins and the rates that last until the next; :meth:`log` adds the last
+    state, with the rates with which it goes on (:attr:`Machine.lasting`). An opening hand is logged on the hold that it
+    leaves.
 
     Args:
         meta: plain data for the log.
@@ -138,7 +139,7 @@ class WalkRecorder:
         Raises:
             ShapeError: no tick was recorded.
         """
-        self._keep(np.zeros(self._walk.walker.robot.nv), self._walk.machine.fixed)
+        self._keep(self._walk.machine.lasting, self._walk.machine.fixed)
         self.write()
         if self._part is not None:
             self._part.close()

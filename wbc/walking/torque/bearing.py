@@ -19,7 +19,7 @@ from wbc.walking.planner.plan_time import planned_joints, swing_times
 from wbc.walking.torque.stack import TorqueStack
 
 #: Part of the torques and of what holds bear that standing still may take; the rest is for motion
-SHARE = 0.95
+SHARE = 0.9
 #: A plan is looked at so often [s], and where hands open and close
 EVERY = 0.2
 #: Times that are no farther apart are the same [s]: one hand lands as another one lifts

@@ -1,4 +1,4 @@
-"""A grasp of a hold that leaves the hand its roll."""
+"""Grasps of holds that leave the hand its roll, or its tilt as well."""
 
 from __future__ import annotations
 
@@ -56,10 +56,33 @@ class AxisGrasp(RigidGrasp):
         return [axis for axis in self._given if axis in self.axes]
 
 
+@dataclass(frozen=True)
+class PointGrasp(AxisGrasp):
+    """A hand that may turn about its origin: three rows as of ``Hold(kind="position")``, and a force within the box."""
+
+    axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
+
+    @property
+    def _hold(self) -> Hold:
+        return Hold(self.frame, kind="position")
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """x, y, z of the world."""
+        return self._hold.rows(robot)
+
+    def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
+        """Of the origin alone."""
+        return twist[:3]
+
+
 def _chosen(rows: list[int], count: int) -> ca.SX:
     """Some rows of the unit matrix."""
     return ca.sparsify(ca.SX(ca.DM(np.eye(count)[rows])))
 
 
 #: By what a hold holds
-GRASPS: dict[GripKind, type[RigidGrasp]] = {GripKind.POSE: RigidGrasp, GripKind.AXIS: AxisGrasp}
+GRASPS: dict[GripKind, type[RigidGrasp]] = {
+    GripKind.POSE: RigidGrasp,
+    GripKind.AXIS: AxisGrasp,
+    GripKind.POSITION: PointGrasp,
+}

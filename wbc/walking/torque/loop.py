@@ -17,7 +17,7 @@ from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
 from wbc.walking.torque.readings import JointFilter
-from wbc.walking.torque.stack import TorqueStack
+from wbc.walking.torque.stack import STEADY, TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
 
@@ -35,11 +35,20 @@ class Gains:
         bandwidth: omega of  a = dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q)  [1/s].
         leak: how fast q_ref comes to q, so that it does not wander where closed chains let nothing move [1/s].
         grip: how fast the drift of closed hands decays [1/s].
+        friction: most that is added to a motor's torque against what acts on its joint and is not known [N m].
     """
 
     bandwidth: float = 40.0
     leak: float = 2.0
     grip: float = 20.0
+    friction: float = 8.0
+
+
+def turns(held: Mapping[str, GripKind]) -> str:
+    """Why these hands do not keep the body from turning, in words; "": they do."""
+    if len(held) >= STEADY or any(kind is not GripKind.POSITION for kind in held.values()):
+        return ""
+    return f"{len(held)} hands that may tilt on their holds do not keep the body from turning, {STEADY} do"
 
 
 class TorqueLoop:
@@ -53,6 +62,9 @@ class TorqueLoop:
     its integral. Every millisecond the stack finds torques for dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q),
     and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
     read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
+
+    What acts on a joint and is not known, such as friction, is the residual r of the robot's momentum; -r is added to
+    the stack's torques, within :attr:`Gains.friction` and what the motors have (a disturbance observer).
 
     A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
     found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
@@ -110,8 +122,9 @@ class TorqueLoop:
         base, noisy = stack.walker.robot.base_nv, encoders is not None and encoders != Encoders()
         self._filter = JointFilter(self._model, base, encoders, self.time_step) if encoders and noisy else None
         self._state = plant.read()
-        # Torques on their way, the oldest first, and that which takes hold next at the end
-        self._sent = np.zeros((ahead + 1, self.nv))
+        # Torques on their way, the oldest first, and that which takes hold next at the end; the stack's, and what was
+        # added to them
+        self._sent, self._added = np.zeros((2, ahead + 1, self.nv))
 
     def reset(self, q: Array, time: float) -> None:
         """At rest, nothing grasped."""
@@ -121,7 +134,8 @@ class TorqueLoop:
         controller.reset(q)
         controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
         self._motors.begin(q, np.zeros(self.nv))
-        self._sent[:] = 0.0
+        self._sent[:] = self._added[:] = 0.0
+        self._left = self._effort
         self._slipping: dict[str, float] = {}
         self._failing, self._overloaded = "", 0
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
@@ -175,15 +189,17 @@ class TorqueLoop:
         state = self._state
         held = {hand: kind for hand, kind in self._closed.items() if hand != frame}
         short = self.bearing.lacking(state.q, held)
-        if short:
-            self._note(state.time, self.bearing.words(short, held), ends=True)
-        return not short
+        why = self.bearing.words(short, held) if short else turns(held)
+        if why:
+            self._note(state.time, why, ends=True)
+        return not why
 
     def lost(self) -> tuple[str, ...]:
         """Hands whose holds have broken off; the stack has done without them since."""
         lost = self._tested.lost()
         for frame in lost:
-            self._note(self._state.time, f"the hold of {frame} broke off")
+            why = turns(self._closed)
+            self._note(self._state.time, f"the hold of {frame} broke off{f'; {why}' if why else ''}", ends=bool(why))
         return lost
 
     def failing(self) -> str:
@@ -203,12 +219,12 @@ class TorqueLoop:
             q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
             reference.target, reference.feedforward = self._q, self._v
             self.step = controller.step(q, v)
-            command.values[:] = self.step.torque
+            command.values[:] = self._compensated(self.step.torque)
             plant.apply(command)
             plant.advance(step)
             self._look(self._decided[0] if len(self._decided) else self.step.a)
-            self._sent[:-1] = self._sent[1:]
-            self._sent[-1] = self.step.torque
+            self._sent[:-1], self._added[:-1] = self._sent[1:], self._added[1:]
+            self._sent[-1], self._added[-1] = self.step.torque, command.values - self.step.torque
             wrenches = self._tested.wrenches
             self._find(wrenches)
             self.watch.see(wrenches, self.step.status)
@@ -223,6 +239,12 @@ class TorqueLoop:
         self._feel()
         self._bear()
         self.watch.period(self._tested)
+
+    def _compensated(self, torque: Array) -> Array:
+        """Torques with what goes against the residual of the momentum ``[nv]``; none on a base."""
+        most = self._gains.friction
+        against = np.maximum(np.minimum(self._motors.residual, most), -most)
+        return np.maximum(np.minimum(torque - against, self._left), -self._left)
 
     def _look(self, decided: Array | None = None, struck: bool = False) -> None:
         """Take what is read; ``decided``: the accelerations of the tick that is over; None: there was none."""
@@ -249,7 +271,7 @@ class TorqueLoop:
         contacts = np.zeros(self.nv)
         for name, wrench in wrenches.items():
             contacts += pin.getFrameJacobian(model, data, model.getFrameId(name), pin.LOCAL).T @ wrench
-        for dof in self._motors.see(state.q, state.v, self._sent[0], contacts):
+        for dof in self._motors.see(state.q, state.v, self._sent[0], self._added[0], contacts):
             robot, share = self.stack.walker.robot, float(self._motors.share[dof])
             self._effort_left()
             text = f"the motor of {robot.dof_names[dof]} is limp: it gives {share:.0%} of its torque"
@@ -257,7 +279,7 @@ class TorqueLoop:
 
     def _effort_left(self) -> None:
         """The stack asks nothing of motors that are limp."""
-        left = self._effort.copy()
+        left = self._left = self._effort.copy()
         left[self._motors.limp] = 0.0
         self.stack.controller["torques"].torque = left[self.stack.walker.robot.base_nv :]
 

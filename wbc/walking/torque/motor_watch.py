@@ -9,7 +9,7 @@ from wbc.estimation import MomentumObserver
 from wbc.validation import Array
 
 #: Of the observer [1/s]
-GAIN = 100.0
+GAIN = 200.0
 #: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
 #: knows of may take [N m], ...
 ASKED, FRICTION = 0.08, 6.0
@@ -19,14 +19,16 @@ GIVEN, LASTING = 0.3, 0.015
 
 
 class MotorWatch:
-    """Compares what the motors give with what they are commanded: with the residual r of a :class:`MomentumObserver`
-    and the command u behind a filter of the same lag, joint k gives the part 1 + r_k / u_k.
+    """Compares what the motors give with what is asked of them: with the residual r of a :class:`MomentumObserver`, the
+    torque u that the stack asks for and what is added to it against friction, c, both behind a filter of the same lag,
+    joint k gives the part (u_k + c_k + r_k) / u_k.
 
     Args:
         model: with masses. effort: largest torques ``[nv]``, 0 for a base [N m; N]. dt: [s].
 
     Attributes:
-        share: of its command that each motor gives, as far as it is judged; else 1 ``[nv]``.
+        share: of what is asked that each motor gives, as far as it is judged; else 1 ``[nv]``.
+        residual: r, what acts beside what is known ``[nv]`` [N m; N].
         limp: degrees of freedom whose motors have been found limp.
     """
 
@@ -35,29 +37,33 @@ class MotorWatch:
         self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), GAIN * dt, round(LASTING / dt)
         self._least[effort <= 0.0] = np.inf
         self.share, self.limp = np.ones(model.nv), list[int]()
-        self._asked, self._low = np.zeros(model.nv), np.zeros(model.nv, dtype=int)
+        self._asked, self._added = np.zeros((2, model.nv))
+        self._low = np.zeros(model.nv, dtype=int)
+        self.residual = self._observer.residual
 
     def begin(self, q: Array, v: Array) -> None:
         """At a state, with motors that work."""
         self._observer.begin(q, v)
-        self._asked[:], self._low[:], self.share[:] = 0.0, 0, 1.0
+        self._asked[:], self._added[:], self._low[:], self.share[:] = 0.0, 0.0, 0, 1.0
         self.limp = []
 
     def struck(self, q: Array, v: Array) -> None:
         """A hand has closed, which changed the velocity at once."""
         self._observer.struck(q, v)
 
-    def see(self, q: Array, v: Array, torque: Array, contacts: Array) -> list[int]:
+    def see(self, q: Array, v: Array, torque: Array, added: Array, contacts: Array) -> list[int]:
         """A tick on; the degrees of freedom that are found limp in it.
 
         Args:
-            q, v: at its end. torque: commanded, that took hold in it. contacts: J'w of what touched ``[nv]``.
+            q, v: at its end. torque: asked for by the stack, that took hold in it. added: commanded beside it.
+            contacts: J'w of what touched ``[nv]``.
         """
-        residual, asked = self._observer.update(q, v, torque + contacts), self._asked
+        residual, asked, more = self._observer.update(q, v, torque + added + contacts), self._asked, self._added
         asked += self._rate * (torque - asked)
+        more += self._rate * (added - more)
         judged = np.abs(asked) > self._least
         self.share[:] = 1.0
-        np.divide(asked + residual, asked, out=self.share, where=judged)
+        np.divide(asked + more + residual, asked, out=self.share, where=judged)
         self._low = np.where(self.share < GIVEN, self._low + 1, 0)
         found = [int(k) for k in np.flatnonzero(self._low == self._ticks) if int(k) not in self.limp]
         self.limp += found

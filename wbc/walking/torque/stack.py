@@ -19,6 +19,8 @@ from wbc.walking.torque.grasps import GRASPS
 PERIOD = 0.001
 #: Weight of the body's pose, beside 1 of every joint
 BODY = 100.0
+#: So many hands that may tilt fix the body
+STEADY = 3
 
 
 class TorqueStack:
@@ -29,7 +31,7 @@ class TorqueStack:
         kinds: how holds may be held. rating: of every hold. backend: as of ``Stack.compile``.
 
     Raises:
-        RangeError: a robot without masses, or holds that let hands tilt.
+        RangeError: a robot without masses; holds that let hands tilt, and not roll or with fewer than four arms.
     """
 
     def __init__(
@@ -45,10 +47,12 @@ class TorqueStack:
         if min(float(i.mass) for i in robot.model.inertias[1:]) <= 0.0:
             raise RangeError("walker", robot.name, "torques need masses: wbc.robots.with_masses(walker)")
         self.walker, self.kinds, self.rating = walker, tuple(dict.fromkeys(kinds)), rating
-        if not set(self.kinds) <= set(GRASPS):
+        few = GripKind.POSITION in self.kinds and len(walker.arms) <= STEADY
+        if few or not set(self.kinds) <= set(GRASPS):
             why = (
                 "two hands that may tilt on their holds bear no moment about the line through them, so that no torques "
-                "keep the body from turning about it while the third one swings; take holds with max_tilt = 0, --rigid"
+                "keep the body from turning about it while the third one swings; take holds with max_tilt = 0, "
+                "--rigid, or four arms"
             )
             raise RangeError("kinds", [str(kind) for kind in self.kinds], f"expected holds that fix the tilt: {why}")
         stack = Stack(robot, dt=period, calm=False)
