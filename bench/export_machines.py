@@ -43,7 +43,9 @@ def solver(folder: Path) -> Path:
     """DAQP for the other machine, of the version of casadi that is installed here."""
     version = importlib.metadata.version("casadi")
     options = ("--no-deps", "--only-binary=:all:", "--platform", PLATFORM, "--python-version", "3.11")
-    run(sys.executable, "-m", "pip", "download", "-q", *options, f"casadi=={version}", "-d", folder, folder=ROOT)
+    words = (sys.executable, "-m", "pip", "download", "-q", *options, f"casadi=={version}", "-d", folder)
+    if subprocess.run([*map(str, words)], cwd=ROOT, capture_output=True, check=False).returncode:
+        raise missing(f"pip cannot download casadi {version} for {PLATFORM}, which has DAQP; --daqp names its archive")
     with zipfile.ZipFile(next(folder.glob(f"casadi-{version}-*.whl"))) as wheel:
         return Path(wheel.extract("casadi/libdaqpstat.a", folder))
 

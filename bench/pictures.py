@@ -1,20 +1,26 @@
-"""Draws pictures of the pages from examples that draw none themselves: ``python -m bench.pictures [--out FOLDER]``."""
+"""Draws pictures of the pages from examples that draw none themselves: ``python -m bench.pictures [--only FILE]``."""
 
 from __future__ import annotations
 
 import argparse
 import runpy
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
+from PIL import Image
 
 import wbc
+from bench.gallery import save
 from bench.pool import ROOT
 from wbc.track import Scene
 
-SIZE = (800, 540)
+SIZE, SMALL = (800, 540), (480, 330)
+#: Pictures of a film, and how far round the path of a hand there is something to see [m]
+FRAMES, ROUND = 24, 0.5
 
 
 def dual_arm(run: dict[str, Any], file: Path) -> None:
@@ -44,18 +50,45 @@ def mobile_base(run: dict[str, Any], file: Path) -> None:
     scene.save(file, size=SIZE, azimuth=3.3, elevation=0.6)
 
 
-PICTURES: dict[str, Callable[[dict[str, Any], Path], None]] = {"dual_arm": dual_arm, "mobile_base": mobile_base}
+def film(run: dict[str, Any], file: Path) -> None:
+    """TIAGo's run from its beginning to its end, with the path of its hand, from where the camera stands still."""
+    hands = np.array([hand for _, hand, _ in run["path"]])
+    low, high = hands.min(axis=0) - ROUND, hands.max(axis=0) + ROUND
+    low[2] = 0.0
+    # Grains at the corners of all that is ever seen: every picture has the same in it
+    corners = np.array(list(product(*np.stack([low, high], axis=1))))
+    frames = []
+    for k in np.linspace(0, len(hands) - 1, FRAMES, endpoint=False).astype(int):
+        scene = Scene(run["robot"], dark=[run["tip"]], detail=0.006)
+        scene.add_robot(run["path"][k][0])
+        scene.add_path(hands, "path of the hand", radius=0.012)
+        for corner in corners:
+            scene.add_shape(wbc.shapes.Sphere(1e-4), pin.SE3(np.eye(3), corner))
+        with Image.open(scene.save(file.with_suffix(".png"), size=SMALL, azimuth=3.3, elevation=0.6)) as shown:
+            frames.append(shown.convert("RGB"))
+    file.with_suffix(".png").unlink()
+    save(frames, file)
+
+
+#: File -> the example that it is drawn from, and how
+PICTURES: dict[str, tuple[str, Callable[[dict[str, Any], Path], None]]] = {
+    "dual_arm.png": ("dual_arm", dual_arm),
+    "mobile_base.png": ("mobile_base", mobile_base),
+    "mobile_base_film.gif": ("mobile_base", film),
+}
 
 
 def main() -> None:
     """Run the examples and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
-    folder = parser.parse_args().out
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in PICTURES.items():
-        draw(runpy.run_path(str(ROOT / "examples" / f"{name}.py"), run_name="__main__"), folder / f"{name}.png")
-        print(folder / f"{name}.png")
+    parser.add_argument("--only", nargs="+", choices=list(PICTURES), default=list(PICTURES))
+    chosen = parser.parse_args()
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    for name in chosen.only:
+        example, draw = PICTURES[name]
+        draw(runpy.run_path(str(ROOT / "examples" / f"{example}.py"), run_name="__main__"), chosen.out / name)
+        print(chosen.out / name)
 
 
 if __name__ == "__main__":

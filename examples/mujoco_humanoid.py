@@ -12,7 +12,8 @@ DT, REACHED, PUSHED, LASTS, SECONDS = 0.002, 1.5, 2.0, 0.15, 3.5  # s
 HALF, REACH, PUSH = (0.1, 0.06), np.array([0.3, 0.05, 0.25]), np.array([0.0, 120.0, 0.0])  # of a sole, m; m; N
 HAND, CHEST, SOLES = "gripper_right_fingertip_1_link", "torso_2_link", ("left_sole_link", "right_sole_link")
 
-# Without limits of acceleration, JointLimits lets an arm run at its stop until it would have to brake within one tick
+# Without limits of acceleration, JointLimits lets an arm run at its stop until it would have to brake within one tick.
+# 40 rad/s^2 is tried out: what wbc.support.braking finds for all joints at once is less, and balances no push
 robot = wbc.robots.load("talos").with_limits(acceleration=40.0)
 stack = wbc.Stack(robot, dt=DT)
 stack.add(wbc.tasks.CenterOfMass(gain=4.0), name="balance", weight=10.0)

@@ -117,8 +117,12 @@ def _spread(robot: Robot, field: str, declared: Input, value: Any) -> Any:
     starts, counts = (model.idx_qs, model.nqs) if turns else (model.idx_vs, model.nvs)
     chosen = [int(model.getJointId(name)) for name in declared.joints or ()]
     at = [k for j in chosen for k in range(int(starts[j]), int(starts[j]) + int(counts[j]))]
-    if numbers.shape != (len(at),) or len(at) == size(robot, declared):
+    whole = size(robot, declared)
+    if numbers.shape == (whole,):
         return value
+    if numbers.shape != (len(at),):
+        expected = f"expected {len(at)} numbers for {', '.join(declared.joints or ())}, or {whole} for all joints"
+        raise ShapeError(field, value, f"{expected}, not shape {numbers.shape}")
     out = robot.neutral.copy() if turns else np.zeros(robot.nv)
     out[at] = numbers
     return out

@@ -133,6 +133,7 @@ _ALL = (
     Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
+    Figure("formulations", (*TICK, "bench/measured/torques.py"), 0.2),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip

@@ -116,6 +116,9 @@ def test_values_as_users_write_them() -> None:
 
     posture.target = [2.0, -0.5]
     assert posture.target[[5, 1]].tolist() == [2.0, -0.5]
+    with pytest.raises(ShapeError, match="expected 2 numbers for panda_joint6, panda_joint2, or 7 for all joints"):
+        posture.target = [2.0]
+    assert repr(controller).startswith("<Controller, daqp (vm), of <Stack of 'panda', dt 0.01 s: hand (EndEffector),")
     posture.feedforward = [0.3, 0.0]
     assert posture.feedforward.tolist() == [0.0, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0]
     whole = robot.random(1)

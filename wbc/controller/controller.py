@@ -209,6 +209,9 @@ class Controller(Handles):
         """Velocity that the next step counts accelerations from, a copy."""
         return self._core.tick.v_last[: self._v_shape[0]].copy()
 
+    def __repr__(self) -> str:
+        return f"<Controller, {self.solver} ({self.backend}), of {self.stack!r}>"
+
     def __str__(self) -> str:
         core = self._core
         return describe(self.stack, core.layout, core.handles, f"solver {self.solver} ({self.backend})")
