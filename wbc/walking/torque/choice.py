@@ -103,6 +103,6 @@ def hold_kind_of(structure: Structure, hold: int) -> str:
     """
     kind = hold_kind(structure, hold)
     if kind == "roll":
-        reason = "torques know holds that fix a hand, leave its roll, or leave tilt and roll; this one leaves the tilt alone"
+        reason = "torques know holds that fix a hand, leave its roll, or leave tilt and roll; not the tilt alone"
         raise RangeError(f"hold {structure.ids[hold]}", kind, reason)
     return kind
