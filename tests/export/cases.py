@@ -11,6 +11,7 @@ import pinocchio as pin
 
 import wbc
 from tests.controller.stacks import arm, humanoid
+from tests.torque.problems import controller as torques
 from wbc.controller import Controller
 from wbc.shapes import Sphere
 
@@ -48,7 +49,14 @@ def talos(backend: str = "native") -> Controller:
     return c
 
 
-CASES = {"panda": panda, "ur5": ur5, "talos": talos}
+def grips(backend: str = "native") -> Controller:
+    """The walker on two grips, commanded by torques."""
+    c = torques("walker", backend).clone()
+    c.reset(c.stack.robot.neutral)
+    return c
+
+
+CASES = {"panda": panda, "ur5": ur5, "talos": talos, "grips": grips}
 
 
 def run(*command: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
