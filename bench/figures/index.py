@@ -123,6 +123,7 @@ _ALL = (
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),
     Figure("viewer", ("wbc/viewer",), 3.0),
+    Figure("viewer_soak", ("wbc/viewer",), 61.0, ("python", "-m", "bench.viewer_soak")),
     Figure("servos", (*TICK, "wbc/servo", "wbc/simulation/mujoco_plant.py", "bench/servo_arm.xml"), 2.0),
     Figure("shapes", ("wbc/robot",), 0.5),
     Figure("soft", TICK, 1.0),
