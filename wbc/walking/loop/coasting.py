@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robots import Walker
+from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.loop.body_command import BodyCommand
@@ -69,7 +70,7 @@ class Coasting:
         assert state.v is not None
         q = state.q.copy()
         q[7:] += 0.5 * self.duration * state.v[6:]
-        q[:3], q[3:7] = self.end.translation, pin.Quaternion(self.end.rotation).coeffs()
+        q[:3], q[3:7] = self.end.translation, quaternion(self.end.rotation)
         return State(q, state.held, state.time + self.duration, None)
 
     def go(self, stack: WalkStack) -> None:
