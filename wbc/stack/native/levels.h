@@ -236,6 +236,34 @@ static void sum_up(wbc_tick *t) {
     }
 }
 
+/* The largest violation of rows that are not minimised, at the command */
+static double missed_most(const wbc_tick *t) {
+    double most = 0.0;
+    for (int k = 0; k < MC; k++) {
+        if (MINIMISED(k)) continue;
+        const double value = row_at(t, k, t->report.v);
+        most = larger(most, larger(lower_side(t, k) - value, value - upper_side(t, k)));
+    }
+    return most;
+}
+
+/* The answer of the first level's QP onto its active rows: no level moves along equalities, so that what it misses of them
+ * would stay. Where contact forces are nearly free and joints are not, that is seen in torques. */
+static void meet_first(wbc_tick *t) {
+    double v[NV], multipliers[ACTIVE_MAX];
+    for (int n = 0; n < MEETINGS && t->factored && t->daqp.n_active > 0; n++) {
+        const double before = missed_most(t);
+        memcpy(v, t->report.v, sizeof v);
+        memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
+        memset(t->scratch, 0, sizeof t->scratch);
+        refine(t);
+        if (all_finite(t->x, NV) && missed_most(t) < before) continue;
+        memcpy(t->report.v, v, sizeof v);
+        memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
+        break;
+    }
+}
+
 /* From the answer of the first level's QP to the command; the flag */
 static int all_levels(wbc_tick *t, int flag) {
     wbc_report *out = &t->report;
@@ -249,6 +277,7 @@ static int all_levels(wbc_tick *t, int flag) {
     for (int i = 0; i < M_ALL; i++) out->pushes[i] = -1.0;
     for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
     if (going) {
+        meet_first(t);
         begin_levels(t);
         if (flag == WBC_SOLVED) held_by_equalities(t);
         for (int level = 0; going && level <= LEVELS; level++) going = one_level(t, level, &error);
