@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from bench.walk.structures import FAMILIES, random_structure
 from wbc.motion_control import loaded
 from wbc.robots import Walker
 from wbc.simulation import Encoders, GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
+from wbc.validation import Array
 from wbc.walking import Structure, save_structure
 from wbc.walking.checker import Report, check_walk
 from wbc.walking.log.log import WalkLog
@@ -144,7 +146,7 @@ class Witness(TorqueLoop):
     def truth(self, log: WalkLog) -> WalkLog:
         """The log as it was: mean rates over each period."""
         q = np.array(self.places)[: len(log)]
-        moved = np.array([pin.difference(self._model, a, b) for a, b in zip(q[:-1], q[1:], strict=True)]) / log.dt
+        moved = np.array([pin.difference(self._model, a, b) for a, b in pairwise(q)]) / log.dt
         rates = np.vstack([moved, moved[-1:]])
         order = [self._model.joints[self._model.getJointId(name)].idx_q for name in log.joints]
         columns = [self._model.joints[self._model.getJointId(name)].idx_v for name in log.joints]
