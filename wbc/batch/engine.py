@@ -130,7 +130,7 @@ class Compiled:
         table, place = np.array([value.row for value in given], np.int64), ctypes.c_void_p(inputs.ctypes.data)
         self._shared(lambda number: self._take(place, *self._part(table, number)))
 
-    def _part(self, table: np.ndarray, number: int) -> tuple[ctypes.c_void_p, ctypes.c_int, Any, Any]:
+    def _part(self, table: np.ndarray, number: int) -> tuple[Any, ...]:
         """Values, and the robots that a thread of this number has."""
         ends = (ctypes.c_longlong(self._count * k // self._busy) for k in (number, number + 1))
         return ctypes.c_void_p(table.ctypes.data), ctypes.c_int(len(table)), *ends

@@ -93,7 +93,8 @@ class Coasting:
     def go(self, stack: WalkStack) -> None:
         """What the stack follows in the next tick."""
         now, self._time = self._time, min(self._time + self._dt, self.duration)
-        stack.body(self._command.go(self._path, *(float(fallen(t, self._brake)) for t in (now, self._time))))
+        before, after = fallen(np.array([now, self._time]), self._brake)
+        stack.body(self._command.go(self._path, float(before), float(after)))
         row = round(now / self._dt)
         for arm, rows in zip(self.free, self._postures, strict=True):
             here, then = (rows[min(k, len(rows) - 1)] for k in (row, row + 1))
