@@ -38,9 +38,9 @@ class Coasting:
 
         p(t) = p + p' T s (1 - s)^2 + (e - p) s^2 (3 - 2 s)
 
-    The end e is p + p' T / 2, straight on. Near a hold it is over that instead, and not under it: there a hand lifts off
-    or comes down, and nowhere else may it be so near to what the hold is mounted on. Where its arm cannot follow that,
-    its joints fall evenly in max |qd_i| / (PART a_i). Hands that hold stay on their holds.
+    The end e is p + p' T / 2, straight on. Near a hold it is over that instead, and not under it: there a hand lifts
+    off or comes down, and nowhere else may it be so near to what the hold is mounted on. Where its arm cannot follow
+    that, its joints fall evenly in max |qd_i| / (PART a_i). Hands that hold stay on their holds.
 
     Args:
         structure: whose holds are there. state: with velocities. brake: T of the body [s]. dt: control period [s].

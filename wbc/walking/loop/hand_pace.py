@@ -38,7 +38,8 @@ def hand_pace(
 
     Args:
         place: of the hand [m]. turned: its wrist is on the branch that it lands with.
-        early: path time until the hold can be held [s]. pace: of the body. far: the hand is from where it began, and from its hold [m].
+        early: path time until the hold can be held [s]. pace: of the body.
+        far: the hand is from where it began, and from its hold [m].
     """
     aim = swinging.aim
     # In plain floats: three numbers are too few for numpy to be quick
