@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robots import Walker
+from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
@@ -86,13 +87,14 @@ class Coasting:
         q[7:] += 0.5 * self._brake * state.v[6:]
         for arm, rows in zip(self.free, self._postures, strict=True):
             q[self._joints[arm]] = rows[-1]
-        q[:3], q[3:7] = self.end.translation, pin.Quaternion(self.end.rotation).coeffs()
+        q[:3], q[3:7] = self.end.translation, quaternion(self.end.rotation)
         return State(q, state.held, state.time + self.duration, None)
 
     def go(self, stack: WalkStack) -> None:
         """What the stack follows in the next tick."""
         now, self._time = self._time, min(self._time + self._dt, self.duration)
-        stack.body(self._command.go(self._path, *(float(fallen(t, self._brake)) for t in (now, self._time))))
+        before, after = fallen(np.array([now, self._time]), self._brake)
+        stack.body(self._command.go(self._path, float(before), float(after)))
         row = round(now / self._dt)
         for arm, rows in zip(self.free, self._postures, strict=True):
             here, then = (rows[min(k, len(rows) - 1)] for k in (row, row + 1))

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import ShapeError
+from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
 from wbc.walking.loop.hand_pace import LANDING, at_rest, hand_pace, ramp_of, turned
@@ -75,7 +76,7 @@ class ArmLeader:
         """The body where the path begins, the arms on their grips."""
         walker, progress = self._machine.walker, self._progress
         q, begin = np.array(walker.robot.neutral), pin.SE3(progress.plan.path.poses[0])
-        q[:3], q[3:7] = begin.translation, pin.Quaternion(begin.rotation).coeffs()
+        q[:3], q[3:7] = begin.translation, quaternion(begin.rotation)
         for arm, grip in zip(walker.arms, progress.grip, strict=True):
             q[arm.q] = progress.grips.posture(np.array(grip), np.array(0))
         return q
