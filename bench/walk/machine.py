@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import pi, sin
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+import wbc
 from bench.walk.limits import Pressed, plan_limit
 from bench.walk.reference import Reference
 from wbc.robots import Walker
@@ -32,6 +34,8 @@ from wbc.walking.run.recording import WalkRecorder
 Record = dict[str, Any]
 
 INCH = 0.0254
+#: Body and necks are within this beyond the shoulders [m]
+NECK = 0.105
 #: A walk keeps its speed if its mean is this part of the command
 KEPT = 0.98
 #: Heights of the body of the reference [m]
@@ -188,3 +192,11 @@ def costs(ticks: TickColumns, loop: Array) -> Record:
         "loop_us": 1e6 * float(np.median(loop)),
         "loop_p99_us": 1e6 * float(np.percentile(loop, 99)),
     }
+
+
+def walker_of(arms: int) -> Walker:
+    """A walker whose arms are as far from each other as three of them, as ``wbc walk --arms`` has it."""
+    three = wbc.robots.walker()
+    if arms <= 3:
+        return wbc.robots.walker(arms)
+    return wbc.robots.walker(arms, three.data.shoulder_radius * sin(pi / 3) / sin(pi / arms))

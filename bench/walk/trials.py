@@ -1,4 +1,5 @@
-"""Trials of walks from seeds: among random structures, by random rates, resumed at random instants, as holds vanish.
+"""Trials of walks from seeds: among random structures, by random rates, resumed at random instants, as holds vanish,
+under torques.
 
 ``python -m bench.walk.trials PART NAME FOLDER`` carries out one and prints its record: a process of its own, so that
 what hangs or dies costs one trial.
@@ -11,16 +12,16 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from math import pi, sin
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import wbc
+from bench.walk.machine import NECK, Record, walker_of
 from bench.walk.reference.passage import passage
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, random_structure
+from bench.walk.torque_trials import torque, violations
 from wbc.errors import RangeError, WbcError
 from wbc.interrupts import obey_kill
 from wbc.robots import Walker
@@ -37,8 +38,6 @@ from wbc.walking.run.request import DriveRequest, PathRequest, Site
 from wbc.walking.run.resume_mode import ResumeRequest
 from wbc.walking.run.session import WalkRun, perform_walk
 
-Record = dict[str, Any]
-
 #: What is walked on where a part has no structure of its own, with the places between which
 GROUNDS = (
     ("cylinder", "13,6", "13,12"),
@@ -48,8 +47,6 @@ GROUNDS = (
 )
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
-#: Body and necks are within this beyond the shoulders [m]
-NECK = 0.105
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -180,7 +177,7 @@ def checked(log: Any, walker: Walker, structure: Structure, folder: Path) -> Rec
     robot = walker.urdf(folder / "robot.urdf")
     report = check_walk(log, robot, structure, rules_of(walker))
     return {
-        "violations": [f"{f.kind}: {f.worst:.4g} at {f.time:.2f} s, {f.where}" for f in report.violations],
+        "violations": violations(report),
         "second": second_check(folder / "run.npz", walker, robot, structure),
     }
 
@@ -190,11 +187,12 @@ PARTS: dict[str, Callable[[str, Walker, Path], Record]] = {
     "velocity": velocity,
     "resume": resume,
     "vanish": vanish,
+    "torque": torque,
 }
 
 
 #: How many trials of a part there are for each random structure
-SHARES = {"structures": 1.0, "velocity": 0.4, "resume": 0.4, "vanish": 0.2}
+SHARES = {"structures": 1.0, "velocity": 0.4, "resume": 0.4, "vanish": 0.2, "torque": 0.2}
 
 
 def names(part: str, count: int) -> list[str]:
@@ -204,21 +202,13 @@ def names(part: str, count: int) -> list[str]:
     return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
 
 
-def walker_of(arms: int) -> Walker:
-    """A walker whose arms are as far from each other as three of them, as ``wbc walk --arms`` has it."""
-    three = wbc.robots.walker()
-    if arms <= 3:
-        return wbc.robots.walker(arms)
-    return wbc.robots.walker(arms, three.data.shoulder_radius * sin(pi / 3) / sin(pi / arms))
-
-
 def tried(part: str, name: str, folder: Path) -> Record:
     """The record of one trial; an error of the package is its outcome."""
     folder.mkdir(parents=True, exist_ok=True)
     cpu, out = time.process_time(), Record()
     try:
         arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
-        out["arms"] = arms
+        out |= {"arms": arms} if part != "torque" else {}
         out |= PARTS[part](name, walker_of(arms), folder)
     except WbcError as error:
         out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}

@@ -121,8 +121,8 @@ def test_a_start_within_something_is_refused_at_once(
 def test_everything_comes_to_rest_from_its_velocity(machine: Walker, plan: Plan, structure: Structure) -> None:
     q, v = np.array(machine.robot.neutral), np.zeros(machine.robot.nv)
     v[:3], v[machine.arms[0].v] = (0.1, 0.0, 0.0), 0.5 * machine.robot.limits.velocity[machine.arms[0].v]
-    assert Coasting.of(machine, State(q, {}), 0.25, DT) is None
-    coasting = Coasting.of(machine, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
+    assert Coasting.of(machine, structure, State(q, {}), 0.25, DT) is None
+    coasting = Coasting.of(machine, structure, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
     assert coasting is not None
     assert coasting.free == [0]
     assert coasting.duration >= 0.25

@@ -156,3 +156,8 @@ class Encoders:
         for name in ("position", "velocity", "resolution"):
             number = validation.scalar(f"Encoders.{name}", getattr(self, name), low=0.0)
             object.__setattr__(self, name, number)
+
+    @property
+    def exact(self) -> bool:
+        """Joints are read as they are."""
+        return not (self.position or self.velocity or self.resolution)

@@ -24,6 +24,8 @@ from wbc.validation import Array
 
 #: Points of a frame that its grip holds, as many as the kind needs [m]
 POINTS = AXIS * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+#: A frame that is so near to its hold is there [m]
+NEAR = 1e-12
 HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
 
 
@@ -39,6 +41,7 @@ class _State:
     fallen: Array = field(default_factory=lambda: np.zeros(6))
     grips: dict[str, Grip] = field(default_factory=dict)
     slips: dict[str, Slip] = field(default_factory=dict)
+    off: dict[str, Array] = field(default_factory=dict)
     broken: list[str] = field(default_factory=list)
 
 
@@ -46,11 +49,12 @@ class GrippingMujocoPlant(MujocoPlant):
     """A robot of ours in MuJoCo (:func:`mujoco_model`) that takes torques, and can grasp.
 
     A grip is a ``connect`` of one, two or three points of the frame. MuJoCo's constraints are springs: a grip gives way
-    under load, the less the shorter the time constant. It goes with its mass, and is not one number [m/N].
+    under load, the less the shorter the time constant. It goes with its mass, and is not one number [m/N]. What a frame
+    is off when it closes decays with ``rate``, as in :class:`PinocchioPlant`: the springs would take it within a step.
 
     Args:
         frames: that can be held. time_step: [s].
-        time_constant: of the grips [s]; None: two time steps, the least that MuJoCo takes.
+        time_constant: of the grips [s]; None: two time steps, the least that MuJoCo takes. rate: [1/s].
         motors: default: torques as commanded within the limits of effort. seed: of their noise.
 
     Raises:
@@ -64,6 +68,7 @@ class GrippingMujocoPlant(MujocoPlant):
         time_step: float = 0.001,
         *,
         time_constant: float | None = None,
+        rate: float = 20.0,
         motors: Motors | None = None,
         seed: int = 0,
     ) -> None:
@@ -90,6 +95,7 @@ class GrippingMujocoPlant(MujocoPlant):
         self._placements = {
             name: np.array(frames_of[robot.model.getFrameId(name)].placement.rotation) for name in frames
         }
+        self._closer = np.exp(-time_step * validation.scalar("rate", rate, low=0.0, unit="1/s"))
         self._balance, self._placed, self._seed = Balance(robot.model), robot.model.createData(), seed
         super().__init__(model, robot)
         self.commands: Collection[CommandKind] = (CommandKind.TORQUE,)
@@ -123,6 +129,8 @@ class GrippingMujocoPlant(MujocoPlant):
             super().apply(Command(CommandKind.TORQUE, torque))
             for name in list(state.slips):
                 self._slide(name, h)
+            for name in list(state.off):
+                self._close(name)
             super().advance(h)
             if self._balance.falls:
                 state.fallen += self._balance.by_gravity(seen.q, h)
@@ -143,6 +151,8 @@ class GrippingMujocoPlant(MujocoPlant):
         number = model.getFrameId(frame)
         check_reach(frame, self._placed.oMf[number], pose, kind)
         self._state.grips[frame] = Grip(pose, kind)
+        points = POINTS[: HELD[kind]]
+        self._state.off[frame] = np.array([self._placed.oMf[number].act(p) - pose.act(p) for p in points])
         self._hold(frame)
 
     def release(self, frame: str) -> None:
@@ -155,6 +165,7 @@ class GrippingMujocoPlant(MujocoPlant):
             raise UnknownNameError("frame", frame, self._state.grips)
         del self._state.grips[frame]
         self._state.slips.pop(frame, None)
+        self._state.off.pop(frame, None)
         for row in self._rows[frame]:
             self.data.eq_active[row] = 0
 
@@ -238,16 +249,23 @@ class GrippingMujocoPlant(MujocoPlant):
     def _hold(self, frame: str) -> None:
         """Write a grip into the model, and switch it on."""
         grip, model = self._state.grips[frame], self._robot.model
-        place = model.frames[model.getFrameId(frame)].placement
-        for row, point in zip(self._rows[frame][: HELD[grip.kind]], POINTS, strict=False):
-            self._model.eq_data[row, :3], self._model.eq_data[row, 3:6] = place.act(point), grip.pose.act(point)
+        place, off = model.frames[model.getFrameId(frame)].placement, self._state.off.get(frame, np.zeros(POINTS.shape))
+        for row, point, gap in zip(self._rows[frame][: HELD[grip.kind]], POINTS, off, strict=False):
+            self._model.eq_data[row, :3], self._model.eq_data[row, 3:6] = place.act(point), grip.pose.act(point) + gap
             self.data.eq_active[row] = 1
+
+    def _close(self, name: str) -> None:
+        """A frame that has closed comes to its hold, a step on."""
+        self._state.off[name] *= self._closer
+        self._hold(name)
+        if np.abs(self._state.off[name]).max() < NEAR:
+            del self._state.off[name]
 
     def _slide(self, name: str, h: float) -> None:
         """A grip that slips, a step on."""
         grip, (moved, left) = self._state.grips[name], self._state.slips[name].on(h)
         self._state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
-        self._model.eq_data[self._rows[name], 3:6] += moved
+        self._hold(name)
         if left is None:
             del self._state.slips[name]
         else:

@@ -46,9 +46,10 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Proximal steps of a relaxation at most, and the change of a row at which they end */
 #define PROXIMAL_STEPS 12
 #define SETTLED 1e-11
-/* Violations of bounds and rows that never give way which a relaxation may leave, in row units */
+/* Violations of bounds and rows that never give way which a relaxation may leave, in row units, and an answer, of LONGEST:
+ * torques are cut to their limits, and what an answer misses of those the accelerations that are sent do not get */
 #define FIRMLY 1e-8
-/* Corrections of the point of a relaxation */
+/* Corrections of a point of a relaxation or of a level, so that it meets its active rows */
 #define MEETINGS 3
 /* Multipliers above this share of the largest one of the class that gives way are not rounding */
 #define PUSHING 1e-6

@@ -130,6 +130,7 @@ class Hands:
 
     Attributes:
         swinging: the swinging hand. manual: a hand that is moved by itself, see :mod:`wbc.walking.modes.arm_mode`.
+        over: row of a hand that comes to rest over a hold, and of that, see :mod:`wbc.walking.loop.coasting`.
     """
 
     def __init__(self, machine: Machine, stack: WalkStack, grasps: Callable[[str, str], bool]) -> None:
@@ -137,6 +138,7 @@ class Hands:
         self.data = machine.walker.tolerances
         self.swinging: Swinging | None = None
         self.manual: Manual | None = None
+        self.over: dict[int, int] = {}
         self._arms = range(len(machine.walker.arms))
         self._landed = (-1, 0.0)
 
@@ -251,7 +253,7 @@ class Hands:
 
     def holds(self) -> tuple[int, ...]:
         """Row of the hold that each hand is at or goes to, -1 for none."""
-        held = self.machine.held
+        held = self.machine.held | self.over
         out = [held.get(arm, -1) for arm in self._arms]
         if self.swinging is not None:
             out[self.swinging.arm] = -1 if self.swinging.dropped else self.swinging.hold

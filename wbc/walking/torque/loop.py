@@ -117,10 +117,11 @@ class TorqueLoop:
         self.watch = Watch(self._model, stack.rating, [arm.hand for arm in arms])
         self._effort = np.array(stack.walker.robot.limits.effort)
         self._effort[: stack.walker.robot.base_nv] = 0.0
-        self._motors, self.bearing = MotorWatch(self._model, self._effort, self.time_step), Bearing(stack)
+        encoders, self.bearing = encoders or Encoders(), Bearing(stack)
+        self._motors = MotorWatch(self._model, self._effort, self.time_step, encoders.velocity)
         self._data = self._model.createData()
-        base, noisy = stack.walker.robot.base_nv, encoders is not None and encoders != Encoders()
-        self._filter = JointFilter(self._model, base, encoders, self.time_step) if encoders and noisy else None
+        base = stack.walker.robot.base_nv
+        self._filter = None if encoders.exact else JointFilter(self._model, base, encoders, self.time_step)
         self._state = plant.read()
         # Torques on their way, the oldest first, and that which takes hold next at the end; the stack's, and what was
         # added to them

@@ -8,8 +8,9 @@ import pinocchio as pin
 from wbc.estimation import MomentumObserver
 from wbc.validation import Array
 
-#: Of the observer [1/s]
-GAIN = 200.0
+#: Of the observer [1/s], and what noise of the rates may make of it, the lesser counts: as its residual is commanded
+#: against, noise of so many rad/s moves the joints by gain times that [rad/s^2]
+GAIN, SHAKEN = 200.0, 0.05
 #: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
 #: knows of may take [N m], ...
 ASKED, FRICTION = 0.08, 6.0
@@ -24,7 +25,8 @@ class MotorWatch:
     joint k gives the part (u_k + c_k + r_k) / u_k.
 
     Args:
-        model: with masses. effort: largest torques ``[nv]``, 0 for a base [N m; N]. dt: [s].
+        model: with masses. effort: largest torques ``[nv]``, 0 for a base [N m; N]. dt: [s]. noise: of the rates that
+            are read [rad/s].
 
     Attributes:
         share: of what is asked that each motor gives, as far as it is judged; else 1 ``[nv]``.
@@ -32,9 +34,10 @@ class MotorWatch:
         limp: degrees of freedom whose motors have been found limp.
     """
 
-    def __init__(self, model: pin.Model, effort: Array, dt: float) -> None:
-        self._observer = MomentumObserver(model, GAIN, dt)
-        self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), GAIN * dt, round(LASTING / dt)
+    def __init__(self, model: pin.Model, effort: Array, dt: float, noise: float = 0.0) -> None:
+        gain = SHAKEN / max(noise, SHAKEN / GAIN)
+        self._observer = MomentumObserver(model, gain, dt)
+        self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), gain * dt, round(LASTING / dt)
         self._least[effort <= 0.0] = np.inf
         self.share, self.limp = np.ones(model.nv), list[int]()
         self._asked, self._added = np.zeros((2, model.nv))
