@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from wbc.trajectory.laws.plots import plot
     from wbc.trajectory.laws.timing import Timing
     from wbc.trajectory.least_time.time_optimal import time_optimal
-    from wbc.trajectory.many import Laws, many
     from wbc.trajectory.paths.arcs import arc_path, arc_through
     from wbc.trajectory.paths.from_function import FunctionPath, function_path
     from wbc.trajectory.paths.joint_paths import blend_path, spline_path, standing_path, straight_path
     from wbc.trajectory.paths.path import Path, PolynomialPath
     from wbc.trajectory.paths.pose_path import PosePath
     from wbc.trajectory.paths.pose_paths import geodesic_path, pose_polyline, pose_spline
+    from wbc.trajectory.together import Laws, many
 else:
     # toppra, ruckig and matplotlib cost nothing until they are used
     __getattr__ = lazy.attach(__name__, __file__, {"Limits": "MotionLimits", "Certificate": "LawCertificate"})
