@@ -107,8 +107,8 @@ class Coasting:
         q, rates, most = state.q[mine.q], state.v[mine.v], limits.acceleration[mine.v]
         least = max(float((np.abs(rates) / (PART * most)).max()), dt)
         for k in range(TRIES):
-            times = dt * np.arange(np.ceil(least * LONGER**k / dt) + 1)
-            rows = self._straight(walker, state, arm, times)
+            stop = dt * float(np.ceil(least * LONGER**k / dt))
+            rows = self._straight(walker, state, arm, stop)
             if rows is None:
                 break
             changes = np.diff(np.concatenate([rates[None], np.diff(rows, axis=0) / dt, np.zeros((1, len(q)))]), axis=0)
@@ -118,18 +118,19 @@ class Coasting:
         times = dt * np.arange(np.ceil(least / dt) + 1)
         return np.asarray(q + fallen(times, float(times[-1]))[:, None] * rates)
 
-    def _straight(self, walker: Walker, state: State, arm: int, times: Array) -> Array | None:
-        """Postures at times [s], the last one that at which the hand is at rest, of an arm whose hand stops in the
-        structure and whose wrist falls evenly; None: it is of a branch in which no hand swings.
+    def _straight(self, walker: Walker, state: State, arm: int, stop: float) -> Array | None:
+        """Postures, tick by tick until body and arm are at rest, of an arm whose hand stops in the structure within a
+        time [s] and whose wrist falls evenly; None: it is of a branch in which no hand swings.
         """
         assert state.v is not None
-        mine, limb, stop = walker.arms[arm], limb_of(walker), float(times[-1])
+        mine, limb = walker.arms[arm], limb_of(walker)
+        times = self._dt * np.arange(np.ceil(max(stop, self._brake) / self._dt - 1e-9) + 1)
         q, rates, twist = state.q[mine.q], state.v[mine.v], state.v[:6]
         base, here = mine.base, self._path.at(0.0)[0]
         small = np.array([0.0, -STEP, STEP])[:, None] * rates
         hand, before, after = np.asarray(limb.points(q + small))[:, -1] @ base.rotation.T + base.translation
         speed = here.rotation @ (twist[:3] + np.cross(twist[3:], hand) + (after - before) / (2.0 * STEP))
-        done, place, part = fallen(times, stop)[:, None], here.act(hand), (times / stop)[:, None]
+        done, place, part = fallen(times, stop)[:, None], here.act(hand), np.minimum(times / stop, 1.0)[:, None]
         end = self._over_hold(walker, arm, place + 0.5 * stop * speed)
         places = place + stop * part * (1.0 - part) ** 2 * speed + part**2 * (3.0 - 2.0 * part) * (end - place)
         bodies = [self._path.at(float(t))[0] for t in fallen(times, self._brake)]

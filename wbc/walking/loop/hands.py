@@ -94,7 +94,8 @@ class ArmLeader:
         if swinging.state == "opening":
             swinging.open_on(self._dt)
         elif swinging.state == "open":
-            far = dist(swinging.place, machine.structure.positions[swinging.hold])
+            ends = swinging.law.places[0], machine.structure.positions[swinging.hold]
+            far = dist(swinging.place, ends[0]), dist(swinging.place, ends[1])
             wanted = min(hand_pace(swinging, swinging.place, at_branch, early, pace, far), swinging.most)
             stops = aborted or swinging.dropped or swinging.pauses
             wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / ramp_of(swinging))
