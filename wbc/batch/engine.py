@@ -130,10 +130,11 @@ class Compiled:
         table, place = np.array([value.row for value in given], np.int64), ctypes.c_void_p(inputs.ctypes.data)
         self._shared(lambda number: self._take(place, *self._part(table, number)))
 
-    def _part(self, table: np.ndarray, number: int) -> tuple[Any, ...]:
+    def _part(self, table: np.ndarray, number: int) -> tuple[ctypes._SimpleCData[Any], ...]:
         """Values, and the robots that a thread of this number has."""
-        ends = (ctypes.c_longlong(self._count * k // self._busy) for k in (number, number + 1))
-        return ctypes.c_void_p(table.ctypes.data), ctypes.c_int(len(table)), *ends
+        first, end = (self._count * k // self._busy for k in (number, number + 1))
+        values = ctypes.c_void_p(table.ctypes.data), ctypes.c_int(len(table))
+        return *values, ctypes.c_longlong(first), ctypes.c_longlong(end)
 
     def tick(self, inputs: Array, reports: Array) -> None:
         following = np.zeros(1, np.int64)

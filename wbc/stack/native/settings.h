@@ -139,9 +139,13 @@ INLINE double row_at(const wbc_tick *t, int k, const double *v) {
 
 /* 1 if no entry is NaN or infinite */
 INLINE int all_finite(const double *x, int count) {
-    int bad = 0;
-    for (int i = 0; i < count; i++) bad |= !(fabs(x[i]) <= DBL_MAX);
-    return !bad;
+    /* 0 times what is not finite is NaN */
+    double sum = 0.0;
+    four sums = {0};
+    int i = 0;
+    for (; i + 4 <= count; i += 4) sums += GIVEN_FOUR(x + i) * EACH(0.0);
+    for (; i < count; i++) sum += x[i] * 0.0;
+    return sum + SUM_OF_FOUR(sums) == 0.0;
 }
 
 #endif
