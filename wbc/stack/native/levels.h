@@ -209,7 +209,8 @@ static int one_level(wbc_tick *t, int level, double *error) {
 
 /* Of rows that are not minimised, at the command */
 static void find_violation(wbc_tick *t) {
-    t->report.violation = t->firm_missed = 0.0;
+    /* A search of a level can end with numbers that are none: comparisons with them are false */
+    t->report.violation = t->firm_missed = all_finite(t->report.v, NV) ? 0.0 : WBC_INF;
     for (int k = 0; k < MC; k++)
         if (!MINIMISED(k)) count_violation(t, k, row_at(t, k, t->report.v));
 }

@@ -103,7 +103,7 @@ class Caution:
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
         fastest = self._fastest(swinging, when.times)
-        if fastest > 1.0 and swinging.part > SLOWEST:
+        if course.stands and fastest > 1.0 and swinging.part > SLOWEST:
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
