@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-pytest_plugins = ["tests.processes", "tests.slow", "tests.pictures", "tests.browsers", "tests.seeds", "tests.backends"]
+pytest_plugins = [
+    f"tests.{name}" for name in ("processes", "slow", "pictures", "browsers", "seeds", "backends", "loading")
+]
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 # One thread a process: pytest-xdist already fills the cores, and sums keep their order.

@@ -62,6 +62,28 @@ class Numbers:
         return buffer, run, given, found
 
 
+def quick(function: ca.Function) -> Callable[..., tuple[np.ndarray, ...]]:
+    """A function on kept arrays, in a fifth of the time of a call that makes its own; matrices come out whole."""
+    symbols = [ca.SX.sym(f"x{k}", *function.size_in(k)) for k in range(function.n_in())]
+    dense = ca.Function("dense", symbols, [ca.densify(ca.SX(o)) for o in function.call(symbols)])
+    buffer, run = dense.buffer()
+    given = [np.zeros(dense.nnz_in(k)) for k in range(dense.n_in())]
+    found = [np.zeros(dense.size_out(k), order="F") for k in range(dense.n_out())]
+    for k, array in enumerate(given):
+        buffer.set_arg(k, memoryview(array))
+    for k, array in enumerate(found):
+        buffer.set_res(k, memoryview(array.ravel(order="K")))
+
+    # The buffer, which has the addresses, is kept as long as the function
+    def call(*values: np.ndarray | float, kept: object = buffer) -> tuple[np.ndarray, ...]:
+        for place, value in zip(given, values, strict=True):
+            place[:] = value
+        run()
+        return tuple(array.copy() for array in found)
+
+    return call
+
+
 def numbers(item: Item, robot: Robot) -> Numbers:
     """Validate an item and make its expressions a function, interpreted."""
     item.validate(robot)

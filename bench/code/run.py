@@ -19,7 +19,7 @@ from bench.problems import Array, load
 #: Builds of the exported folder: what is told to make
 BUILDS = {
     "exported C": (),
-    "exported C, -march=native": ("TICK_FLAGS=-O3 -march=native", "ROWS_FLAGS=-O1 -march=native"),
+    "exported C, -march=native": ("TICK_FLAGS=-O3 -march=native", "ROWS_FLAGS=-O1 -fstrict-aliasing -march=native"),
 }
 PROGRAM = Path(__file__).with_name("cycles.c")
 #: Turns, and pairs of passes in each; passes that counters see

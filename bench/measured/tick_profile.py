@@ -22,7 +22,7 @@ from bench.sheet import Sheet
 BEFORE = "5f7bfc6"
 PROBLEM = "talos"
 #: As the library of a controller is built, and which line an instruction comes from
-FLAGS = ("TICK_FLAGS=-O3 -march=native -g", "ROWS_FLAGS=-O1 -march=native -g")
+FLAGS = ("TICK_FLAGS=-O3 -march=native -g", "ROWS_FLAGS=-O1 -fstrict-aliasing -march=native -g")
 #: Files of the tick, or functions of the generated rows, by what they do
 WORK = {
     "task rows: kinematics, errors, Jacobians": ("wbc_generated_f0", "wbc_generated_f"),

@@ -17,6 +17,8 @@ def machine(rng: np.random.Generator) -> Robot:
     """Three to nine joints in series with a branch now and then; every joint has a frame ``f0``, ``f1``, ..."""
     model = pin.Model()
     model.name = "random"
+    # not Inertia.Random(), whose numbers depend on what the process did before; this leaves the other draws as they are
+    other = np.random.Generator(rng.bit_generator.jumped())
     count, parent, chain = int(rng.integers(3, 10)), 0, []
     if rng.random() < 0.2:
         base = pin.JointModelFreeFlyer() if rng.random() < 0.5 else pin.JointModelPlanar()
@@ -29,7 +31,7 @@ def machine(rng: np.random.Generator) -> Robot:
             parent = chain[-1]
         parent = model.addJoint(parent, kind(), place, f"j{k}")
         chain.append(parent)
-        model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+        model.appendBodyToJoint(parent, inertia(other), pin.SE3.Identity())
         tip = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.2, 3))
         model.addFrame(pin.Frame(f"f{k}", parent, 0, tip, pin.FrameType.OP_FRAME))
     robot = wbc.robots.load(model)
@@ -37,6 +39,13 @@ def machine(rng: np.random.Generator) -> Robot:
     shapes = {f"f{k}": [PlacedShape(Sphere(0.05), pin.SE3.Identity())] for k in range(0, count, 2)}
     shapes["f1"] = [PlacedShape(Capsule(0.04, 0.3), pin.SE3.Identity())]
     return robot.with_shapes(shapes)
+
+
+def inertia(rng: np.random.Generator) -> pin.Inertia:
+    """Of up to 1 kg within 1 m, as ``pin.Inertia.Random()`` draws it."""
+    root = np.triu(rng.uniform(-1.0, 1.0, (3, 3)))
+    root += np.triu(root, 1).T
+    return pin.Inertia(1.0 - float(rng.random()), rng.uniform(-1.0, 1.0, 3), root @ root)
 
 
 def _limits(robot: Robot, rng: np.random.Generator) -> dict[str, np.ndarray]:

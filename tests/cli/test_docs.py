@@ -5,11 +5,14 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import pytest
+
 from tests.cli.test_commands import run
 
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
 
 
+@pytest.mark.usefixtures("loaded_once")
 def test_a_stale_page_is_named_and_written(tmp_path: Path) -> None:
     folder = tmp_path / "tasks"
     shutil.copytree(PAGES, folder)

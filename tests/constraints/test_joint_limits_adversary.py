@@ -178,13 +178,13 @@ def test_promise_of_equal_ticks_that_is_broken_passes_the_limit() -> None:
     joints = Joints(np.array([-1.0]), np.array([1.0]), np.array([np.inf]), np.array([10.0]))
     passed = {}
     for shortest in (None, 0.008):
-        interval = joints.interval(shortest)
+        interval = Buffered(joints.interval(shortest))
         q, v, passed[shortest] = np.zeros(1), np.zeros(1), 0.0
         for tick in range(4000):
             # Long ticks up to the limit, short ones where the brake must hold
             dt = 0.008 if tick < 50 else 0.001
             _, upper = interval(q, v, dt, 1.0)
-            v = np.array(upper)[:, 0]
+            v = upper.copy()
             q = q + v * dt
             passed[shortest] = max(passed[shortest], float(q[0] - 1.0))
     assert passed[None] <= 1e-15
@@ -193,10 +193,10 @@ def test_promise_of_equal_ticks_that_is_broken_passes_the_limit() -> None:
 
 def returning(joints: Joints, start: np.ndarray, speed: np.ndarray, dt: float, rng: np.random.Generator) -> np.ndarray:
     """Violation over time, ticks x joints, under an adversary that pushes outwards half of the time."""
-    interval = joints.interval(None)
+    interval = Buffered(joints.interval(None))
     q, v, out = start.copy(), speed.copy(), []
     for _ in range(1500):
-        lower, upper = (np.array(e)[:, 0] for e in interval(q, v, dt, 1.0))
+        lower, upper = interval(q, v, dt, 1.0)
         assert (lower <= upper).all()
         outward = np.where(q > joints.upper, upper, np.where(q < joints.lower, lower, upper))
         command = np.where(rng.random(joints.n) < 0.5, outward, lower + rng.random(joints.n) * (upper - lower))

@@ -11,6 +11,7 @@ import pytest
 
 import wbc
 from tests.export.cases import CASES, STRICT, build, exported, panda, run
+from tests.repeats import ALL, MORE
 from tests.stack import small
 from wbc.controller import Controller, core_of
 from wbc.export.memory import bytes_of_tick
@@ -120,7 +121,7 @@ def boxed(backend: str) -> Controller:
     return c
 
 
-@pytest.mark.parametrize("backend", ["native", "vm"])
+@pytest.mark.parametrize("backend", ["vm"] if MORE < ALL else ["native", "vm"])
 def test_sensed_pairs_are_inputs(backend: str, tmp_path: Path) -> None:
     folder = boxed(backend).export(tmp_path / "box", states=120)
     text = (folder / "wbc_tick.h").read_text()

@@ -18,6 +18,7 @@ FLOORS = {
     "wbc.lazy": 0,
     "wbc.pickling": 0,
     "wbc.renamed": 0,
+    "wbc.rotations": 0,
     "wbc.validation": 0,
     "wbc.shapes": 0,
     "wbc.style": 0,

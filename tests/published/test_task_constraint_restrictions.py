@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.evaluation import quick
 from wbc.coordinates import ClosedForm, CoordinatePair, closed_form, expressions, mode_pairs, parts, restriction_table
 
 PAGE = (Path(__file__).parents[2] / "docs" / "coordinates.md").read_text()
@@ -93,14 +94,14 @@ def agree(lines: tuple[str, ...], other: Function, joints: int, ways: int) -> in
 def determinant(name: str, pair: CoordinatePair) -> Function:
     """Of all rows of a pair; what is not of the first arm is anywhere."""
     robot, rng = parts(name).robot, np.random.default_rng(6)
-    rates = expressions.rate_function(robot, pair.rows)
+    rates = quick(expressions.rate_function(robot, pair.rows))
     columns = [robot.dof_names.index(joint) for joint in parts(name).arms[0].joints]
     others = rng.uniform(-1.0, 1.0, robot.nv)
 
     def of(q: np.ndarray) -> float:
         whole = others.copy()
         whole[columns] = q
-        return float(np.linalg.det(np.asarray(rates(whole).full())))
+        return float(np.linalg.det(rates(whole)[0]))
 
     return of
 

@@ -14,9 +14,10 @@ import pinocchio as pin
 import pytest
 
 from tests.published.via_walker import INCH, inches, place, rot_z, swing
+from wbc.rotations import quaternion
 from wbc.trajectory import via_points
 from wbc.trajectory.jerk.via_speeds import SpeedBounds, corner_speeds
-from wbc.trajectory.paths.turning import quaternion, turn_between
+from wbc.trajectory.paths.turning import turn_between
 
 AXIAL, ROUND = swing((13, 12), (13, 16)), swing((13, 12), (17, 12))
 

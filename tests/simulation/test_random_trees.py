@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from bench.soak.torque_stacks import followed as obeying
 from tests.refusals import assert_refused
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.robot import Coupling, Robot
@@ -55,14 +56,6 @@ def followed(robot: Robot, rng: np.random.Generator) -> Robot:
     couplings = tuple(Coupling(int(i), int(j), float(rng.normal()), float(0.3 * rng.normal())) for i, j in pairs)
     coupled = replace(robot, couplings=couplings)
     return replace(coupled, neutral=obeying(coupled, robot.neutral, np.zeros(robot.nv))[0])
-
-
-def obeying(robot: Robot, q: Vector, v: Vector) -> tuple[Vector, Vector]:
-    q, v, places = q.copy(), v.copy(), robot.position_index
-    for coupling in robot.couplings:
-        q[places[coupling.follower]] = coupling.ratio * q[places[coupling.leader]] + coupling.offset
-        v[coupling.follower] = coupling.ratio * v[coupling.leader]
-    return q, v
 
 
 def state(robot: Robot, rng: np.random.Generator) -> tuple[Vector, Vector, Vector]:

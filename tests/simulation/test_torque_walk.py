@@ -13,6 +13,7 @@ import wbc.robots
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.robot import Robot
 from wbc.robots import with_masses
 from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPlant, Motors, PinocchioPlant
 from wbc.walking import cylinder
@@ -75,17 +76,22 @@ def test_friction_that_nobody_knows_is_compensated() -> None:
     assert off[1] > 0.05
 
 
+def turns_alone(loop: TorqueLoop, robot: Robot, joint: str, rate: float, ticks: int, within: float) -> None:
+    """A joint of an open arm follows its command within some ticks; nothing else moves, and no hold is lost."""
+    v = np.zeros(robot.nv)
+    v[robot.dofs(joint)] = rate
+    for _ in range(ticks):
+        loop.apply(Command(CommandKind.VELOCITY, v))
+        loop.advance(0.01)
+    assert loop.read().v == pytest.approx(v, abs=within)
+    assert loop.watch.drift < 1e-6
+
+
 def test_an_opened_hand_moves_alone() -> None:
     loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT)))
     loop.release(HANDS[2])
-    v = np.zeros(ROBOT.nv)
-    v[ROBOT.dofs("arm3_joint1")] = 0.1
-    for _ in range(4):
-        loop.apply(Command(CommandKind.VELOCITY, v))
-        loop.advance(0.01)
-    assert loop.read().v == pytest.approx(v, abs=0.01)
+    turns_alone(loop, ROBOT, "arm3_joint1", 0.1, 4, 0.01)
     assert set(loop.plant.grips) == set(HANDS[:2])  # type: ignore[attr-defined]
-    assert loop.watch.drift < 1e-6
 
 
 def test_faults_come_in_time_and_a_broken_hold_is_lost() -> None:
@@ -148,13 +154,7 @@ def test_four_arms_stand_on_holds_that_let_hands_tilt() -> None:
         loop.grasp(hand, robot.pose(q, hand), GripKind.POSITION)
     assert loop.holds_without(hands[3])
     loop.release(hands[3])
-    v = np.zeros(robot.nv)
-    v[robot.dofs("arm4_joint1")] = 0.2
-    for _ in range(6):
-        loop.apply(Command(CommandKind.VELOCITY, v))
-        loop.advance(0.01)
-    assert loop.read().v == pytest.approx(v, abs=0.05)
-    assert loop.watch.drift < 1e-6
+    turns_alone(loop, robot, "arm4_joint1", 0.2, 6, 0.05)
     assert loop.watch.moment == 0.0
     assert not loop.holds_without(hands[2])
     assert "2 hands that may tilt on their holds do not keep the body from turning" in loop.failing()

@@ -548,7 +548,7 @@ def test_temporary_folder_goes_with_its_process(tmp_path: Folder) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "temporary").mkdir()
     script = (
-        "import pathlib, sys\nfrom tests.stack import small\nc = small.stack().compile(backend='vm')\n"
+        "import pathlib, sys\nfrom tests.stack import small\nc = small.stack().compile(backend='python')\n"
         "small.command(c)\nprint(len(list(pathlib.Path(sys.argv[1]).iterdir())))"
     )
     done = subprocess.run(

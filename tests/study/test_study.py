@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -104,6 +105,21 @@ def test_a_lost_worker_loses_no_trial(tmp_path: Path) -> None:
         assert (tmp_path / "happened").exists()
         assert (progress.done, progress.failed) == (8, 0)
         assert kept.table()["square"] == [4.0 + seed for seed in range(8)]
+
+
+def test_a_cluster_by_its_address(tmp_path: Path) -> None:
+    """A scheduler that was there before, as that of another machine is, goes on after the study."""
+    study = Study(scenario=SQUARES, parameters={"base": 2}, seeds=8, metrics=["square"])
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
+        ) as cluster,
+        Kept(tmp_path, study) as kept,
+    ):
+        progress = carry_out(kept, address=cluster.scheduler_address)
+        assert (progress.done, progress.failed) == (8, 0)
+        assert kept.table()["square"] == [4.0 + seed for seed in range(8)]
+        assert cluster.scheduler.status.name == "running"
 
 
 def test_results_failures_and_an_interrupt(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 import wbc.robots
 from tests import models
+from tests.evaluation import quick
 from wbc.robot import Robot
 from wbc.symbolic import Kinematics, Tracer
 from wbc.tasks._plane import PlaneItem
@@ -89,9 +90,14 @@ def compiled(name: str, item: PlaneItem) -> ca.Function:
     return ca.Function("item", [kin.q, target], ca.cse(outputs))
 
 
+@functools.cache
+def quickly(name: str, item: PlaneItem) -> Callable[..., tuple[np.ndarray, ...]]:
+    return quick(compiled(name, item))
+
+
 def evaluate(name: str, item: PlaneItem, q: np.ndarray, target: float = 0.0) -> tuple[np.ndarray, ...]:
-    value, jacobian, factor, _ = compiled(name, item)(q, target)
-    return np.array(value).ravel(), np.array(jacobian), np.array(factor).ravel()
+    value, jacobian, factor, _ = quickly(name, item)(q, target)
+    return value.ravel(), jacobian, factor.ravel()
 
 
 def wrap(angle: float) -> float:

@@ -12,6 +12,8 @@ from wbc import pages
 from wbc.pages import docstring, folder
 from wbc.tasks import EndEffector, Hold, Task
 
+pytestmark = pytest.mark.usefixtures("loaded_once")
+
 PAGES = Path(__file__).parents[2] / "docs" / "tasks"
 NAMES = tuple(sorted(pages.page_name(cls) for cls in pages.shipped().values()))
 

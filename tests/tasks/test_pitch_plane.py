@@ -19,6 +19,7 @@ from tests.tasks.planes import (
     clear,
     compiled,
     evaluate,
+    quickly,
     robot,
     seen,
     wrap,
@@ -46,10 +47,12 @@ def test_a_mutated_formula_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(stereo, "coordinates", conventional)
     compiled.cache_clear()
+    quickly.cache_clear()
     try:
         assert angle_differs("panda", PANDA) > 0.1
     finally:
         compiled.cache_clear()
+        quickly.cache_clear()
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -10,13 +10,13 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from tests.viewer import arms
+from tests.viewer.clients import client, heard
 from wbc.errors import WbcError
 from wbc.viewer.link import LoopEnd, ViewerEnd
 from wbc.viewer.messages import LONGEST, OBEYED, SERVED, read, write
@@ -54,19 +54,6 @@ def served() -> Iterator[tuple[Session, LoopEnd]]:
     session.ended.set()
     runner.join()
     loop.close()
-
-
-def joined(session: Session, name: str = "") -> ClientConnection:
-    return connect(session.url.replace("http", "ws") + f"wbc/{name}", max_size=None)
-
-
-def heard(link: ClientConnection, kind: str) -> dict[str, Any]:
-    until = time.monotonic() + 10.0
-    while time.monotonic() < until:
-        message: dict[str, Any] = json.loads(link.recv(timeout=10.0))
-        if message["type"] == kind:
-            return message
-    raise AssertionError(f"no {kind} came")
 
 
 def gone(session: Session) -> None:
@@ -110,19 +97,19 @@ def test_a_storm_of_connections_and_of_noise_leaves_nothing(served: tuple[Sessio
     for k in range(30):
         with socket.create_connection(("127.0.0.1", port)) as raw:
             raw.sendall((b"", b"GET / HTTP/1.1\r\nHost", bytes(range(256)), b"\r\n\r\n")[k % 4])
-        with joined(session, f"page{k % 3}") as page:
+        with client(session, f"page{k % 3}") as page:
             page.send(("", "[]", "{" * 1000, '{"type": "set"}', "x" * (LONGEST + 1))[k % 5])
             if k % 2:
                 page.socket.close()
     gone(session)
-    with joined(session) as page:
+    with client(session) as page:
         assert heard(page, "hello")["robot"] == "panda"
         heard(page, "state")
 
 
 def test_a_name_that_somebody_has_is_not_given_twice(served: tuple[Session, LoopEnd]) -> None:
     session, loop = served
-    with joined(session, "captain") as one, joined(session, "captain") as two:
+    with client(session, "captain") as one, client(session, "captain") as two:
         assert heard(one, "hello")["you"] == "captain"
         assert heard(two, "hello")["you"] != "captain"
         one.send('{"type": "operate"}')
@@ -143,7 +130,7 @@ def test_a_client_that_does_not_read_is_left_out_and_holds_nobody_up(served: tup
     until = time.monotonic() + 10.0
     while session.server.watchers < 1:
         assert time.monotonic() < until
-    with joined(session, "quick") as quick:
+    with client(session, "quick") as quick:
         # 700 states are 14 MB; the slow one has what its sockets hold, and one frame more
         big = {"type": "state", "number": -1, "text": "x" * 20_000}
         seen = 0

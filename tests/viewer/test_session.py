@@ -19,6 +19,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from tests.viewer import arms
+from tests.viewer.clients import client, heard
 from wbc.viewer import ViewerError, server
 from wbc.viewer.link import LoopEnd, ViewerEnd
 from wbc.viewer.messages import read
@@ -59,23 +60,8 @@ def served() -> Iterator[tuple[Session, Loop]]:
     loop.end.close()
 
 
-@contextlib.contextmanager
-def client(session: Session, name: str = "") -> Iterator[ClientConnection]:
-    with connect(session.url.replace("http", "ws") + f"wbc/{name}", max_size=None) as socket:
-        yield socket
-
-
 def send(socket: ClientConnection, **message: Any) -> None:
     socket.send(json.dumps(message))
-
-
-def heard(socket: ClientConnection, kind: str) -> dict[str, Any]:
-    until = time.monotonic() + 10.0
-    while time.monotonic() < until:
-        message: dict[str, Any] = json.loads(socket.recv(timeout=10.0))
-        if message["type"] == kind:
-            return message
-    raise AssertionError(f"no {kind} came")
 
 
 def status(address: str) -> int:

@@ -13,18 +13,21 @@ from wbc.robots import Walker, WalkerData
 from wbc.shapes import Sphere
 from wbc.walking import Obstacle, PlaneSurface, Structure
 from wbc.walking.arms.fits import check_fits
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
 from wbc.walking.loop.caution import Caution
+from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
-from wbc.walking.loop.hand_pace import RAMP_AGAIN
+from wbc.walking.loop.hand_pace import LEAST_PACE, RAMP_AGAIN, hand_pace
 from wbc.walking.loop.stack import DT, WalkStack
-from wbc.walking.loop.state import AFTER_PAUSE, State
+from wbc.walking.loop.state import AFTER_PAUSE, State, Swinging
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.swings.law import SwingLaw
 
 
 @pytest.fixture(scope="module")
@@ -121,8 +124,8 @@ def test_a_start_within_something_is_refused_at_once(
 def test_everything_comes_to_rest_from_its_velocity(machine: Walker, plan: Plan, structure: Structure) -> None:
     q, v = np.array(machine.robot.neutral), np.zeros(machine.robot.nv)
     v[:3], v[machine.arms[0].v] = (0.1, 0.0, 0.0), 0.5 * machine.robot.limits.velocity[machine.arms[0].v]
-    assert Coasting.of(machine, State(q, {}), 0.25, DT) is None
-    coasting = Coasting.of(machine, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
+    assert Coasting.of(machine, structure, State(q, {}), 0.25, DT) is None
+    coasting = Coasting.of(machine, structure, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
     assert coasting is not None
     assert coasting.free == [0]
     assert coasting.duration >= 0.25
@@ -130,6 +133,52 @@ def test_everything_comes_to_rest_from_its_velocity(machine: Walker, plan: Plan,
     at_rest = coasting.state(State(q, {1: 0, 2: 1}, v=v))
     assert at_rest.v is None
     assert at_rest.time == coasting.duration
+
+
+def test_a_hand_comes_to_rest_over_its_hold(machine: Walker, structure: Structure, plan: Plan) -> None:
+    """One that comes down on a moving body, at several heights and paces, goes neither aside of its hold nor into it,
+    and asks for no more than its joints' accelerations."""
+    chain, grips, hands = ClosedChain(machine, structure), plan.grips, machine.robot.limits
+    assert grips is not None
+    arm, q, v = machine.arms[0], np.array(machine.robot.neutral), np.zeros(machine.robot.nv)
+    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(plan.path.poses[0]))
+    for mine, grip in zip(machine.arms, plan.chain, strict=True):
+        q[mine.q] = grips.posture_at(grip[0], 0)
+    hold = structure.index(plan.start[0])
+    lifted = limb_of(machine).follow(
+        (plan.path.poses[0] @ arm.base.homogeneous)[None, None],
+        (structure.positions[hold] - 0.05 * structure.axes[hold])[None, None],
+        q[arm.q][None, None, 3:],
+        machine.margins,
+    )[0][0, 0]
+    for posture, fast in ((lifted, 0.3), (lifted, -0.3), (lifted, 1.0), (q[arm.q].copy(), 0.2)):
+        q[arm.q], v[:6], v[arm.v] = posture, [0.1, 0.02, 0.0, 0.0, 0.0, 0.05], fast * (q[arm.q] - lifted) / 0.2
+        if fast == 0.2:
+            v[arm.v][0] = 0.05
+        state = State(q, {1: 0, 2: 1}, v=v)
+        coasting = Coasting.of(machine, structure, state, 0.25, DT)
+        assert coasting is not None
+        assert coasting.over == {0: hold}
+        chain.place(coasting.state(state).q)
+        offset = chain.origins[0] - structure.positions[hold]
+        height = float(-structure.axes[hold] @ offset)
+        assert height > -1e-9
+        assert np.linalg.norm(offset + height * structure.axes[hold]) < 1e-9
+        rows = coasting._postures[0]
+        rates = np.concatenate([v[arm.v][None], np.diff(rows, axis=0) / DT, np.zeros((1, 6))])
+        assert (np.abs(np.diff(rates, axis=0)) <= DT * hands.acceleration[arm.v]).all()
+
+
+def test_a_swing_waits_for_a_hand_that_leaves_its_hold_late() -> None:
+    """Aims 10 mm ahead of a hand that may still be near to what it held are waited for; farther on they are not."""
+    times = np.linspace(0.0, 1.0, 201)
+    places = np.stack([np.zeros(201), np.zeros(201), times], axis=1)
+    swinging = Swinging(0, 0, 0, SwingLaw(times, places, times), latch=0.0, state="open")
+    for time, slow in ((0.05, True), (0.5, False)):
+        swinging.aim = swinging.law.at(time)
+        place = swinging.aim.position - [0.0, 0.0, 0.01]
+        pace = hand_pace(swinging, place, True, 0.0, 1.0, (time - 0.01, 1.01 - time))
+        assert pace == pytest.approx(LEAST_PACE if slow else 1.0)
 
 
 def test_a_body_slows_down_before_a_corner(plan: Plan) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -13,9 +14,9 @@ from wbc import validation
 from wbc.batch import numbers
 from wbc.batch.batch_step import BatchStep
 from wbc.batch.derivatives import Derivatives
-from wbc.batch.engine import Clones, Compiled, Engine
+from wbc.batch.engine import Clones, Compiled, Engine, Given
 from wbc.controller import Controller, core_of
-from wbc.controller.handle import Handle, UnknownValueError
+from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.together import main_input
 from wbc.errors import RangeError, ShapeError, SolverError
@@ -86,11 +87,17 @@ class Batch:
         Raises:
             UnknownNameError: no such item, or no such value. WbcError: as of a single value; nothing is changed.
         """
-        found: list[tuple[Array, Array]] = []
-        filled: list[Slot] = []
+        asked: list[tuple[Handle, Mapping[str, Any]]] = []
         for name, given in values.items():
             handle = self._core.handles[validation.one_of("set", name, self._core.handles)]
-            own = given if isinstance(given, Mapping) else {main_input(handle): given}
+            asked.append((handle, given if isinstance(given, Mapping) else {main_input(handle): given}))
+        if (quick := self._quick(asked)) and self._engine.fit(list(quick.values())):
+            self._engine.take(self.inputs, list(quick.values()))
+            self._filled(quick)
+            return
+        found: list[tuple[Array, Array]] = []
+        filled: list[Slot] = []
+        for handle, own in asked:
             slots = {key: numbers_ for key, numbers_ in own.items() if key != "weight"}
             checked = {key: self._checked(handle, key, value) for key, value in slots.items()}
             self._check_order(handle, checked)
@@ -102,10 +109,36 @@ class Batch:
                 found.append(self._weights(handle, own["weight"]))
         for place, flat in found:
             place[:] = flat
-        for slot in filled:
+        self._filled(filled)
+
+    def _filled(self, slots: Iterable[Slot]) -> None:
+        """These have values now."""
+        for slot in slots:
             self._waiting.pop(slot, None)
             self._first.pop(slot, None)
         self.changes += 1
+
+    def _quick(self, asked: list[tuple[Handle, Mapping[str, Any]]]) -> dict[Slot, Given]:
+        """Values as native code takes them; none where it does not take all of them."""
+        found: dict[Slot, Given] = {}
+        for handle, own in asked:
+            kinds = handle.quick
+            for key, value in own.items():
+                if key not in kinds or key not in handle.names:
+                    return {}
+                slot, kind = handle.slot(key), kinds[key]
+                shape = (4, 4) if kind == POSE else (slot.size,)
+                if (one := self._given(value, shape, kind, self._memory["p"].start + slot.start)) is None:
+                    return {}
+                found[slot] = one
+        return found
+
+    def _given(self, value: Any, shape: tuple[int, ...], kind: int, at: int) -> Given | None:
+        """A value for the engine, with its place in memory; None where it is no array of one or of all."""
+        array, shapes = numbers.taken(value), (shape, (self.count, *shape))
+        if type(array) is not np.ndarray or array.dtype != np.float64 or array.shape not in shapes:
+            return None
+        return Given(np.ascontiguousarray(array), kind, at - self._memory.report, math.prod(shape))
 
     def _checked(self, handle: Handle, key: str, value: Any) -> Array:
         slot = handle.slot(key)
@@ -157,7 +190,32 @@ class Batch:
         stack = self._core.stack
         low, high = stack.dt_range
         seconds = stack.dt if dt is None else validation.scalar("dt", dt, low=low, high=high, unit="s")
-        configurations = numbers.configurations(stack.robot, q, self.count, self._units)
+        if (quick := self._quick_state(q, v, seconds)) and self._engine.fit(quick):
+            self._take_first(np.broadcast_to(quick[0].numbers, (self.count, stack.robot.nq)))
+            self._engine.take(self.inputs, quick)
+        else:
+            self._set_state(q, v, seconds)
+        reports = np.empty((self.count, self._memory.report))
+        self._engine.tick(self.inputs, reports)
+        self.changes += 1
+        return BatchStep(reports, self, self._core.context)
+
+    def _quick_state(self, q: Any, v: Any, seconds: float) -> list[Given]:
+        """What a step is given as native code takes it; nothing where it does not."""
+        layout, place = self._layout, self._memory
+        found = [
+            self._given(q, (layout.nq,), CONFIGURATION, place["q"].start),
+            self._given(np.array([seconds]), (1,), NUMBERS, place["dt"].start),
+        ]
+        if v is not None:
+            found.append(self._given(v, (layout.nv,), NUMBERS, place["v_in"].start))
+            found.append(self._given(np.ones(1), (1,), NUMBERS, place["use_v"].start))
+        known = [given for given in found if given is not None]
+        return known if len(known) == len(found) else []
+
+    def _set_state(self, q: Any, v: Any, seconds: float) -> None:
+        """The same, checked in Python."""
+        configurations = numbers.configurations(self._core.stack.robot, q, self.count, self._units)
         measured = None if v is None else numbers.rows("v", v, self.count, self._layout.nv)
         self._take_first(configurations)
         self._view("q")[:] = configurations
@@ -165,10 +223,6 @@ class Batch:
         if measured is not None:
             self._view("v_in")[:, : self._layout.nv] = measured
             self._view("use_v")[:] = 1.0
-        reports = np.empty((self.count, self._memory.report))
-        self._engine.tick(self.inputs, reports)
-        self.changes += 1
-        return BatchStep(reports, self, self._core.context)
 
     def reset(self, q: Any = None, v: Any = None) -> None:
         """Start anew, see :meth:`wbc.Controller.reset`; q [n, nq] and v [n, nv], or one for all.

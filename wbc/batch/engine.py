@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import os
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,12 +18,39 @@ from wbc.controller.tick.buffers import RELAXED, UNSOUND
 from wbc.controller.tick.native import NativeTick
 from wbc.validation import Array
 
-#: Robots that a thread takes at a time
-_CHUNK = 64
+#: Robots from which on a second thread is worth waking
+_SMALL = 64
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value that native code checks and writes (``native/many.h``).
+
+    Attributes:
+        numbers: one value, or one of each robot, contiguous. kind: what it is, see :mod:`wbc.controller.handle`.
+        at: its first place in a robot's inputs. size: of one value.
+    """
+
+    numbers: Array
+    kind: int
+    at: int
+    size: int
+
+    @property
+    def row(self) -> tuple[int, int, int, int, int]:
+        """As C reads it."""
+        stride = 0 if self.numbers.size == self.size else 8 * self.size
+        return self.numbers.ctypes.data, stride, self.kind, self.at, self.size
 
 
 class Engine(Protocol):
     """Ticks all robots of a batch."""
+
+    def fit(self, given: list[Given]) -> bool:
+        """Whether all values may be written; no where native code cannot say, too."""
+
+    def take(self, inputs: Array, given: list[Given]) -> None:
+        """Write values that fit."""
 
     def tick(self, inputs: Array, reports: Array) -> None:
         """One tick of each robot: ``inputs`` [count, k] in place, ``reports`` [count, m] out."""
@@ -42,9 +71,13 @@ class Compiled:
         assert isinstance(tick, NativeTick)
         self._tick, self._count = tick, count
         self._ticks = [tick.twin() for _ in range(threads)]
+        self._busy = min(threads, -(-count // _SMALL))
         size = int(tick.library_function("wbc_tick_carried_size", ctypes.c_longlong)())
         self._carried = np.zeros((count, size), np.uint8)
-        self._many = tick.library_function("wbc_tick_many", None, unlocked=True)
+        self._many, self._take = (
+            tick.library_function(name, None, unlocked=True) for name in ("wbc_tick_many", "wbc_many_take")
+        )
+        self._fit = tick.library_function("wbc_many_fit", ctypes.c_int, unlocked=True)
         self._resume, self._suspend = (
             tick.library_function(name, None) for name in ("wbc_tick_resume", "wbc_tick_suspend")
         )
@@ -60,38 +93,62 @@ class Compiled:
             self._pool = os.getpid(), ThreadPoolExecutor(len(self._ticks), "wbc-batch")
         return self._pool[1]
 
-    def tick(self, inputs: Array, reports: Array) -> None:
-        chunk = max(_CHUNK, -(-self._count // (4 * len(self._ticks))))
-        starts = list(range(0, self._count, chunk))
-        if len(self._ticks) == 1 or len(starts) == 1:
-            self._run(self._ticks[0], inputs, reports, 0, self._count)
-        else:
-            idle = list(self._ticks)
+    def _shared(self, work: Callable[[int], Any], stop: Callable[[], object] = bool) -> list[Any]:
+        """What ``work`` returns for the number of every thread; alone where there is too little for several.
 
-            def run(start: int) -> None:
-                tick = idle.pop()
-                try:
-                    self._run(tick, inputs, reports, start, min(chunk, self._count - start))
-                finally:
-                    idle.append(tick)
+        After an exception no thread is at work any more; ``stop`` tells them to end.
+        """
+        threads = self._busy
+        if threads == 1:
+            return [work(0)]
+        busy, pool = list[int](), self._threads()
 
-            pool = self._threads()
+        def run(number: int) -> Any:
+            busy.append(number)
             try:
-                list(pool.map(run, starts))
-            except BaseException:
-                # Ctrl-C: no thread may go on with memory that the next tick takes
-                pool.shutdown(cancel_futures=True)
-                self._pool = None
-                # A thread that was being started is not known to the pool yet
-                while len(idle) < len(self._ticks):
-                    time.sleep(1e-3)
-                raise
+                return work(number)
+            finally:
+                busy.pop()
+
+        try:
+            return list(pool.map(run, range(threads)))
+        except BaseException:
+            # Ctrl-C: no thread may go on with memory that the next tick takes
+            stop()
+            pool.shutdown(cancel_futures=True)
+            self._pool = None
+            # A thread that was being started is not known to the pool yet
+            while busy:
+                time.sleep(1e-3)
+            raise
+
+    def fit(self, given: list[Given]) -> bool:
+        table = np.array([value.row for value in given], np.int64)
+        return all(self._shared(lambda number: self._fit(*self._part(table, number))))
+
+    def take(self, inputs: Array, given: list[Given]) -> None:
+        table, place = np.array([value.row for value in given], np.int64), ctypes.c_void_p(inputs.ctypes.data)
+        self._shared(lambda number: self._take(place, *self._part(table, number)))
+
+    def _part(self, table: np.ndarray, number: int) -> tuple[ctypes._SimpleCData[Any], ...]:
+        """Values, and the robots that a thread of this number has."""
+        first, end = (self._count * k // self._busy for k in (number, number + 1))
+        values = ctypes.c_void_p(table.ctypes.data), ctypes.c_int(len(table))
+        return *values, ctypes.c_longlong(first), ctypes.c_longlong(end)
+
+    def tick(self, inputs: Array, reports: Array) -> None:
+        following = np.zeros(1, np.int64)
+        self._shared(
+            lambda number: self._run(self._ticks[number], following, inputs, reports),
+            lambda: following.fill(self._count),
+        )
         for k in np.flatnonzero((self._left >> self._flags) & 1).tolist():
             self._finish(k, inputs, reports)
 
-    def _run(self, tick: NativeTick, inputs: Array, reports: Array, start: int, count: int) -> None:
-        places = (array[start:].ctypes.data for array in (inputs, reports, self._carried, self._flags))
-        self._many(tick.pointer, ctypes.c_longlong(count), *map(ctypes.c_void_p, places), ctypes.c_int(self._left))
+    def _run(self, tick: NativeTick, following: np.ndarray, inputs: Array, reports: Array) -> None:
+        places = (array.ctypes.data for array in (following, inputs, reports, self._carried, self._flags))
+        count, left = ctypes.c_longlong(self._count), ctypes.c_int(self._left)
+        self._many(tick.pointer, count, *map(ctypes.c_void_p, places), left)
 
     def _finish(self, k: int, inputs: Array, reports: Array) -> None:
         core, carried = self._spare, ctypes.c_void_p(self._carried[k].ctypes.data)
@@ -108,6 +165,12 @@ class Clones:
 
     def __init__(self, controller: Controller, count: int) -> None:
         self._cores = [core_of(controller.clone()) for _ in range(count)]
+
+    def fit(self, given: list[Given]) -> bool:
+        return False
+
+    def take(self, inputs: Array, given: list[Given]) -> None:
+        raise AssertionError("nothing fits")
 
     def tick(self, inputs: Array, reports: Array) -> None:
         for core, given, report in zip(self._cores, inputs, reports, strict=True):

@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.clearance.tree import Tree
 from wbc.errors import ContinuityError, RangeError, ShapeError
+from wbc.rotations import matrices
 from wbc.validation import Array
 
 #: Highest degree of the polynomials; what rounding may leave between two of them, in parts of the greatest scalar
@@ -165,13 +166,7 @@ def quaternion_matrices(x: Array) -> Array:
     length = np.linalg.norm(x, axis=-1, keepdims=True)
     if x.size and np.abs(length - 1.0).max() > validation.ROTATION_TOLERANCE:
         validation.rotation("poses", np.eye(3) * float(length.flat[int(np.abs(length - 1.0).argmax())]))
-    i, j, k, w = np.moveaxis(x / np.where(length > 0.0, length, 1.0), -1, 0)
-    rows = [
-        [1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j)],
-        [2 * (i * j + w * k), 1 - 2 * (i * i + k * k), 2 * (j * k - w * i)],
-        [2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return matrices(x / np.where(length > 0.0, length, 1.0))
 
 
 def _for_all(field: str, value: Any, shape: tuple[int, ...]) -> Array:

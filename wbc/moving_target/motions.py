@@ -12,6 +12,7 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from wbc.estimation import FrameMotion
+from wbc.rotations import quaternion
 from wbc.validation import Array
 
 #: Components of a sea, and the band that they lie in, in parts of the peak frequency
@@ -127,7 +128,7 @@ def tumble(start: pin.SE3, rng: np.random.Generator, rate: float, arm: float, dr
         x, w = y[:3], y[4:]
         return np.concatenate([0.5 * (y[3] * w + np.cross(x, w)), [-0.5 * x @ w], _euler(inertia, w)])
 
-    first = np.concatenate([pin.Quaternion(start.rotation).coeffs(), rate * spin])
+    first = np.concatenate([quaternion(start.rotation), rate * spin])
     solved = solve_ivp(slope, (0.0, seconds), first, method="DOP853", rtol=TOLERANCE, atol=TOLERANCE, dense_output=True)
     centre = start.translation - start.rotation @ lever
     return Tumble(centre, drift * way, lever, inertia, solved.sol)

@@ -13,13 +13,12 @@ from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.robot.robot import Robot, checked_robot
 from wbc.robot.sources.mjmodel import (
     SIZES,
-    TO_MUJOCO,
-    TO_PINOCCHIO,
     body_name,
     is_mjmodel,
     joint_name,
     pose_of,
 )
+from wbc.rotations import TO_MUJOCO, TO_PINOCCHIO
 from wbc.validation import Array
 
 if TYPE_CHECKING:

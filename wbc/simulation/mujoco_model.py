@@ -12,6 +12,7 @@ from wbc import validation
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
+from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
 from wbc.simulation.plant import CommandKind
 from wbc.symbolic.joints import motion_at
@@ -125,7 +126,7 @@ def _add_bodies(spec: mujoco.MjSpec, robot: Robot) -> list[mujoco.MjsBody]:
     taken: set[str] = set()
     for j in range(1, model.njoints):
         name, place, inertia = str(model.names[j]), model.jointPlacements[j], model.inertias[j]
-        body = bodies[int(model.parents[j])].add_body(pos=place.translation, quat=_quaternion(place.rotation))
+        body = bodies[int(model.parents[j])].add_body(pos=place.translation, quat=quaternion(place.rotation)[TO_MUJOCO])
         body.name = links[j] if j in links and links[j] not in taken else name
         taken.add(body.name)
         bodies.append(body)
@@ -186,7 +187,7 @@ def _add_shapes(
             validation.instance(f"contacts[{name!r}]", one, PlacedShape, "a PlacedShape")
             place, shape = frame.placement * one.placement, one.shape
             geom = bodies[int(frame.parentJoint)].add_geom(
-                pos=place.translation, quat=_quaternion(place.rotation), mass=0.0, group=1 if touching else 2
+                pos=place.translation, quat=quaternion(place.rotation)[TO_MUJOCO], mass=0.0, group=1 if touching else 2
             )
             if isinstance(shape, Sphere) or (isinstance(shape, Capsule) and shape.length == 0.0):
                 geom.type, geom.size = kinds.mjGEOM_SPHERE, [shape.radius, 0.0, 0.0]
@@ -238,9 +239,3 @@ def _add_actuators(spec: mujoco.MjSpec, robot: Robot, kind: str, frequency: floa
             actuator.set_to_velocity(kv=frequency * inertia[start])
         if np.isfinite(effort) and effort > 0.0:
             actuator.forcelimited, actuator.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, [-effort, effort]
-
-
-def _quaternion(rotation: Array) -> Array:
-    """w, x, y, z."""
-    x, y, z, w = pin.Quaternion(rotation).coeffs()
-    return np.array([w, x, y, z])

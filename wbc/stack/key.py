@@ -23,6 +23,7 @@ PARTS = (
     "wbc.pickling",
     "wbc.proximity",
     "wbc.robot",
+    "wbc.rotations",
     "wbc.shapes",
     "wbc.stack",
     "wbc.symbolic",

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.rotations import quaternion
 from wbc.validation import Array
 
 #: Consecutive orientations may be at most this far apart [rad]; beyond it, the direction of the turn is ambiguous.
@@ -88,7 +89,7 @@ class SplinePath:
             raise RangeError("path.times", times, f"expected times {SHORTEST:g} s apart or more, {LONGEST:g} s in all")
         placed = [validation.pose(f"path.poses[{k}]", pose) for k, pose in enumerate(poses)]
         points = validation.ordinary_array("path.poses", [pose.translation for pose in placed])
-        quaternions = _continuous(np.array([pin.Quaternion(pose.rotation).coeffs() for pose in placed]))
+        quaternions = _continuous(np.array([quaternion(pose.rotation) for pose in placed]))
         self.times = stamps - stamps[0]
         self.points = points
         self._quaternions = quaternions

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from wbc.trajectory.laws.plots import plot
     from wbc.trajectory.laws.timing import Timing
     from wbc.trajectory.least_time.time_optimal import time_optimal
+    from wbc.trajectory.many import Laws, many
     from wbc.trajectory.paths.arcs import arc_path, arc_through
     from wbc.trajectory.paths.from_function import FunctionPath, function_path
     from wbc.trajectory.paths.joint_paths import blend_path, spline_path, standing_path, straight_path
@@ -33,6 +34,7 @@ __all__ = [
     "FunctionPath",
     "Law",
     "LawCertificate",
+    "Laws",
     "MotionLimits",
     "Online",
     "Path",
@@ -50,6 +52,7 @@ __all__ = [
     "jerk_limited",
     "jerk_limited_along",
     "load",
+    "many",
     "online",
     "plot",
     "pose_polyline",

@@ -96,10 +96,3 @@ def indexed(triangles: Array, colour: Colour) -> Mesh:
         parts.append(corners[used])
         left = left[~near]
     return Mesh(np.concatenate(parts).astype(np.float32), places.reshape(-1, 3), colour)
-
-
-def wxyz(rotation: Array) -> Array:
-    """A rotation as viser takes it."""
-    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
-    x, y, z, w = pin.SE3ToXYZQUAT(pin.SE3(rotation, np.zeros(3)))[3:]
-    return np.array([w, x, y, z])

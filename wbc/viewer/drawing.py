@@ -13,11 +13,12 @@ import pinocchio as pin
 from wbc.controller import Controller, core_of
 from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
+from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
 from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
-from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh, wxyz
+from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh
 from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
@@ -449,7 +450,7 @@ class Drawing:
 
     def _place(self, node: str, pose: pin.SE3) -> None:
         """Where a node is; nothing is sent where it did not move."""
-        at, turn = np.array(pose.translation), wxyz(pose.rotation)
+        at, turn = np.array(pose.translation), quaternion(pose.rotation)[TO_MUJOCO]
         before = self._placed.get(node)
         if before is not None:
             same = min(np.abs(turn - before[1]).max(), np.abs(turn + before[1]).max()) < STILL

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
 from wbc.errors import RotationError
+from wbc.rotations import quaternion
 from wbc.validation import Array
 
 Vector: TypeAlias = list[Poly]
@@ -95,8 +96,8 @@ def exact_rotation(rotation: Array, what: str, approximate: bool, notes: list[st
         raise RotationError(
             what, rotation.tolist(), "not a multiple of 90 degrees about an axis; approximate=True takes a rational one"
         )
-    quaternion = pin.Quaternion(rotation).coeffs()
-    scaled = quaternion / np.abs(quaternion).max()
+    raw = quaternion(rotation)
+    scaled = raw / np.abs(raw).max()
     x, y, z, w = (Fraction(float(v)).limit_denominator(DENOMINATOR) for v in scaled)
     n = x * x + y * y + z * z + w * w
     out = [

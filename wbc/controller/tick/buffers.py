@@ -32,8 +32,8 @@ TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
 
 #: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
 #: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
-#: third; as in ``native/settings.h``
-SOUND, KNOWN, OPTIMAL = 1e-6, 1e-3, 1e-9
+#: third, or a row that never gives way is violated by more than the last; as in ``native/settings.h``
+SOUND, KNOWN, OPTIMAL, FIRMLY = 1e-6, 1e-3, 1e-9, 1e-8
 
 #: Paths to another answer, in the order in which they are tried by default; braking is always the last
 CHAIN = ("cold", "daqp", "osqp", "elastic")

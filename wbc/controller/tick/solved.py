@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wbc.controller.tick.buffers import (
     BRAKED,
+    FIRMLY,
     INFINITE,
     KNOWN,
     OPTIMAL,
@@ -96,7 +97,7 @@ class SolvedTick(Buffers):
                 multipliers = qp.rows_of(answer.multipliers)
                 bounded = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
                 certificate = certify(bounded, QPSolution(x, answer.multipliers, "solved"), self._velocities)
-                if not self._sound(certificate):
+                if not (self._sound(certificate) and self._firm(qp, v, answer)):
                     found = polish(bounded, QPSolution(x, answer.multipliers, "solved"), POLISH_ROUNDS)
                     better = certify(bounded, found.solution, self._velocities)
                     if found.exact and self._sound(better):
@@ -116,6 +117,7 @@ class SolvedTick(Buffers):
         if flag == RELAXED and not slack[self._hard].any():
             flag = SOLVED  # the rows contradict each other by rounding only
         certificate = replace(certificate, violation=max(certificate.violation, self._broken(qp, v, answer)))
+        sound = self._sound(certificate) and self._firm(qp, v, answer)
         for name in ("stationarity", "violation", "complementarity", "error_bound"):
             report[memory[name]] = min(getattr(certificate, name), INFINITE)
         report[memory["v"]] = v
@@ -125,15 +127,19 @@ class SolvedTick(Buffers):
         report[memory["multipliers"]] = multipliers
         report[memory["slack"]] = slack
         self.assembly.look_ahead()
-        self.assembly.commanded(v, answer is not None and self._sound(certificate))
+        self.assembly.commanded(v, answer is not None and sound)
         if answer is None:
             return BRAKED + UNSOUND if self.assembly.usable and not self._proven(wide) else BRAKED
-        return flag if self._sound(certificate) else flag + UNSOUND
+        return flag if sound else flag + UNSOUND
 
     def _broken(self, qp: QP, v: Array, answer: Relaxed | None) -> float:
         """By how much an answer breaks rows that never give way, by their own sides whatever it made of them."""
         firm = self._hard & (self._orders == 0)
         return 0.0 if answer is None else float(qp.violation(v)[qp.n :][firm].max(initial=0.0))
+
+    def _firm(self, qp: QP, v: Array, answer: Relaxed | None) -> bool:
+        """Whether those rows are broken by rounding only, as ``unsound`` in ``native/tick.c`` decides it."""
+        return self._broken(qp, v, answer) <= FIRMLY * self._longest
 
     def _proven(self, qp: QP) -> bool:
         """Whether it is proven that rows which never give way contradict each other within the simple bounds."""

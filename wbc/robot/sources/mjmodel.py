@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from wbc.errors import RobotFileError
 from wbc.robot.sources.description import Description, Mimic, with_base
+from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ FREE, BALL, SLIDE, HINGE = range(4)
 SIZES = {FREE: (7, 6), BALL: (4, 3), SLIDE: (1, 1), HINGE: (1, 1)}
 #: Types of transmissions to a joint and of equalities of joints
 TO_JOINT, JOINT_EQUALITY = (0, 1), 2
-#: A quaternion w, x, y, z from one x, y, z, w, and the reverse
-TO_MUJOCO, TO_PINOCCHIO = [3, 0, 1, 2], [1, 2, 3, 0]
 
 
 def is_mjmodel(source: Any) -> bool:

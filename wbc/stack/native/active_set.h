@@ -149,6 +149,15 @@ static int firm_rows_hold(const wbc_tick *t, int checked) {
     return 1;
 }
 
+/* x of the point u that the search has found, in the metric of the factor, and multipliers of rows as they were given */
+static void point(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    double y[WIDE] = {0};
+    for (int i = 0; i < NV; i++) y[i] = t->u[i] - t->ldp_v[i];
+    for (int i = 0; i < NV; i++) t->x[i] = dot(t->inverse + i * WIDE, y, i);
+    for (int a = 0; a < work->n_active; a++) work->lam_star[a] *= work->scaling[work->WS[a]];
+}
+
 /* Solve with the factorisation at hand. `warm`: start from the active set in `keep`. Rows of classes from
  * `checked` on may be violated where the solver cannot move them, rows that depend on others by `angle` |row| |v|.
  * `base`: the point that v is counted from, or NULL. DAQP's exit flag. */
@@ -173,7 +182,9 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
             if ((t->keep[i] & ACTIVE) && !(t->sense[i] & IMMUTABLE)) activate(work, i, t->keep[i] & LOWER);
     const int flag = search(t, work, limit);
     if (flag < 0) return flag;
-    ldp2qp_solution(work);
+    /* A relaxation has a metric of its own */
+    if (base) ldp2qp_solution(work);
+    else point(t);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
     if (base) {
         meet_active(t);

@@ -20,7 +20,7 @@ INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
     for (int r = 0; r < count; r++) {
         const double weight = t->weight[row + r] * t->report.factor[row + r];
         double *out = spread + r * WIDE;
-        for (int b = 0; b < 8 * groups; b++) out[b] = 0.0;
+        for (int b = 0; b < 8 * groups; b += 4) FOUR(out + b) = (four){0};
         for (int c = 0; c < cols; c++) out[place[c]] = J[r * cols + c];
         for (int c = 0; c < cols; c++) weighted[r * cols + c] = weight * J[r * cols + c];
         for (int c = 0; c < cols; c++) pull[c] += weighted[r * cols + c] * t->desired[row + r];
@@ -42,15 +42,8 @@ INLINE void block(wbc_tick *t, int row, int count, int first, int cols) {
 }
 
 /* The upper triangle of H is given, with zeros left of the diagonal in its group of 8 */
-static void empty_hessian(wbc_tick *t) {
-    const four zero = {0};
-    for (int i = 0; i < NV; i++)
-        for (int at = i & ~7; at < WIDE; at += 4) FOUR(t->H + i * WIDE + at) = zero;
-}
-
 static void only_upper(wbc_tick *t) {
-    for (int i = 0; i < NV; i++)
-        for (int j = i & ~7; j < i; j++) t->H[i * WIDE + j] = 0.0;
+    for (int i = 0; i < NV; i++) upper_part(t->H + i * WIDE + (i & ~7), i & 7);
 }
 
 /* The same for rows with one non-zero each */
@@ -114,7 +107,8 @@ static void assemble(wbc_tick *t, int screen) {
 #endif
                        t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);
-    empty_hessian(t);
+    for (int i = 0; i < NV; i++)
+        for (int at = i * WIDE + (i & ~7); at < i * WIDE + WIDE; at += 8) FOUR(t->H + at) = FOUR(t->H + at + 4) = (four){0};
     memset(t->g, 0, sizeof t->g);
     /* Comparisons with NaN are false, so a row of NaN would pass as satisfied: such a tick brakes */
     t->unusable = 0.0;

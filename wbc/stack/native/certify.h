@@ -113,6 +113,13 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
     }
 }
 
+/* Row k, which is `value` at the command, among those that are violated */
+INLINE void count_violation(wbc_tick *t, int k, double value) {
+    const double missed = larger(lower_side(t, k) - value, value - upper_side(t, k));
+    t->report.violation = larger(missed, t->report.violation);
+    if (FIRM_ROW(k)) t->firm_missed = larger(missed, t->firm_missed);
+}
+
 /* Residuals and the error bound of v; leaves the residual of the stationarity in `scratch` */
 static void examine(wbc_tick *t) {
     wbc_report *out = &t->report;
@@ -120,14 +127,11 @@ static void examine(wbc_tick *t) {
     memcpy(v, out->v, sizeof out->v);
     gradient(t, v, residual, size);
     add_forces(t, v, residual, size);
-    out->violation = 0.0;
+    out->violation = t->firm_missed = 0.0;
     for (int k = 0; k < MC; k++) {
         if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
         if (SOFTENED(t, k) && (HELD(t, k) || t->sense[NV + k] & ACTIVE)) continue;
-        const double value = row_at(t, k, v);
-        const double below = lower_side(t, k) - value, above = value - upper_side(t, k);
-        if (below > out->violation) out->violation = below;
-        if (above > out->violation) out->violation = above;
+        count_violation(t, k, row_at(t, k, v));
     }
     out->stationarity = 0.0;
     for (int i = 0; i < NV; i++) {

@@ -82,11 +82,13 @@ static void right_side(wbc_tick *t) {
 /* Matrices are worked on in blocks of four rows and eight columns, which stay in registers, in loops that are short as
  * code: unrolled they would not fit into the cache of instructions. Rows from NV to TALL are zeros.
  *
- * Four rows of R, columns from `at` on, without what the first `count` rows have of them */
-INLINE void reduce_rows(wbc_tick *t, int k, int count, int at) {
+ * Four rows of R, columns from `at` on: those of `from` without what the first `count` rows of R have of them */
+INLINE void reduce_rows(wbc_tick *t, const double *from, int k, int count, int at) {
     double *r0 = t->R + k * WIDE + at, *r1 = r0 + WIDE, *r2 = r1 + WIDE, *r3 = r2 + WIDE;
-    four p0 = FOUR(r0), p1 = FOUR(r1), p2 = FOUR(r2), p3 = FOUR(r3);
-    four q0 = FOUR(r0 + 4), q1 = FOUR(r1 + 4), q2 = FOUR(r2 + 4), q3 = FOUR(r3 + 4);
+    const double *s0 = from + k * WIDE + at;
+    const double *s1 = k + 1 < NV ? s0 + WIDE : r1, *s2 = k + 2 < NV ? s0 + 2 * WIDE : r2, *s3 = k + 3 < NV ? s0 + 3 * WIDE : r3;
+    four p0 = GIVEN_FOUR(s0), p1 = GIVEN_FOUR(s1), p2 = GIVEN_FOUR(s2), p3 = GIVEN_FOUR(s3);
+    four q0 = GIVEN_FOUR(s0 + 4), q1 = GIVEN_FOUR(s1 + 4), q2 = GIVEN_FOUR(s2 + 4), q3 = GIVEN_FOUR(s3 + 4);
     for (int i = 0; i < count; i++) {
         const double *f = t->R + i * WIDE + k, *above = t->R + i * WIDE + at;
         const four p = -GIVEN_FOUR(above), q = -GIVEN_FOUR(above + 4);
@@ -114,7 +116,10 @@ static double chosen_pivot(wbc_pivots *chosen, const double *row, int k) {
     /* Entries right of the diagonal in its group of 8, then those of the others */
     four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from) * GIVEN_FOUR(chosen->scale + from)) & ((four_bits){0, 1, 2, 3} > here));
     RAISE_FOUR(most, (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(row + from + 4) * GIVEN_FOUR(chosen->scale + from + 4)) & ((four_bits){4, 5, 6, 7} > here)));
-    for (int at = from + 8; at < WIDE; at += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(row + at) * GIVEN_FOUR(chosen->scale + at)));
+    for (int at = from + 8; at < WIDE; at += 8) {
+        RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(row + at) * GIVEN_FOUR(chosen->scale + at)));
+        RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(row + at + 4) * GIVEN_FOUR(chosen->scale + at + 4)));
+    }
     const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3]));
     chosen->more[k] = 0.0;
     /* A branch, so that the next rows need not wait for what decides it */
@@ -124,34 +129,45 @@ static double chosen_pivot(wbc_pivots *chosen, const double *row, int k) {
     return pivot / unit;
 }
 
+/* 0 in the first of eight places */
+INLINE void upper_part(double *place, int first) {
+    const four_bits at = {first, first, first, first};
+    FOUR(place) = (four)((four_bits)GIVEN_FOUR(place) & ((four_bits){0, 1, 2, 3} >= at));
+    FOUR(place + 4) = (four)((four_bits)GIVEN_FOUR(place + 4) & ((four_bits){4, 5, 6, 7} >= at));
+}
+
 /* Row k + n of the four that begin with k: without what those before it have of it, and its pivot's root taken out. Rows
  * wait for reciprocals of pivots only, not for their roots. */
 INLINE int finish_row(wbc_tick *t, int k, int n, double *plain, double *shares, wbc_pivots *chosen) {
     const int from = k & ~7, here = k - from + n;
     double *out = t->R + (k + n) * WIDE, *row = plain + n * WIDE;
     const double *f = shares + n;
-    for (int at = from; at < WIDE; at += 4) {
-        four p = GIVEN_FOUR(out + at);
-        if (n > 0) p = MADD(EACH(f[0]), GIVEN_FOUR(plain + at), p);
-        if (n > 1) p = MADD(EACH(f[4]), GIVEN_FOUR(plain + WIDE + at), p);
-        if (n > 2) p = MADD(EACH(f[8]), GIVEN_FOUR(plain + 2 * WIDE + at), p);
-        FOUR(row + at) = p;
+    for (int at = from; at < WIDE; at += 8) {
+        four p = GIVEN_FOUR(out + at), q = GIVEN_FOUR(out + at + 4);
+        for (int r = 0; r < n; r++) {
+            p = MADD(EACH(f[4 * r]), GIVEN_FOUR(plain + r * WIDE + at), p);
+            q = MADD(EACH(f[4 * r]), GIVEN_FOUR(plain + r * WIDE + at + 4), q);
+        }
+        FOUR(row + at) = p, FOUR(row + at + 4) = q;
     }
     if (chosen) row[k + n] = chosen_pivot(chosen, row, k + n);
     const double pivot = row[k + n], reciprocal = 1.0 / pivot, scale = t->inverse_diagonal[k + n] = 1.0 / sqrt(pivot);
     for (int c = n + 1; c < 4; c++) shares[4 * n + c] = -row[k + c] * reciprocal;
-    for (int at = from; at < WIDE; at += 4) FOUR(out + at) = GIVEN_FOUR(row + at) * EACH(scale);
-    for (int c = 0; c < 8; c++) out[from + c] = c < here ? 0.0 : out[from + c];
+    for (int at = from; at < WIDE; at += 8) {
+        FOUR(out + at) = GIVEN_FOUR(row + at) * EACH(scale);
+        FOUR(out + at + 4) = GIVEN_FOUR(row + at + 4) * EACH(scale);
+    }
+    upper_part(out + from, here);
     return pivot > 0.0;
 }
 
-/* The matrix in R into its Cholesky factor, with the inverse of its diagonal; 0 where it is not positive definite. `chosen`:
- * NULL, or how pivots are chosen so that there always is one. */
-INLINE int factor_rows(wbc_tick *t, wbc_pivots *chosen) {
+/* R = the Cholesky factor of the matrix `from`, R or H, with the inverse of its diagonal; 0 where it is not positive definite.
+ * `chosen`: NULL, or how pivots are chosen so that there always is one. */
+INLINE int factor_rows(wbc_tick *t, const double *from, wbc_pivots *chosen) {
     int ok = 1;
     for (int k = 0; k < NV; k += 4) {
         double plain[4 * WIDE], shares[16];
-        for (int at = k & ~7; k > 0 && at < WIDE; at += 8) reduce_rows(t, k, k, at);
+        for (int at = k & ~7; at < WIDE; at += 8) reduce_rows(t, from, k, k, at);
         ok &= finish_row(t, k, 0, plain, shares, chosen);
         if (k + 1 < NV) ok &= finish_row(t, k, 1, plain, shares, chosen);
         if (k + 2 < NV) ok &= finish_row(t, k, 2, plain, shares, chosen);
@@ -160,19 +176,17 @@ INLINE int factor_rows(wbc_tick *t, wbc_pivots *chosen) {
     return ok;
 }
 
-/* R = H, upper triangle */
-INLINE void copy_hessian(wbc_tick *t) {
-    for (int i = 0; i < NV; i++)
-        for (int at = i & ~7; at < WIDE; at += 4) FOUR(t->R + i * WIDE + at) = GIVEN_FOUR(t->H + i * WIDE + at);
-}
-
 /* R = H with the equality rows in it, not yet factored */
 static void load(wbc_tick *t) {
-    copy_hessian(t);
+    for (int i = 0; i < NV; i++)
+        for (int at = i * WIDE + (i & ~7); at < i * WIDE + WIDE; at += 8) {
+            FOUR(t->R + at) = GIVEN_FOUR(t->H + at);
+            FOUR(t->R + at + 4) = GIVEN_FOUR(t->H + at + 4);
+        }
     strengthen(t);
 }
 
-static int decompose(wbc_tick *t) { return factor_rows(t, NULL); }
+static int decompose(wbc_tick *t) { return factor_rows(t, t->R, NULL); }
 
 /* H += a diagonal that makes it positive definite, with pivots of v / dof_scale of `least` or more, where it is not (Gill and
  * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. H without entries as large as `added` is
@@ -182,13 +196,12 @@ static void decompose_amended(wbc_tick *t, double least, double added) {
     double diagonal = 0.0, other = 0.0, scale[WIDE] = {0}, more[WIDE];
     wbc_pivots chosen = {.least = least, .scale = scale, .more = more};
     memcpy(scale, dof_scale, NV * sizeof(double));
-    copy_hessian(t);
     for (int i = 0; i < NV; i++) diagonal = larger(diagonal, fabs(t->H[i * WIDE + i]) * dof_scale[i] * dof_scale[i]);
     /* No entry of a semidefinite matrix is larger than the largest on its diagonal */
     for (int i = 0; (diagonal + 2.0 * added) * share > diagonal && i < NV; i++)
         for (int j = i + 1; j < NV; j++) other = larger(other, fabs(t->H[i * WIDE + j]) * dof_scale[i] * dof_scale[j]);
     chosen.bound = larger(diagonal, other * share);
-    factor_rows(t, &chosen);
+    factor_rows(t, t->H, &chosen);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i];
 }
 
@@ -238,10 +251,10 @@ static void solve_upper(const wbc_tick *t, const double *y, double *x) {
 /* Rows i to i + 3 of R^-1, eight columns from `at` on: R_r^-1 (e_r - the sum of R_rk times row k over later rows k) */
 INLINE void invert_rows(wbc_tick *t, int i, int at) {
     const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
-    double *out = t->inverse + i * WIDE + at, less[4 * 8] = {0};
-    for (int r = 0; at == (i & ~7) && r < 4; r++) less[8 * r + i - at + r] = -1.0;
-    four p0 = FOUR(less), p1 = FOUR(less + 8), p2 = FOUR(less + 16), p3 = FOUR(less + 24);
-    four q0 = FOUR(less + 4), q1 = FOUR(less + 12), q2 = FOUR(less + 20), q3 = FOUR(less + 28);
+    const double here = at == (i & ~7) && i == at ? -1.0 : 0.0, there = at == (i & ~7) && i > at ? -1.0 : 0.0;
+    double *out = t->inverse + i * WIDE + at;
+    four p0 = {here, 0.0, 0.0, 0.0}, p1 = {0.0, here, 0.0, 0.0}, p2 = {0.0, 0.0, here, 0.0}, p3 = {0.0, 0.0, 0.0, here};
+    four q0 = {there, 0.0, 0.0, 0.0}, q1 = {0.0, there, 0.0, 0.0}, q2 = {0.0, 0.0, there, 0.0}, q3 = {0.0, 0.0, 0.0, there};
     const int to = at + 8 < NV ? at + 8 : NV;
     for (int k = i + 4; k < to; k++) {
         const double *below = t->inverse + k * WIDE + at;

@@ -10,8 +10,6 @@
 #define PROXIMAL 1e-6
 #define LEVEL_STEPS 12
 #define LEVEL_SETTLED 1e-11
-/* Corrections of the point where active rows meet */
-#define MEETINGS 2
 /* Rows shorter than this in the space that is left cannot be moved */
 #define UNMOVED 1e-9
 /* Multipliers below this are rounding, whatever drives the level */

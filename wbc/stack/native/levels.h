@@ -207,12 +207,19 @@ static int one_level(wbc_tick *t, int level, double *error) {
     return !t->spent;
 }
 
+/* Of rows that are not minimised, at the command */
+static void find_violation(wbc_tick *t) {
+    t->report.violation = t->firm_missed = 0.0;
+    for (int k = 0; k < MC; k++)
+        if (!MINIMISED(k)) count_violation(t, k, row_at(t, k, t->report.v));
+}
+
 /* What rows miss, how later levels have moved earlier ones, and the certificate of all levels together */
 static void sum_up(wbc_tick *t) {
     wbc_levels *s = &t->levels;
     wbc_report *out = &t->report;
     for (int i = 0; i < NV; i++) out->v[i] = clamp(s->x[i] * dof_scale[i], t->low[i], t->high[i]);
-    out->stationarity = out->complementarity = out->violation = 0.0;
+    out->stationarity = out->complementarity = 0.0;
     out->error_bound = out->levels[LEVELS * LEVEL_NUMBERS + 7];
     for (int level = 0; level <= LEVELS; level++) {
         double *numbers = out->levels + level * LEVEL_NUMBERS, row[NV];
@@ -224,15 +231,33 @@ static void sum_up(wbc_tick *t) {
             numbers[4] = larger(numbers[4], fabs(moved));
         }
     }
+    find_violation(t);
     for (int k = 0; k < MC; k++) {
         const double value = row_at(t, k, out->v);
         if (MINIMISED(k)) {
             const double slack = larger(t->free_low[k] - value, value - t->free_high[k]);
             out->slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
-        } else {
-            out->violation = larger(out->violation, larger(lower_side(t, k) - value, value - upper_side(t, k)));
         }
         if (out->dropped[k] < -1.0) out->dropped[k] = fabs(value - t->low[NV + k]);
+    }
+}
+
+/* The answer of the first level's QP onto its active rows: no level moves along equalities, so that what it misses of them
+ * would stay. Where contact forces are nearly free and joints are not, that is seen in torques. */
+static void meet_first(wbc_tick *t) {
+    double v[NV], multipliers[ACTIVE_MAX];
+    for (int n = 0; n < MEETINGS && t->factored && t->daqp.n_active > 0; n++) {
+        find_violation(t);
+        const double missed = t->report.violation;
+        memcpy(v, t->report.v, sizeof v);
+        memcpy(multipliers, t->daqp.lam_star, sizeof multipliers);
+        memset(t->scratch, 0, sizeof t->scratch);
+        refine(t);
+        find_violation(t);
+        if (all_finite(t->x, NV) && t->report.violation < missed) continue;
+        memcpy(t->report.v, v, sizeof v);
+        memcpy(t->daqp.lam_star, multipliers, sizeof multipliers);
+        break;
     }
 }
 
@@ -249,6 +274,7 @@ static int all_levels(wbc_tick *t, int flag) {
     for (int i = 0; i < M_ALL; i++) out->pushes[i] = -1.0;
     for (int i = 0; i < M_ALL; i++) out->lambda[i] = 0.0;
     if (going) {
+        meet_first(t);
         begin_levels(t);
         if (flag == WBC_SOLVED) held_by_equalities(t);
         for (int level = 0; going && level <= LEVELS; level++) going = one_level(t, level, &error);

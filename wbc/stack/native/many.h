@@ -3,7 +3,7 @@
 #ifndef WBC_MANY_H
 #define WBC_MANY_H
 
-#include "tick.h"
+#include "values.h"
 
 #define REPORT_SIZE sizeof(wbc_report)
 /* Of what the caller writes, which stands between the report and H */
@@ -51,19 +51,52 @@ EXPORT void wbc_tick_suspend(const wbc_tick *t, wbc_carried *to) {
 #endif
 }
 
-/* One tick of each robot. Of a robot whose tick ends with a flag in `left`, bits of 1 << flag, nothing is changed: it is
- * the caller's. Flags with WBC_UNSOUND are bits above, refusals are not expected. */
-EXPORT void wbc_tick_many(wbc_tick *t, long long count, double *inputs, double *reports, wbc_carried *carried, int *flags,
-                          int left) {
-    for (long long k = 0; k < count; k++) {
-        char *input = (char *)inputs + k * (long long)INPUT_SIZE;
-        memcpy(t->q, input, INPUT_SIZE);
-        wbc_tick_resume(t, carried + k);
-        flags[k] = wbc_tick_step(t);
-        if (flags[k] < 0 || (left >> flags[k] & 1)) continue;
-        memcpy((char *)reports + k * (long long)REPORT_SIZE, &t->report, REPORT_SIZE);
-        memcpy(input, t->q, INPUT_SIZE);
-        wbc_tick_suspend(t, carried + k);
+/* A value of each robot: where it is of the first, and how many bytes further of the next (0: one for all); what it is, see
+ * values.h; where it goes in a robot's inputs, and how many numbers it has */
+typedef struct {
+    const char *from;
+    long long stride, kind, at, size;
+} wbc_given;
+
+/* Check values of the robots from `first` up to `end`; 0 where one is refused */
+EXPORT int wbc_many_fit(const wbc_given *given, int values, long long first, long long end) {
+    for (const wbc_given *g = given; g < given + values; g++)
+        for (long long k = first; k < (g->stride ? end : first + 1); k++)
+            if (!is_value((int)g->kind, (int)g->size, (const double *)(g->from + k * g->stride))) return 0;
+    return 1;
+}
+
+/* Write them into the inputs */
+EXPORT void wbc_many_take(double *inputs, const wbc_given *given, int values, long long first, long long end) {
+    for (long long k = first; k < end; k++) {
+        double *to = (double *)((char *)inputs + k * (long long)INPUT_SIZE);
+        for (const wbc_given *g = given; g < given + values; g++)
+            put_value((int)g->kind, (int)g->size, (const double *)(g->from + k * g->stride), to + g->at);
+    }
+}
+
+/* Robots that a thread takes at a time */
+#define PIECE 16
+
+/* One tick of each robot, by several threads with a `t` each: `next` is the first that none has taken. Of a robot whose
+ * tick ends with a flag in `left`, bits of 1 << flag, nothing is changed: it is the caller's. Flags with WBC_UNSOUND are
+ * bits above, refusals are not expected. */
+EXPORT void wbc_tick_many(wbc_tick *t, long long count, long long *next, double *inputs, double *reports,
+                          wbc_carried *carried, int *flags, int left) {
+    for (;;) {
+        const long long first = __atomic_fetch_add(next, PIECE, __ATOMIC_RELAXED);
+        const long long end = first + PIECE < count ? first + PIECE : count;
+        if (first >= end) return;
+        for (long long k = first; k < end; k++) {
+            char *input = (char *)inputs + k * (long long)INPUT_SIZE;
+            memcpy(t->q, input, INPUT_SIZE);
+            wbc_tick_resume(t, carried + k);
+            flags[k] = wbc_tick_step(t);
+            if (flags[k] < 0 || (left >> flags[k] & 1)) continue;
+            memcpy((char *)reports + k * (long long)REPORT_SIZE, &t->report, REPORT_SIZE);
+            memcpy(input, t->q, INPUT_SIZE);
+            wbc_tick_suspend(t, carried + k);
+        }
     }
 }
 

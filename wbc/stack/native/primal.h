@@ -327,12 +327,10 @@ static int primal(wbc_tick *t) {
         t->x[i] = out->v[i] = clamp((double)s.x[i], t->low[i], t->high[i]);
         if (i < DOFS) rounding = larger(rounding, (double)fabsl(s.x[i] - out->v[i]));
     }
-    out->stationarity = out->complementarity = out->violation = 0.0;
+    out->stationarity = out->complementarity = out->violation = t->firm_missed = 0.0;
     for (int i = 0; i < NV; i++) out->stationarity = larger(out->stationarity, fabs((double)s.G[i]));
     for (int k = 0; k < MC; k++) {
-        if (is_soft(t, NV + k)) continue;
-        const double value = row_at(t, k, out->v);
-        out->violation = larger(out->violation, larger(t->low[NV + k] - value, value - t->high[NV + k]));
+        if (!is_soft(t, NV + k)) count_violation(t, k, row_at(t, k, out->v));
     }
     out->error_bound = bound + rounding;
     for (int i = 0; i < M_ALL; i++) t->keep[i] = is_soft(t, i) ? 0 : s.active[i];

@@ -120,15 +120,21 @@ static int find_free(const wbc_tick *t, const double *slope, double *free) {
     return blocked;
 }
 
+/* Entries between a blocked joint and others times 1 - share (1 - free free'): that of the others is 1 */
+INLINE void blend(double *matrix, const double *free, double share) {
+    for (int i = 0; i < NV; i++) {
+        if (free[i] == 1.0) continue;
+        for (int j = 0; j < i; j++)
+            if (free[j] == 1.0) matrix[j * WIDE + i] *= 1.0 - share * (1.0 - free[i]);
+        for (int j = i + 1; j < NV; j++) matrix[i * WIDE + j] *= 1.0 - share * (1.0 - free[i] * free[j]);
+    }
+}
+
 /* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
 static int cut_off(wbc_tick *t, const double *free, double more) {
     load(t);
-    for (int i = 0; i < NV; i++) {
-        double *row = t->R + i * WIDE;
-        const double own = row[i];
-        for (int at = i & ~7; at < WIDE; at += 4) FOUR(row + at) *= EACH(free[i]) * GIVEN_FOUR(free + at);
-        row[i] = own + more / (dof_scale[i] * dof_scale[i]);
-    }
+    blend(t->R, free, 1.0);
+    for (int i = 0; i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
     t->prepared = 0;
     return decompose(t);
 }
@@ -235,22 +241,17 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
 #if LEVELS > 0
     memset(t->curvature, 0, sizeof t->curvature);
 #endif
-    for (int i = 0; i < NV; i++) {
-        double *row = t->H + i * WIDE;
-        const double own = row[i];
-        for (int at = i & ~7; at < WIDE; at += 4)
-            FOUR(row + at) *= EACH(1.0) - EACH(share) * (EACH(1.0) - EACH(free[i]) * GIVEN_FOUR(free + at));
-        row[i] = own;
-    }
-    for (int e = 0; e < NNZK; e++) {
-        const int i = k_row[e], j = k_col[e];
-        const double entry = share * free[i] * free[j] * t->curvature_entries[e];
-        most[e & 3] = larger(fabs(entry) * dof_scale[i] * dof_scale[j], most[e & 3]);
-        t->H[i * WIDE + j] += entry;
+    blend(t->H, free, share);
+    for (int first = 0; first < NNZK; first += 4)
+        for (int n = 0; n < 4 && first + n < NNZK; n++) {
+            const int e = first + n, i = k_row[e], j = k_col[e];
+            const double entry = share * free[i] * free[j] * t->curvature_entries[e];
+            most[n] = larger(fabs(entry) * dof_scale[i] * dof_scale[j], most[n]);
+            t->H[i * WIDE + j] += entry;
 #if LEVELS > 0
-        t->curvature[i * NV + j] = t->curvature[j * NV + i] = entry;
+            t->curvature[i * NV + j] = t->curvature[j * NV + i] = entry;
 #endif
-    }
+        }
     return larger(larger(most[0], most[1]), larger(most[2], most[3]));
 }
 

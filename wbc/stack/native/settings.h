@@ -46,9 +46,10 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Proximal steps of a relaxation at most, and the change of a row at which they end */
 #define PROXIMAL_STEPS 12
 #define SETTLED 1e-11
-/* Violations of bounds and rows that never give way which a relaxation may leave, in row units */
+/* Violations of bounds and rows that never give way which a relaxation may leave, in row units, and an answer, of LONGEST:
+ * torques are cut to their limits, and what an answer misses of those the accelerations that are sent do not get */
 #define FIRMLY 1e-8
-/* Corrections of the point of a relaxation */
+/* Corrections of a point of a relaxation or of a level, so that it meets its active rows */
 #define MEETINGS 3
 /* Multipliers above this share of the largest one of the class that gives way are not rounding */
 #define PUSHING 1e-6
@@ -138,9 +139,13 @@ INLINE double row_at(const wbc_tick *t, int k, const double *v) {
 
 /* 1 if no entry is NaN or infinite */
 INLINE int all_finite(const double *x, int count) {
-    int bad = 0;
-    for (int i = 0; i < count; i++) bad |= !(fabs(x[i]) <= DBL_MAX);
-    return !bad;
+    /* 0 times what is not finite is NaN */
+    double sum = 0.0;
+    four sums = {0};
+    int i = 0;
+    for (; i + 4 <= count; i += 4) sums += GIVEN_FOUR(x + i) * EACH(0.0);
+    for (; i < count; i++) sum += x[i] * 0.0;
+    return sum + SUM_OF_FOUR(sums) == 0.0;
 }
 
 #endif

@@ -63,7 +63,7 @@ static void partly(wbc_tick *t, const double *found, double share) {
 static void stop_early(wbc_tick *t, int first) {
     double found[NV];
     if (first) {
-        ldp2qp_solution(&t->daqp);
+        point(t);
         remember(t);
     }
     memcpy(found, t->x, sizeof found);

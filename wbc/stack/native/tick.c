@@ -33,7 +33,8 @@ static int unsound(const wbc_tick *t, int flag) {
     if (flag == WBC_CAPPED) return 0;
     if (flag == WBC_BRAKED) return t->unusable == 0.0 && !t->proven;
     const int optimal = t->report.stationarity <= OPTIMAL && t->report.complementarity <= OPTIMAL;
-    return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && t->report.violation <= SOUND * LONGEST);
+    const int met = t->report.violation <= SOUND * LONGEST && t->firm_missed <= FIRMLY * LONGEST;
+    return !((optimal || t->report.error_bound <= KNOWN * LONGEST) && met);
 }
 
 #if LEVELS == 0

@@ -127,6 +127,7 @@ typedef struct {
     int warm;                    /* the sense array holds the active set of the last tick */
     int spent;                   /* the cap has ended a search of this tick */
     double met[NV];              /* where the classes of a relaxation met */
+    double firm_missed;          /* the largest violation of a row that never gives way */
     int proven;                  /* nothing within the bounds keeps the rows that never give way */
     int brief;                   /* iterations of a search that may fail; 0: as many as it takes */
     int alone;                   /* no row binds: R^-1 is all that a refinement needs */

@@ -37,27 +37,28 @@ static int is_configuration(const double *q) {
     return 1;
 }
 
+/* Whether `size` numbers are a value of this kind */
+INLINE int is_value(int kind, int size, const double *x) {
+    if (kind == VALUE_POSE) return is_pose(x);
+    for (int i = 0; i < size; i++)
+        if (!(fabs(x[i]) < LARGEST_VALUE)) return 0;
+    return kind != VALUE_CONFIGURATION || is_configuration(x);
+}
+
+INLINE void put_value(int kind, int size, const double *x, double *to) {
+    /* Of a pose: the rotation by columns, then the position */
+    for (int i = 0; kind == VALUE_POSE && i < 12; i++) to[i] = x[4 * (i % 3) + i / 3];
+    if (kind != VALUE_POSE) memcpy(to, x, (size_t)size * sizeof(double));
+}
+
 /* Take values over that stand in `from`, one after the other; 0, and no change, where one of them is refused.
  * `plan` has of each: what it is, where it goes in p, how many numbers it has. */
 EXPORT int wbc_tick_take(wbc_tick *t, const double *from, const int *plan, int count) {
     const double *x = from;
-    for (int k = 0; k < count; k++) {
-        const int kind = plan[3 * k], size = plan[3 * k + 2];
-        if (kind == VALUE_POSE && !is_pose(x)) return 0;
-        if (kind != VALUE_POSE)
-            for (int i = 0; i < size; i++)
-                if (!(fabs(x[i]) < LARGEST_VALUE)) return 0;
-        if (kind == VALUE_CONFIGURATION && !is_configuration(x)) return 0;
-        x += size;
-    }
+    for (int k = 0; k < count; x += plan[3 * k++ + 2])
+        if (!is_value(plan[3 * k], plan[3 * k + 2], x)) return 0;
     x = from;
-    for (int k = 0; k < count; k++) {
-        double *to = t->p + plan[3 * k + 1];
-        /* Of a pose: the rotation by columns, then the position */
-        for (int i = 0; plan[3 * k] == VALUE_POSE && i < 12; i++) to[i] = x[4 * (i % 3) + i / 3];
-        if (plan[3 * k] != VALUE_POSE) memcpy(to, x, (size_t)plan[3 * k + 2] * sizeof(double));
-        x += plan[3 * k + 2];
-    }
+    for (int k = 0; k < count; x += plan[3 * k++ + 2]) put_value(plan[3 * k], plan[3 * k + 2], x, t->p + plan[3 * k + 1]);
     return 1;
 }
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.rotations import matrices, quaternion
 from wbc.trajectory.jerk.joined_courses import STILL
 from wbc.trajectory.jerk.via_speeds import SpeedBounds, ViaCorners, corner_speeds
 from wbc.trajectory.laws.law import Law
@@ -26,7 +27,7 @@ from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
 from wbc.trajectory.paths.pose_paths import standing_pose
-from wbc.trajectory.paths.turning import TwoTurns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import TwoTurns, turn_between
 from wbc.validation import Array
 
 #: Segments below this length are rotations on the spot [m]

@@ -14,9 +14,9 @@ import numpy as np
 
 from wbc import style, validation
 from wbc.errors import LawFileError, ShapeError
+from wbc.rotations import quaternion
 from wbc.trajectory.laws.certificate import ORDERS, LawPieces, Worst
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.paths.turning import quaternion
 from wbc.validation import Array
 
 #: Points of every curve, at least

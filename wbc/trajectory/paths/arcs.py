@@ -9,10 +9,11 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.rotations import matrices, quaternion
 from wbc.trajectory.paths.path import Path, PolynomialPath
 from wbc.trajectory.paths.pose_path import Circle, PosePath
 from wbc.trajectory.paths.pose_paths import LARGEST_TURN, RADIUS, standing_pose
-from wbc.trajectory.paths.turning import TwoTurns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import TwoTurns, turn_between
 from wbc.trajectory.paths.waypoints import SMALLEST, distance
 from wbc.validation import Array
 

@@ -19,11 +19,12 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.rotations import matrices, quaternion
 from wbc.trajectory.paths.corners import DEEPEST, RoundedCorners, rounded
 from wbc.trajectory.paths.joint_paths import standing_path
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
-from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns, matrices, quaternion, turn_between
+from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns, turn_between
 from wbc.trajectory.paths.waypoints import ENDS, Ends, cubic_spline, distance, kept, summed
 from wbc.validation import Array
 

@@ -5,12 +5,12 @@ Each gives the rotation matrix R(s), and w(s) with dR/ds = [w]x R in world axes,
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError
+from wbc.rotations import exponential, matrices
 from wbc.trajectory.paths import bernstein
 from wbc.trajectory.paths.path import Index, PolynomialPath
 from wbc.validation import Array
@@ -120,37 +120,6 @@ class QuaternionSpline:
         ddsize += 2.0 * np.einsum("mi,mi->m", value, parts[2])[:, None]
         out = ddn / size - (2.0 * dn * dsize + n * ddsize) / size**2 + 2.0 * n * dsize**2 / size**3
         return np.asarray(out)
-
-
-def exponential(turns: Array) -> Array:
-    """Rotation matrices of rotation vectors, m x 3 [rad]: 1 + sin(t) K + (1 - cos(t)) K^2, by Rodrigues."""
-    angles = np.linalg.norm(turns, axis=1)
-    axes = turns / np.where(angles > 0.0, angles, 1.0)[:, None]
-    x, y, z = axes.T
-    cross = np.zeros((len(turns), 3, 3))
-    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -z, y, -x
-    cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = z, -y, x
-    sines, halves = np.sin(angles)[:, None, None], np.sin(0.5 * angles)[:, None, None]
-    out: Array = np.eye(3) + sines * cross + 2.0 * halves**2 * (cross @ cross)
-    return out
-
-
-def matrices(quaternions: Array) -> Array:
-    """Rotation matrices of unit quaternions x, y, z, w, m x 4."""
-    x, y, z, w = quaternions.T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
-
-
-def quaternion(rotation: Any) -> Array:
-    """Unit quaternion x, y, z, w of a rotation matrix that may be off by rounding."""
-    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
-    q = np.asarray(pin.SE3ToXYZQUAT(pin.SE3(np.asarray(rotation), np.zeros(3)))[3:], dtype=np.float64)
-    return np.asarray(q / np.linalg.norm(q))
 
 
 def turn_between(first: Array, second: Array) -> Array:

@@ -23,6 +23,9 @@ from wbc.walking.planner.swings.swings import SETTLE
 STRAY, EVERY, ARM = 0.002, 10, 1.3
 #: Path time that the body's way is proven ahead, and what is left of it when it is looked at again [s]
 AHEAD, LEFT = 1.0, 0.4
+#: Part of their rates that joints get of a hand that has to go slower, and the least part of its pace; what an arm is
+#: off its way does not count any more after [s]
+RATE, SLOWEST, SETTLED = 0.96, 0.3, 0.3
 
 
 class Course(NamedTuple):
@@ -92,9 +95,18 @@ class Caution:
         return self._near(None, Timing(times, np.full(2, self._progress.path_time), times))
 
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
-        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
+        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
+
+        A hand whose joints would need more than their rates, as the body stands that was to go with it, goes slower
+        from now on: it could not follow, and would swing beyond its way as that ends.
+        """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
+        fastest = self._fastest(swinging, when.times)
+        if fastest > 1.0 and swinging.part > SLOWEST:
+            swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
+            when = self.timing(swinging, course)
+            found = self._near(swinging, when)
         if found is None:
             self._known = self._progress.plan.path, swinging, course.stands
             self.until = self._progress.path_time
@@ -102,6 +114,15 @@ class Caution:
             places = np.concatenate([self._rows[:, :7], self.sight.hand(swinging.arm, self._rows)], axis=1)
             self._foreseen = self._machine.time, when.times, places
         return found
+
+    def _fastest(self, swinging: Swinging, times: Array) -> float:
+        """The greatest rate of the swinging arm's joints in what was foreseen last, in parts of their limits, once it
+        is back on its way.
+        """
+        arm = self._machine.walker.arms[swinging.arm]
+        since = min(int(np.searchsorted(times, SETTLED)), len(times) - 2)
+        rates = np.diff(self._rows[since:, arm.q], axis=0) / np.diff(times[since:])[:, None]
+        return float((np.abs(rates) / self._machine.walker.robot.limits.velocity[arm.v]).max())
 
     def strays(self, swinging: Swinging) -> bool:
         """Whether body and hand are elsewhere than they were foreseen, as far as that is looked at now."""

@@ -16,7 +16,7 @@ from wbc.walking.loop.state import Swinging
 BEHIND = 0.02
 #: A swing waits for a hand that is behind its aim or beside it: full pace up to the first [m], least pace beyond the
 #: second. As it comes to the distance at which it may be near to what its hold is mounted on, within :data:`OVER` of
-#: it [m], it is over the hold
+#: it [m], it is over the hold; so is one that leaves a hold, from where it is to beyond that distance
 BESIDE, WAITS, LEAST_PACE = 0.0008, 0.005, 0.05
 OVER = (0.06, 0.16)
 #: A hand is near its hold from this part of the wrist's motion on; its joints are then this near to theirs [rad]
@@ -31,12 +31,15 @@ HAND_RAMP, RAMP_AGAIN = 0.2, 0.5
 HAND_STOP = 0.3
 
 
-def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace: float, far: float) -> float:
+def hand_pace(
+    swinging: Swinging, place: Array, turned: bool, early: float, pace: float, far: tuple[float, float]
+) -> float:
     """Part of full speed at which the aim of a hand should go on.
 
     Args:
         place: of the hand [m]. turned: its wrist is on the branch that it lands with.
-        early: path time until the hold can be held [s]. pace: of the body. far: the hand is from its hold [m].
+        early: path time until the hold can be held [s]. pace: of the body.
+        far: the hand is from where it began, and from its hold [m].
     """
     aim = swinging.aim
     # In plain floats: three numbers are too few for numpy to be quick
@@ -46,7 +49,7 @@ def hand_pace(swinging: Swinging, place: Array, turned: bool, early: float, pace
     across = sqrt(max(x * x + y * y + z * z - along * along, 0.0))
     # A hand that is ahead must not be stopped: it could not
     off = max(along, 0.0) + across
-    least, most = (BESIDE, WAITS) if OVER[0] < far < OVER[1] else (0.5 * BEHIND, 1.5 * BEHIND)
+    least, most = (BESIDE, WAITS) if far[0] < OVER[1] or OVER[0] < far[1] < OVER[1] else (0.5 * BEHIND, 1.5 * BEHIND)
     wanted = min(max((most - off) / (most - least), LEAST_PACE), 1.0)
     wait = early - pace * (swinging.law.duration - swinging.clock)
     if wait > 0.0:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import ShapeError
+from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
 from wbc.walking.loop.hand_pace import LANDING, at_rest, hand_pace, ramp_of, turned
@@ -75,7 +76,7 @@ class ArmLeader:
         """The body where the path begins, the arms on their grips."""
         walker, progress = self._machine.walker, self._progress
         q, begin = np.array(walker.robot.neutral), pin.SE3(progress.plan.path.poses[0])
-        q[:3], q[3:7] = begin.translation, pin.Quaternion(begin.rotation).coeffs()
+        q[:3], q[3:7] = begin.translation, quaternion(begin.rotation)
         for arm, grip in zip(walker.arms, progress.grip, strict=True):
             q[arm.q] = progress.grips.posture(np.array(grip), np.array(0))
         return q
@@ -93,7 +94,8 @@ class ArmLeader:
         if swinging.state == "opening":
             swinging.open_on(self._dt)
         elif swinging.state == "open":
-            far = dist(swinging.place, machine.structure.positions[swinging.hold])
+            ends = swinging.law.places[0], machine.structure.positions[swinging.hold]
+            far = dist(swinging.place, ends[0]), dist(swinging.place, ends[1])
             wanted = min(hand_pace(swinging, swinging.place, at_branch, early, pace, far), swinging.most)
             stops = aborted or swinging.dropped or swinging.pauses
             wanted, change = (0.0, self._dt / self.stops.hand) if stops else (wanted, self._dt / ramp_of(swinging))
@@ -129,6 +131,7 @@ class Hands:
 
     Attributes:
         swinging: the swinging hand. manual: a hand that is moved by itself, see :mod:`wbc.walking.modes.arm_mode`.
+        over: row of a hand that comes to rest over a hold, and of that, see :mod:`wbc.walking.loop.coasting`.
     """
 
     def __init__(self, machine: Machine, stack: WalkStack, grasps: Callable[[str, str], bool]) -> None:
@@ -136,6 +139,7 @@ class Hands:
         self.data = machine.walker.tolerances
         self.swinging: Swinging | None = None
         self.manual: Manual | None = None
+        self.over: dict[int, int] = {}
         self._arms = range(len(machine.walker.arms))
         self._landed = (-1, 0.0)
 
@@ -250,7 +254,7 @@ class Hands:
 
     def holds(self) -> tuple[int, ...]:
         """Row of the hold that each hand is at or goes to, -1 for none."""
-        held = self.machine.held
+        held = self.machine.held | self.over
         out = [held.get(arm, -1) for arm in self._arms]
         if self.swinging is not None:
             out[self.swinging.arm] = -1 if self.swinging.dropped else self.swinging.hold

@@ -55,6 +55,7 @@ class Swinging:
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
         waits: the body stands until the hand has landed.
         pauses: hand and body come to rest where they are, and then it goes on. paused: how often they have.
+        part: of full speed that its joints allow while the body goes as it does now.
         dropped: it does not go to its hold any more, but comes to rest on its law.
     """
 
@@ -67,6 +68,7 @@ class Swinging:
     waits: bool = False
     pauses: bool = False
     paused: int = 0
+    part: float = 1.0
     dropped: bool = False
     clock: float = 0.0
     pace: float = 1.0
@@ -89,7 +91,7 @@ class Swinging:
         """The pace that it may have: a hand that goes on from a pause speeds up, and the body with it, on a law that
         was made for joints near their accelerations, so it leaves them some.
         """
-        return AFTER_PAUSE if self.paused else 1.0
+        return min(self.part, AFTER_PAUSE if self.paused else 1.0)
 
     def open_on(self, dt: float) -> None:
         """The latch of an opening hand goes on for a tick [s]; when it is through, the hand is open."""

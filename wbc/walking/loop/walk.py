@@ -121,7 +121,10 @@ class Walk:
             sight = Foresight(walker, structure)
             self.replanner.sight, sight.left = sight, machine.left
             self._caution = Caution(sight, machine, self.progress, self.leader.stops)
-        self._coasting = None if state is None else Coasting.of(walker, state, self.leader.stops.brake, self.dt)
+        self._coasting = None
+        if state is not None:
+            self._coasting = Coasting.of(walker, structure, state, self.leader.stops.brake, self.dt)
+            self.hands.over = {} if self._coasting is None else self._coasting.over
 
     @property
     def q(self) -> Array:
@@ -172,7 +175,7 @@ class Walk:
     def still(self) -> bool:
         """Neither the body nor a hand is commanded to move."""
         swinging = None if self.leader.one_motion else self.swinging
-        if self._coasting is not None and not self._coasting.over:
+        if self._coasting is not None and not self._coasting.done:
             return False
         return self.pace == 0.0 and (swinging is None or (swinging.state == "open" and swinging.pace == 0.0))
 
@@ -224,9 +227,10 @@ class Walk:
             machine.rest()
             raise HoldLost("hands", len(machine.held), f"at least {self.walker.min_holds} must hold")
         coasting = self._coasting
-        if coasting is not None and coasting.over:
+        if coasting is not None and coasting.done:
             for arm in coasting.free:
                 hands.settle_in_air(arm)
+            hands.over = {}
             coasting = self._coasting = None
         if coasting is not None:
             coasting.go(self.stack)

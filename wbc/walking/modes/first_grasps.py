@@ -7,10 +7,10 @@ from math import radians
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.robots import Walker
+from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
@@ -34,7 +34,7 @@ def free_state(walker: Walker, pose: Any, posture: Sequence[float] = FOLDED) -> 
     where = validation.pose("pose", pose)
     angles = validation.real_array("posture", posture, (6,))
     q = np.array(walker.robot.neutral)
-    q[:3], q[3:7] = where.translation, pin.Quaternion(where.rotation).coeffs()
+    q[:3], q[3:7] = where.translation, quaternion(where.rotation)
     for arm in walker.arms:
         q[arm.q] = angles
     return State(q, {})

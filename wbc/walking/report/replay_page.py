@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import WbcError
+from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import PlacedShape
 from wbc.track import render
 from wbc.track.scene import simplified
@@ -71,7 +72,7 @@ def _recorded(server: Any, run: WalkRun, log: WalkLog, stop: Callable[[], bool] 
     # The structure as it stands in the pictures: up is away from it
     scene.set_up_direction("+z")
     _look(server, log, turn, DISTANCE * surroundings.scale(run.walker))
-    scene.add_frame("/walk", show_axes=False, wxyz=_wxyz(turn.rotation), position=turn.translation)
+    scene.add_frame("/walk", show_axes=False, wxyz=quaternion(turn.rotation)[TO_MUJOCO], position=turn.translation)
     _add_structure(scene, run, log)
     handles = [_add_part(scene, k, part) for k, part in enumerate(parts)]
     marks = [_add_mark(scene, run, k) for k in range(len(run.walker.arms))]
@@ -138,7 +139,7 @@ def _show(run: WalkRun, log: WalkLog, row: int, parts: list[Part], handles: list
     """Everything that moves, at a row of the log."""
     poses = part_poses(run.walker, parts, configuration(run.walker, log, row))
     for handle, pose in zip(handles, poses, strict=True):
-        handle.position, handle.wxyz = pose.translation, _wxyz(pose.rotation)
+        handle.position, handle.wxyz = pose.translation, quaternion(pose.rotation)[TO_MUJOCO]
     held = {arm: hold for hold, arm in held_by(log, row).items()}
     for arm, mark in enumerate(marks):
         if bool(mark.visible) != (arm in held):
@@ -146,10 +147,4 @@ def _show(run: WalkRun, log: WalkLog, row: int, parts: list[Part], handles: list
         if arm in held:
             frame = run.structure.frames[held[arm]]
             if not np.allclose(mark.position, frame[:3, 3], atol=1e-6):
-                mark.position, mark.wxyz = frame[:3, 3], _wxyz(frame[:3, :3])
-
-
-def _wxyz(rotation: Array) -> Array:
-    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
-    x, y, z, w = pin.SE3ToXYZQUAT(pin.SE3(rotation, np.zeros(3)))[3:]
-    return np.array([w, x, y, z])
+                mark.position, mark.wxyz = frame[:3, 3], quaternion(frame[:3, :3])[TO_MUJOCO]

@@ -207,7 +207,7 @@ class ResumeMode(Mode[PathRequest]):
         self._state = resumed_state(old, row, walker, self._there)
         asked = resume.points or "way" not in old.meta
         whole = request.path(walker.arm_data) if asked else path_of(old.meta["way"])
-        coasting = Coasting.of(walker, self._state, Stops.of(walker, DT).brake, DT)
+        coasting = Coasting.of(walker, self._there, self._state, Stops.of(walker, DT).brake, DT)
         self._stands = self._state if coasting is None else coasting.state(self._state)
         self.path = _rest(pin.XYZQUATToSE3(self._stands.q[:7]), whole, request)
 

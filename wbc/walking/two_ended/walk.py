@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.robots import Walker
+from wbc.rotations import quaternion
 from wbc.simulation import Plant
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath
@@ -79,7 +80,7 @@ class TurnLeader:
         """The body where the path begins, the arm on its grips, and then where the held hands have it."""
         machine, progress = self._machine, self._progress
         q, begin = np.array(machine.walker.robot.neutral), pin.SE3(progress.plan.path.poses[0])
-        q[:3], q[3:7] = begin.translation, pin.Quaternion(begin.rotation).coeffs()
+        q[:3], q[3:7] = begin.translation, quaternion(begin.rotation)
         for arm, grip in zip(machine.walker.arms, progress.grip, strict=True):
             q[arm.q] = progress.grips.posture_at(grip, 0)[: len(arm.joints)]
         return machine.chain.settle(q, machine.held)[0]

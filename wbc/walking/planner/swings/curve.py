@@ -162,8 +162,9 @@ def between(
     there = around(walker, structure)
     lack = np.stack([np.maximum(height - there.height(end), 0.0) for end in ends], axis=1)
     # However a hand in the air is turned, it goes straight away from what it is near to
+    near = (free > 0) & (lack > 0.0)
     leave, arrive = (
-        np.where(((free[:, side] > 0) & (lack[:, side] > 0.0))[:, None], -_upwards(there, ends[side]), axes[side])
+        np.where(near[:, side, None], -_upwards(there, ends[side]), axes[side]) if near[:, side].any() else axes[side]
         for side in (0, 1)
     )
     flat = replace(flat, leave=leave, arrive=arrive)

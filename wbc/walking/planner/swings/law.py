@@ -128,7 +128,8 @@ def least_time_law(
     duration = max(fastest, least)
     slower = duration / fastest
     times, rate = found.time[0] * slower, found.rate[0] / slower
-    rows = rows_over(duration)
+    # One that is not possible may take minutes; only its duration counts
+    rows = rows_over(duration, None if found.possible[0] else FINE)
     # Between points of the law the acceleration is constant
     low = np.clip(np.searchsorted(times, rows, side="right") - 1, 0, FINE - 2)
     since = rows - times[low]

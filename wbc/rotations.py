@@ -1,0 +1,44 @@
+"""Rotation vectors, matrices and unit quaternions, as numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wbc.validation import Array
+
+#: Entries of x, y, z, w, which is Pinocchio's order, in MuJoCo's and viser's, which is w, x, y, z; and back
+TO_MUJOCO, TO_PINOCCHIO = [3, 0, 1, 2], [1, 2, 3, 0]
+
+
+def exponential(turns: Array) -> Array:
+    """Rotation matrices of rotation vectors, m x 3 [rad]: 1 + sin(t) K + (1 - cos(t)) K^2, by Rodrigues."""
+    angles = np.linalg.norm(turns, axis=1)
+    axes = turns / np.where(angles > 0.0, angles, 1.0)[:, None]
+    x, y, z = axes.T
+    cross = np.zeros((len(turns), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -z, y, -x
+    cross[:, 1, 0], cross[:, 2, 0], cross[:, 2, 1] = z, -y, x
+    sines, halves = np.sin(angles)[:, None, None], np.sin(0.5 * angles)[:, None, None]
+    out: Array = np.eye(3) + sines * cross + 2.0 * halves**2 * (cross @ cross)
+    return out
+
+
+def matrices(quaternions: Array) -> Array:
+    """Rotation matrices [..., 3, 3] of unit quaternions x, y, z, w, [..., 4]."""
+    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def quaternion(rotation: Any) -> Array:
+    """Unit quaternion x, y, z, w of a rotation matrix that may be off by rounding."""
+    # Not pin.Quaternion(rotation), whose 80 bytes pin 4.1 never frees
+    q = np.asarray(pin.SE3ToXYZQUAT(pin.SE3(np.asarray(rotation), np.zeros(3)))[3:], dtype=np.float64)
+    return np.asarray(q / np.linalg.norm(q))
