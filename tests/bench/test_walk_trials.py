@@ -16,6 +16,7 @@ from bench.sheet import Sheet
 from bench.walk import second_checker, trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, capsule_between, random_structure
+from bench.walk.torque_trials import ARMS, Draw
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
 from bench.walk.trials import Spent, names, tried
 from tests.repeats import repeats
@@ -30,6 +31,7 @@ from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.torque.faults import Fault
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -60,7 +62,19 @@ def test_an_unknown_family_is_refused() -> None:
 
 def test_names_of_trials() -> None:
     assert names("structures", 9) == [*(f"{family} 0" for family in FAMILIES), "posts 1", "bars 1"]
-    assert [len(names(part, 500)) for part in ("structures", "velocity", "resume", "vanish")] == [500, 200, 200, 100]
+    parts = ("structures", "velocity", "resume", "vanish", "torque")
+    assert [len(names(part, 500)) for part in parts] == [500, 200, 200, 100, 100]
+
+
+def test_draws_of_walks_under_torques_are_those_of_their_seeds(tmp_path: Path) -> None:
+    draws = [Draw.of(seed, tmp_path, 0.4) for seed in range(12)]
+    assert draws == [Draw.of(seed, tmp_path, 0.4) for seed in range(12)]
+    assert len({draw.words for draw in draws}) == 12
+    assert {draw.plant for draw in draws} == {"pinocchio", "mujoco"}
+    for draw in draws:
+        assert np.linalg.norm(draw.gravity) <= ARMS[draw.arms] + 1e-3
+        if draw.fault:
+            assert Fault.read(draw.fault).kind in draw.fault
 
 
 def test_a_refusal_counts_processor_time_also_where_a_part_of_the_way_was_planned(

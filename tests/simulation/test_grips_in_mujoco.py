@@ -52,6 +52,21 @@ def test_grips_hold_and_bear_what_rigid_ones_do(plant: GrippingMujocoPlant, kind
         assert plant.wrenches[hand] == pytest.approx(other.wrenches[hand], abs=0.5)
 
 
+def test_a_frame_that_closes_beside_its_hold_is_drawn_there_and_not_struck(plant: GrippingMujocoPlant) -> None:
+    """exp(-rate t) of 0.1 mm, with 5 N; springs that took it up at once pushed with 270 N."""
+    plant.reset(ROBOT.neutral, 0.0)
+    there = ROBOT.pose(ROBOT.neutral, HANDS[0])
+    off = np.array([1e-4, 0.0, 0.0])
+    plant.grasp(HANDS[0], pin.SE3(there.rotation, there.translation + off), GripKind.AXIS)
+    most = 0.0
+    for k in range(1, 101):
+        plant.advance(0.001)
+        most = max(most, float(np.abs(plant.wrenches[HANDS[0]][:3]).max()))
+        gap = plant.grips[HANDS[0]].pose.translation - ROBOT.pose(plant.read().q, HANDS[0]).translation
+        assert gap == pytest.approx(np.exp(-0.02 * k) * off, abs=1e-5)
+    assert most < 10.0
+
+
 def test_wrenches_are_in_the_axes_of_a_frame_that_rolls_on_its_hold(plant: GrippingMujocoPlant) -> None:
     """M a + h = tau + J'w, by Pinocchio, long after the hand has rolled away from where it closed."""
     plant.reset(ROBOT.neutral, 0.0)

@@ -90,7 +90,7 @@ def compare_controllers(
         loaded(scenario.robot, condition.payload, condition.heavier, scenario.frame)
     names = scenario.names(only or ())
     written = ("controllers.json", "controllers-*.png")
-    folder = run_folder(out, "controllers", written, force, clear=False)
+    folder = run_folder(out, "controllers", written, force, clear=False, made=False)
     found: list[Compared] = []
     total = sum(len(names) * scenario.seconds * condition.rate for condition in conditions)
     rows: list[dict[str, object]] = []

@@ -19,6 +19,7 @@ def run_folder(
     *,
     field: str = "out",
     clear: bool = True,
+    made: bool = True,
 ) -> Path:
     """The folder that was asked for, or a new one ``runs/NAME-TIME``; made, and without the files of an earlier run.
 
@@ -26,6 +27,7 @@ def run_folder(
         wanted: None: a new one. written: names, or patterns, of all files that such a run writes.
         force: write into a folder that has such a file. field: the option, for errors.
         clear: False: the files of an earlier run stay until :func:`filled` has those of the new one.
+        made: False: a new folder is not made yet: whoever is killed before there is something in it leaves none.
 
     Raises:
         OutputError: it has a file of a run and ``force`` is off, or it cannot be written.
@@ -36,6 +38,7 @@ def run_folder(
         if there and not force:
             reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
             raise OutputError(field, str(folder), reason)
+        known = folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
         for file in there if clear else ():
             file.unlink()
@@ -43,6 +46,8 @@ def run_folder(
         probe = folder / ".probe"
         probe.touch()
         probe.unlink()
+        if not made and not known:
+            folder.rmdir()
     except (OSError, ValueError) as error:
         raise OutputError(field, str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
     return folder
@@ -57,7 +62,7 @@ def filled(folder: Path, replaced: Sequence[str] = ()) -> Iterator[Path]:
     """
     fresh = folder / ".writing"
     shutil.rmtree(fresh, ignore_errors=True)
-    fresh.mkdir()
+    fresh.mkdir(parents=True)
     try:
         yield fresh
         for old in [file for pattern in replaced for file in folder.glob(pattern)]:

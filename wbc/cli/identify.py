@@ -45,7 +45,7 @@ def identify(
 
     machine = robots.load(robot)
     written = ("identified.json", "motion.png", "motion.npz")
-    folder = run_folder(out, "identify", written, force, clear=False)
+    folder = run_folder(out, "identify", written, force, clear=False, made=False)
     with progress_bar() as bar:
         task = bar.add_task("motions", total=tries + 1)
         done = experiment(machine, far=far, noise=noise, tries=tries, seed=seed, tick=lambda: bar.advance(task))

@@ -94,6 +94,7 @@ def published_figures(run: PublishedRun) -> list[Figure]:
 def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path]:
     """Writes ``published.npz``, the fields of the walker's log, and a plot of holds over time; returns the files."""
     file, log = folder / FILE, run.log
+    folder.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(file, allow_pickle=False, **{f.name: np.array(getattr(log, f.name)) for f in fields(log)})
     with style.pyplot() as plt:
         figure, panel = plt.subplots(figsize=(9.2, 3.6), layout="constrained")

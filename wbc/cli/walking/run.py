@@ -38,8 +38,8 @@ ARMS = 2, 6
 
 
 def new_folder(structure: str, output: Path | None, force: bool) -> Path:
-    """The folder that was asked for, or a new one under ``runs``."""
-    return run_folder(output, f"walk-{Path(structure).stem}", WRITTEN, force)
+    """The folder that was asked for, or a new one under ``runs``; made when the walk begins."""
+    return run_folder(output, f"walk-{Path(structure).stem}", WRITTEN, force, made=False)
 
 
 def changed_machine(changes: list[str], two_ended: bool = False, arms: int | None = None) -> Walker:

@@ -27,7 +27,7 @@ def begin_folder(
     structure: Structure,
     plant: Mapping[str, Any] | None = None,
 ) -> None:
-    """Writes what a run needs to be begun again, gone on with and checked, whenever it ends.
+    """Makes the folder and writes what a run needs to be begun again, gone on with and checked, whenever it ends.
 
     Args:
         asked: the run's request as plain data. plant: what moves, as plain data; None: the kinematic one.
@@ -37,6 +37,10 @@ def begin_folder(
     """
     begun = {"request": asked, "machine": machine_of(machine), **({} if plant is None else {"plant": plant})}
     text = json.dumps(begun, indent=1) + "\n"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WalkLogError("path", str(folder), f"cannot be made: {error.strerror}") from error
     write_whole(folder / BEGUN, lambda file: file.write_text(text))
     save_structure(structure, folder / STRUCTURE)
     write_whole(folder / URDF, machine.urdf)
