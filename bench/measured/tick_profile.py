@@ -53,6 +53,9 @@ def parts() -> dict[str, Sheet | str]:
     with tempfile.TemporaryDirectory(prefix="wbc-profile-") as place:
         work = Path(place)
         _run(["git", "worktree", "add", "--detach", str(work / "tree"), BEFORE], ROOT)
+        # An editable installation leads to these folders of its own tree, wherever the package is imported from
+        for name in ("tasks", "robots"):
+            (work / "tree" / "wbc" / name).symlink_to(work / "tree" / name)
         try:
             folders = {"before": _built(work / "before", work / "tree", problems)}
         finally:

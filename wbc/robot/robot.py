@@ -279,7 +279,12 @@ class Robot:
 
         so that one interval of the leader, times the ratio, is that of each follower. Where ranges exclude each other
         it is the leader's own. Efforts stay as they are.
+
+        Raises:
+            ShapeError: no Limits, or of another number of degrees of freedom.
         """
+        limits = validation.instance("limits", limits, Limits, "wbc.robot.Limits")
+        validation.real_array("limits.velocity", limits.velocity, (self.nv,), finite=False)
         if not self.couplings:
             return limits
         low, high = limits.position_lower.copy(), limits.position_upper.copy()
