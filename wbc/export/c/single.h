@@ -74,13 +74,13 @@ typedef int wbc_bits;
 #define RHO 1e-4f
 #define SETTLED (64.0f * EPS)
 #define FIRMLY (256.0f * EPS)
-#define PUSHING 1e-3f
+#define PUSHING 1e-4f
 #define QUICK_BOUND 1e-3f
 #define GOOD_BOUND 1e-3f
 #define GOOD_VIOLATION (256.0f * EPS)
 #define UNIT_TOLERANCE 2e-5f
 #define TOLERANCE (64.0f * EPS)
-#define SOUND (1024.0f * EPS)
+#define SOUND (2048.0f * EPS)
 #define KNOWN 1e-2f
 #define OPTIMAL (1024.0f * EPS)
 #define SEEN (1024.0f * EPS)

@@ -70,8 +70,8 @@ typedef long double wbc_wide;
 #define WIDE_EPS (0.5L * LDBL_EPSILON)
 typedef long long wbc_bits;
 #define MOST_BITS LLONG_MAX
-#elif LEVELS > 0 || SOFT_ROWS > 0 || UNITS > 0 || COMMAND != VELOCITY
-#error "single precision is for velocities of a robot without a floating base, of tasks without strict levels and soft rows"
+#elif LEVELS > 0 || SOFT_ROWS > 0 || COMMAND != VELOCITY
+#error "single precision is for commands of velocities, without strict levels, soft rows and scaled tasks"
 #endif
 
 /* Iterations of a search with a higher price at most, see first_slack */
