@@ -573,8 +573,8 @@ class Walk:
         if self.halted or self.aborted:
             return True
         if self.leader.one_motion:
-            # A swinging hand goes on to its hold with the body
-            return self._changing and self.swinging is None
+            # A swinging hand goes on to its hold with the body, as long as that is there
+            return self._changing if self.swinging is None else self.swinging.dropped
         return self._changing or (self.swinging is not None and (self.swinging.waits or self.swinging.pauses))
 
     def _soonest(self, swinging: Swinging) -> float:
