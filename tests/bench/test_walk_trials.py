@@ -13,7 +13,7 @@ import pytest
 import wbc
 from bench.measured import clearance
 from bench.sheet import Sheet
-from bench.walk import second_checker, trial_parts
+from bench.walk import second_checker, structures, trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, capsule_between, random_structure
 from bench.walk.torque_trials import ARMS, Draw
@@ -53,6 +53,23 @@ def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> Non
         assert [one.id for one in read.obstacles] == [one.id for one in structure.obstacles]
         assert read.clearance(structure.positions) == pytest.approx(structure.clearance(structure.positions), abs=1e-9)
     assert len(digests) == seeds
+
+
+def test_where_a_wide_body_has_no_place_another_structure_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, place = random_structure("bars", 0), structures.has_place
+    looked: list[Structure] = []
+
+    def later(structure: Structure, foot: np.ndarray, within: float) -> bool:
+        if structure.digest == first.structure.digest:
+            looked.append(structure)
+            return False
+        return place(structure, foot, within)
+
+    monkeypatch.setattr(structures, "has_place", later)
+    second = random_structure("bars", 0)
+    assert looked
+    assert second.structure.digest != first.structure.digest
+    assert {second.start, second.goal} <= set(second.structure.ids)
 
 
 def test_an_unknown_family_is_refused() -> None:
