@@ -20,7 +20,7 @@ from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
 from wbc.walking.planner.proof import EVERY, clear_scene
 from wbc.walking.planner.stances.body import BodySearch
-from wbc.walking.planner.starts import Beginning, stances
+from wbc.walking.planner.starts import Beginning, holding_of, stances
 from wbc.walking.planner.swings.curve import Pivots, between
 from wbc.walking.planner.swings.joints import blend
 from wbc.walking.planner.swings.law import SwingLaw, least_time_law
@@ -72,7 +72,7 @@ def plan_from_stance(
     """
     beginning: Beginning = start, postures or {}, {}
     rows = [structure.index(start[arm.name]) for arm in walker.arms]
-    grips = yield from grip_slices(walker, structure, path, rows)
+    grips = yield from grip_slices(walker, structure, path, rows, holding_of(walker, structure, beginning))
     search = BodySearch(walker, structure, path, grips)
     stance = stances(walker, structure, search, beginning)[0]
     # The plan that follows keeps the branches
@@ -185,7 +185,9 @@ def _from_here(
     start = {arms[arm].name: structure.ids[hold] for arm, hold in held.items()}
     postures = {arms[arm].name: q[arms[arm].q] for arm in held}
     free = [arm for arm in range(len(arms)) if arm not in held]
-    grips = yield from grip_slices(walker, structure, path)
+    grips = yield from grip_slices(
+        walker, structure, path, holding=holding_of(walker, structure, (start, postures, {}))
+    )
     while True:
         beginning: Beginning = start, postures, avoid
         asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)

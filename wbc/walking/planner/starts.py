@@ -17,7 +17,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.grips.held import held, near_holds
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import Grips, Holding
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.search import PAIRS, StanceSearch
@@ -31,6 +31,20 @@ STARTS, ALL_STARTS = (10, 24), (24, 200)
 FEW_ARMS, ENOUGH = 3, 1000
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
+
+
+def holding_of(walker: Walker, structure: Structure, beginning: Beginning) -> Holding:
+    """The hands that hold at the beginning and whose postures are known, for the table of grips.
+
+    Raises:
+        UnknownNameError: another arm or hold.
+    """
+    start, postures, _ = beginning
+    names = [arm.name for arm in walker.arms]
+    for name in (*start, *postures):
+        validation.one_of("start", name, names)
+    known = [name for name in start if name in postures]
+    return {(names.index(name), structure.index(start[name])): (0, float(postures[name][-1])) for name in known}
 
 
 def grips_at_first(
