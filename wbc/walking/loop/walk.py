@@ -522,7 +522,7 @@ class Walk:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
         machine = self.machine
         _, _, _, a, b, c = machine.q[self.walker.arms[arm].q].tolist()
-        law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q)
+        law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q, machine.held)
         more: dict[str, Any] = {"counted": False, "waits": True, "state": "open", "first_wrist": (a, b, c)}
         grip = self._grip(self.progress.grip[arm])
         swinging = self.hands.going(arm, grip, law, latch=0.0, wrist=(a, b, c), **more)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Protocol
@@ -194,7 +194,7 @@ def _from_here(
         plan = _complete(structure, (yield from asked))
         far = list[int]()
         for arm in free:
-            law = way_to(walker, structure, plan, arm, hands, q)
+            law = way_to(walker, structure, plan, arm, hands, q, held)
             if not law.possible or (may is not None and not may(plan, arm, law, held, q)):
                 far.append(arm)
         if not far:
@@ -207,8 +207,20 @@ def _from_here(
                 raise NoPlanError("plan", arms[arm].name, reason, separating=avoid[arms[arm].name])
 
 
-def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: HandsThere, q: Array) -> SwingLaw:
-    """From where a free hand is to where the plan has it at the beginning; the body stands there."""
+def way_to(
+    walker: Walker,
+    structure: Structure,
+    plan: Plan,
+    arm: int,
+    hands: HandsThere,
+    q: Array,
+    held: Collection[int],
+) -> SwingLaw:
+    """From where a free hand is to where the plan has it at the beginning; the body stands there.
+
+    Args:
+        held: rows of the arms whose hands hold; of the others those before this one have been brought.
+    """
     grips, guided = plan.grips, limb_of(walker).guided
     if grips is None:
         raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
@@ -235,14 +247,14 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
     postures, holds = list[Array](), list[Ints]()
     for k, other in enumerate(walker.arms):
         # Hands that are free as well are brought there one after the other, from where they are
-        rows = angles[0] if k == arm else np.repeat(q[other.q][None], len(times), axis=0)
-        postures.append(rows)
+        now = grips.posture_at(plan.chain[k][0], 0) if k < arm and k not in held else q[other.q]
+        postures.append(angles[0] if k == arm else np.repeat(now[None], len(times), axis=0))
         holds.append(np.array([structure.index(plan.start[k])]))
-    # A hand that has just left a hold may be near to what that is mounted on, also where the hold is gone since
+    # Hands that have just left a hold may be near to what that is mounted on, also where the hold is gone since
     near_by = np.linalg.norm(structure.positions - hands.origins[arm], axis=1).argmin()
     holds[arm] = np.append(holds[arm], near_by)
     poses = np.repeat(plan.path.poses[:1], len(times), axis=0)
-    left = arm, np.array(hands.origins[arm])
+    left = {k: np.array(hands.origins[k]) for k in range(arm, len(walker.arms)) if k not in held}
     law.possible = clear_scene(walker, structure).touched(times, poses, postures, holds, left) is None
     return law
 
