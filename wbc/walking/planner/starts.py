@@ -179,17 +179,17 @@ def _lasting_longest(
     grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
 ) -> Iterator[tuple[int, ...]]:
     """Stances that last beyond a sample, grown arm by arm from the :data:`ENOUGH` that last longest."""
-    ends = {
-        frozenset((a, b)): min(int(grips.last[a]), int(grips.last[b]), search.conflicts.first_conflict(a, b, 0) - 1)
-        for one, other in combinations(choices, 2)
-        for a, b in product(one, other)
-        if grips.hold[a] != grips.hold[b]
-    }
-    some: list[tuple[int, int, tuple[int, ...]]] = [(int(grips.last[g]), 0, (g,)) for g in choices[0]]
+    last, ends = grips.last.tolist(), {g: dict[int, int]() for mine in choices for g in mine}
+    for one, other in combinations(choices, 2):
+        for a, b in product(one, other):
+            if grips.hold[a] != grips.hold[b]:
+                ends[b][a] = min(last[a], last[b], search.conflicts.first_conflict(a, b, 0) - 1)
+    some: list[tuple[int, int, tuple[int, ...]]] = [(last[g], 0, (g,)) for g in choices[0]]
     for mine in choices[1:]:
         longer = []
         for (until, total, stance), g in product(some, mine):
-            each = [ends.get(frozenset((g, other)), -1) for other in stance]
+            mate = ends[g]
+            each = [mate.get(other, -1) for other in stance]
             if min(each) > sample:
                 longer.append((min(until, *each), total + sum(each), (*stance, g)))
         # Of those that last as long, the ones whose pairs last longer
