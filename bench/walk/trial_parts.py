@@ -129,14 +129,14 @@ def ranged(numbers: list[float], end: int) -> str:
 
 
 def trial_goals(part: str, records: list[Record]) -> list[Goal]:
-    """Nothing that arrived violates, by either checker, and nothing crashes; of structures nearly all are walked that
-    the reference does not prove impossible, and plans are made in time.
+    """Nothing that was carried out violates, by either checker, however it ended, and nothing crashes; of structures
+    nearly all are walked that the reference does not prove impossible, and plans are made in time.
     """
-    well = [r for r in records if r["outcome"] in WELL]
-    bad = sum(bool(r.get("violations") or r.get("second")) for r in well)
+    well, walked = [r for r in records if r["outcome"] in WELL], [r for r in records if "violations" in r]
+    bad = sum(bool(r["violations"] or r["second"]) for r in walked)
     crashed = sum(r["outcome"] in CRASHED for r in records)
     out = [
-        Goal(f"{part}: walks of {len(well)} that arrived and violate", bad, 0, ""),
+        Goal(f"{part}: walks of {len(walked)} that were carried out and violate", bad, 0, ""),
         Goal(f"{part}: trials of {len(records)} that crash", crashed, 0, ""),
     ]
     open_ = [r for r in records if not impossible(r)]
