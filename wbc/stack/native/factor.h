@@ -325,13 +325,13 @@ static void solve_transposed(const wbc_tick *t, double *y) {
     for (int i = TALL; i < WIDE; i++) y[i] = 0.0;
 }
 
-/* x = R^-1 y, as above */
+/* x = R^-1 y, as above; entries that have just been found are waited for last */
 static void solve_upper(const wbc_tick *t, const double *y, double *x) {
     for (int i = TALL; i < WIDE; i++) x[i] = 0.0;
     for (int i = TALL - 4; i >= 0; i -= 4) {
         const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
         four p0 = {0}, p1 = {0}, p2 = {0}, p3 = {0};
-        for (int at = i + 4; at < WIDE; at += 4) {
+        for (int at = WIDE - 4; at > i; at -= 4) {
             const four known = GIVEN_FOUR(x + at);
             p0 = MADD(GIVEN_FOUR(s0 + at), known, p0), p1 = MADD(GIVEN_FOUR(s1 + at), known, p1);
             p2 = MADD(GIVEN_FOUR(s2 + at), known, p2), p3 = MADD(GIVEN_FOUR(s3 + at), known, p3);
@@ -378,8 +378,9 @@ static void invert(wbc_tick *t) {
         for (int at = i & ~7; at < WIDE; at += 8) invert_rows(t, i, at);
     for (int i = 0; i < NV; i++) {
         const double *row = t->inverse + i * WIDE;
-        t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
+        t->scaling[i] = dot(row, row, i);
     }
+    for (int i = 0; i < NV; i++) t->scaling[i] = 1.0 / sqrt(t->scaling[i]);
 }
 
 #define PACK(i) ((2 * NV - (i) - 1) * (i) / 2)
