@@ -313,13 +313,15 @@ def test_ctrl_c_ends_a_step_when_no_thread_is_at_work(monkeypatch: pytest.Monkey
     batch = bare("native").batch(len(q), threads=2)
     run, begun, ended = Compiled._run, list[object](), list[object]()
 
-    def slow(self: Compiled, tick: Any, following: Any, inputs: Any, reports: Any) -> None:
+    def slow(self: Compiled, tick: Any, *given: Any) -> bool:
         begun.append(tick)
-        if len(begun) == 1:
-            _thread.interrupt_main()
-        time.sleep(0.02)
-        run(self, tick, following, inputs, reports)
-        ended.append(tick)
+        try:
+            if len(begun) == 1:
+                _thread.interrupt_main()
+            time.sleep(0.02)
+            return run(self, tick, *given)
+        finally:
+            ended.append(tick)
 
     with monkeypatch.context() as patched:
         patched.setattr(Compiled, "_run", slow)
