@@ -106,6 +106,18 @@ def test_without_a_compiler_too(name: str) -> None:
     compare(MADE[name]("vm"), count=3, threads=1, ticks=3)
 
 
+def test_after_a_reset_no_torques_are_known() -> None:
+    """Limits of how fast torques change do not count from 0."""
+    single = problems.controller("panda").clone()
+    batch, q = single.batch(2), single.stack.robot.neutral
+    single.step(q)
+    batch.step(q)
+    single.reset(q)
+    batch.reset(q)
+    core = core_of(single)
+    np.testing.assert_array_equal(batch.inputs[1], core.tick.state[core.context.memory.report :])
+
+
 def test_a_policy_acts_on_each_robot() -> None:
     """Braking in conflicts, and a chain for answers without a certificate."""
     one = controller("conflicts", backend="native")

@@ -17,6 +17,7 @@ from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import Clones, Compiled, Engine, Given
 from wbc.controller import Controller, core_of
 from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
+from wbc.controller.tick.buffers import INFINITE
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.together import main_input
 from wbc.errors import RangeError, ShapeError, SolverError
@@ -236,7 +237,9 @@ class Batch:
             self._take_first(configurations)
         self._view("v_last")[:, : robot.nv] = velocity
         if self._layout.command != "velocity":
+            # No wrenches are kept, and the last torques are not known
             self._view("kept")[:] = 0.0
+            self._view("kept")[:, : robot.nv] = INFINITE
         self._engine.forget()
         self.changes += 1
 

@@ -103,7 +103,8 @@ class Compiled:
     def _shared(self, work: Callable[[int, np.ndarray], bool]) -> bool:
         """What ``work`` returns, by all threads, this one among them; alone where there is too little for several.
 
-        After an exception no thread is at work any more. ``work`` is told the number of its thread, and where all count.
+        After an exception no thread is at work any more. ``work`` is told the number of its thread, and where all
+        count.
         """
         shared = np.zeros(_SHARED, np.int64)
         if self._busy == 1:
