@@ -151,7 +151,10 @@ class InverseKinematics(Handles):
         hopeless = np.zeros(total, bool)
         if proofs:
             for entry in self.stack.entries:
-                if entry.name in self.goals and (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
+                # Rows that are switched off need not be met
+                if entry.name not in self.goals or not engine.tick.weight[engine.core.layout.blocks[entry.name].span].all():
+                    continue
+                if (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
                     hopeless |= beyond(parameters[:, controller[entry.name].slot("target").span])
         sought = np.flatnonzero(~hopeless)
         answers = np.tile(first, (total, 1))
