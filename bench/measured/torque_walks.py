@@ -18,17 +18,17 @@ from scipy.optimize import linprog
 
 import wbc
 from bench.sheet import Sheet
+from bench.walk.torque_trials import Witness
 from wbc.robots import Walker
 from wbc.simulation import Encoders, GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
 from wbc.validation import Array
-from wbc.walking.checker import check_walk
+from wbc.walking.checker import Report, check_walk
 from wbc.walking.report.folder import rules_of
 from wbc.walking.run.path_mode import PathMode
 from wbc.walking.run.request import PathRequest, Site
 from wbc.walking.run.session import perform_walk
 from wbc.walking.torque.bearing import SHARE, stances
 from wbc.walking.torque.faults import Fault, delay_of
-from wbc.walking.torque.loop import TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
 from wbc.walking.torque.tested import Tested
 
@@ -112,13 +112,14 @@ def tried(trial: Trial) -> tuple[str, ...]:
             heavy.robot, integrator="midpoint", motors=motors, encoders=trial.encoders, payloads=payloads
         )
     stack = TorqueStack(heavy, [GripKind.AXIS])
-    loop = TorqueLoop(stack, plant, delay=motors.delay, encoders=trial.encoders, faults=faults)
+    loop = Witness(stack, plant, delay=motors.delay, encoders=trial.encoders, faults=faults)
     run = perform_walk(REQUEST, bare, plant=loop)
     print(f"{trial.name}: {run.outcome} {run.reason}", file=sys.stderr)
     if run.log is None or run.ticks is None:
         return (trial.name, f"{run.outcome}: {run.reason}", *[""] * 6)
     with TemporaryDirectory() as folder:
-        report = check_walk(run.log, bare.urdf(Path(folder) / "robot.urdf"), run.structure, rules_of(bare))
+        urdf, rules = bare.urdf(Path(folder) / "robot.urdf"), rules_of(bare)
+        found = [check_walk(log, urdf, run.structure, rules) for log in (loop.truth(run.log), run.log)]
     watch = loop.watch
     return (
         trial.name,
@@ -128,8 +129,14 @@ def tried(trial: Trial) -> tuple[str, ...]:
         f"{1e3 * watch.drift:.2g} mm",
         f"{watch.force:.0f} N, {watch.moment:.0f} N m",
         f"{watch.given[0]:.0f} N s",
-        ", ".join(finding.kind for finding in report.violations) or "clean",
+        verdict(*found),
     )
+
+
+def verdict(was: Report, read: Report) -> str:
+    """Of where the robot was, and of what was read where that is another one."""
+    true, seen = (", ".join(finding.kind for finding in report.violations) or "clean" for report in (was, read))
+    return true if true == seen else f"{true}; of what was read: {seen}"
 
 
 @cache
