@@ -67,6 +67,7 @@ TRIALS = (
     Trial("Pinocchio, on Pluto, 0.62 m/s^2", gravity=PLUTO),
     Trial("Pinocchio, 1 m/s^2", gravity=MOST),
     Trial("MuJoCo, 1 m/s^2", "mujoco", gravity=MOST),
+    Trial("Pinocchio, 0.8 m/s^2 across", gravity=(0.8, 0.0, 0.0)),
     Trial("Pinocchio, on the Moon, 1.62 m/s^2", gravity=MOON),
     Trial("the same with four arms", gravity=MOON, arms=4),
     Trial("four arms, 1.9 m/s^2", gravity=(0.0, -1.9, 0.0), arms=4),
