@@ -51,6 +51,8 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         UnknownNameError: no such frame. What :func:`mujoco_model` raises.
     """
 
+    _state: _State
+
     def __init__(
         self,
         robot: Robot,

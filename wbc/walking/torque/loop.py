@@ -24,6 +24,8 @@ from wbc.walking.torque.watch import Watch
 #: A closed hand that is farther from its hold slips; the walk ends where it is farther off than the hands are in the
 #: mean, which is what the walk does not take for the body's [m]
 SLIPS, LOST = 3e-4, 1e-3
+#: A hand that closes at rest is slower [m/s], [rad/s]
+MEETS = 0.002, np.radians(0.5)
 #: Torques that do not do what they are to for so long end the walk [s]
 OVERLOAD = 0.05
 
@@ -179,6 +181,7 @@ class TorqueLoop:
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
         if self._opening.pop(frame, None) is not None:
             self._tested.release(frame)
+        self._meets(frame)
         self._tested.grasp(frame, pose, kind)
         self._look(struck=True)
         state = self._state
@@ -187,6 +190,15 @@ class TorqueLoop:
         item.target, item.enabled = pose, True
         self._closed[frame] = kind
         self.watch.grasps(self._tested, frame)
+
+    def _meets(self, frame: str) -> None:
+        """Say so where a hand is not at rest as it closes; it may roll."""
+        state, model, data = self._state, self._model, self._data
+        pin.forwardKinematics(model, data, state.q, state.v)
+        twist = pin.getFrameVelocity(model, data, model.getFrameId(frame), pin.LOCAL).vector
+        speed, rate = float(np.sqrt(twist[:3] @ twist[:3])), float(np.sqrt(twist[3:5] @ twist[3:5]))
+        if speed > MEETS[0] or rate > MEETS[1]:
+            self._note(state.time, f"{frame} closed with {1e3 * speed:.2g} mm/s and {rate:.2g} rad/s")
 
     def release(self, frame: str) -> None:
         """The stack does without the hand, and the plant's opens when the first such torques take hold."""
