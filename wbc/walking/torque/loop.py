@@ -24,6 +24,8 @@ from wbc.walking.torque.watch import Watch
 #: A closed hand that is farther from its hold slips; the walk ends where it is farther off than the hands are in the
 #: mean, which is what the walk does not take for the body's [m]
 SLIPS, LOST = 3e-4, 1e-3
+#: Part of joints' rate limits that is used: what acts and is not known moves them a little faster
+RATE = 1.0 - 1e-4
 #: A hand that closes at rest is slower [m/s], [rad/s]
 MEETS = 0.002, np.radians(0.5)
 #: Torques that do not do what they are to for so long end the walk [s]
@@ -143,6 +145,7 @@ class TorqueLoop:
         gains, controller = self._gains, self.stack.controller
         controller.reset(q)
         controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
+        controller["limits"].velocity_scale = RATE
         self._motors.begin(q, np.zeros(self.nv))
         self._sent[:] = self._added[:] = 0.0
         self._left = self._effort
