@@ -25,6 +25,8 @@ from wbc.walking import PlaneSurface, Structure
 CLEARANCE, SLACK = 0.0254, 1e-4
 #: A hand this near to its hold may be near to what that is mounted on, which is this near to the hold, so deep [m]
 NEAR, MOUNTED, DEPTH = 0.0762, 0.005, 0.005
+#: What is thicker than NEAR less the clearance is near within its radius, the clearance and what plans keep beside [m]
+THICKER = 0.04
 #: Of hands at their holds [m, rad], and of joints' accelerations, in parts of their limits
 OFF, TURNED, HARDER = 0.002, np.radians(0.5), 1.01
 #: By which the velocity of the body may change from tick to tick: ten times the ramp to 0.1 m/s in 0.5 s [m/s, rad/s]
@@ -154,8 +156,9 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structur
                 mounts[row] = list(_mounts(structure, log["hold_pose"][row, :3]))
             # As long as the hand is near the hold without a break
             point, k, last = log["hold_pose"][row, :3], int(start), int(end)
-            gaps = np.linalg.norm(places[:, arm] - point, axis=1)
-            near = gaps <= NEAR
+            gaps, wide = np.linalg.norm(places[:, arm] - point, axis=1), max(_radius(part) for part in mine)
+            within = NEAR if wide + CLEARANCE <= NEAR + 1e-9 else wide + CLEARANCE + THICKER
+            near = gaps <= within
             if _vanished(log, row, log["t"][end]):
                 # No hand stops at once: it comes nearer for a while
                 while last < len(near) - 1 and gaps[last + 1] < gaps[last]:
@@ -166,9 +169,12 @@ def _exemptions(log: Columns, model: pin.Model, parts: list[SweptBody], structur
                 last += 1
             since, until = float(log["t"][k]), float(log["t"][last])
             for part in mine:
-                depth = DEPTH + float(getattr(part.shape, "radius", 0.0))
                 for mount in mounts[row]:
-                    yield Exemption(part.name, mount, point, NEAR, depth, since, until)
+                    yield Exemption(part.name, mount, point, within, DEPTH + _radius(part), since, until)
+
+
+def _radius(part: SweptBody) -> float:
+    return float(getattr(part.shape, "radius", 0.0))
 
 
 def _vanished(log: Columns, row: int, t: float) -> bool:

@@ -66,8 +66,12 @@ def random_structure(family: str, seed: int, body: float = BODY) -> Trial:
     """
     make = FAMILIES[validation.one_of("family", family, tuple(FAMILIES))]
     rng = np.random.default_rng([list(FAMILIES).index(family), seed])
-    structure, ends = make(rng, f"{family}-{seed}")
-    return Trial(family, seed, structure, *(ends or _ends(rng, structure, body)))
+    while True:
+        structure, ends = make(rng, f"{family}-{seed}")
+        ends = ends or _ends(rng, structure, body)
+        if ends is not None:
+            return Trial(family, seed, structure, *ends)
+        # It is so full that a wide body has no place at two ends: another one
 
 
 def _lattice(rows: int, columns: int) -> dict[str, Array]:
@@ -88,8 +92,10 @@ def _on_plane(name: str, obstacles: list[Obstacle], rows: int = 15, columns: int
     return Structure(name, tuple(holds), tuple(obstacles), PlaneSurface(pin.SE3.Identity()))
 
 
-def _ends(rng: np.random.Generator, structure: Structure, body: float) -> tuple[str, str]:
-    """Two holds over which a body has place, at least APART, and MARGIN from the outline of all holds [m]."""
+def _ends(rng: np.random.Generator, structure: Structure, body: float) -> Ends:
+    """Two holds over which a body has place, at least APART, and MARGIN from the outline of all holds [m]; None: there
+    are none.
+    """
     points = structure.positions
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high - low <= 2 * MARGIN
@@ -99,8 +105,8 @@ def _ends(rng: np.random.Generator, structure: Structure, body: float) -> tuple[
     first, last = np.nonzero((gaps >= APART) & (gaps <= APART + 0.8))
     place = functools.cache(lambda row: has_place(structure, points[row], body))
     pairs = ((rows[first[k]], rows[last[k]]) for k in rng.permutation(len(first)))
-    begin, end = next(pair for pair in pairs if place(pair[0]) and place(pair[1]))
-    return structure.ids[begin], structure.ids[end]
+    found = next((pair for pair in pairs if place(pair[0]) and place(pair[1])), None)
+    return None if found is None else (structure.ids[found[0]], structure.ids[found[1]])
 
 
 def has_place(structure: Structure, foot: Array, within: float) -> bool:

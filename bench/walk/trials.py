@@ -1,5 +1,5 @@
-"""Trials of walks from seeds: among random structures, by random rates, resumed at random instants, as holds vanish,
-under torques.
+"""Trials of walks from seeds: among random structures, by random rates, by tasks of one hand, resumed at random
+instants, as holds vanish, under torques.
 
 ``python -m bench.walk.trials PART NAME FOLDER`` carries out one and prints its record: a process of its own, so that
 what hangs or dies costs one trial.
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+import wbc
 from bench.walk.machine import NECK, Record, walker_of
 from bench.walk.reference.passage import passage
 from bench.walk.second_checker import second_check
@@ -28,15 +29,15 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking import Structure, save_structure
 from wbc.walking.checker import check_walk
-from wbc.walking.loop.walk import Tick, Walk
+from wbc.walking.loop.walk import Tick
 from wbc.walking.planner.plan import HoldLost, NoPlanError
-from wbc.walking.planner.planner import Objective, plan_walk
+from wbc.walking.planner.planner import Objective
 from wbc.walking.report.folder import rules_of, save_run
-from wbc.walking.run.mode import compiled_stack
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import DriveRequest, PathRequest, Site
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Site, TwoEndedRequest, arm_task
 from wbc.walking.run.resume_mode import ResumeRequest
-from wbc.walking.run.session import WalkRun, perform_walk
+from wbc.walking.run.session import WalkRun, mode_of, perform_walk
+from wbc.walking.two_ended import grapple_row
 
 #: What is walked on where a part has no structure of its own, with the places between which
 GROUNDS = (
@@ -47,6 +48,20 @@ GROUNDS = (
 )
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
+#: Arms of those of other parts, drawn with equal chances, and what else is drawn where it has the mode
+LIMBS, TWO_ENDED = (2, 3, 4, 5, 6), "two-ended"
+DRAWN = {
+    "velocity": LIMBS,
+    "arm": LIMBS,
+    "resume": (*LIMBS, TWO_ENDED),
+    "vanish": (*LIMBS, TWO_ENDED),
+}
+#: Holds of the two-ended arm: least and largest distance of neighbours [m]
+GRAPPLES, PITCHES = 7, (2.0, 5.0)
+#: Tasks of a hand: how many at most, how far from the base of the arm its holds are [m], largest rates [m/s, rad/s] and
+#: how long each [s]; and how fast it leaves its hold first [m/s]
+TASKS, REACH, HAND_RATES, SECONDS = 3, 1.7, np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2]), (0.3, 2.0)
+OFF = (0.05, 0.1)
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -106,15 +121,37 @@ class RandomRates:
 def velocity(name: str, walker: Walker, folder: Path) -> Record:
     """A body that is driven; ``SEED``."""
     rng = np.random.default_rng([1, int(name)])
-    asked = _request(rng)
+    asked = _path(rng)
     request = DriveRequest(asked.site, asked.start, asked.points, asked.speed, asked.turn_rate, "seed")
     return kept(perform_walk(request, walker, commands=RandomRates(rng)), folder)
+
+
+def arm(name: str, walker: Walker, folder: Path) -> Record:
+    """One hand of a body that stands goes to holds and by rates; ``SEED``."""
+    rng = np.random.default_rng([6, int(name)])
+    asked = _path(rng)
+    standing = DriveRequest(asked.site, asked.start, asked.points)
+    chosen = walker.arms[int(rng.integers(len(walker.arms)))]
+    holds, body = standing.site.build(), standing.beginning(walker.arm_data)
+    base = body.act(chosen.base.translation)
+    near = [name for name, at in zip(holds.ids, holds.positions, strict=True) if np.linalg.norm(at - base) < REACH]
+    # First off the hold, towards the body
+    off = np.concatenate([-body.rotation[:, 2] * rng.uniform(*OFF), np.zeros(3)])
+    tasks = [_rate(off, rng.uniform(1.0, 2.0))]
+    for _ in range(int(rng.integers(1, TASKS + 1))):
+        if rng.random() < 0.5:
+            tasks.append(f"hold {rng.choice(near)}")
+        else:
+            tasks.append(_rate(rng.uniform(-1.0, 1.0, 6) * HAND_RATES, rng.uniform(*SECONDS)))
+    did = tuple(arm_task(text) for text in tasks)
+    request = ArmRequest(asked.site, asked.start, asked.points, arm=chosen.name, tasks=did)
+    return kept(perform_walk(request, walker), folder)
 
 
 def resume(name: str, walker: Walker, folder: Path) -> Record:
     """A walk that goes on from a random instant of its log; ``SEED``."""
     rng = np.random.default_rng([2, int(name)])
-    first = perform_walk(_request(rng), walker)
+    first = perform_walk(_request(rng, walker, folder), walker)
     if first.log is None:
         return kept(first, folder)
     save_run(first, folder, check=False)
@@ -127,15 +164,17 @@ def resume(name: str, walker: Walker, folder: Path) -> Record:
 def vanish(name: str, walker: Walker, folder: Path) -> Record:
     """A walk on which holds vanish that are held, or that a hand is on its way to; ``SEED``."""
     rng = np.random.default_rng([3, int(name)])
-    request = _request(rng)
-    structure = request.site.build()
+    mode = mode_of(_request(rng, walker, folder), walker)
+    structure = mode.structure
     cpu = time.process_time()
     try:
-        plan = plan_walk(walker, structure, request.path(walker.data), detour=True)  # type: ignore[arg-type]
+        plan = mode.plan()
     except NoPlanError as error:
         return {"outcome": "refused", "reason": str(error), "plan_s": time.process_time() - cpu}
     planned = time.process_time() - cpu
-    walk = Walk(walker, structure, plan, stack=compiled_stack(walker, structure))
+    if not plan.complete:
+        return {"outcome": "refused", "reason": plan.reason, "plan_s": planned}
+    walk = mode.walk(plan, mode.compiled("auto"), None)
     recorder, when = WalkRecorder(walk), list(np.sort(rng.uniform(0.5, plan.path.duration, int(rng.integers(1, 4)))))
 
     def on_tick(tick: Tick) -> None:
@@ -185,6 +224,7 @@ def checked(log: Any, walker: Walker, structure: Structure, folder: Path) -> Rec
 PARTS: dict[str, Callable[[str, Walker, Path], Record]] = {
     "structures": structures,
     "velocity": velocity,
+    "arm": arm,
     "resume": resume,
     "vanish": vanish,
     "torque": torque,
@@ -192,7 +232,7 @@ PARTS: dict[str, Callable[[str, Walker, Path], Record]] = {
 
 
 #: How many trials of a part there are for each random structure
-SHARES = {"structures": 1.0, "velocity": 0.4, "resume": 0.4, "vanish": 0.2, "torque": 0.2}
+SHARES = {"structures": 1.0, "velocity": 0.4, "arm": 0.2, "resume": 0.4, "vanish": 0.2, "torque": 0.2}
 
 
 def names(part: str, count: int) -> list[str]:
@@ -202,14 +242,25 @@ def names(part: str, count: int) -> list[str]:
     return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
 
 
+def limbs(part: str, name: str) -> int | str:
+    """How many arms the body of a trial has, or :data:`TWO_ENDED`; under torques the trial draws its own."""
+    if part == "structures":
+        return ARMS[int(name.split()[1]) % len(ARMS)]
+    if part not in DRAWN:
+        return 3
+    drawn = DRAWN[part]
+    return drawn[int(np.random.default_rng([5, list(DRAWN).index(part), int(name)]).integers(len(drawn)))]
+
+
 def tried(part: str, name: str, folder: Path) -> Record:
     """The record of one trial; an error of the package is its outcome."""
     folder.mkdir(parents=True, exist_ok=True)
     cpu, out = time.process_time(), Record()
     try:
-        arms = ARMS[int(name.split()[1]) % len(ARMS)] if part == "structures" else 3
+        arms = limbs(part, name)
         out |= {"arms": arms} if part != "torque" else {}
-        out |= PARTS[part](name, walker_of(arms), folder)
+        walker = wbc.robots.walker(two_ended=True) if arms == TWO_ENDED else walker_of(int(arms))
+        out |= PARTS[part](name, walker, folder)
     except WbcError as error:
         out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)
@@ -221,7 +272,25 @@ def tried(part: str, name: str, folder: Path) -> Record:
     return {"trial": name, "cpu_s": time.process_time() - cpu, **out}
 
 
-def _request(rng: np.random.Generator) -> PathRequest:
+def _request(rng: np.random.Generator, walker: Walker, folder: Path) -> PathRequest | TwoEndedRequest:
+    """A way of a body with arms, or of the two-ended arm over holds of which a file is left in the folder."""
+    if not walker.two_ended:
+        return _path(rng)
+    row, ids = grapple_row(GRAPPLES, float(rng.uniform(*PITCHES))), [str(k + 1) for k in range(GRAPPLES)]
+    folder.mkdir(parents=True, exist_ok=True)
+    file = save_structure(row, folder / "grapples.csv")
+    first = int(rng.integers(GRAPPLES - 1))
+    goal = ids[int(rng.choice([k for k in range(GRAPPLES) if k not in (first, first + 1)]))]
+    start = (ids[first], ids[first + 1])
+    return TwoEndedRequest(Site(str(file)), start if rng.random() < 0.5 else start[::-1], goal)
+
+
+def _rate(twist: Array, seconds: float) -> str:
+    """The task of a hand that moves with a twist."""
+    return f"rate {','.join(f'{rate:.4f}' for rate in twist)} for {seconds:.2f}"
+
+
+def _path(rng: np.random.Generator) -> PathRequest:
     ground, start, goal = GROUNDS[int(rng.integers(len(GROUNDS)))]
     return PathRequest(Site(ground), start, (goal,), float(rng.uniform(0.05, 0.15)), 0.1)
 

@@ -13,12 +13,12 @@ import pytest
 import wbc
 from bench.measured import clearance
 from bench.sheet import Sheet
-from bench.walk import second_checker, trial_parts
+from bench.walk import second_checker, structures, trial_parts
 from bench.walk.second_checker import second_check
 from bench.walk.structures import FAMILIES, capsule_between, random_structure
 from bench.walk.torque_trials import ARMS, Draw
 from bench.walk.trial_parts import apart, trial_goals, trial_sheet
-from bench.walk.trials import Spent, names, tried
+from bench.walk.trials import TWO_ENDED, Spent, limbs, names, tried
 from tests.repeats import repeats
 from wbc.clearance import SweptBody
 from wbc.errors import UnknownNameError
@@ -55,6 +55,23 @@ def test_structures_are_those_of_their_seeds(family: str, tmp_path: Path) -> Non
     assert len(digests) == seeds
 
 
+def test_where_a_wide_body_has_no_place_another_structure_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, place = random_structure("bars", 0), structures.has_place
+    looked: list[Structure] = []
+
+    def later(structure: Structure, foot: np.ndarray, within: float) -> bool:
+        if structure.digest == first.structure.digest:
+            looked.append(structure)
+            return False
+        return place(structure, foot, within)
+
+    monkeypatch.setattr(structures, "has_place", later)
+    second = random_structure("bars", 0)
+    assert looked
+    assert second.structure.digest != first.structure.digest
+    assert {second.start, second.goal} <= set(second.structure.ids)
+
+
 def test_an_unknown_family_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="posts"):
         random_structure("post", 0)
@@ -62,8 +79,16 @@ def test_an_unknown_family_is_refused() -> None:
 
 def test_names_of_trials() -> None:
     assert names("structures", 9) == [*(f"{family} 0" for family in FAMILIES), "posts 1", "bars 1"]
-    parts = ("structures", "velocity", "resume", "vanish", "torque")
-    assert [len(names(part, 500)) for part in parts] == [500, 200, 200, 100, 100]
+    parts = ("structures", "velocity", "arm", "resume", "vanish", "torque")
+    assert [len(names(part, 500)) for part in parts] == [500, 200, 100, 200, 100, 100]
+
+
+@pytest.mark.parametrize(("part", "kinds"), [("velocity", 5), ("arm", 5), ("resume", 6), ("vanish", 6)])
+def test_every_number_of_limbs_is_tried_in_every_mode(part: str, kinds: int) -> None:
+    drawn = [limbs(part, name) for name in names(part, 500)]
+    assert drawn == [limbs(part, name) for name in names(part, 500)]
+    assert min(drawn.count(kind) for kind in set(drawn)) >= 8
+    assert set(drawn) == set((2, 3, 4, 5, 6, TWO_ENDED)[:kinds])
 
 
 def test_draws_of_walks_under_torques_are_those_of_their_seeds(tmp_path: Path) -> None:

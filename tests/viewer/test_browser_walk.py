@@ -95,9 +95,8 @@ def test_the_stick_moves_the_walker_and_a_hand_is_moved_alone(browser: Chromium)
         picture(page, "7 walker")
         page.mouse("mouseReleased", x, y - 50.0)
         page.wait("wbc.state.speed < 1e-4", 60.0)
-        # One hand alone
-        page.evaluate("document.getElementById('arm').value = 'arm1'")
-        page.evaluate("document.getElementById('arm').onchange()")
+        # One hand alone, chosen in one step: a state that comes in between writes the list back
+        page.evaluate("(() => { const a = document.getElementById('arm'); a.value = 'arm1'; a.onchange(); })()")
         page.wait("wbc.state.walk.arm === 'arm1' || wbc.state.walk.reason", 60.0)
         assert page.evaluate("wbc.state.walk.arm") == "arm1", page.evaluate("wbc.state.walk.reason")
         page.key("KeyR", True)

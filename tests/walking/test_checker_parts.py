@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +124,23 @@ def test_distances_are_those_of_many_points() -> None:
 
 def table(roll: str | int, tilt: float) -> HoldTable:
     return HoldTable.of(honest(roll, tilt)[0])
+
+
+def test_what_hands_hardly_fix_stays_as_logged() -> None:
+    holds = table("fixed", 0.05)
+    # Two holds, almost upright on the line between them: that is how much their rolls fix the turn about it
+    first = holds.rotation[0]
+    lean = pin.exp3(1e-3 * np.array([1.0, 0.0, 0.0]))
+    holds = replace(holds, rotation=np.stack([first, lean @ first, *holds.rotation[2:]]))
+    body = pin.SE3(np.eye(3), np.array([0.3, -0.2, 1.2]))
+    hold = np.array([[0, 1]])
+    grips = [body.inverse() * pin.SE3(holds.rotation[k], holds.position[k]) for k in range(2)]
+    # Hands turned in their holds by what a loop leaves
+    grips[1] = grips[1] * pin.SE3(pin.exp3(np.array([0.0, 0.0, 4e-6])), np.zeros(3))
+    hands = Hands(np.array([[grip.translation for grip in grips]]), np.array([[grip.rotation for grip in grips]]))
+    found = estimate(hands, hold, np.ones((1, 2), dtype=bool), holds, body.translation[None], np.array([body.rotation]))
+    assert np.linalg.norm(found.position[0] - body.translation) < 1e-4
+    assert np.linalg.norm(pin.log3(body.rotation.T @ found.rotation[0])) < 1e-4
 
 
 @pytest.mark.parametrize(("roll", "tilt"), [("free", 0.0), ("fixed", 0.0), (4, 0.0), ("free", 0.05)])

@@ -75,6 +75,6 @@ def test_of_two_arms_that_conflict_the_one_whose_grip_ends_sooner_moves() -> Non
         def free_from(self, one: int, other: int, sample: int) -> int:
             return sample
 
-    last = np.array([20, 30, 40])
-    assert StanceEnds(Meeting(), last, last).by_arm((0, 1, 2), 0) == [4, 30, 40]
-    assert StanceEnds(Meeting(), last[::-1], last).by_arm((0, 1, 2), 0) == [40, 30, 4]
+    last, stance = np.array([20, 30, 40]), (np.array([[0, 1, 2]]), np.array([0]))
+    assert StanceEnds(Meeting(), last, last).by_arm(*stance).tolist() == [[4, 30, 40]]
+    assert StanceEnds(Meeting(), last[::-1], last).by_arm(*stance).tolist() == [[40, 30, 4]]

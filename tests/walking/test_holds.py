@@ -20,9 +20,10 @@ from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.planner.grips.rolls import ANY, frame_on, turns
-from wbc.walking.planner.grips.table import Grips, find_grips
+from wbc.walking.planner.grips.table import Grips, find_grips, grip_slices
 from wbc.walking.planner.grips.tilt import TILT_PART, leaning
 from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.slices import drained
 from wbc.walking.run.recording import WalkRecorder
 
 INCH = 0.0254
@@ -45,6 +46,26 @@ def hands(walker: Walker, path: BodyPath, grips: Grips, grip: int) -> np.ndarray
     postures = grips.posture(np.full(len(samples), grip), samples)
     base = walker.arms[grips.arm[grip]].base.homogeneous
     return np.asarray(path.poses[samples] @ base @ ArmKinematics(walker.arm_data).forward(postures))
+
+
+def test_a_hand_that_holds_keeps_its_roll_where_another_would_do(machine: Walker, structure: Structure) -> None:
+    """Of several rolls the table has the best; a hand that is there already cannot change."""
+    held, path = declared(structure, (8, 0.0)), grid_path([(13, 12), (13, 12.3)], 4 * INCH)
+    best = find_grips(machine, held, path)
+    limit = machine.data.position_limits[5] - machine.margins.held_angle
+    grip = next(g for g in range(len(best)) if best.first[g] == 0 and best.postures[best.offset[g], 5] < limit - 1.0)
+    arm, hold, branch = (int(of[grip]) for of in (best.arm, best.hold, best.branch))
+    angle = float(best.posture_at(grip, 0)[5]) + np.pi / 4
+
+    def rolls(grips: Grips) -> set[int]:
+        mine = (grips.arm == arm) & (grips.hold == hold) & (grips.branch == branch)
+        near = [g for g in np.flatnonzero(mine) if abs(grips.posture_at(g, 0)[5] - angle) < 1e-6]
+        return {int(grips.roll[g]) for g in near}
+
+    kept = drained(grip_slices(machine, held, path, holding={(arm, hold): (0, angle)}))
+    assert rolls(best) == set()
+    assert rolls(kept) == {(int(best.roll[grip]) + 1) % 8}
+    assert len(kept) == len(best) + 1
 
 
 @pytest.mark.parametrize(("roll", "tilt"), [("fixed", 0.0), (4, 0.0), (4, 0.05)])

@@ -12,8 +12,10 @@ from wbc.walking.checker.holds import HoldTable
 
 #: Length [m] that weighs angles against distances
 LEVER = 0.3
-#: Added to the normal equations: a freedom that no hand fixes stays as it was logged
-DAMPING = 1e-7
+#: Eigenvalues of the normal equations: along freedoms with less than the first the body stays as it was logged, along
+#: those with more than the second it is where the hands have it. Hands on holds that let them tilt leave the turn about
+#: the line between them nearly free, and what they are off their holds would count a thousand times in it
+FREE, FIXED = 1e-5, 1e-3
 #: Steps at most, and the step [m, rad] at which they end
 STEPS, SMALL = 12, 1e-8
 #: Eigenvalues of the normal equations below this are freedoms that no hand fixes
@@ -60,7 +62,7 @@ def estimate(
         hands: in the body's frame. hold: [s, a] rows of ``table``; those of hands that do not hold are not read.
     """
     row = np.where(held, hold, 0)
-    position, rotation = position.copy(), rotation.copy()
+    position, rotation, moved = position.copy(), rotation.copy(), np.zeros((len(position), 6))
     weights = [
         held.astype(float),
         LEVER * (held & (table.max_tilt[row] == 0.0)),
@@ -74,11 +76,17 @@ def estimate(
             break
         part = Hands(hands.position[left], hands.rotation[left])
         jacobian, error = _rows(part, row[left], [w[left] for w in weights], table, position[left], rotation[left])
-        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        values, axes = np.linalg.eigh(np.swapaxes(jacobian, 1, 2) @ jacobian)
+        back = np.swapaxes(axes, 1, 2)
         if step == 0:
-            loose[left] = np.linalg.eigvalsh(normal)[:, 0] < OPEN
-        right = np.swapaxes(jacobian, 1, 2) @ error[..., None]
-        move = -np.asarray(np.linalg.solve(normal + DAMPING * np.eye(6), right)[..., 0], dtype=np.float64)
+            loose[left] = values[:, 0] < OPEN
+        right = (back @ np.swapaxes(jacobian, 1, 2) @ error[..., None])[..., 0]
+        so_far = (back @ moved[left, :, None])[..., 0]
+        # Logarithmically between the two, so that no freedom comes or goes from one sample to the next
+        values = np.maximum(values, FREE)
+        part_fixed = np.clip(np.log(values / FREE) / np.log(FIXED / FREE), 0.0, 1.0)
+        move = (axes @ (part_fixed * (so_far - right / values) - so_far)[..., None])[..., 0]
+        moved[left] += move
         position[left] += move[:, :3]
         rotation[left] = _turn(move[:, 3:]) @ rotation[left]
         left = left[np.abs(move).max(axis=1) > SMALL]

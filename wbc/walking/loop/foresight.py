@@ -171,6 +171,10 @@ class Foresight:
         angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
         out[:, mine.q] = angles[0]
         at = [*self.holds(there), *self.around(arm, places[0])]
+        for k in range(arm + 1, len(self.walker.arms)):
+            if k not in held:
+                # It is still where it left its hold
+                at += self.around(k, self.hand(k, out[:1])[0])
         return self.nearest(times, out, at, held) is None
 
     def holds(self, held: Mapping[int, int]) -> list[tuple[int, Array]]:

@@ -146,15 +146,19 @@ class HandCommand:
 UPRIGHT = 0.05
 #: A hand whose law ends within this of its hold turns at once [m]
 THERE = 0.001
+#: |mu| is at most so many times |phi|, or this angle where |phi| is less [rad]
+GOES_ON, LEAST_TURN = 3.0, 0.05
 
 
 class HandLanding:
     """The axes of a hand that comes down, in the structure's frame:
 
-        z(s) = exp(s phi) z_hold,     x(s) = exp(s phi) x_hold,     s = |p - p_hold| / |p_0 - p_hold|
+        z(r) = exp(w(r)) z_hold,     x(r) = exp(w(r)) x_hold,     r = |p - p_hold| / |p_0 - p_hold|
+        w(r) = (r + r^2 - r^3) phi + (r^3 - r^2) mu,     w(1) = phi,     w'(1) = mu
 
     p is its aim, p_0 that at which its wrist was let go, phi the turn that takes the axes of the hold to those which
-    the hand had there; the shortest one where only z counts. As the arm brings a hand down along the normal its lean
+    the hand had there; the shortest one where only z counts. mu is such that the hand goes on to turn as it turned
+    then: no wrist changes its rates from one tick to the next. As the arm brings a hand down along the normal its lean
     goes with its height. To want the hold's own axis at once turns the hand by that lean in a tenth of a second, and
     with theta5 near 0, where joint 4 hardly turns it, off its path by centimetres.
 
@@ -165,7 +169,9 @@ class HandLanding:
     def __init__(self, dt: float) -> None:
         self._dt = dt
         self._swinging: Swinging | None = None
-        self._turn, self._far, self._part = np.zeros(3), 0.0, 0.0
+        self._phi, self._mu, self._far, self._part = np.zeros(3), np.zeros(3), 0.0, 0.0
+        # Axes of the hand a tick ago
+        self._before: tuple[Swinging, Array, Array] | None = None
 
     def go(self, swinging: Swinging, hold: tuple[Array, Array], near: bool) -> Axes | None:
         """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None until then.
@@ -175,22 +181,35 @@ class HandLanding:
             near: it comes down on it.
         """
         if not near:
-            self._swinging = None
+            self._swinging, self._before = None, (swinging, swinging.axis, swinging.x_axis)
             return None
         place, z = hold
         far, x = float(np.linalg.norm(swinging.aim.position - place)), swinging.x
         if swinging is not self._swinging:
-            self._swinging, self._turn, self._far = swinging, _turn(swinging, z), far
-            self._part = 1.0 if far > THERE else 0.0
+            self._swinging, self._phi, self._far = swinging, _turn(swinging.axis, swinging.x_axis, z, x), far
+            self._mu, self._part = self._goes_on(swinging, place), 1.0 if far > THERE else 0.0
         before, self._part = self._part, min(self._part, far / self._far if self._far > THERE else 0.0)
-        now, later = (pin.exp3(part * self._turn) for part in (before, self._part))
+        now, later = (pin.exp3(self._lean(part)) for part in (before, self._part))
         rate = (later - now) / self._dt
         return Axes(now @ z, rate @ z, None if x is None else now @ x, None if x is None else rate @ x)
 
+    def _lean(self, r: float) -> Array:
+        """w(r)."""
+        return np.asarray(r * (1.0 + r - r * r) * self._phi + r * r * (r - 1.0) * self._mu)
 
-def _turn(swinging: Swinging, z: Array) -> Array:
-    """Rotation vector that takes the axes of the hold to those of the hand [rad]."""
-    axis, x_axis, x = swinging.axis, swinging.x_axis, swinging.x
+    def _goes_on(self, swinging: Swinging, place: Array) -> Array:
+        """mu: the rate at which the hand turned until now, for its way to the hold; less where that is much."""
+        closing = swinging.pace * float(swinging.aim.velocity @ (place - swinging.aim.position)) / self._far
+        if self._before is None or self._before[0] is not swinging or closing < THERE:
+            return self._phi
+        _, axis, x_axis = self._before
+        rate = _turn(swinging.axis, swinging.x_axis, axis, None if swinging.x is None else x_axis) / self._dt
+        mu, most = -rate * self._far / closing, GOES_ON * max(float(np.linalg.norm(self._phi)), LEAST_TURN)
+        return np.asarray(mu * min(1.0, most / max(float(np.linalg.norm(mu)), 1e-12)))
+
+
+def _turn(axis: Array, x_axis: Array, z: Array, x: Array | None) -> Array:
+    """Rotation vector that takes z, and x where there is one, to the axes of a hand [rad]."""
     if x is not None:
         hand, hold = (np.column_stack([a, np.cross(b, a), b]) for a, b in ((x_axis, axis), (x, z)))
         return np.asarray(pin.log3(hand @ hold.T))

@@ -522,7 +522,7 @@ class Walk:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
         machine = self.machine
         _, _, _, a, b, c = machine.q[self.walker.arms[arm].q].tolist()
-        law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q)
+        law = way_to(self.walker, self.structure, self.plan, arm, machine.chain, machine.q, machine.held)
         more: dict[str, Any] = {"counted": False, "waits": True, "state": "open", "first_wrist": (a, b, c)}
         grip = self._grip(self.progress.grip[arm])
         swinging = self.hands.going(arm, grip, law, latch=0.0, wrist=(a, b, c), **more)
@@ -573,8 +573,8 @@ class Walk:
         if self.halted or self.aborted:
             return True
         if self.leader.one_motion:
-            # A swinging hand goes on to its hold with the body
-            return self._changing and self.swinging is None
+            # A swinging hand goes on to its hold with the body, as long as that is there
+            return self._changing if self.swinging is None else self.swinging.dropped
         return self._changing or (self.swinging is not None and (self.swinging.waits or self.swinging.pauses))
 
     def _soonest(self, swinging: Swinging) -> float:

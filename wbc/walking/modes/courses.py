@@ -14,7 +14,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.state import Swinging
 from wbc.walking.loop.walk import Walk
-from wbc.walking.planner.grips.table import Grips, grip_slices
+from wbc.walking.planner.grips.table import Grips, Holding, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.planner import plan_slices
 from wbc.walking.planner.stances.body import BodySearch
@@ -98,10 +98,10 @@ def course_slices(
     lands = [[at] for at in begun.sample]
     for step in begun.kept:
         lands[names.index(step.arm)].append(round(step.land / path.spacing))
-    sample = max([splice, *(samples[-1] for samples in lands)])
+    sample, holding = max([splice, *(samples[-1] for samples in lands)]), _holding(old, begun, lands, shift)
     if quick:
         rows = [int(old.hold[grips[-1]]) for grips in begun.hands]
-        few = yield from grip_slices(walker, structure, path, rows)
+        few = yield from grip_slices(walker, structure, path, rows, holding)
         chain = _chain(structure, old, few, begun, lands, shift)
         search = BodySearch(walker, structure, path, few)
         until = search.until([grips[-1] for grips in chain], max(samples[-1] for samples in lands))
@@ -109,12 +109,21 @@ def course_slices(
         sample = max(min(sample + round(walker.margins.onward / path.spacing), until - 1), sample)
         start = tuple(structure.ids[few.hold[grips[0]]] for grips in chain)
         yield Plan(path, start, (), False, sample * path.spacing, "being planned", few, chain)
-    grips = yield from grip_slices(walker, structure, path)
+    grips = yield from grip_slices(walker, structure, path, holding=holding)
     chain = _chain(structure, old, grips, begun, lands, shift)
     stance = tuple(grips[-1] for grips in chain)
     rest = yield from plan_slices(walker, structure, path, grips=grips, stance=stance, sample=sample, tries=TRIES)
     start = tuple(structure.ids[grips.hold[mine[0]]] for mine in chain)
     return Plan(path, start, begun.kept, False, rest.reached, rest.reason, grips, chain, (), begun.laws).then(rest)
+
+
+def _holding(old: Grips, begun: Course, lands: Sequence[Sequence[int]], shift: int) -> Holding:
+    """The hands of a course, for another table of grips."""
+    return {
+        (arm, int(old.hold[grip])): (at, float(old.posture_at(grip, at + shift)[-1]))
+        for arm, (hands, samples) in enumerate(zip(begun.hands, lands, strict=True))
+        for grip, at in zip(hands, samples, strict=True)
+    }
 
 
 def _chain(

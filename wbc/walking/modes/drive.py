@@ -151,6 +151,10 @@ class Drive:
                     # The body may have to wait for the hand, where it can land
                     there = float(walk.progress.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
                     self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.hands.data) + SURE)
+                elif walk.pace == 0.0 and swinging is None and len(self._order) > 1:
+                    # Its hands cannot hold as fast as that where it stands
+                    del self._order[0]
+                    self._settled = False
                 else:
                     self._stuck = True
             else:

@@ -26,7 +26,7 @@ from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.sound import sound_slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
-from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, stance_slices
+from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, holding_of, stance_slices
 from wbc.walking.planner.swings.law import SwingLaw
 
 Objective = Literal["velocity", "destination"]
@@ -214,7 +214,7 @@ def plan_slices(
     validation.one_of("objective", objective, ("velocity", "destination"))
     limb_of(walker)
     if grips is None:
-        grips = yield from grip_slices(walker, structure, path)
+        grips = yield from grip_slices(walker, structure, path, holding=holding_of(walker, structure, beginning))
     best: tuple[Found, tuple[SwingLaw, ...]] | None = None
     delays: tuple[float, ...] = DELAYS[-1:] if objective == "destination" else SOON if soon else DELAYS
     usual: list[tuple[float, int | None]] = [(delay, width) for delay in delays]

@@ -8,7 +8,7 @@ be near to what its hold is mounted on while it is at the hold, see :class:`wbc.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -33,6 +33,8 @@ EVERY = 0.02
 DEPTH, TOLERANCE = 0.005, 1e-4
 #: The bodies' free joint in a swept tree
 BASE = 0
+#: No hand in the air
+NONE_LEFT: Mapping[int, Array] = {}
 
 
 class ClearScene:
@@ -76,14 +78,14 @@ class ClearScene:
         poses: Array,
         postures: Sequence[Array],
         holds: Sequence[Ints],
-        left: tuple[int, Array] | None = None,
+        left: Mapping[int, Array] = NONE_LEFT,
     ) -> Nearest | None:
         """An instant at which two bodies are too near to each other; None where there is provably none.
 
         Args:
             times: of instants ``[k]`` [s]. poses: of the body ``[k, 4, 4]``. postures: of every arm ``[k, joints]``
-                [rad]. holds: rows of the holds that each hand is at, leaves or comes to. left: row of an arm, and where
-                its hand begins in the air: it may have just left a hold there that is gone ``[3]`` [m].
+                [rad]. holds: rows of the holds that each hand is at, leaves or comes to. left: rows of arms -> where
+                their hands begin in the air: they may have just left a hold there that is gone ``[3]`` [m].
         """
         if self._sweeper is None:
             return None
@@ -95,8 +97,8 @@ class ClearScene:
         controls = np.stack([scalars[:-1], scalars[1:]], axis=2)
         motion = Motion(times, controls, free, np.zeros(scalars.shape[1]), np.zeros((1, 2)))
         exempt = list(self._exemptions(holds))
-        if left is not None:
-            exempt += self._leaving(*left)
+        for arm, point in left.items():
+            exempt += self._leaving(arm, point)
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
 
     def _leaving(self, arm: int, point: Array) -> Iterator[Exemption]:

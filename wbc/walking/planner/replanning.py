@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Protocol
@@ -20,7 +20,7 @@ from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
 from wbc.walking.planner.proof import EVERY, clear_scene
 from wbc.walking.planner.stances.body import BodySearch
-from wbc.walking.planner.starts import Beginning, stances
+from wbc.walking.planner.starts import Beginning, holding_of, stances
 from wbc.walking.planner.swings.curve import Pivots, between
 from wbc.walking.planner.swings.joints import blend
 from wbc.walking.planner.swings.law import SwingLaw, least_time_law
@@ -72,7 +72,7 @@ def plan_from_stance(
     """
     beginning: Beginning = start, postures or {}, {}
     rows = [structure.index(start[arm.name]) for arm in walker.arms]
-    grips = yield from grip_slices(walker, structure, path, rows)
+    grips = yield from grip_slices(walker, structure, path, rows, holding_of(walker, structure, beginning))
     search = BodySearch(walker, structure, path, grips)
     stance = stances(walker, structure, search, beginning)[0]
     # The plan that follows keeps the branches
@@ -185,14 +185,16 @@ def _from_here(
     start = {arms[arm].name: structure.ids[hold] for arm, hold in held.items()}
     postures = {arms[arm].name: q[arms[arm].q] for arm in held}
     free = [arm for arm in range(len(arms)) if arm not in held]
-    grips = yield from grip_slices(walker, structure, path)
+    grips = yield from grip_slices(
+        walker, structure, path, holding=holding_of(walker, structure, (start, postures, {}))
+    )
     while True:
         beginning: Beginning = start, postures, avoid
         asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
         plan = _complete(structure, (yield from asked))
         far = list[int]()
         for arm in free:
-            law = way_to(walker, structure, plan, arm, hands, q)
+            law = way_to(walker, structure, plan, arm, hands, q, held)
             if not law.possible or (may is not None and not may(plan, arm, law, held, q)):
                 far.append(arm)
         if not far:
@@ -205,8 +207,20 @@ def _from_here(
                 raise NoPlanError("plan", arms[arm].name, reason, separating=avoid[arms[arm].name])
 
 
-def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: HandsThere, q: Array) -> SwingLaw:
-    """From where a free hand is to where the plan has it at the beginning; the body stands there."""
+def way_to(
+    walker: Walker,
+    structure: Structure,
+    plan: Plan,
+    arm: int,
+    hands: HandsThere,
+    q: Array,
+    held: Collection[int],
+) -> SwingLaw:
+    """From where a free hand is to where the plan has it at the beginning; the body stands there.
+
+    Args:
+        held: rows of the arms whose hands hold; of the others those before this one have been brought.
+    """
     grips, guided = plan.grips, limb_of(walker).guided
     if grips is None:
         raise ShapeError("plan", plan, "expected a plan of the planner for a body with arms")
@@ -233,14 +247,14 @@ def way_to(walker: Walker, structure: Structure, plan: Plan, arm: int, hands: Ha
     postures, holds = list[Array](), list[Ints]()
     for k, other in enumerate(walker.arms):
         # Hands that are free as well are brought there one after the other, from where they are
-        rows = angles[0] if k == arm else np.repeat(q[other.q][None], len(times), axis=0)
-        postures.append(rows)
+        now = grips.posture_at(plan.chain[k][0], 0) if k < arm and k not in held else q[other.q]
+        postures.append(angles[0] if k == arm else np.repeat(now[None], len(times), axis=0))
         holds.append(np.array([structure.index(plan.start[k])]))
-    # A hand that has just left a hold may be near to what that is mounted on, also where the hold is gone since
+    # Hands that have just left a hold may be near to what that is mounted on, also where the hold is gone since
     near_by = np.linalg.norm(structure.positions - hands.origins[arm], axis=1).argmin()
     holds[arm] = np.append(holds[arm], near_by)
     poses = np.repeat(plan.path.poses[:1], len(times), axis=0)
-    left = arm, np.array(hands.origins[arm])
+    left = {k: np.array(hands.origins[k]) for k in range(arm, len(walker.arms)) if k not in held}
     law.possible = clear_scene(walker, structure).touched(times, poses, postures, holds, left) is None
     return law
 

@@ -17,7 +17,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.grips.held import held, near_holds
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import Grips, Holding
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.search import PAIRS, StanceSearch
@@ -31,6 +31,20 @@ STARTS, ALL_STARTS = (10, 24), (24, 200)
 FEW_ARMS, ENOUGH = 3, 1000
 #: Joints of one branch differ by less than this from where they are [rad]; other branches by more
 SAME_BRANCH = 0.3
+
+
+def holding_of(walker: Walker, structure: Structure, beginning: Beginning) -> Holding:
+    """The hands that hold at the beginning and whose postures are known, for the table of grips.
+
+    Raises:
+        UnknownNameError: another arm or hold.
+    """
+    start, postures, _ = beginning
+    names = [arm.name for arm in walker.arms]
+    for name in (*start, *postures):
+        validation.one_of("start", name, names)
+    known = [name for name in start if name in postures]
+    return {(names.index(name), structure.index(start[name])): (0, float(postures[name][-1])) for name in known}
 
 
 def grips_at_first(
@@ -165,17 +179,17 @@ def _lasting_longest(
     grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
 ) -> Iterator[tuple[int, ...]]:
     """Stances that last beyond a sample, grown arm by arm from the :data:`ENOUGH` that last longest."""
-    ends = {
-        frozenset((a, b)): min(int(grips.last[a]), int(grips.last[b]), search.conflicts.first_conflict(a, b, 0) - 1)
-        for one, other in combinations(choices, 2)
-        for a, b in product(one, other)
-        if grips.hold[a] != grips.hold[b]
-    }
-    some: list[tuple[int, int, tuple[int, ...]]] = [(int(grips.last[g]), 0, (g,)) for g in choices[0]]
+    last, ends = grips.last.tolist(), {g: dict[int, int]() for mine in choices for g in mine}
+    for one, other in combinations(choices, 2):
+        for a, b in product(one, other):
+            if grips.hold[a] != grips.hold[b]:
+                ends[b][a] = min(last[a], last[b], search.conflicts.first_conflict(a, b, 0) - 1)
+    some: list[tuple[int, int, tuple[int, ...]]] = [(last[g], 0, (g,)) for g in choices[0]]
     for mine in choices[1:]:
         longer = []
         for (until, total, stance), g in product(some, mine):
-            each = [ends.get(frozenset((g, other)), -1) for other in stance]
+            mate = ends[g]
+            each = [mate.get(other, -1) for other in stance]
             if min(each) > sample:
                 longer.append((min(until, *each), total + sum(each), (*stance, g)))
         # Of those that last as long, the ones whose pairs last longer

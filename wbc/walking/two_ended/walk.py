@@ -98,11 +98,11 @@ class TurnLeader:
             swinging.open_on(machine.dt)
         now, before = swinging.aim, law.posture(swinging.clock)
         lifted = progress.plan.regrasps[progress.next].lift
-        swinging.clock = min(progress.path_time - lifted, law.duration)
-        swinging.aim = law.at(swinging.clock)
-        dt = machine.dt
+        dt, clock = machine.dt, min(progress.path_time - lifted, law.duration)
+        swinging.clock, swinging.pace = clock, (clock - swinging.clock) / dt
+        swinging.aim = law.at(clock)
         speed, rates = (swinging.aim.position - now.position) / dt, law.posture(swinging.clock) - before
-        near = swinging.clock > law.duration - NEAR
+        near = clock > law.duration - NEAR and not swinging.dropped
         at_hold = (machine.structure.axes[swinging.hold], swinging.x) if near and swinging.x is not None else None
         self._stack.turn(arm, (now.position, speed), (before, rates / dt), at_hold)
 

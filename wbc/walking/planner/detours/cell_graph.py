@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from wbc.validation import Array
 from wbc.walking.planner.detours.cell_grips import Flags
@@ -21,12 +22,17 @@ NONE_SPARE, POOR = 4.0, 2.0
 
 def round_labels(flags: Flags) -> NDArray[np.int32]:
     """Numbers of connected sets of an array whose last axis is round, from 1 on; 0 where it is false."""
-    number, count = _numbered(flags)
-    i, j = (np.concatenate(side) for side in zip(*[_along(number, axis) for axis in range(flags.ndim)], strict=True))
-    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(count, count))
-    out = np.zeros(flags.shape, dtype=np.int32)
-    out[flags] = connected_components(graph, directed=False)[1] + 1
-    return out
+    out: NDArray[np.int32] = label(flags)[0]
+    first, last = out[..., 0], out[..., -1]
+    across = (first > 0) & (last > 0) & (first != last)
+    if not across.any():
+        return out
+    # Of sets that go on beyond the end of the axis the first one gives the number
+    same = np.arange(out.max() + 1, dtype=np.int32)
+    for a, b in set(zip(first[across].tolist(), last[across].tolist(), strict=True)):
+        low, high = sorted((int(same[a]), int(same[b])))
+        same[same == high] = low
+    return np.unique(same, return_inverse=True)[1].astype(np.int32)[out]
 
 
 def distances(cells: Cells, fits: Sequence[Flags], least: int, goal: int) -> Array:

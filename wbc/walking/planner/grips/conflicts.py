@@ -151,10 +151,13 @@ class ArmClearance:
 
     def first_conflict(self, one: int, other: int, sample: int) -> int:
         """The first sample from ``sample`` on at which the arms are too near, NEVER if there is none."""
-        pair = _pair(one, other)
-        if pair not in self._conflicts:
+        pair = (one, other) if one < other else (other, one)
+        found = self._conflicts.get(pair)
+        if found is None:
             self.prepare([pair])
-        found = self._conflicts[pair]
+            found = self._conflicts[pair]
+        if not found:
+            return NEVER
         place = bisect_left(found, sample - EVERY + 1)
         return found[place] if place < len(found) else NEVER
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -31,7 +31,14 @@ class Turned:
     ends: str
 
 
-def turns(angles: Array, rolls: tuple[float, ...], limit: float, fastest: float, shortest: int) -> Iterator[Turned]:
+def turns(
+    angles: Array,
+    rolls: tuple[float, ...],
+    limit: float,
+    fastest: float,
+    shortest: int,
+    kept: tuple[int, float] | None = None,
+) -> Iterator[Turned]:
     """Grips of one stretch: theta6 + roll + 2 pi w within the limit for as long as possible.
 
     Where the whole stretch is possible at several turns the one nearest to the middle of the joint is taken; of a fixed
@@ -40,7 +47,7 @@ def turns(angles: Array, rolls: tuple[float, ...], limit: float, fastest: float,
     Args:
         angles: theta6 at roll 0, row by row [rad]. rolls: allowed [rad].
         limit: largest size of theta6 [rad]. fastest: largest step from row to row [rad].
-        shortest: rows of a grip at least.
+        shortest: rows of a grip at least. kept: a row and theta6 there [rad]: the grip that has it is found, too.
     """
     smooth = np.unwrap(angles)
     offsets = (np.array(rolls)[:, None] + 2 * pi * np.arange(-2, 3)).ravel()
@@ -54,6 +61,8 @@ def turns(angles: Array, rolls: tuple[float, ...], limit: float, fastest: float,
             found = [(0, end - begin - 1, k) for k in whole]
         else:
             found = list(_parts(part, offsets, limit, shortest))
+        if kept is not None and begin <= kept[0] < end:
+            found += _with(part, offsets, limit, shortest, kept[0] - begin, kept[1], found)
         for first, last, k in found:
             cut = "rate" if begin + last + 1 < len(smooth) else ""
             ends = "limit" if begin + last + 1 < end else cut
@@ -73,6 +82,22 @@ def _parts(part: Array, offsets: Array, limit: float, shortest: int) -> Iterator
     for _, first, last, k in runs:
         if not any(a <= first and last <= b for a, b in kept):
             kept.append((first, last))
+            yield first, last, k
+
+
+def _with(
+    part: Array,
+    offsets: Array,
+    limit: float,
+    shortest: int,
+    row: int,
+    angle: float,
+    found: Sequence[tuple[int, int, int]],
+) -> Iterator[tuple[int, int, int]]:
+    """The stretch within the limit that has an angle at a row, unless it is among those found."""
+    k = int(np.abs(part[row] + offsets - angle).argmin())
+    for first, last in _runs(np.abs(part + offsets[k]) <= limit):
+        if first <= row <= last and last - first + 1 >= shortest and (first, last, k) not in found:
             yield first, last, k
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,6 +21,9 @@ from wbc.walking.planner.grips.stretches import stretches
 from wbc.walking.planner.slices import Slices, drained
 
 Ints = NDArray[np.int64]
+#: Hands that hold: (arm, hold), their rows, -> a sample of the path and the angle of the last joint there [rad]
+Holding = Mapping[tuple[int, int], tuple[int, float]]
+NONE_HOLD: Holding = {}
 
 #: Reason of a grip that lasts as long as the path
 END = "end of the path"
@@ -139,11 +142,18 @@ def find_grips(walker: Walker, structure: Structure, path: BodyPath) -> Grips:
     return drained(grip_slices(walker, structure, path))
 
 
-def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequence[int] = ()) -> Slices[Grips]:
+def grip_slices(
+    walker: Walker,
+    structure: Structure,
+    path: BodyPath,
+    only: Sequence[int] = (),
+    holding: Holding = NONE_HOLD,
+) -> Slices[Grips]:
     """As :func:`find_grips`, in slices of about :data:`ROWS` postures.
 
     Args:
-        only: one row of a hold for each arm, where others do not matter.
+        only: one row of a hold for each arm, where others do not matter. holding: hands that hold where the roll is
+            fixed: the grip at their roll is in the table, whichever would do for longer.
     """
     limb, margins, there = limb_of(walker), walker.margins, around(walker, structure)
     blocked = there.bodies(path.poses)
@@ -155,7 +165,7 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
             some = holds[begin : begin + size]
             quick = stretches(there, arm, frames, blocked, some, path.spacing, margins, SHORTEST)
             if quick is None:
-                found += _of_arm(there, margins, arm, frames, blocked, some, path.spacing)
+                found += _of_arm(there, margins, arm, frames, blocked, some, path.spacing, holding)
             else:
                 found += [(arm, *stretch[:-1], ANY, stretch[-1]) for stretch in quick]
             yield None
@@ -171,7 +181,14 @@ def grip_slices(walker: Walker, structure: Structure, path: BodyPath, only: Sequ
 
 
 def _of_arm(
-    around_it: Around, margins: Margins, arm: int, frames: Array, blocked: Ints, among: Ints, spacing: float
+    around_it: Around,
+    margins: Margins,
+    arm: int,
+    frames: Array,
+    blocked: Ints,
+    among: Ints,
+    spacing: float,
+    holding: Holding,
 ) -> Iterator[tuple[int, int, int, int, int, int, int, Array]]:
     """(arm, hold, branch, first, last, reason of the end, roll, postures) of every grip of an arm on some holds."""
     limb, structure = around_it.limb, around_it.structure
@@ -202,7 +219,9 @@ def _of_arm(
                 yield arm, hold, branch, first, last, reason, ANY, q[rows]
                 continue
             limit = limb.position_limits[free] - margins.held_angle
-            for one in turns(q[rows][:, free], structure.holds[hold].rolls, limit, most[free], SHORTEST):
+            here = holding.get((arm, hold))
+            kept = None if here is None else (here[0] - first, here[1])
+            for one in turns(q[rows][:, free], structure.holds[hold].rolls, limit, most[free], SHORTEST, kept):
                 turned = q[rows][one.first : one.last + 1].copy()
                 turned[:, free] = one.angles
                 why = {"limit": free, "rate": names + 1 + free}.get(one.ends, reason)

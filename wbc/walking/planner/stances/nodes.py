@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.validation import Array
+from wbc.walking.planner.grips.conflicts import NEVER
 from wbc.walking.planner.grips.table import Ints
 from wbc.walking.planner.slices import Slices
 from wbc.walking.planner.swings.move import Chosen, Key, Move, Swing
@@ -108,25 +109,34 @@ class StanceEnds:
 
     def __init__(self, conflicts: Conflicts, last: Ints, spared: Ints) -> None:
         self._conflicts, self._last, self._spared = conflicts, last, spared
+        self._known: dict[tuple[int, ...], int] = {}
 
     def among(self, others: Sequence[int], sample: int) -> int:
         """Last sample that the grips of some arms can hold together, less what is spared."""
-        return min([*(int(self._spared[g]) for g in others), *self._free(others, sample)])
+        return min([*(int(self._spared[g]) for g in others), self._first(tuple(others), sample) - 1])
 
     def until(self, key: Sequence[int], sample: int) -> int:
         """Last sample that a stance can hold, from a sample on."""
-        return min([*(int(self._last[g]) for g in key), *self._free(key, sample)])
+        return min([*(int(self._last[g]) for g in key), self._first(tuple(key), sample) - 1])
 
-    def by_arm(self, key: Key, sample: int) -> list[int]:
-        """For each arm the last sample that it can hold itself, from a sample on: of two arms that conflict the one
-        whose grip ends sooner has to move first.
+    def by_arm(self, keys: Ints, samples: Ints) -> Ints:
+        """For each arm of stances ``[n, arms]`` the last sample that it can hold itself, from a sample ``[n]`` on: of
+        two arms that conflict the one whose grip ends sooner has to move first.
         """
-        ends = [int(self._last[grip]) for grip in key]
-        order = sorted(range(len(key)), key=ends.__getitem__)
-        for k, arm in enumerate(order):
-            later = [self._conflicts.first_conflict(key[arm], key[other], sample) - 1 for other in order[k + 1 :]]
-            ends[arm] = min([ends[arm], *later])
-        return ends
+        one, other = np.triu_indices(keys.shape[1], 1)
+        size, last = int(keys.max()) + 1, self._last[keys]
+        pairs = np.sort(np.stack([keys[:, one], keys[:, other]], axis=2), axis=2)
+        codes, which = np.unique(pairs @ [size, 1], return_inverse=True)
+        # Most pairs conflict nowhere, or only later
+        whole = [self._conflicts.first_conflict(code // size, code % size, 0) for code in codes.tolist()]
+        first = np.array(whole)[which.reshape(pairs.shape[:2])]
+        for row, k in zip(*np.nonzero(first < samples[:, None]), strict=True):
+            a, b = pairs[row, k].tolist()
+            first[row, k] = self._conflicts.first_conflict(a, b, int(samples[row]))
+        rank = last.argsort(axis=1, kind="stable").argsort(axis=1)
+        sooner = np.where(rank[:, one] < rank[:, other], one, other)
+        np.minimum.at(last, (np.arange(len(keys))[:, None], sooner), first - 1)
+        return last
 
     def limits(self, key: Key, sample: int) -> tuple[list[int], list[int]]:
         """For each arm the last sample that the others can hold, less what is spared, and that it can hold itself."""
@@ -144,6 +154,14 @@ class StanceEnds:
         while (after := max(self._conflicts.free_from(grip, other, sample) for other in others)) > sample:
             sample = after
         return sample
+
+    def _first(self, grips: tuple[int, ...], sample: int) -> int:
+        """The first sample from a sample on at which two of some grips conflict; one behind every path for none."""
+        first = self._known.get(grips)
+        if first is None:
+            first = min((self._conflicts.first_conflict(*pair, 0) for pair in combinations(grips, 2)), default=NEVER)
+            self._known[grips] = first
+        return first if first >= sample else min(self._free(grips, sample)) + 1
 
     def _free(self, grips: Sequence[int], sample: int) -> list[int]:
         """Last samples before pairs conflict."""

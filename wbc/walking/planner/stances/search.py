@@ -24,7 +24,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from wbc.walking.body_path import BodyPath
-from wbc.walking.planner.grips.table import Grips, Ints
+from wbc.walking.planner.grips.table import Grips
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.candidates import QUANTUM, Fan, Outlook, following
 from wbc.walking.planner.stances.nodes import Conflicts, Found, Node, StanceEnds, SwingTable, moves_to
@@ -168,18 +168,18 @@ class StanceSearch(Generic[S]):
         some = list(islice(order, most))
         if not some:
             return order
-        pairs = [pair for key, _ in some for pair in combinations(key, 2)]
+        yield from self._compared([key for key, _ in some])
+        keys, heads = np.array([key for key, _ in some], dtype=np.int64), [nodes[0] for _, nodes in some]
+        samples, delays = np.array([(node.sample, node.delay) for node in heads], dtype=np.int64).T
+        promise = self._outlook.promise(self.ends.by_arm(keys, samples), samples, delays)
+        return chain((some[k] for k in self._outlook.order(keys, samples, promise).tolist()), order)
+
+    def _compared(self, keys: Sequence[Key]) -> Slices[None]:
+        """Look at all pairs of grips of some stances together, each once."""
+        pairs = sorted({pair for key in keys for pair in combinations(key, 2)})
         for begin in range(0, len(pairs), PAIRS):
             self.conflicts.prepare(pairs[begin : begin + PAIRS])
             yield None
-        keys, heads = np.array([key for key, _ in some], dtype=np.int64), [nodes[0] for _, nodes in some]
-        samples, delays = np.array([(node.sample, node.delay) for node in heads], dtype=np.int64).T
-        promise = self._outlook.promise(self._ends(keys, samples), samples, delays)
-        return chain((some[k] for k in self._outlook.order(keys, samples, promise).tolist()), order)
-
-    def _ends(self, keys: Ints, samples: Ints) -> Ints:
-        """Last samples of the arms of stances, as their conflicts end them."""
-        return np.array([self.ends.by_arm(*one) for one in zip(keys.tolist(), samples.tolist(), strict=True)])
 
     def _best(self, kept: dict[Key, Node]) -> dict[Key, Node]:
         """The promising ones of checked stances: arms that conflict end them."""
@@ -188,7 +188,7 @@ class StanceSearch(Generic[S]):
         keys = np.array(list(kept), dtype=np.int64)
         samples, delays = np.array([(node.sample, node.delay) for node in kept.values()], dtype=np.int64).T
         if keys.shape[1] > FEW_ARMS:
-            promise = self._outlook.promise(self._ends(keys, samples), samples, delays)
+            promise = self._outlook.promise(self.ends.by_arm(keys, samples), samples, delays)
         else:
             until = np.array([self.until(key, node.sample) for key, node in kept.items()])
             promise = self._outlook.promise(self.grips.last[keys], samples, delays)
@@ -200,10 +200,7 @@ class StanceSearch(Generic[S]):
         self, level: dict[Key, Node], part: Sequence[tuple[Key, list[Node]]]
     ) -> Slices[list[list[Swing | None]]]:
         """The swings that lead to some stances, and what their check needs, computed together."""
-        pairs = [pair for key, _ in part for pair in combinations(key, 2)]
-        for begin in range(0, len(pairs), PAIRS):
-            self.conflicts.prepare(pairs[begin : begin + PAIRS])
-            yield None
+        yield from self._compared([key for key, _ in part])
         found = [[self._swing(level, key, node) for node in nodes] for key, nodes in part]
         yield from self.swings.slices(swing for swings in found for swing in swings if swing is not None)
         return found
