@@ -20,8 +20,6 @@
 #define LEAST_PIVOT 1e-4
 /* Share of the acceleration limits that slowing down towards the optimum may take */
 #define BRAKING 1.0
-/* Errors beyond this are left to the linear model, before squares of them overflow */
-#define TOO_FAR 1e50
 /* Corrections of a step with residuals in wide arithmetic, where the squared pivots of the metric are further apart */
 #define SHARPENED 3
 #define APART 1e6
