@@ -152,7 +152,8 @@ class InverseKinematics(Handles):
         if proofs:
             for entry in self.stack.entries:
                 # Rows that are switched off need not be met
-                if entry.name not in self.goals or not engine.tick.weight[engine.core.layout.blocks[entry.name].span].all():
+                all_count = engine.tick.weight[engine.core.layout.blocks[entry.name].span].all()
+                if not all_count or entry.name not in self.goals:
                     continue
                 if (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
                     hopeless |= beyond(parameters[:, controller[entry.name].slot("target").span])
