@@ -42,7 +42,7 @@ TALOS_FRAMES = [
 ]  # fmt: skip
 SPHERES = (0, 1, 5, 10, 20, 50)
 #: Boxes in the world; five links carry one each
-BOXES = (0, 1, 4, 10, 20, 40)
+BOXES = (0, 1, 2, 4, 10, 20, 40)
 #: First configurations, where they are not the robot's neutral one [rad]
 HOME = {
     "panda": {

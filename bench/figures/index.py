@@ -109,6 +109,7 @@ _ALL = (
     Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
+    Figure("cortex_m7", (*TICK, "wbc/export", "bench/single.py", "bench/cortex_m7"), 5.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),

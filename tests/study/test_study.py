@@ -137,7 +137,9 @@ def test_results_failures_and_an_interrupt(tmp_path: Path) -> None:
         "x": {"count": 3.0, "mean": 1.0, "p5": pytest.approx(0.1), "median": 1.0, "p95": pytest.approx(1.9)},
         "y": {"count": 0.0},
     }
-    table = pq.read_table(tmp_path / "results.parquet").to_pydict()
+    read = pq.read_table(tmp_path / "results.parquet")
+    assert json.loads(read.schema.metadata[b"study"]) == json.loads((tmp_path / "study.json").read_text())
+    table = read.to_pydict()
     assert table == {"trial": [0] * 3, "seed": [0] * 3, "x": [0.0, 1.0, 2.0], "y": [None] * 3}
     assert (tmp_path / "study.png").stat().st_size > 1000
 

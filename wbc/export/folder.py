@@ -22,7 +22,7 @@ from wbc.export.texts import build_files
 #: First number of check.bin, see check.c
 MARK = 1234567.0
 #: Files that are the same in every export
-_SAME = ("wbc_tick.c", "wbc_rows.c", "check.c")
+_SAME = ("wbc_tick.c", "wbc_rows.c", "single.h", "check.c")
 _EXPORTED = re.compile(r"^CASADI_SYMBOL_EXPORT [^(;]*?\b(\w+)\(", re.MULTILINE)
 
 
@@ -121,6 +121,9 @@ def _names(rows: str) -> str:
     return "\n".join(
         [
             "/* Names that a program sees begin with wbc_; generated */",
+            "#ifdef WBC_SINGLE",
+            '#include "single.h"',
+            "#endif",
             "#define EXPORT static __attribute__((unused))",
             "#define CASADI_SYMBOL_EXPORT",
             "#define CASADI_CODEGEN_PREFIX",

@@ -48,13 +48,12 @@ def _sizes(snapshot: Snapshot) -> str:
         "ROWS": (layout.general_rows, "rows of constraints other than bounds on velocities"),
         "MARGINS": (layout.margin_rows, "rows of constraints that have a margin"),
         "BOUND_BLOCKS": (layout.bound_blocks, "constraints that are bounds on velocities"),
-        "BYTES": (
-            bytes_of_tick(sources["tick.h"], sources["stack.h"], layout),
-            "memory of a controller, or a little more",
-        ),
         "DT": (repr(snapshot.stack.dt), f"time between commands [s]; wbc_set_dt takes {low:g} to {high:g}"),
     }
-    return "\n".join(f"#define WBC_{name} {value} /* {text} */" for name, (value, text) in named.items())
+    lines = [f"#define WBC_{name} {value} /* {text} */" for name, (value, text) in named.items()]
+    single, double = (bytes_of_tick(sources["tick.h"], sources["stack.h"], layout, number) for number in (4, 8))
+    memory = ["#ifdef WBC_SINGLE", f"# define WBC_BYTES {single}", "#else", f"#define WBC_BYTES {double}", "#endif"]
+    return "\n".join([*lines, "/* memory of a controller, or a little more */", *memory])
 
 
 #: Sizes in the public header
@@ -70,7 +69,8 @@ def _result(snapshot: Snapshot) -> str:
         return re.sub(r"[A-Z_]{2,}", lambda word: (_MACROS | numbers)[word[0]], size)
 
     fields = report_fields(snapshot.layout)
-    return "\n".join(f"    {f.declaration(flat=False, macro=macro)} /* {f.text} */" for f in fields)
+    lines = [f"    {f.declaration(flat=False, macro=macro)} /* {f.text} */" for f in fields]
+    return "\n".join(lines).replace("    double ", "    wbc_real ")
 
 
 def _robot(snapshot: Snapshot) -> str:

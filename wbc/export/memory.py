@@ -15,14 +15,15 @@ _BLOCK = re.compile(r"^#if (LEVELS|SOFT_ROWS) > 0$(.*?)^#endif$", re.DOTALL | re
 _FIELD = re.compile(r"\s*(\w+)\s*(?:\[(.+)\])?\s*$", re.DOTALL)
 
 
-def bytes_of_tick(tick: str, stack: str, layout: Layout) -> int:
+def bytes_of_tick(tick: str, stack: str, layout: Layout, number: int = 8) -> int:
     """Bound on the size of ``wbc_tick``.
 
     Args:
         tick: text of ``tick.h``. stack: text of ``stack.h``. layout: that of both.
+        number: bytes of a number, 4 in single precision.
     """
     known = dict(_DEFINE.findall(stack + tick))
-    sizes, known_fields = dict(_BYTES), 8 * Memory(layout).size
+    sizes, known_fields = _BYTES | {"double": number}, number * Memory(layout).size
     tick = tick.replace("WBC_BUFFERS", "")
     tick = _BLOCK.sub(lambda block: block[2] if int(known[block[1]]) > 0 else "", tick)
     for body, name in _STRUCT.findall(re.sub(r"/\*.*?\*/", "", tick, flags=re.DOTALL)):

@@ -15,11 +15,13 @@ STRICT = -std=c99 -ffp-contract=off -fno-math-errno
 ROWS_FLAGS = -O1 -fstrict-aliasing
 TICK_FLAGS = -O3
 CFLAGS = -Wall -Wextra -pedantic
+# In single precision, with the solver's source: -DWBC_SINGLE -DDAQP_SINGLE_PRECISION -fsingle-precision-constant
+PRECISION =
 
 all: libwbc_tick.a {library} check
 
 check: check.c wbc_tick.h libwbc_tick.a {library}
-\t$(CC) -std=c99 -O2 $(CFLAGS) check.c libwbc_tick.a {library} -lm -o $@
+\t$(CC) -std=c99 -O2 $(PRECISION) $(CFLAGS) check.c libwbc_tick.a {library} -lm -o $@
 
 run: check
 \t./check check.bin
@@ -28,10 +30,10 @@ libwbc_tick.a: wbc_tick.o wbc_rows.o
 \tar rcs $@ wbc_tick.o wbc_rows.o
 
 wbc_tick.o: wbc_tick.c wbc_tick.h values.h names.h $(wildcard tick/*)
-\t$(CC) $(STRICT) $(TICK_FLAGS) $(CFLAGS) -Idaqp/include -c wbc_tick.c -o $@
+\t$(CC) $(STRICT) $(PRECISION) $(TICK_FLAGS) $(CFLAGS) -Idaqp/include -c wbc_tick.c -o $@
 
 wbc_rows.o: wbc_rows.c names.h tick/rows.c
-\t$(CC) $(STRICT) $(ROWS_FLAGS) $(CFLAGS) -c wbc_rows.c -o $@
+\t$(CC) $(STRICT) $(PRECISION) $(ROWS_FLAGS) $(CFLAGS) -c wbc_rows.c -o $@
 {build}
 clean:
 \trm -f *.o *.a check{more}
@@ -42,7 +44,7 @@ clean:
 BUILD_SOLVER = """
 # The solver's own code is compiled as its authors wrote it, and without warnings
 libdaqp.a: $(wildcard daqp/src/*.c daqp/include/daqp/*.h)
-\tcd daqp/src && for file in *.c; do $(CC) $(STRICT) -O3 -w -I../include/daqp -c $$file || exit 1; done
+\tcd daqp/src && for file in *.c; do $(CC) $(STRICT) $(PRECISION) -O3 -w -I../include/daqp -c $$file || exit 1; done
 \tar rcs $@ daqp/src/*.o
 """
 

@@ -99,7 +99,7 @@ class Kept:
         return columns
 
     def save(self) -> Path:
-        """Write ``results.parquet``.
+        """Write ``results.parquet``, with the study in its metadata.
 
         Raises:
             RobotFileError: it cannot be written.
@@ -110,7 +110,8 @@ class Kept:
         path = self.folder / RESULTS
         part = path.with_suffix(".part")
         try:
-            pq.write_table(pa.table(self.table()), part)
+            about = {"study": json.dumps(self.study.data())}
+            pq.write_table(pa.table(self.table()).replace_schema_metadata(about), part)
             part.replace(path)
         except OSError as error:
             raise RobotFileError("study", str(path), f"cannot be written: {error.strerror}") from error

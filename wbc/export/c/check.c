@@ -9,12 +9,19 @@
 
 #define MARK 1234567.0
 
-static int numbers(FILE *file, double *to, int count) { return fread(to, 8, (size_t)count, file) == (size_t)count; }
+static int numbers(FILE *file, wbc_real *to, int count) {
+    for (int i = 0; i < count; i++) {
+        double number;
+        if (fread(&number, 8, 1, file) != 1) return 0;
+        to[i] = (wbc_real)number;
+    }
+    return 1;
+}
 
 int main(int argc, char **argv) {
     static wbc_memory memory;
-    static double q[WBC_NQ + 1], v[WBC_NV], expected[1 + WBC_NV];
-    double head[6], largest = 0.0;
+    static wbc_real q[WBC_NQ + 1], v[WBC_NV], expected[1 + WBC_NV];
+    wbc_real head[6], largest = 0;
     int differ = 0, others = 0, seen[4] = {0, 0, 0, 0};
     const char *name = argc > 1 ? argv[1] : "check.bin";
     FILE *file = fopen(name, "rb");
@@ -37,7 +44,7 @@ int main(int argc, char **argv) {
         const int status = wbc_step(c, q, v);
         int same = status == (int)expected[0];
         for (int i = 0; i < WBC_NV; i++) {
-            const double difference = fabs(wbc_last(c)->v[i] - expected[1 + i]);
+            const wbc_real difference = (wbc_real)fabs(wbc_last(c)->v[i] - expected[1 + i]);
             if (!(difference <= largest)) largest = difference;
             same = same && difference <= head[5];
         }

@@ -16,6 +16,13 @@
 extern "C" {
 #endif
 
+/* The numbers of this interface; with WBC_SINGLE, which all parts of a build must share, float */
+#ifdef WBC_SINGLE
+typedef float wbc_real;
+#else
+typedef double wbc_real;
+#endif
+
 @SIZES@
 
 /* Status of a step. Negative: the arguments were refused and nothing was changed. */
@@ -70,38 +77,38 @@ typedef struct wbc_controller wbc_controller;
 wbc_controller *wbc_init(wbc_memory *memory);
 
 /* Start anew: the last command becomes v (NULL: zero), and the solver forgets what it knows */
-void wbc_reset(wbc_controller *c, const double *v);
+void wbc_reset(wbc_controller *c, const wbc_real *v);
 
 /* One cycle at configuration q. v: a measured velocity that acceleration bounds are counted from, or NULL for the last
  * command. Returns the status; a command is certified unless it is WBC_BRAKED, WBC_CAPPED or WBC_UNCERTIFIED. Takes about
  * twice as long where the first answer has no certificate. */
-int wbc_step(wbc_controller *c, const double *q, const double *v);
+int wbc_step(wbc_controller *c, const wbc_real *q, const wbc_real *v);
 
 /* The report of the last step; it lies in the controller and changes with the next one */
 const wbc_result *wbc_last(wbc_controller *c);
 
 /* Run-time inputs, WBC_NP numbers that may be written between steps. They are not checked: a rotation must be one, and
  * a rate times dt lies in (0, 1]. Numbers that are not finite make the step brake. */
-double *wbc_inputs(wbc_controller *c);
+wbc_real *wbc_inputs(wbc_controller *c);
 
 /* Weight of every task row >= 0, scales of rows and units included; 0 switches a row off */
-double *wbc_weights(wbc_controller *c);
+wbc_real *wbc_weights(wbc_controller *c);
 
 /* The same for a task: weight is what the stack calls so. 0 or WBC_BAD_VALUE. */
-int wbc_set_weight(wbc_controller *c, int first, int rows, double weight);
+int wbc_set_weight(wbc_controller *c, int first, int rows, wbc_real weight);
 
 /* 1 or 0 for every constraint row, and for every degree of freedom of every bound */
-double *wbc_rows_enabled(wbc_controller *c);
-double *wbc_bounds_enabled(wbc_controller *c);
+wbc_real *wbc_rows_enabled(wbc_controller *c);
+wbc_real *wbc_bounds_enabled(wbc_controller *c);
 
 /* Time between this command and the next [s]. 0 or WBC_BAD_VALUE. */
-int wbc_set_dt(wbc_controller *c, double dt);
+int wbc_set_dt(wbc_controller *c, wbc_real dt);
 
 /* Iterations of the QP solver a step may take, 0 for as many as it needs: keeps a deadline. 0 or WBC_BAD_VALUE. */
 int wbc_set_iteration_cap(wbc_controller *c, int cap);
 
 /* out = q (+) v dt, the configuration after v has been held for dt; out may be q. For simulations. */
-void wbc_integrate(wbc_controller *c, const double *q, const double *v, double dt, double *out);
+void wbc_integrate(wbc_controller *c, const wbc_real *q, const wbc_real *v, wbc_real dt, wbc_real *out);
 
 #ifdef __cplusplus
 }

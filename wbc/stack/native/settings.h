@@ -24,6 +24,8 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 #define VELOCITY 0
 #define TORQUE 2
 
+/* Tolerances in double precision, and its types; those of an export in single precision are in its single.h */
+#ifndef WBC_SINGLE
 #define EPS 1.1102230246251565e-16
 /* Two rows whose normals differ by an angle below sqrt(DEPENDENT) count as one */
 #define DEPENDENT 1e-10
@@ -35,33 +37,19 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 #define DEAD 1e-20
 /* Weight of the proximal term |v - base|^2 against slack^2 in the relaxation */
 #define RHO 1e-6
-/* Iterations of a search with a higher price at most, see first_slack */
-#define BRIEF 30
-/* How much more than other equality rows those that keep a direction count while curvature is looked for */
-#define FIRM 1e4
-/* Soft rows that are held are part of H where they count at most this often as much as it; of the price of others, as
- * much as that, or at least a share, is in the factor */
-#define MODEST 1e0
-#define SHARE 1e-7
-/* Proximal steps of a relaxation at most, and the change of a row at which they end */
-#define PROXIMAL_STEPS 12
+/* The change of a row at which the proximal steps of a relaxation end */
 #define SETTLED 1e-11
 /* Violations of bounds and rows that never give way which a relaxation may leave, in row units, and an answer, of LONGEST:
  * torques are cut to their limits, and what an answer misses of those the accelerations that are sent do not get */
 #define FIRMLY 1e-8
-/* Corrections of a point of a relaxation or of a level, so that it meets its active rows */
-#define MEETINGS 3
 /* Multipliers above this share of the largest one of the class that gives way are not rounding */
 #define PUSHING 1e-6
 /* The cheap error bound is good enough up to here [rad/s] */
 #define QUICK_BOUND 1e-8
-/* Above this [rad/s] the bound is found in wide arithmetic, and the solution refined; how often at most */
+/* Above this [rad/s] the bound is found in wide arithmetic, and the solution refined */
 #define GOOD_BOUND 1e-7
-#define REFINEMENTS 4
 /* Violations above this are refined as well, in row units */
 #define GOOD_VIOLATION 1e-8
-/* Accelerations and forces beyond this, in their units, are none */
-#define FAR_AWAY 1e6
 /* Squared length of a quaternion or of a (cos, sin) pair minus 1: its length may be off by 1e-6 */
 #define UNIT_TOLERANCE 2.00001e-6
 /* Violations up to this, in row units, are rounding */
@@ -74,10 +62,37 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 #define OPTIMAL 1e-9
 /* Violations of rows that the solver took into account, in row units: beyond this the row cannot hold */
 #define SEEN 1e-6
+/* Errors beyond this are left to the linear model, before squares of them overflow */
+#define TOO_FAR 1e50
+/* How far DAQP may miss the side of a row */
+#define SEARCH_SETTINGS(s) ((s).primal_tol = 1e-11)
+typedef long double wbc_wide;
+#define WIDE_EPS (0.5L * LDBL_EPSILON)
+typedef long long wbc_bits;
+#define MOST_BITS LLONG_MAX
+#elif LEVELS > 0 || SOFT_ROWS > 0 || COMMAND != VELOCITY
+#error "single precision is for commands of velocities, without strict levels, soft rows and scaled tasks"
+#endif
+
+/* Iterations of a search with a higher price at most, see first_slack */
+#define BRIEF 30
+/* How much more than other equality rows those that keep a direction count while curvature is looked for */
+#define FIRM 1e4
+/* Soft rows that are held are part of H where they count at most this often as much as it; of the price of others, as
+ * much as that, or at least a share, is in the factor */
+#define MODEST 1e0
+#define SHARE 1e-7
+/* Proximal steps of a relaxation at most */
+#define PROXIMAL_STEPS 12
+/* Corrections of a point of a relaxation or of a level, so that it meets its active rows */
+#define MEETINGS 3
+/* How often a solution is refined at most */
+#define REFINEMENTS 4
+/* Accelerations and forces beyond this, in their units, are none */
+#define FAR_AWAY 1e6
 
 /* Where double precision is not enough */
-typedef long double wide;
-#define WIDE_EPS (0.5L * LDBL_EPSILON)
+typedef wbc_wide wide;
 
 /* General rows that are minimised at a level are no part of the first level's QP */
 #if LEVELS > 0
@@ -99,12 +114,12 @@ typedef long double wide;
 #define MADD(x, y, z) ((x) * (y) + (z))
 
 /* Four numbers at once, wherever they are */
-typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double)), may_alias));
 #define EACH(x) ((four){x, x, x, x})
 #define FOUR(place) (*(four *)(place))
 #define GIVEN_FOUR(place) (*(const four *)(place))
-typedef long long four_bits __attribute__((vector_size(32)));
-#define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){LLONG_MAX, LLONG_MAX, LLONG_MAX, LLONG_MAX}))
+typedef wbc_bits four_bits __attribute__((vector_size(4 * sizeof(wbc_bits))));
+#define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){MOST_BITS, MOST_BITS, MOST_BITS, MOST_BITS}))
 
 #define SUM_OF_FOUR(x) (((x)[0] + (x)[2]) + ((x)[1] + (x)[3]))
 /* Macros and no functions: what returns four numbers is called in another way on each processor. */

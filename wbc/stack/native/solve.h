@@ -102,6 +102,23 @@ static int report_slack(wbc_tick *t, int flag) {
     return gave_way;
 }
 
+/* Whether the search ended at a point that misses bounds or rows: in single precision it may not see that they contradict
+ * each other, and multipliers grow until nothing of the point is true */
+static int mistaken(const wbc_tick *t) {
+#ifdef WBC_SINGLE
+    for (int i = 0; i < NV; i++) {
+        const double tolerance = SOUND * dof_scale[i];
+        if (!(t->x[i] >= t->low[i] - tolerance && t->x[i] <= t->high[i] + tolerance)) return 1;
+    }
+    for (int k = 0; k < MC; k++) {
+        const double value = row_at(t, k, t->x), tolerance = SOUND * row_scale[k];
+        if (!(value >= t->low[NV + k] - tolerance && value <= t->high[NV + k] + tolerance)) return 1;
+    }
+#endif
+    (void)t;
+    return 0;
+}
+
 EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
@@ -113,6 +130,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     } else {
         int exit_flag = optimum(t, TIGHT);
         const int first = t->spent;
+        if (exit_flag >= 0 && mistaken(t)) exit_flag = -1;
         if (exit_flag < 0 && MC > 0 && !first) {
             flag = WBC_RELAXED;
             exit_flag = relaxed(t);

@@ -196,7 +196,7 @@ EXPORT void wbc_tick_init(wbc_tick *t) {
     work->qp = &t->problem;
     work->settings = &t->settings;
     daqp_default_settings(&t->settings);
-    t->settings.primal_tol = 1e-11;
+    SEARCH_SETTINGS(t->settings);
     t->settings.eps_prox = 0.0;
     t->settings.rho_soft = RHO;
     work->Rinv = t->Rinv;
