@@ -125,7 +125,6 @@ def test_a_killed_walk_goes_on(
 def test_a_killed_walk_under_torques_goes_on_in_mujoco(
     machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
 ) -> None:
-    pytest.importorskip("mujoco")
     choice = PlantChoice("mujoco", (0.0, -0.2, 0.0), ("delay 0.003",))
     loop, ticks = choice.build(machine, structure, backend="vm"), iter(range(60))
     child = os.fork()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,7 +38,7 @@ class GrippingState:
     broken: list[str] = field(default_factory=list)
 
 
-class Gripping:
+class Gripping(ABC):
     """Base of plants that take torques; they hold frames where :attr:`grips` says, and are told when that changes."""
 
     commands: Collection[CommandKind] = (CommandKind.TORQUE,)
@@ -49,13 +50,13 @@ class Gripping:
     _placed: pin.Data
 
     @property
+    @abstractmethod
     def state(self) -> PlantState:
         """The truth."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _changed(self, frame: str) -> None:
         """A grip is new, elsewhere or gone."""
-        raise NotImplementedError
 
     def apply(self, command: Command) -> None:
         """Take torques ``[nv]``.
