@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.rotations import rotation_rate
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import Constraint, Input, Item, Task
@@ -84,6 +85,7 @@ def quick(function: ca.Function) -> Callable[..., tuple[np.ndarray, ...]]:
     return call
 
 
+@quick_operators()
 def numbers(item: Item, robot: Robot) -> Numbers:
     """Validate an item and make its expressions a function, interpreted."""
     item.validate(robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -114,20 +115,12 @@ class Draw:
             f"{f.name} {getattr(self, f.name)}" for f in fields(self) if getattr(self, f.name) != f.default
         )
 
-    def loop(self, walker: Walker, structure: Structure) -> TorqueLoop:
+    def loop(self, walker: Walker, structure: Structure) -> Witness:
         """The simulated machine with the loop of torques over it."""
-        heavy = wbc.robots.with_masses(walker, self.gravity)
         motors = Motors(viscous=self.friction, coulomb=self.friction, delay=self.delay)
         encoders = Encoders(position=self.noise, velocity=100.0 * self.noise) if self.noise else None
-        robot = loaded(heavy.robot, self.payload, frame="body")
-        plant: Tested
-        if self.plant == "mujoco":
-            plant = GrippingMujocoPlant(robot, [arm.hand for arm in heavy.arms], motors=motors)
-        else:
-            plant = PinocchioPlant(robot, integrator="midpoint", motors=motors, encoders=encoders)
-        stack = TorqueStack(heavy, [GripKind(hold_kind_of(structure, k)) for k in range(len(structure))])
         faults = [Fault.read(self.fault)] if self.fault else []
-        return Witness(stack, plant, delay=self.delay, encoders=encoders, faults=faults)
+        return witnessed(walker, structure, self.plant, self.gravity, self.payload, motors, encoders, faults)
 
 
 class Witness(TorqueLoop):
@@ -152,6 +145,33 @@ class Witness(TorqueLoop):
         columns = [self._model.joints[self._model.getJointId(name)].idx_v for name in log.joints]
         return replace(log, q=q[:, order], v=rates[:, columns], pose_body_in_structure=q[:, :7],
                        twist_body=rates[:, :6])  # fmt: skip
+
+
+def witnessed(
+    walker: Walker,
+    structure: Structure,
+    plant: str,
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    payload: float = 0.0,
+    motors: Motors | None = None,
+    encoders: Encoders | None = None,
+    faults: Sequence[Fault] = (),
+) -> Witness:
+    """A loop of torques that keeps where the robot was, over a simulated machine: pinocchio or mujoco.
+
+    Args:
+        payload: on the body [kg], and friction of the motors: the loop does not know them. It knows the motors' delay
+            and the encoders' noise.
+    """
+    motors, heavy = motors or Motors(), wbc.robots.with_masses(walker, gravity)
+    robot = loaded(heavy.robot, payload, frame="body")
+    simulated: Tested
+    if plant == "mujoco":
+        simulated = GrippingMujocoPlant(robot, [arm.hand for arm in heavy.arms], motors=motors)
+    else:
+        simulated = PinocchioPlant(robot, integrator="midpoint", motors=motors, encoders=encoders)
+    stack = TorqueStack(heavy, [GripKind(hold_kind_of(structure, k)) for k in range(len(structure))])
+    return Witness(stack, simulated, delay=motors.delay, encoders=encoders, faults=faults)
 
 
 def torque(name: str, walker: Walker, folder: Path) -> dict[str, Any]:

@@ -59,8 +59,9 @@ DRAWN = {
 #: Holds of the two-ended arm: least and largest distance of neighbours [m]
 GRAPPLES, PITCHES = 7, (2.0, 5.0)
 #: Tasks of a hand: how many at most, how far from the base of the arm its holds are [m], largest rates [m/s, rad/s] and
-#: how long each [s]
+#: how long each [s]; and how fast it leaves its hold first [m/s]
 TASKS, REACH, HAND_RATES, SECONDS = 3, 1.7, np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2]), (0.3, 2.0)
+OFF = (0.05, 0.1)
 #: Commanded rates of velocity trials: largest [m/s, m/s, rad/s], how many and how long each [s]
 RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 
@@ -131,15 +132,17 @@ def arm(name: str, walker: Walker, folder: Path) -> Record:
     asked = _path(rng)
     standing = DriveRequest(asked.site, asked.start, asked.points)
     chosen = walker.arms[int(rng.integers(len(walker.arms)))]
-    holds, base = standing.site.build(), standing.beginning(walker.arm_data).act(chosen.base.translation)
+    holds, body = standing.site.build(), standing.beginning(walker.arm_data)
+    base = body.act(chosen.base.translation)
     near = [name for name, at in zip(holds.ids, holds.positions, strict=True) if np.linalg.norm(at - base) < REACH]
-    tasks = []
+    # First off the hold, towards the body
+    off = np.concatenate([-body.rotation[:, 2] * rng.uniform(*OFF), np.zeros(3)])
+    tasks = [_rate(off, rng.uniform(1.0, 2.0))]
     for _ in range(int(rng.integers(1, TASKS + 1))):
         if rng.random() < 0.5:
             tasks.append(f"hold {rng.choice(near)}")
         else:
-            twist = ",".join(f"{rate:.4f}" for rate in rng.uniform(-1.0, 1.0, 6) * HAND_RATES)
-            tasks.append(f"rate {twist} for {rng.uniform(*SECONDS):.2f}")
+            tasks.append(_rate(rng.uniform(-1.0, 1.0, 6) * HAND_RATES, rng.uniform(*SECONDS)))
     did = tuple(arm_task(text) for text in tasks)
     request = ArmRequest(asked.site, asked.start, asked.points, arm=chosen.name, tasks=did)
     return kept(perform_walk(request, walker), folder)
@@ -280,6 +283,11 @@ def _request(rng: np.random.Generator, walker: Walker, folder: Path) -> PathRequ
     goal = ids[int(rng.choice([k for k in range(GRAPPLES) if k not in (first, first + 1)]))]
     start = (ids[first], ids[first + 1])
     return TwoEndedRequest(Site(str(file)), start if rng.random() < 0.5 else start[::-1], goal)
+
+
+def _rate(twist: Array, seconds: float) -> str:
+    """The task of a hand that moves with a twist."""
+    return f"rate {','.join(f'{rate:.4f}' for rate in twist)} for {seconds:.2f}"
 
 
 def _path(rng: np.random.Generator) -> PathRequest:

@@ -106,6 +106,18 @@ def test_without_a_compiler_too(name: str) -> None:
     compare(MADE[name]("vm"), count=3, threads=1, ticks=3)
 
 
+def test_after_a_reset_no_torques_are_known() -> None:
+    """Limits of how fast torques change do not count from 0."""
+    single = problems.controller("panda").clone()
+    batch, q = single.batch(2), single.stack.robot.neutral
+    single.step(q)
+    batch.step(q)
+    single.reset(q)
+    batch.reset(q)
+    core = core_of(single)
+    np.testing.assert_array_equal(batch.inputs[1], core.tick.state[core.context.memory.report :])
+
+
 def test_a_policy_acts_on_each_robot() -> None:
     """Braking in conflicts, and a chain for answers without a certificate."""
     one = controller("conflicts", backend="native")
@@ -313,13 +325,15 @@ def test_ctrl_c_ends_a_step_when_no_thread_is_at_work(monkeypatch: pytest.Monkey
     batch = bare("native").batch(len(q), threads=2)
     run, begun, ended = Compiled._run, list[object](), list[object]()
 
-    def slow(self: Compiled, tick: Any, following: Any, inputs: Any, reports: Any) -> None:
+    def slow(self: Compiled, tick: Any, *given: Any) -> bool:
         begun.append(tick)
-        if len(begun) == 1:
-            _thread.interrupt_main()
-        time.sleep(0.02)
-        run(self, tick, following, inputs, reports)
-        ended.append(tick)
+        try:
+            if len(begun) == 1:
+                _thread.interrupt_main()
+            time.sleep(0.02)
+            return run(self, tick, *given)
+        finally:
+            ended.append(tick)
 
     with monkeypatch.context() as patched:
         patched.setattr(Compiled, "_run", slow)

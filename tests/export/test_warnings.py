@@ -38,7 +38,6 @@ def made(kind: str) -> wbc.Stack:
         ("only a posture", QUICK),
         ("linear", QUICK),
         ("curved", "-O2"),
-        ("curved", "-O0"),
     ],
 )
 def test_parts_that_are_missing_leave_no_warning(kind: str, flags: str, tmp_path: Path) -> None:

@@ -80,6 +80,8 @@ def test_leaving_out_what_is_out_of_reach_changes_no_other_answer() -> None:
     assert (both[1].q[~sought] == robot.neutral).all()
     nothing = kinematics.solve_batch(robot.neutral, {"hand": targets[:1]}, nearest=False)
     assert not nothing.solved.any()
+    kinematics["hand"].mask = [True] * 3 + [False] * 3
+    assert kinematics.solve_batch(robot.neutral, {"hand": targets[:1]}, budget=None, nearest=False).descents[0] > 0.0
     with pytest.raises(WbcError, match="nearest"):
         kinematics.solve_batch(robot.neutral, {"hand": targets}, nearest="no")  # type: ignore[arg-type]
     with pytest.raises(ShapeError):

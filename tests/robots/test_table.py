@@ -15,7 +15,7 @@ import wbc.robots
 from tests.robots.files import example, joints
 from wbc.errors import RobotFileError
 from wbc.robot import Recipe, Robot
-from wbc.robot.sources.files import example_data_folder
+from wbc.robot.sources.files import example_data_folder, listed_data_folder
 
 TABLE = {recipe.name: recipe for recipe in wbc.robots.table()}
 LOADABLE = [name for name, recipe in TABLE.items() if not recipe.problem]
@@ -32,6 +32,10 @@ def test_every_urdf_of_the_wheel_has_one_row() -> None:
     rows = sorted(recipe.file for recipe in TABLE.values() if recipe.file.endswith(".urdf"))
     assert rows == files
     assert len(files) == 69
+
+
+def test_the_folder_is_that_of_the_wheel_s_own_list() -> None:
+    assert example_data_folder() == listed_data_folder()
 
 
 def test_every_folder_of_the_wheel_has_a_row() -> None:

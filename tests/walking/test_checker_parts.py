@@ -252,3 +252,15 @@ def test_blocks_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     for one, other in zip(whole.findings, parts.findings, strict=True):
         assert (one.kind, one.count, one.where) == (other.kind, other.count, other.where)
         assert one.worst == pytest.approx(other.worst, rel=1e-9, abs=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("count", [0, 1, 200])
+def test_points_that_are_near_one_of_many_are_found(count: int) -> None:
+    rng = np.random.default_rng(count)
+    points, of = rng.uniform(-1.0, 1.0, (count, 3)), rng.uniform(-0.5, 0.5, (300, 3))
+    gaps = np.linalg.norm(of[:, None] - points[None], axis=2).min(axis=1, initial=np.inf)
+    for distance in (0.02, 0.1, 0.4, 2.0):
+        np.testing.assert_array_equal(distances.near_any(points, of, distance), gaps <= distance)
+    # At the edge of their box too
+    assert distances.near_any(np.eye(3), np.zeros((1, 3)), 1.0).all()
+    assert len(distances.near_any(points, of[:0], 1.0)) == 0

@@ -16,14 +16,15 @@ from hypothesis import strategies as st
 from wbc.errors import RangeError, WbcError
 from wbc.robots import Walker
 from wbc.walking import Structure
-from wbc.walking.checker import check_run
+from wbc.walking.checker import check_run, check_walk
 from wbc.walking.log import TickColumns, WalkLog, WalkLogError
 from wbc.walking.log.part import PART, PartWriter, read_part
 from wbc.walking.loop.stack import WalkStack
-from wbc.walking.report.folder import save_run
+from wbc.walking.report.folder import rules_of, save_run
 from wbc.walking.run import PathRequest, ResumeRequest, Site, perform_walk
 from wbc.walking.run.recording import CHUNK
-from wbc.walking.run.resume_mode import going_on
+from wbc.walking.run.resume_mode import going_on, plant_walked
+from wbc.walking.torque.choice import PlantChoice
 
 REQUEST = PathRequest(Site(rigid=True), "13,9", ("13,10",))
 
@@ -119,6 +120,34 @@ def test_a_killed_walk_goes_on(
     _, report = save_run(again, tmp_path / "again")
     assert report is not None
     assert report.ok, str(report)
+
+
+def test_a_killed_walk_under_torques_goes_on_in_mujoco(
+    machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
+) -> None:
+    choice = PlantChoice("mujoco", (0.0, -0.2, 0.0), ("delay 0.003",))
+    loop, ticks = choice.build(machine, structure, backend="vm"), iter(range(60))
+    child = os.fork()
+    if not child:
+        try:
+            stop = lambda: _kill(next(ticks, None))  # noqa: E731
+            perform_walk(REQUEST, machine, stack=stack, folder=tmp_path, stop=stop, plant=loop)
+        finally:
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    request = going_on(ResumeRequest(tmp_path))
+    assert PlantChoice.of_run(plant_walked(request, tmp_path)) == choice
+    left, more = WalkLog.load(tmp_path), iter(range(5))
+    again = perform_walk(request, machine, stack=stack, plant=loop, stop=lambda: next(more, None) is None)
+    log = again.log
+    assert log is not None
+    assert again.outcome == "interrupted"
+    assert (log.q[: len(left)] == left.q).all()
+    # It was in motion as it was killed, and so it is as it goes on: nothing jumps, no hand slips
+    assert np.abs(left.v[-2]).max() > 0.1
+    assert check_walk(log, machine.urdf(tmp_path / "robot.urdf"), again.structure, rules_of(machine)).ok
+    assert loop.watch.drift < 1e-4
+    assert loop.watch.unsolved == 0
 
 
 def _kill(left: int | None) -> bool:

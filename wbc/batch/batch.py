@@ -17,6 +17,7 @@ from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import Clones, Compiled, Engine, Given
 from wbc.controller import Controller, core_of
 from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
+from wbc.controller.tick.buffers import INFINITE
 from wbc.controller.tick.native import NativeTick
 from wbc.controller.together import main_input
 from wbc.errors import RangeError, ShapeError, SolverError
@@ -91,8 +92,7 @@ class Batch:
         for name, given in values.items():
             handle = self._core.handles[validation.one_of("set", name, self._core.handles)]
             asked.append((handle, given if isinstance(given, Mapping) else {main_input(handle): given}))
-        if (quick := self._quick(asked)) and self._engine.fit(list(quick.values())):
-            self._engine.take(self.inputs, list(quick.values()))
+        if (quick := self._quick(asked)) and self._engine.take(self.inputs, list(quick.values())):
             self._filled(quick)
             return
         found: list[tuple[Array, Array]] = []
@@ -190,13 +190,12 @@ class Batch:
         stack = self._core.stack
         low, high = stack.dt_range
         seconds = stack.dt if dt is None else validation.scalar("dt", dt, low=low, high=high, unit="s")
-        if (quick := self._quick_state(q, v, seconds)) and self._engine.fit(quick):
+        reports, quick = np.empty((self.count, self._memory.report)), self._quick_state(q, v, seconds)
+        if quick and self._waiting and self._engine.fit(quick):
             self._take_first(np.broadcast_to(quick[0].numbers, (self.count, stack.robot.nq)))
-            self._engine.take(self.inputs, quick)
-        else:
+        if not quick or self._waiting or not self._engine.tick(self.inputs, reports, quick):
             self._set_state(q, v, seconds)
-        reports = np.empty((self.count, self._memory.report))
-        self._engine.tick(self.inputs, reports)
+            self._engine.tick(self.inputs, reports, [])
         self.changes += 1
         return BatchStep(reports, self, self._core.context)
 
@@ -238,7 +237,9 @@ class Batch:
             self._take_first(configurations)
         self._view("v_last")[:, : robot.nv] = velocity
         if self._layout.command != "velocity":
+            # No wrenches are kept, and the last torques are not known
             self._view("kept")[:] = 0.0
+            self._view("kept")[:, : robot.nv] = INFINITE
         self._engine.forget()
         self.changes += 1
 

@@ -20,6 +20,8 @@ from wbc.validation import Array
 
 #: Robots from which on a second thread is worth waking
 _SMALL = 64
+#: Numbers of ``wbc_shared``, and what ``wbc_tick_many`` returns where robots are left (``native/many.h``)
+_SHARED, _MORE = 32, 2
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,22 @@ class Given:
         return self.numbers.ctypes.data, stride, self.kind, self.at, self.size
 
 
+def _table(given: list[Given]) -> np.ndarray:
+    """Values as C reads them."""
+    return np.array([value.row for value in given], np.int64).reshape(-1, 5)
+
+
 class Engine(Protocol):
     """Ticks all robots of a batch."""
 
     def fit(self, given: list[Given]) -> bool:
         """Whether all values may be written; no where native code cannot say, too."""
 
-    def take(self, inputs: Array, given: list[Given]) -> None:
-        """Write values that fit."""
+    def take(self, inputs: Array, given: list[Given]) -> bool:
+        """Write values if all fit."""
 
-    def tick(self, inputs: Array, reports: Array) -> None:
-        """One tick of each robot: ``inputs`` [count, k] in place, ``reports`` [count, m] out."""
+    def tick(self, inputs: Array, reports: Array, given: list[Given]) -> bool:
+        """Write values and tick each robot if all fit: ``inputs`` [count, k] in place, ``reports`` [count, m] out."""
 
     def forget(self) -> None:
         """The next tick starts from no active set."""
@@ -74,10 +81,10 @@ class Compiled:
         self._busy = min(threads, -(-count // _SMALL))
         size = int(tick.library_function("wbc_tick_carried_size", ctypes.c_longlong)())
         self._carried = np.zeros((count, size), np.uint8)
-        self._many, self._take = (
-            tick.library_function(name, None, unlocked=True) for name in ("wbc_tick_many", "wbc_many_take")
+        self._many, self._take, self._fit = (
+            tick.library_function(name, ctypes.c_int, unlocked=True)
+            for name in ("wbc_tick_many", "wbc_many_take", "wbc_many_fit")
         )
-        self._fit = tick.library_function("wbc_many_fit", ctypes.c_int, unlocked=True)
         self._resume, self._suspend = (
             tick.library_function(name, None) for name in ("wbc_tick_resume", "wbc_tick_suspend")
         )
@@ -88,33 +95,40 @@ class Compiled:
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def _threads(self) -> ThreadPoolExecutor:
-        """A pool of this process: a fork has none of its parent's threads."""
+        """A pool of this process, beside its main thread: a fork has none of its parent's threads."""
         if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = os.getpid(), ThreadPoolExecutor(len(self._ticks), "wbc-batch")
+            self._pool = os.getpid(), ThreadPoolExecutor(self._busy - 1, "wbc-batch")
         return self._pool[1]
 
-    def _shared(self, work: Callable[[int], Any], stop: Callable[[], object] = bool) -> list[Any]:
-        """What ``work`` returns for the number of every thread; alone where there is too little for several.
+    def _shared(self, work: Callable[[int, np.ndarray], bool]) -> bool:
+        """What ``work`` returns, by all threads, this one among them; alone where there is too little for several.
 
-        After an exception no thread is at work any more; ``stop`` tells them to end.
+        After an exception no thread is at work any more. ``work`` is told the number of its thread, and where all
+        count.
         """
-        threads = self._busy
-        if threads == 1:
-            return [work(0)]
+        shared = np.zeros(_SHARED, np.int64)
+        if self._busy == 1:
+            return work(0, shared)
         busy, pool = list[int](), self._threads()
 
-        def run(number: int) -> Any:
+        def run(number: int) -> bool:
             busy.append(number)
             try:
-                return work(number)
+                return work(number, shared)
             finally:
                 busy.pop()
 
         try:
-            return list(pool.map(run, range(threads)))
+            others = [pool.submit(run, number) for number in range(1, self._busy)]
+            fine = work(0, shared)
+            # None of them finds another answer, and those that have not begun would find nothing to do
+            for other in others:
+                if not other.cancel():
+                    other.result()
+            return fine
         except BaseException:
             # Ctrl-C: no thread may go on with memory that the next tick takes
-            stop()
+            shared.fill(self._count)
             pool.shutdown(cancel_futures=True)
             self._pool = None
             # A thread that was being started is not known to the pool yet
@@ -123,32 +137,33 @@ class Compiled:
             raise
 
     def fit(self, given: list[Given]) -> bool:
-        table = np.array([value.row for value in given], np.int64)
-        return all(self._shared(lambda number: self._fit(*self._part(table, number))))
+        table = _table(given)
+        return self._shared(lambda _, shared: bool(self._fit(*self._values(shared, table))))
 
-    def take(self, inputs: Array, given: list[Given]) -> None:
-        table, place = np.array([value.row for value in given], np.int64), ctypes.c_void_p(inputs.ctypes.data)
-        self._shared(lambda number: self._take(place, *self._part(table, number)))
+    def take(self, inputs: Array, given: list[Given]) -> bool:
+        table, place = _table(given), ctypes.c_void_p(inputs.ctypes.data)
+        return self._shared(lambda _, shared: bool(self._take(*self._values(shared, table), place)))
 
-    def _part(self, table: np.ndarray, number: int) -> tuple[ctypes._SimpleCData[Any], ...]:
-        """Values, and the robots that a thread of this number has."""
-        first, end = (self._count * k // self._busy for k in (number, number + 1))
+    def _values(self, shared: np.ndarray, table: np.ndarray) -> tuple[ctypes._SimpleCData[Any], ...]:
+        """Where threads count, the values, and how many robots there are, for C."""
         values = ctypes.c_void_p(table.ctypes.data), ctypes.c_int(len(table))
-        return *values, ctypes.c_longlong(first), ctypes.c_longlong(end)
+        return ctypes.c_void_p(shared.ctypes.data), *values, ctypes.c_longlong(self._count)
 
-    def tick(self, inputs: Array, reports: Array) -> None:
-        following = np.zeros(1, np.int64)
-        self._shared(
-            lambda number: self._run(self._ticks[number], following, inputs, reports),
-            lambda: following.fill(self._count),
-        )
+    def tick(self, inputs: Array, reports: Array, given: list[Given]) -> bool:
+        table = _table(given)
+        if not self._shared(lambda number, shared: self._run(self._ticks[number], shared, table, inputs, reports)):
+            return False
         for k in np.flatnonzero((self._left >> self._flags) & 1).tolist():
             self._finish(k, inputs, reports)
+        return True
 
-    def _run(self, tick: NativeTick, following: np.ndarray, inputs: Array, reports: Array) -> None:
-        places = (array.ctypes.data for array in (following, inputs, reports, self._carried, self._flags))
-        count, left = ctypes.c_longlong(self._count), ctypes.c_int(self._left)
-        self._many(tick.pointer, count, *map(ctypes.c_void_p, places), left)
+    def _run(self, tick: NativeTick, shared: np.ndarray, table: np.ndarray, inputs: Array, reports: Array) -> bool:
+        places = (ctypes.c_void_p(array.ctypes.data) for array in (inputs, reports, self._carried, self._flags))
+        arguments = (tick.pointer, *self._values(shared, table), *places, ctypes.c_int(self._left))
+        # Between calls Python has a look at signals
+        while (answer := self._many(*arguments)) == _MORE:
+            pass
+        return bool(answer)
 
     def _finish(self, k: int, inputs: Array, reports: Array) -> None:
         core, carried = self._spare, ctypes.c_void_p(self._carried[k].ctypes.data)
@@ -169,12 +184,15 @@ class Clones:
     def fit(self, given: list[Given]) -> bool:
         return False
 
-    def take(self, inputs: Array, given: list[Given]) -> None:
-        raise AssertionError("nothing fits")
+    def take(self, inputs: Array, given: list[Given]) -> bool:
+        return False
 
-    def tick(self, inputs: Array, reports: Array) -> None:
-        for core, given, report in zip(self._cores, inputs, reports, strict=True):
-            tick_alone(core, given, report)
+    def tick(self, inputs: Array, reports: Array, given: list[Given]) -> bool:
+        if given:
+            return False
+        for core, numbers, report in zip(self._cores, inputs, reports, strict=True):
+            tick_alone(core, numbers, report)
+        return True
 
     def forget(self) -> None:
         for core in self._cores:

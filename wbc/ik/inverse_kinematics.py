@@ -136,18 +136,26 @@ class InverseKinematics(Handles):
         threads = os.cpu_count() or 1 if workers is None else validation.integer("workers", workers, 1, THREADS)
         total = next(iter(lengths.values()))
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
-        first = engine.begin(q0)
-        parameters = np.tile(engine.tick.p, (total, 1))
+        proofs = not validation.flag("nearest", nearest)
+        checked = []
         for name, values in wanted.items():
             handle = controller[name]
-            span = handle.slot("target").span
-            for k, value in enumerate(values):
-                parameters[k, span] = handle.checked("target", value)
+            checked.append((handle.slot("target").span, [handle.checked("target", value) for value in values]))
+        # Nothing else is refused: from here on targets that wait are taken from q0
+        first = engine.begin(q0)
+        parameters = np.tile(engine.tick.p, (total, 1))
+        for span, numbers in checked:
+            for k, value in enumerate(numbers):
+                parameters[k, span] = value
         query, before = engine.query(self.goals, near, starts, number), engine.tick.p.copy()
         hopeless = np.zeros(total, bool)
-        if not validation.flag("nearest", nearest):
+        if proofs:
             for entry in self.stack.entries:
-                if entry.name in self.goals and (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
+                # Rows that are switched off need not be met
+                all_count = engine.tick.weight[engine.core.layout.blocks[entry.name].span].all()
+                if not all_count or entry.name not in self.goals:
+                    continue
+                if (beyond := beyond_reach(self.stack.robot, entry, near)) is not None:
                     hopeless |= beyond(parameters[:, controller[entry.name].slot("target").span])
         sought = np.flatnonzero(~hopeless)
         answers = np.tile(first, (total, 1))

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.errors import ShapeError, WbcError
 from wbc.robot import Robot
-from wbc.simulation.dynamics import AXIS, Grip, Slip
+from wbc.simulation.dynamics import AXIS
+from wbc.simulation.gripping import Gripping, GrippingState
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, Motors, MotorState
+from wbc.simulation.motors import Drive, Motors
 from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
-from wbc.simulation.pinocchio_plant import check_reach
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
 from wbc.validation import Array
 
@@ -29,23 +28,14 @@ NEAR = 1e-12
 HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
 
 
-@dataclass(eq=False)
-class _State:
+@dataclass(eq=False, kw_only=True)
+class _State(GrippingState):
     """All that changes beside MuJoCo's own state."""
 
-    command: Array
-    motors: MotorState
-    scale: Array
-    random: np.random.Generator
-    first: Array
-    fallen: Array = field(default_factory=lambda: np.zeros(6))
-    grips: dict[str, Grip] = field(default_factory=dict)
-    slips: dict[str, Slip] = field(default_factory=dict)
     off: dict[str, Array] = field(default_factory=dict)
-    broken: list[str] = field(default_factory=list)
 
 
-class GrippingMujocoPlant(MujocoPlant):
+class GrippingMujocoPlant(Gripping, MujocoPlant):
     """A robot of ours in MuJoCo (:func:`mujoco_model`) that takes torques, and can grasp.
 
     A grip is a ``connect`` of one, two or three points of the frame. MuJoCo's constraints are springs: a grip gives way
@@ -60,6 +50,8 @@ class GrippingMujocoPlant(MujocoPlant):
     Raises:
         UnknownNameError: no such frame. What :func:`mujoco_model` raises.
     """
+
+    _state: _State
 
     def __init__(
         self,
@@ -97,38 +89,28 @@ class GrippingMujocoPlant(MujocoPlant):
         }
         self._closer = np.exp(-time_step * validation.scalar("rate", rate, low=0.0, unit="1/s"))
         self._balance, self._placed, self._seed = Balance(robot.model), robot.model.createData(), seed
-        super().__init__(model, robot)
-        self.commands: Collection[CommandKind] = (CommandKind.TORQUE,)
+        self.robot = robot
+        MujocoPlant.__init__(self, model, robot)
+        self.commands = Gripping.commands
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
         """At a configuration, at rest or with a velocity, and nothing grasped."""
         super().reset(q, time, v)
-        state, drive = self.read(), self._drive
-        self._state = _State(
-            np.zeros(self.nv), drive.fresh(), drive.driven.copy(), np.random.default_rng(self._seed),
-            self._balance.momentum(state.q, state.v),
-        )  # fmt: skip
-
-    def apply(self, command: Command) -> None:
-        """Take torques ``[nv]``.
-
-        Raises:
-            UnknownNameError: another kind of command. ShapeError, NotFiniteError: no numbers.
-        """
-        validation.one_of("command.kind", str(command.kind), [str(CommandKind.TORQUE)])
-        self._state.command = validation.real_array("command.values", command.values, (self.nv,))
+        drive = self._drive
+        self._state = _State(command=np.zeros(self.nv), motors=drive.fresh(), scale=drive.driven.copy(),
+                             random=np.random.default_rng(self._seed))  # fmt: skip
+        self._state.first = self.momentum
 
     def advance(self, dt: float) -> None:
         """Whole time steps."""
         h, drive, state = self.time_step, self._drive, self._state
         for _ in range(round(dt / h)):
             seen = self.read()
-            torque = state.scale * drive.torque(state.motors, state.command, seen.v, state.random)
+            torque = self._motors_on(seen.v)
             if drive.rubs:
                 torque = torque - drive.friction(seen.v)
-            super().apply(Command(CommandKind.TORQUE, torque))
-            for name in list(state.slips):
-                self._slide(name, h)
+            MujocoPlant.apply(self, Command(CommandKind.TORQUE, torque))
+            self._slide(h)
             for name in list(state.off):
                 self._close(name)
             super().advance(h)
@@ -142,69 +124,15 @@ class GrippingMujocoPlant(MujocoPlant):
             UnknownNameError: no such frame or kind. RangeError: held already, or out of reach, as of
                 :meth:`PinocchioPlant.grasp`.
         """
-        validation.one_of("frame", frame, self._rows)
-        kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in GripKind]))
-        if frame in self._state.grips:
-            raise RangeError("frame", frame, "it is held already")
-        model = self._robot.model
-        pin.framesForwardKinematics(model, self._placed, self.read().q)
-        number = model.getFrameId(frame)
-        check_reach(frame, self._placed.oMf[number], pose, kind)
-        self._state.grips[frame] = Grip(pose, kind)
-        points = POINTS[: HELD[kind]]
-        self._state.off[frame] = np.array([self._placed.oMf[number].act(p) - pose.act(p) for p in points])
+        at = self._take(validation.one_of("frame", frame, self._rows), pose, kind)
+        points = POINTS[: HELD[self._state.grips[frame].kind]]
+        self._state.off[frame] = np.array([at.act(p) - pose.act(p) for p in points])
         self._hold(frame)
-
-    def release(self, frame: str) -> None:
-        """It is free again.
-
-        Raises:
-            UnknownNameError: it was not held.
-        """
-        if frame not in self._state.grips:
-            raise UnknownNameError("frame", frame, self._state.grips)
-        del self._state.grips[frame]
-        self._state.slips.pop(frame, None)
-        self._state.off.pop(frame, None)
-        for row in self._rows[frame]:
-            self.data.eq_active[row] = 0
-
-    def lost(self) -> tuple[str, ...]:
-        """Frames that what held them has let go of, since this was last asked."""
-        out = tuple(self._state.broken)
-        self._state.broken.clear()
-        return out
-
-    def lose(self, frame: str) -> None:
-        """As :meth:`PinocchioPlant.lose`."""
-        self.release(frame)
-        self._state.broken.append(frame)
-
-    def slip(self, frame: str, velocity: Any, duration: float) -> None:
-        """As :meth:`PinocchioPlant.slip`."""
-        validation.one_of("frame", frame, self._state.grips)
-        rate = validation.real_array("velocity", velocity, (3,))
-        self._state.slips[frame] = Slip(rate, validation.scalar("duration", duration, low=0.0, open_low=True, unit="s"))
-
-    def limp(self, joint: str, scale: float = 0.0) -> None:
-        """As :meth:`PinocchioPlant.limp`."""
-        self._state.scale[self._robot.dofs(joint)] = validation.scalar("scale", scale, low=0.0, high=1.0)
-
-    @property
-    def grips(self) -> Mapping[str, Grip]:
-        """Frame -> how it is held."""
-        return self._state.grips
 
     @property
     def state(self) -> PlantState:
         """The truth, which is what is read."""
         return self.read()
-
-    @property
-    def given(self) -> Array:
-        """As of :attr:`PinocchioPlant.given`."""
-        state = self.read()
-        return self._state.first + self._state.fallen - self._balance.momentum(state.q, state.v)
 
     @property
     def wrenches(self) -> dict[str, Array]:
@@ -246,6 +174,14 @@ class GrippingMujocoPlant(MujocoPlant):
             self._state = before
             raise
 
+    def _changed(self, frame: str) -> None:
+        if frame in self._state.grips:
+            self._hold(frame)
+            return
+        self._state.off.pop(frame, None)
+        for row in self._rows[frame]:
+            self.data.eq_active[row] = 0
+
     def _hold(self, frame: str) -> None:
         """Write a grip into the model, and switch it on."""
         grip, model = self._state.grips[frame], self._robot.model
@@ -260,13 +196,3 @@ class GrippingMujocoPlant(MujocoPlant):
         self._hold(name)
         if np.abs(self._state.off[name]).max() < NEAR:
             del self._state.off[name]
-
-    def _slide(self, name: str, h: float) -> None:
-        """A grip that slips, a step on."""
-        grip, (moved, left) = self._state.grips[name], self._state.slips[name].on(h)
-        self._state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
-        self._hold(name)
-        if left is None:
-            del self._state.slips[name]
-        else:
-            self._state.slips[name] = left

@@ -3,51 +3,41 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, UnknownNameError
+from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.coupled import CoupledDynamics
-from wbc.simulation.dynamics import Dynamics, Grip, Integrator, Slip, step_midpoint, step_rk4
+from wbc.simulation.dynamics import Dynamics, Integrator, step_midpoint, step_rk4
+from wbc.simulation.gripping import Gripping, GrippingState
 from wbc.simulation.ground import Ground, Touch
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, Encoders, Motors, MotorState
-from wbc.simulation.plant import Command, CommandKind, GripKind, PlantError, PlantState
+from wbc.simulation.motors import Drive, Encoders, Motors
+from wbc.simulation.plant import GripKind, PlantError, PlantState
 from wbc.simulation.stability import largest_step
 from wbc.validation import Array
 
 INTEGRATORS: Mapping[Integrator, Any] = {"rk4": step_rk4, "midpoint": step_midpoint}
 #: A mass matrix with a smaller ratio of its least to its largest eigenvalue is singular
 SINGULAR = 1e-9
-#: How far from its hold a frame may be when it is grasped [m], [rad]
-REACH, TURN = 0.01, 0.1
 
 
-@dataclass(eq=False)
-class _State:
+@dataclass(eq=False, kw_only=True)
+class _State(GrippingState):
     """All that changes: what :meth:`PinocchioPlant.save` copies."""
 
     q: Array
     v: Array
     time: float
-    command: Array
-    motors: MotorState
-    scale: Array
     anchors: Array
-    random: np.random.Generator
     reading: PlantState
-    grips: dict[str, Grip] = field(default_factory=dict)
-    slips: dict[str, Slip] = field(default_factory=dict)
-    broken: list[str] = field(default_factory=list)
-    first: Array = field(default_factory=lambda: np.zeros(6))
-    fallen: Array = field(default_factory=lambda: np.zeros(6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +48,7 @@ class SavedState:
     _state: _State
 
 
-class PinocchioPlant:
+class PinocchioPlant(Gripping):
     """Rigid bodies by Pinocchio: M a + h = tau + J'f, with closed grips as hard constraints (:class:`Dynamics`).
 
         plant = PinocchioPlant(robot, motors=Motors(viscous=0.5, delay=0.002), encoders=Encoders(position=1e-5), seed=1)
@@ -88,7 +78,7 @@ class PinocchioPlant:
             frame or integrator. ShapeError, NotFiniteError: numbers that are none.
     """
 
-    commands: Collection[CommandKind] = (CommandKind.TORQUE,)
+    _state: _State
 
     def __init__(
         self,
@@ -122,7 +112,7 @@ class PinocchioPlant:
             model.gravity.linear = validation.real_array("gravity", gravity, (3,))
         self.model = model
         _check_inertias(model)
-        self._balance = Balance(model)
+        self._balance, self._placed = Balance(model), model.createData()
         follows = bool(robot.couplings) or any("Mimic" in joint.shortname() for joint in model.joints)
         self._dynamics = CoupledDynamics(robot, model, self._rate) if follows else Dynamics(model, self._rate)
         self._touch = None if ground is None else Touch(ground, robot, model)
@@ -151,9 +141,10 @@ class PinocchioPlant:
 
     def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
-        reading = PlantState(q, v, time)
-        self._state = _State(q, v, time, np.zeros(self.nv), self._drive.fresh(), self._drive.driven.copy(), anchors,
-                             np.random.default_rng(self._seed), reading)  # fmt: skip
+        self._state = _State(
+            q=q, v=v, time=time, anchors=anchors, reading=PlantState(q, v, time), command=np.zeros(self.nv),
+            motors=self._drive.fresh(), scale=self._drive.driven.copy(), random=np.random.default_rng(self._seed),
+        )  # fmt: skip
         self._hold()
         self._state.first = self._balance.momentum(q, v)
         self._sense()
@@ -162,24 +153,15 @@ class PinocchioPlant:
         """What encoders read; of a base the truth."""
         return self._state.reading
 
-    def apply(self, command: Command) -> None:
-        """Take torques ``[nv]``.
-
-        Raises:
-            UnknownNameError: another kind of command. ShapeError, NotFiniteError: no numbers.
-        """
-        validation.one_of("command.kind", str(command.kind), [str(kind) for kind in self.commands])
-        self._state.command = validation.real_array("command.values", command.values, (self.nv,))
-
     def advance(self, dt: float) -> None:
         """Whole time steps.
 
         Raises:
             PlantError: the simulation has blown up, which a state says with numbers that are none.
         """
-        state, h, drive, balance = self._state, self.time_step, self._drive, self._balance
+        state, h, balance = self._state, self.time_step, self._balance
         for _ in range(round(dt / h)):
-            self._torque = state.scale * drive.torque(state.motors, state.command, state.v, state.random)
+            self._torque = self._motors_on(state.v)
             if state.slips:
                 self._slide(h)
             if self._touch is not None:
@@ -201,64 +183,9 @@ class PinocchioPlant:
             UnknownNameError: no such frame or kind. RangeError: held already, or farther from the pose than 10 mm or,
                 as far as the kind holds it, 0.1 rad.
         """
-        robot, state = self.robot, self._state
-        robot.check_frame("frame", frame)
-        kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in GripKind]))
-        pose = validation.pose("pose", pose)
-        if frame in state.grips:
-            raise RangeError("frame", frame, "it is held already")
-        data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, state.q)
-        at = data.oMf[self.model.getFrameId(frame)]
-        check_reach(frame, at, pose, kind)
-        state.grips[frame] = Grip(pose, kind)
-        self._hold()
+        state = self._state
+        self._take(self.robot.check_frame("frame", frame), pose, kind)
         state.v = self._dynamics.latched(state.q, state.v)
-
-    def release(self, frame: str) -> None:
-        """See :class:`wbc.simulation.GrippingPlant`."""
-        if frame not in self._state.grips:
-            raise UnknownNameError("frame", frame, self._state.grips)
-        del self._state.grips[frame]
-        self._state.slips.pop(frame, None)
-        self._hold()
-
-    def lost(self) -> tuple[str, ...]:
-        """See :class:`wbc.simulation.GrippingPlant`."""
-        out = tuple(self._state.broken)
-        self._state.broken.clear()
-        return out
-
-    # What breaks
-
-    def lose(self, frame: str) -> None:
-        """What holds a frame breaks off.
-
-        Raises:
-            UnknownNameError: nothing holds it.
-        """
-        self.release(frame)
-        self._state.broken.append(frame)
-
-    def slip(self, frame: str, velocity: Any, duration: float) -> None:
-        """A grip slips: what it holds the frame at moves with a mean velocity in the world [m/s] for some seconds, as
-        of :class:`wbc.simulation.dynamics.Slip`.
-
-        Raises:
-            UnknownNameError: nothing holds that frame.
-        """
-        validation.one_of("frame", frame, self._state.grips)
-        rate = validation.real_array("velocity", velocity, (3,))
-        time = validation.scalar("duration", duration, low=0.0, open_low=True, unit="s")
-        self._state.slips[frame] = Slip(rate, time)
-
-    def limp(self, joint: str, scale: float = 0.0) -> None:
-        """The motor of a joint gives this part of its torque from now on.
-
-        Raises:
-            UnknownNameError: no such joint.
-        """
-        self._state.scale[self.robot.dofs(joint)] = validation.scalar("scale", scale, low=0.0, high=1.0)
 
     # What is known of it
 
@@ -269,28 +196,11 @@ class PinocchioPlant:
         return PlantState(state.q, state.v, state.time)
 
     @property
-    def grips(self) -> Mapping[str, Grip]:
-        """Frame -> how it is held."""
-        return self._state.grips
-
-    @property
     def wrenches(self) -> Mapping[str, Array]:
         """Frame -> what its grip exerts on the robot, in the frame's axes and about its origin, in the last
         acceleration that was computed ``[6]`` [N, N m].
         """
         return self._dynamics.wrenches()
-
-    @property
-    def given(self) -> Array:
-        """Momentum that the robot has given to what it holds on to or stands on since the reset: what it has lost, and
-        what gravity gave it, (linear; angular about the world's origin) [N s, N m s].
-        """
-        return self._state.first + self._state.fallen - self.momentum
-
-    @property
-    def momentum(self) -> Array:
-        """Of the robot, see :class:`Balance` ``[6]``."""
-        return self._balance.momentum(self._state.q, self._state.v)
 
     @property
     def energy(self) -> float:
@@ -329,20 +239,11 @@ class PinocchioPlant:
             tau = tau + self._touch.force(q, v, self._state.anchors)
         return tau
 
+    def _changed(self, frame: str) -> None:
+        self._hold()
+
     def _hold(self) -> None:
         self._dynamics.hold(self._state.grips)
-
-    def _slide(self, h: float) -> None:
-        """Grips that slip, a step on."""
-        state = self._state
-        for name, slip in list(state.slips.items()):
-            grip, (moved, left) = state.grips[name], slip.on(h)
-            state.grips[name] = Grip(pin.SE3(grip.pose.rotation, grip.pose.translation + moved), grip.kind)
-            if left is None:
-                del state.slips[name]
-            else:
-                state.slips[name] = left
-        self._hold()
 
     def _sense(self) -> None:
         state, encoders, base = self._state, self._encoders, self.robot.base_nv
@@ -385,22 +286,6 @@ class PinocchioPlant:
             raise RangeError(
                 "time_step", self.time_step, f"too coarse for this plant: the largest that works is {most:.3g} s"
             )
-
-
-def check_reach(frame: str, at: pin.SE3, pose: pin.SE3, kind: GripKind) -> None:
-    """A frame is grasped where it is, as far as the kind holds it.
-
-    Raises:
-        RangeError: it is too far away.
-    """
-    off = float(np.linalg.norm(at.translation - pose.translation))
-    turn = float(np.linalg.norm(pin.log3(at.rotation.T @ pose.rotation)))
-    if kind is GripKind.AXIS:
-        turn = float(np.arccos(np.clip(at.rotation[:, 2] @ pose.rotation[:, 2], -1.0, 1.0)))
-    if off > REACH or (turn > TURN and kind is not GripKind.POSITION):
-        most = f"{REACH:g} and {TURN:g} are possible"
-        reason = f"an impossible contact: {frame} is {off:.3g} m and {turn:.3g} rad off, {most}"
-        raise RangeError("pose", pose.translation.tolist(), reason)
 
 
 def _check_inertias(model: pin.Model) -> None:

@@ -35,11 +35,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
 
 from wbc.errors import ShapeError
+from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
 from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
@@ -48,6 +50,7 @@ from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
@@ -89,13 +92,25 @@ class TickProgram:
         return {name: function for name, function in every.items() if function is not None}
 
 
+#: Expressions of robots whose stacks were built, for as long as the robots live
+_KNOWN: WeakKeyDictionary[Robot, Kinematics] = WeakKeyDictionary()
+
+
+def _kinematics_of(robot: Robot) -> Kinematics:
+    """The same for all stacks of a robot, as they ask for the same frames."""
+    known = _KNOWN.get(robot)
+    if known is None:
+        known = _KNOWN[robot] = Kinematics(robot.model)
+    return known
+
+
 class _Builder:
     def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
         # Loops know first derivatives
         loops = loops and stack.command == "velocity"
         self.stack, self.layout, self.loops = stack, layout, loops
         self.balls = Balls.of(stack, layout) if loops else Balls()
-        self.kinematics = Kinematics(stack.robot.model)
+        self.kinematics = _kinematics_of(stack.robot)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
         self.force = ca.SX.sym("force", layout.task_rows)
@@ -280,6 +295,7 @@ class _Builder:
         return margin
 
 
+@quick_operators()
 def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgram:
     """Build the functions of a stack; ``loops``: without what a compiled tick computes in loops.
 

@@ -53,7 +53,8 @@ class Osqp(Backend):
         values = np.zeros((n, 1 + m))
         values[:, 0] = 1.0
         C = sparse.csc_matrix((values.ravel(), indices, starts), shape=(n + m, n))
-        self._solver: Any = osqp.OSQP()
+        # Named: looking for other algebras takes longer than all the rest, and theirs would give other bits
+        self._solver: Any = osqp.OSQP(algebra="builtin")
         far = np.full(n + m, 1e30)
         self._solver.setup(H, np.zeros(n), C, -far, far, eps_abs=TOLERANCES[0], eps_rel=TOLERANCES[0], **_SETTINGS)
         self._rho = float(self._solver.settings.rho)

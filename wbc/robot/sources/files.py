@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib.metadata
 import os
 import pathlib
 import sys
@@ -12,6 +11,8 @@ import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+
+import pinocchio as pin
 
 from wbc.errors import RobotFileError
 
@@ -24,14 +25,27 @@ _stderr_lock = threading.Lock()
 
 @functools.cache
 def example_data_folder() -> pathlib.Path:
-    """The folder ``robots`` of the example-robot-data wheel, found through the wheel's own list of files.
+    """The folder ``robots`` of the example-robot-data wheel: beside Pinocchio, where both wheels put what is no Python,
+    else found through the wheel's own list of files.
 
     Raises:
         RobotFileError: the wheel is not installed, or has no robots.
     """
+    folder = pathlib.Path(pin.__file__).resolve().parents[4] / "share" / _DATA_WHEEL / "robots"
+    return folder if folder.is_dir() else listed_data_folder()
+
+
+def listed_data_folder() -> pathlib.Path:
+    """The same by the wheel's list alone; slower, as reading it imports the parsers of mail.
+
+    Raises:
+        RobotFileError: as :func:`example_data_folder`.
+    """
+    from importlib import metadata
+
     try:
-        files = importlib.metadata.distribution(_DATA_WHEEL).files or []
-    except importlib.metadata.PackageNotFoundError as error:
+        files = metadata.distribution(_DATA_WHEEL).files or []
+    except metadata.PackageNotFoundError as error:
         raise RobotFileError("robot", _DATA_WHEEL, "the package that holds the robot files is not installed") from error
     for file in files:
         if file.suffix == ".urdf":

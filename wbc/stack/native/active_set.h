@@ -223,6 +223,13 @@ static int within_bounds(const wbc_tick *t) {
     return 1;
 }
 
+/* Whether the search begins with rows that were active in the last tick: then the optimum without rows is hardly the answer */
+static int begins_with_rows(const wbc_tick *t) {
+    int any = 0;
+    for (int i = 0; t->warm && i < M_ALL; i++) any |= t->keep[i] & ACTIVE;
+    return any != 0;
+}
+
 /* The optimum without rows; 1 if it respects all of them and is therefore the answer */
 static int unconstrained(wbc_tick *t) {
     solve_transposed(t, t->y);

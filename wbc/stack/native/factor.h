@@ -161,11 +161,107 @@ INLINE int finish_row(wbc_tick *t, int k, int n, double *plain, double *shares, 
     return pivot > 0.0;
 }
 
+/* Of a block of four rows: what each takes from those before it in the block, per entry of them, and its pivot */
+typedef struct {
+    double f01, f02, f03, f12, f13, f23, pivot[4], scale[4];
+    four most[4]; /* largest entries right of the diagonal, where pivots are chosen */
+} wbc_block;
+
+/* From columns k to k + 3 of the rows; the arithmetic is that of finish_row */
+INLINE void begin_block(wbc_block *b, four p0, four p1, four p2, four p3) {
+    const double first = 1.0 / p0[0];
+    b->f01 = -p0[1] * first, b->f02 = -p0[2] * first, b->f03 = -p0[3] * first;
+    const double d1 = MADD(b->f01, p0[1], p1[1]), e2 = MADD(b->f01, p0[2], p1[2]), e3 = MADD(b->f01, p0[3], p1[3]), second = 1.0 / d1;
+    b->f12 = -e2 * second, b->f13 = -e3 * second;
+    const double d2 = MADD(b->f12, e2, MADD(b->f02, p0[2], p2[2])), g3 = MADD(b->f12, e3, MADD(b->f02, p0[3], p2[3]));
+    b->f23 = -g3 * (1.0 / d2);
+    b->pivot[0] = p0[0], b->pivot[1] = d1, b->pivot[2] = d2;
+    b->pivot[3] = MADD(b->f23, g3, MADD(b->f13, e3, MADD(b->f03, p0[3], p3[3])));
+    for (int n = 0; n < 4; n++) b->scale[n] = 1.0 / sqrt(b->pivot[n]);
+}
+
+/* Rows k to k + 3 of R at once while they are in registers, columns from `at` on, eight or, with `half`, four; `first`: columns
+ * from k on, which say what the rows of the block take from each other */
+INLINE void finish_block(wbc_tick *t, const double *from, int k, int at, int half, int first, const double *scale, wbc_block *b) {
+    const double *s = from + k * WIDE + at;
+    double *r = t->R + k * WIDE + at;
+    four p0 = GIVEN_FOUR(s), p1 = GIVEN_FOUR(s + WIDE), p2 = GIVEN_FOUR(s + 2 * WIDE), p3 = GIVEN_FOUR(s + 3 * WIDE);
+    four q0 = {0}, q1 = {0}, q2 = {0}, q3 = {0};
+    if (!half) q0 = GIVEN_FOUR(s + 4), q1 = GIVEN_FOUR(s + WIDE + 4), q2 = GIVEN_FOUR(s + 2 * WIDE + 4), q3 = GIVEN_FOUR(s + 3 * WIDE + 4);
+    const double *row = t->R + at, *end = row + k * WIDE;
+    for (const double *f = t->R + k; row < end; row += WIDE, f += WIDE) {
+        const four f0 = EACH(f[0]), f1 = EACH(f[1]), f2 = EACH(f[2]), f3 = EACH(f[3]), p = GIVEN_FOUR(row);
+        p0 -= f0 * p, p1 -= f1 * p, p2 -= f2 * p, p3 -= f3 * p;
+        if (half) continue;
+        const four q = GIVEN_FOUR(row + 4);
+        q0 -= f0 * q, q1 -= f1 * q, q2 -= f2 * q, q3 -= f3 * q;
+    }
+    if (first) begin_block(b, p0, p1, p2, p3);
+    const four f01 = EACH(b->f01), f02 = EACH(b->f02), f03 = EACH(b->f03), f12 = EACH(b->f12), f13 = EACH(b->f13), f23 = EACH(b->f23);
+    p1 = MADD(f01, p0, p1), q1 = MADD(f01, q0, q1);
+    p2 = MADD(f12, p1, MADD(f02, p0, p2)), q2 = MADD(f12, q1, MADD(f02, q0, q2));
+    p3 = MADD(f23, p2, MADD(f13, p1, MADD(f03, p0, p3))), q3 = MADD(f23, q2, MADD(f13, q1, MADD(f03, q0, q3)));
+    if (first) {
+        /* Nothing left of the diagonal */
+        p1 = (four)((four_bits)p1 & (four_bits){0, -1, -1, -1}), p2 = (four)((four_bits)p2 & (four_bits){0, 0, -1, -1});
+        p3 = (four)((four_bits)p3 & (four_bits){0, 0, 0, -1});
+    }
+    if (scale) {
+        const four here = GIVEN_FOUR(scale + at), there = half ? here : GIVEN_FOUR(scale + at + 4);
+        const four_bits right = {first ? 0 : -1, -1, -1, -1}, later = {first ? 0 : -1, first ? 0 : -1, -1, -1};
+        const four_bits last = {first ? 0 : -1, first ? 0 : -1, first ? 0 : -1, -1}, none = {first ? 0 : -1, first ? 0 : -1, first ? 0 : -1, first ? 0 : -1};
+        RAISE_FOUR(b->most[0], (four)((four_bits)SIZE_OF_FOUR(p0 * here) & right));
+        RAISE_FOUR(b->most[1], (four)((four_bits)SIZE_OF_FOUR(p1 * here) & later));
+        RAISE_FOUR(b->most[2], (four)((four_bits)SIZE_OF_FOUR(p2 * here) & last));
+        RAISE_FOUR(b->most[3], (four)((four_bits)SIZE_OF_FOUR(p3 * here) & none));
+        if (!half) {
+            RAISE_FOUR(b->most[0], SIZE_OF_FOUR(q0 * there));
+            RAISE_FOUR(b->most[1], SIZE_OF_FOUR(q1 * there));
+            RAISE_FOUR(b->most[2], SIZE_OF_FOUR(q2 * there));
+            RAISE_FOUR(b->most[3], SIZE_OF_FOUR(q3 * there));
+        }
+    }
+    const four s0 = EACH(b->scale[0]), s1 = EACH(b->scale[1]), s2 = EACH(b->scale[2]), s3 = EACH(b->scale[3]);
+    FOUR(r) = p0 * s0, FOUR(r + WIDE) = p1 * s1, FOUR(r + 2 * WIDE) = p2 * s2, FOUR(r + 3 * WIDE) = p3 * s3;
+    if (!half) FOUR(r + 4) = q0 * s0, FOUR(r + WIDE + 4) = q1 * s1, FOUR(r + 2 * WIDE + 4) = q2 * s2, FOUR(r + 3 * WIDE + 4) = q3 * s3;
+}
+
+/* Whether the pivot of row k is what it would be without a choice */
+INLINE int is_chosen(const wbc_pivots *chosen, double pivot, four most, int k) {
+    const double unit = chosen->scale[k] * chosen->scale[k], given = pivot * unit;
+    const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3]));
+    return given >= chosen->least && given * chosen->bound >= aside * aside * unit;
+}
+
+/* Rows k to k + 3 of R, behind which there are at least eight columns; 0 where a pivot is not positive, or not what is chosen */
+INLINE int four_rows(wbc_tick *t, const double *from, int k, wbc_pivots *chosen) {
+    const double *scale = chosen ? chosen->scale : NULL;
+    wbc_block b = {.most = {{0}}};
+    int at = k + 8, ok = 1;
+    if (k & 4)
+        for (int n = 0; n < 4; n++) FOUR(t->R + (k + n) * WIDE + k - 4) = (four){0};
+    finish_block(t, from, k, k, 0, 1, scale, &b);
+    for (; at + 8 <= WIDE; at += 8) finish_block(t, from, k, at, 0, 0, scale, &b);
+    if (at < WIDE) finish_block(t, from, k, at, 1, 0, scale, &b);
+    for (int n = 0; n < 4; n++) {
+        ok &= chosen ? is_chosen(chosen, b.pivot[n], b.most[n], k + n) : b.pivot[n] > 0.0;
+        t->inverse_diagonal[k + n] = b.scale[n];
+        if (chosen) chosen->more[k + n] = 0.0;
+    }
+    return ok;
+}
+
 /* R = the Cholesky factor of the matrix `from`, R or H, with the inverse of its diagonal; 0 where it is not positive definite.
- * `chosen`: NULL, or how pivots are chosen so that there always is one. */
+ * `chosen`: NULL, or how pivots are chosen so that there always is one; `from` is H then. */
 INLINE int factor_rows(wbc_tick *t, const double *from, wbc_pivots *chosen) {
     int ok = 1;
     for (int k = 0; k < NV; k += 4) {
+        if (k + 8 < NV) {
+            const int fine = four_rows(t, from, k, chosen);
+            if (!chosen) ok &= fine;
+            if (!chosen || fine) continue;
+        }
+        /* The last rows, and those whose pivots are chosen: one after the other */
         double plain[4 * WIDE], shares[16];
         for (int at = k & ~7; at < WIDE; at += 8) reduce_rows(t, from, k, k, at);
         ok &= finish_row(t, k, 0, plain, shares, chosen);
@@ -229,13 +325,13 @@ static void solve_transposed(const wbc_tick *t, double *y) {
     for (int i = TALL; i < WIDE; i++) y[i] = 0.0;
 }
 
-/* x = R^-1 y, as above */
+/* x = R^-1 y, as above; entries that have just been found are waited for last */
 static void solve_upper(const wbc_tick *t, const double *y, double *x) {
     for (int i = TALL; i < WIDE; i++) x[i] = 0.0;
     for (int i = TALL - 4; i >= 0; i -= 4) {
         const double *s0 = t->R + i * WIDE, *s1 = s0 + WIDE, *s2 = s1 + WIDE, *s3 = s2 + WIDE, *d = t->inverse_diagonal + i;
         four p0 = {0}, p1 = {0}, p2 = {0}, p3 = {0};
-        for (int at = i + 4; at < WIDE; at += 4) {
+        for (int at = WIDE - 4; at > i; at -= 4) {
             const four known = GIVEN_FOUR(x + at);
             p0 = MADD(GIVEN_FOUR(s0 + at), known, p0), p1 = MADD(GIVEN_FOUR(s1 + at), known, p1);
             p2 = MADD(GIVEN_FOUR(s2 + at), known, p2), p3 = MADD(GIVEN_FOUR(s3 + at), known, p3);
@@ -282,8 +378,9 @@ static void invert(wbc_tick *t) {
         for (int at = i & ~7; at < WIDE; at += 8) invert_rows(t, i, at);
     for (int i = 0; i < NV; i++) {
         const double *row = t->inverse + i * WIDE;
-        t->scaling[i] = 1.0 / sqrt(dot(row, row, i));
+        t->scaling[i] = dot(row, row, i);
     }
+    for (int i = 0; i < NV; i++) t->scaling[i] = 1.0 / sqrt(t->scaling[i]);
 }
 
 #define PACK(i) ((2 * NV - (i) - 1) * (i) / 2)

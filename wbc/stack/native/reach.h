@@ -96,8 +96,9 @@ static void solve_with(const wbc_tick *t, const double *b, double *x) {
 }
 
 static double largest_step(const double *x) {
-    double largest = 0.0;
-    for (int i = 0; i < DOFS; i++) largest = larger(largest, fabs(x[i]) / dof_scale[i]);
+    double size[NV], largest = 0.0;
+    for (int i = 0; i < DOFS; i++) size[i] = fabs(x[i]) / dof_scale[i];
+    for (int i = 0; i < DOFS; i++) largest = larger(largest, size[i]);
     return largest;
 }
 
@@ -110,6 +111,7 @@ static int find_free(const wbc_tick *t, const double *slope, double *free) {
     for (int i = 0; i < NV; i++) {
         if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
         const double q = t->q[stop_q[i]], slack = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
+        if (slack >= 2.0 * AT_LIMIT * dof_scale[i]) continue;
         const double near = clamp(2.0 - slack / (AT_LIMIT * dof_scale[i]), 0.0, 1.0);
         const double pushed = clamp(fabs(slope[i]) * dof_scale[i] / (PUSHED * steepest + DBL_MIN), 0.0, 1.0);
         free[i] = 1.0 - near * pushed;
@@ -132,12 +134,23 @@ INLINE void blend(double *matrix, const double *free, double share) {
 static int cut_off(wbc_tick *t, const double *free, double more) {
     load(t);
     blend(t->R, free, 1.0);
-    for (int i = 0; i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
+    for (int i = 0; more != 0.0 && i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
     t->prepared = 0;
     return decompose(t);
 }
 
 #if NNZK > 0
+
+/* The least and the largest pivot of the factor, of v / dof_scale */
+static void find_pivots(const wbc_tick *t, double *least, double *most) {
+    double pivot[NV];
+    *least = WBC_INF, *most = 0.0;
+    for (int i = 0; i < NV; i++) pivot[i] = dof_scale[i] / t->inverse_diagonal[i];
+    for (int i = 0; i < NV; i++) {
+        *least = smaller(*least, pivot[i] * pivot[i]);
+        *most = larger(*most, pivot[i] * pivot[i]);
+    }
+}
 
 /* What a metric step leaves of the slope: r -= f a a' x for a row a, blocked joints cut off */
 INLINE void less_row(const double *a, const int *col, int count, double f, const double *free, const double *x, wide *r) {
@@ -153,12 +166,8 @@ INLINE void less_row(const double *a, const int *col, int count, double f, const
 /* The solution x for b in the metric of R, at rounding level however far its pivots are apart: the errors that a step
  * leaves are small differences, and the curvature along them must not be noise. `more` is on the diagonal besides. */
 static void sharpen(const wbc_tick *t, const double *free, double more, const double *b, double *x) {
-    double least = WBC_INF, most = 0.0;
-    for (int i = 0; i < NV; i++) {
-        const double pivot = dof_scale[i] / t->inverse_diagonal[i];
-        least = smaller(least, pivot * pivot);
-        most = larger(most, pivot * pivot);
-    }
+    double least, most;
+    find_pivots(t, &least, &most);
     for (int n = 0; most > APART * least && n < SHARPENED; n++) {
         wide r[NV];
         double rest[WIDE] = {0}, change[WIDE];
@@ -213,15 +222,6 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     return !changed || cut_off(t, free, 0.0);
 }
 
-static double least_pivot(const wbc_tick *t) {
-    double least = WBC_INF;
-    for (int i = 0; i < NV; i++) {
-        const double pivot = dof_scale[i] / t->inverse_diagonal[i];
-        least = smaller(least, pivot * pivot);
-    }
-    return least;
-}
-
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
 static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
     double size = 0.0, whole = 0.0, most[4] = {0};
@@ -255,7 +255,8 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
 static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *force) {
-    double least = least_pivot(t);
+    double least, most;
+    find_pivots(t, &least, &most);
     const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
     decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);

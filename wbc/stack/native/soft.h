@@ -178,8 +178,11 @@ static int optimum(wbc_tick *t, double angle) {
         steady(t->H);
         if (!factor(t)) return -1;
     }
-    t->alone = unconstrained(t);
+    const int likely = begins_with_rows(t);
+    if (likely) solve_transposed(t, t->y);
+    else t->alone = unconstrained(t);
     flag = t->alone ? 0 : constrained(t, angle);
+    if (likely && flag < 0) solve_upper(t, t->y, t->x);
 #endif
     return flag;
 }

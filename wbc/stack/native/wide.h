@@ -36,19 +36,64 @@ static double side_gap(const wbc_tick *t, int a) {
     return (double)gap * t->scaling[i];
 }
 
+/* What rounding takes from x y, exactly: with one rounding, where the processor can (the loop becomes one instruction), else
+ * from halves of both that have exact products (Dekker 1971). The bits are the same. */
+#if defined(__FMA__) || defined(__aarch64__)
+#define LOST_OF_PRODUCT(x, y, xy, lost) \
+    do { \
+        for (int n_ = 0; n_ < 4; n_++) (lost)[n_] = __builtin_fma((x)[n_], (y)[n_], -(xy)[n_]); \
+    } while (0)
+#else
+#define SPLIT EACH(sizeof(double) == 4 ? 0x1p12 + 1.0 : 0x1p27 + 1.0)
+#define LOST_OF_PRODUCT(x, y, xy, lost) \
+    do { \
+        const four x_ = SPLIT * (x), y_ = SPLIT * (y), high_ = x_ - (x_ - (x)), top_ = y_ - (y_ - (y)); \
+        const four small_ = (x) - high_, rest_ = (y) - top_; \
+        (lost) = small_ * rest_ - ((((xy) - high_ * top_) - small_ * top_) - high_ * rest_); \
+    } while (0)
+#endif
+/* sum += x y, and what rounding takes from both to `lost` */
+#define ADD_PRODUCT(x, y, sum, lost, bulk) \
+    do { \
+        const four xy_ = (x) * (y), new_ = (sum) + xy_, part_ = new_ - (sum); \
+        four left_; \
+        LOST_OF_PRODUCT(x, y, xy_, left_); \
+        (lost) += (((sum) - (new_ - part_)) + (xy_ - part_)) + left_; \
+        (bulk) += SIZE_OF_FOUR(xy_); \
+        (sum) = new_; \
+    } while (0)
+
+/* H v + g as a sum, what its rounding lost, and the size of its terms: as if with twice the digits, but for
+ * ((NV + 8) EPS)^2 of that size (Ogita, Rump and Oishi 2005, Dot2) */
+static void wide_product(const wbc_tick *t, wide *out, double *bulk) {
+    double v[WIDE] = {0}, sum[WIDE], lost[WIDE] = {0};
+    memcpy(v, t->report.v, sizeof t->report.v);
+    for (int i = 0; i < WIDE; i++) {
+        sum[i] = i < NV ? t->g[i] : 0.0;
+        bulk[i] = fabs(sum[i]);
+    }
+    for (int i = 0; i < NV; i++) {
+        const int from = i & ~3;
+        const four here = EACH(v[i]);
+        four across = {0}, across_lost = {0}, across_bulk = {0};
+        for (int at = from; at < WIDE; at += 4) {
+            const four there = GIVEN_FOUR(v + at);
+            four h = GIVEN_FOUR(t->H + i * WIDE + at), s = GIVEN_FOUR(sum + at), l = GIVEN_FOUR(lost + at), b = GIVEN_FOUR(bulk + at);
+            ADD_PRODUCT(h, there, across, across_lost, across_bulk);
+            if (at == from) h[i - from] = 0.0;
+            ADD_PRODUCT(h, here, s, l, b);
+            FOUR(sum + at) = s, FOUR(lost + at) = l, FOUR(bulk + at) = b;
+        }
+        out[i] = ((wide)across[0] + across[1]) + ((wide)across[2] + across[3]) + SUM_OF_FOUR(across_lost);
+        bulk[i] += SUM_OF_FOUR(across_bulk);
+    }
+    for (int i = 0; i < NV; i++) out[i] += (wide)sum[i] + lost[i];
+}
+
 /* residual = H v + g + A' lambda of the general rows, and a bound on its rounding */
 static void wide_forces(const wbc_tick *t, const wide *lambda, wide *residual, double *rounding) {
-    const double *v = t->report.v;
-    for (int i = 0; i < NV; i++) {
-        double row[WIDE], bulk = fabs(t->g[i]);
-        wide part[4] = {t->g[i], 0.0L, 0.0L, 0.0L};
-        for (int j = 0; j < i; j++) row[j] = t->H[j * WIDE + i];
-        for (int j = i; j < WIDE; j++) row[j] = t->H[i * WIDE + j];
-        for (int j = 0; j < NV; j++) part[j & 3] += (wide)row[j] * v[j];
-        for (int j = 0; j < NV; j++) bulk += fabs(row[j] * v[j]);
-        residual[i] = (part[0] + part[2]) + (part[1] + part[3]);
-        rounding[i] = bulk;
-    }
+    const double doubled = (NV + 8) * EPS;
+    wide_product(t, residual, rounding);
     for (int a = 0; a < t->daqp.n_active; a++) {
         const int k = t->daqp.WS[a] - NV;
         for (int e = k < 0 ? 0 : a_start[k]; k >= 0 && e < a_end[k]; e++) {
@@ -57,14 +102,14 @@ static void wide_forces(const wbc_tick *t, const wide *lambda, wide *residual, d
             rounding[a_col[e]] += fabs((double)part);
         }
     }
-    for (int i = 0; i < NV; i++) rounding[i] *= (NV + t->daqp.n_active + 4) * WIDE_EPS;
+    for (int i = 0; i < NV; i++) rounding[i] *= (t->daqp.n_active + 8) * WIDE_EPS + doubled * doubled;
 }
 
 /* The multipliers of general rows that fit the command best, as far as their signs allow */
 static void fit_multipliers(wbc_tick *t, wide *lambda) {
     DAQPWorkspace *work = &t->daqp;
     wide residual[NV];
-    double rounding[NV], y[WIDE], mu[ACTIVE_MAX];
+    double rounding[WIDE], y[WIDE], mu[ACTIVE_MAX];
     int general = 0;
     for (int a = 0; a < work->n_active; a++) general |= work->WS[a] >= NV;
     if (!general) return;
@@ -88,15 +133,18 @@ static void fit_multipliers(wbc_tick *t, wide *lambda) {
     }
 }
 
-/* Row i of R^-1 without its part along the first `count` active rows */
-static void row_beside(const wbc_tick *t, int i, int count, double *row) {
+/* Row i of R^-1 without its part along the first `count` active rows, in `own` where there is such a part */
+static const double *row_beside(const wbc_tick *t, int i, int count, double *own) {
+    const double *row = t->inverse + i * WIDE;
     double mu[ACTIVE_MAX];
-    memcpy(row, t->inverse + i * WIDE, WIDE * sizeof(double));
-    for (int twice = 0; count > 0 && twice < 2; twice++) {
-        for (int a = 0; a < count; a++) mu[a] = seen_through(t, t->daqp.WS[a], row);
+    if (count == 0) return row;
+    memcpy(own, row, WIDE * sizeof(double));
+    for (int twice = 0; twice < 2; twice++) {
+        for (int a = 0; a < count; a++) mu[a] = seen_through(t, t->daqp.WS[a], own);
         solve_gram(t, count, mu);
-        for (int a = 0; a < count; a++) push_back(t, t->daqp.WS[a], -mu[a], row);
+        for (int a = 0; a < count; a++) push_back(t, t->daqp.WS[a], -mu[a], own);
     }
+    return own;
 }
 
 /* By how much rounding may turn the plane beside the first `count` active rows */
@@ -127,7 +175,7 @@ static double active_residual(const wbc_tick *t) {
 static double wide_bound(wbc_tick *t) {
     const DAQPWorkspace *work = &t->daqp;
     wide lambda[MC + 1], residual[NV];
-    double rounding[NV], row[WIDE], step[WIDE] = {0}, noise[WIDE] = {0}, whole[WIDE] = {0}, reach = 0.0, longest = 0.0;
+    double rounding[WIDE], own[WIDE], step[WIDE] = {0}, noise[WIDE] = {0}, whole[WIDE] = {0}, reach = 0.0, longest = 0.0;
     int equal = 0;
     for (int k = 0; k < MC; k++) lambda[k] = t->report.lambda[NV + k];
     fit_multipliers(t, lambda);
@@ -144,14 +192,18 @@ static double wide_bound(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         const double force = t->scratch[i] = (double)residual[i];
         if (i >= DOFS && force == 0.0 && rounding[i] == 0.0) continue;
-        row_beside(t, i, equal, row);
-        axpy(step, row, force, 0);
-        for (int j = 0; j < NV; j++) {
-            noise[j] += rounding[i] * fabs(row[j]);
-            whole[j] += (fabs(force) + rounding[i]) * fabs(t->inverse[i * WIDE + j]);
+        /* Without equalities the row ends at the diagonal, and nothing is turned */
+        const double *row = row_beside(t, i, equal, own);
+        const int from = equal > 0 ? 0 : i & ~3;
+        const four push = EACH(force), blur = EACH(rounding[i]);
+        for (int at = from; at < WIDE; at += 4) {
+            const four here = GIVEN_FOUR(row + at);
+            FOUR(step + at) = MADD(push, here, GIVEN_FOUR(step + at));
+            FOUR(noise + at) = MADD(blur, SIZE_OF_FOUR(here), GIVEN_FOUR(noise + at));
         }
+        for (int j = 0; equal > 0 && j < NV; j++) whole[j] += (fabs(force) + rounding[i]) * fabs(t->inverse[i * WIDE + j]);
         if (i >= DOFS) continue;
-        reach = larger(sqrt(dot(row, row, 0)), reach);
+        reach = larger(sqrt(dot(row, row, from)), reach);
         longest = larger(1.0 / t->scaling[i], longest);
     }
     const double turned = tilt(t, equal), rest = active_residual(t);

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from wbc.symbolic.operators import quick_operators
 from wbc.trajectory.jerk.braking import guarded, reach
 from wbc.trajectory.jerk.course import Point
 from wbc.validation import Array
@@ -95,6 +96,7 @@ class Walls:
         ticks = self._ticks_clear()
         return 1 + int(ticks) if ticks >= 0.0 else 0
 
+    @quick_operators()
     def _ticks(self) -> ca.Function:
         """Least clearance of a joint, in ticks: to a wall after a stop, or to where a wall counts.
 

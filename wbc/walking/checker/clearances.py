@@ -124,9 +124,7 @@ def check_structure(
             bound = partial(measure, of=around.bounds.get(name, part))
 
             def touches(rows: Rows, at: Array | None = hand, holds: Array = around.holds[name]) -> NDArray[np.bool_]:
-                if at is None or not len(holds):
-                    return np.zeros(len(rows), dtype=bool)
-                return distances.nearest(holds, at[rows])[1] <= rules.exempt_distance
+                return _never(rows) if at is None else distances.near_any(holds, at[rows], rules.exempt_distance)
 
             _add(tally, STRUCTURE, measure, moving.travel, samples, rules, f"{link} and {name}", touches, bound)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.clearance import TriangleMesh
 from wbc.errors import UnknownNameError
@@ -17,6 +18,8 @@ from wbc.walking.holds.surface import CylinderSurface, PlaneSurface, Surface
 THIRDS = 60
 #: Parts of a segment that a bound looks at
 PARTS = 4
+#: A box is this much larger than what it holds [m]
+EDGE = 1e-6
 
 
 def between_segments(a: Array, b: Array, c: Array, d: Array) -> Array:
@@ -109,6 +112,18 @@ def nearest(points: Array, of: Array) -> tuple[np.ndarray, Array]:
     square = (points**2).sum(axis=1) - 2.0 * (of @ points.T)
     row = np.argmin(square, axis=1)
     return row, np.linalg.norm(of - points[row], axis=1)
+
+
+def near_any(points: Array, of: Array, distance: float) -> NDArray[np.bool_]:
+    """Whether one of ``points`` [h, 3] is within a distance [m] of each of ``of``, [s, 3]."""
+    if not len(of):
+        return np.zeros(0, dtype=bool)
+    # None outside the box about them is; rounding must not leave out one at its edge
+    low, high = of.min(axis=0) - distance, of.max(axis=0) + distance
+    inside = ((points >= low - EDGE) & (points <= high + EDGE)).all(axis=1)
+    if not inside.any():
+        return np.zeros(len(of), dtype=bool)
+    return np.asarray(nearest(points[inside], of)[1] <= distance)
 
 
 def _from_box(x: Array, half: Array) -> Array:

@@ -16,6 +16,7 @@ from wbc.native.compiled_function import compiled
 from wbc.robots import Walker
 from wbc.stack.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.rotations import exp3, from_quaternion, quaternion_product
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
@@ -53,6 +54,7 @@ def chain_function(walker: Walker) -> ca.Function:
     return known
 
 
+@quick_operators()
 def _function(walker: Walker) -> ca.Function:
     n, rows = len(walker.arms), _hands(walker)
     q = ca.SX.sym("q", walker.robot.nq)

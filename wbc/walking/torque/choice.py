@@ -10,6 +10,7 @@ from wbc import validation
 from wbc.errors import RangeError, WbcError
 from wbc.robots import Walker, with_masses
 from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
+from wbc.simulation.drives import PLANTS
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.part import WalkLogError
 from wbc.walking.loop.stack import hold_kind
@@ -17,8 +18,6 @@ from wbc.walking.torque.faults import Fault, delay_of
 from wbc.walking.torque.loop import TorqueLoop
 from wbc.walking.torque.stack import TorqueStack
 from wbc.walking.torque.tested import Tested
-
-PLANTS = ("kinematic", "pinocchio", "mujoco")
 
 
 @dataclass(frozen=True)

@@ -10,19 +10,24 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import ShapeError
+from wbc.errors import ShapeError, UnknownNameError
 from wbc.simulation import Command, CommandKind, Encoders, GripKind, Plant, PlantState
 from wbc.validation import Array
 from wbc.walking.torque.bearing import Bearing
 from wbc.walking.torque.faults import Fault
 from wbc.walking.torque.motor_watch import MotorWatch
 from wbc.walking.torque.readings import JointFilter
-from wbc.walking.torque.stack import STEADY, TorqueStack
+from wbc.walking.torque.stack import STEADY, UNKNOWN, TorqueStack
 from wbc.walking.torque.tested import Tested
 from wbc.walking.torque.watch import Watch
 
-#: A closed hand that is farther from its hold slips; farther than that the walk ends [m]
-SLIPS, LOST = 3e-4, 2e-3
+#: A closed hand that is farther from its hold slips; the walk ends where it is farther off than the hands are in the
+#: mean, which is what the walk does not take for the body's [m]
+SLIPS, LOST = 3e-4, 1e-3
+#: Part of joints' rate limits that is used: what acts and is not known moves them a little faster
+RATE = 1.0 - 1e-4
+#: A hand that closes at rest is slower [m/s], [rad/s]
+MEETS = 0.002, np.radians(0.5)
 #: Torques that do not do what they are to for so long end the walk [s]
 OVERLOAD = 0.05
 
@@ -63,8 +68,12 @@ class TorqueLoop:
     and for what the closed hands bear. Torques that take hold late are found for the state that they will meet: what is
     read, and the accelerations that were decided since. Nothing of the walk, its planner or its stack is changed.
 
-    What acts on a joint and is not known, such as friction, is the residual r of the robot's momentum; -r is added to
-    the stack's torques, within :attr:`Gains.friction` and what the motors have (a disturbance observer).
+    What acts and is not known is the residual r of the robot's momentum (a disturbance observer). Of a joint, such as
+    friction, -r is added to the stack's torques, within :attr:`Gains.friction` and what the motors have. Of the body,
+    such as a payload, it is an external wrench to the stack, whose accelerations are then those that come about.
+
+    A hand opens as late as torques take hold: those on their way were found for a hand that is closed. The reference
+    then begins anew where the robot is, as what was strained between closed hands would spring.
 
     A motor that gives less than it is commanded (:class:`MotorWatch`, with the wrenches that the hands measure) is
     found, and the stack does without it; so is a hand that slips on its hold. :meth:`failing` says which: what drives
@@ -105,11 +114,13 @@ class TorqueLoop:
         self.time_step = stack.controller.stack.dt
         items: Any = stack.controller
         arms = stack.walker.arms
-        self._model, self._reference = stack.walker.robot.model, items["reference"]
+        self._model, self._reference, self._body = stack.walker.robot.model, items["reference"], items[UNKNOWN]
         self._items = {(arm.hand, kind): items[f"{arm.hand} {kind}"] for arm in arms for kind in stack.kinds}
         self._gains, self._faults = gains or Gains(), tuple(fault for fault in faults if fault.kind != "delay")
         self._command = Command(CommandKind.TORQUE, np.zeros(self.nv))
         ahead = round(validation.scalar("delay", delay, low=0.0, unit="s") / self.time_step)
+        # Hands that are to open: after so many ticks
+        self._opening: dict[str, int] = {}
         # Accelerations on their way, the oldest first, and how long each lasts until the next torque takes hold
         self._decided = np.zeros((ahead, self.nv))
         self._lasts = (np.arange(ahead, 0, -1) - 0.5) * self.time_step**2
@@ -134,11 +145,14 @@ class TorqueLoop:
         gains, controller = self._gains, self.stack.controller
         controller.reset(q)
         controller["torques"].torque = self._effort[self.stack.walker.robot.base_nv :]
+        controller["limits"].velocity_scale = RATE
         self._motors.begin(q, np.zeros(self.nv))
         self._sent[:] = self._added[:] = 0.0
         self._left = self._effort
-        self._slipping: dict[str, float] = {}
+        # Hands that slip, and whether the walk ends of it
+        self._slipping: dict[str, bool] = {}
         self._failing, self._overloaded = "", 0
+        self._opening.clear()
         self._reference.set(stiffness=gains.bandwidth**2, damping=2.0 * gains.bandwidth)
         for item in self._items.values():
             item.enabled, item.gain = False, gains.grip
@@ -168,6 +182,9 @@ class TorqueLoop:
     def grasp(self, frame: str, pose: pin.SE3, kind: GripKind) -> None:
         """The plant's hand closes, and the stack counts on it."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in self.stack.kinds]))
+        if self._opening.pop(frame, None) is not None:
+            self._tested.release(frame)
+        self._meets(frame)
         self._tested.grasp(frame, pose, kind)
         self._look(struck=True)
         state = self._state
@@ -177,11 +194,23 @@ class TorqueLoop:
         self._closed[frame] = kind
         self.watch.grasps(self._tested, frame)
 
+    def _meets(self, frame: str) -> None:
+        """Say so where a hand is not at rest as it closes; it may roll."""
+        state, model, data = self._state, self._model, self._data
+        pin.forwardKinematics(model, data, state.q, state.v)
+        twist = pin.getFrameVelocity(model, data, model.getFrameId(frame), pin.LOCAL).vector
+        speed, rate = float(np.sqrt(twist[:3] @ twist[:3])), float(np.sqrt(twist[3:5] @ twist[3:5]))
+        if speed > MEETS[0] or rate > MEETS[1]:
+            self._note(state.time, f"{frame} closed with {1e3 * speed:.2g} mm/s and {rate:.2g} rad/s")
+
     def release(self, frame: str) -> None:
-        """The plant's hand opens, and the stack does without it."""
-        self._tested.release(frame)
+        """The stack does without the hand, and the plant's opens when the first such torques take hold."""
+        if frame not in self._closed:
+            raise UnknownNameError("frame", frame, self._closed)
+        self._opening[frame] = len(self._decided)
         self._slipping.pop(frame, None)
         self._let_go(frame)
+        self._q = self._ahead(self._state)[0]
 
     def holds_without(self, frame: str) -> bool:
         """Whether holds and motors bear the robot, at rest where it is, when this closed hand opens; if they do not,
@@ -212,16 +241,19 @@ class TorqueLoop:
         count = max(round(dt / self.time_step), 1)
         ramp, step = (self._next - self._v) / count, self.time_step
         plant, reference, command, controller = self.plant, self._reference, self._command, self.stack.controller
-        reference.acceleration = ramp / step
         for _ in range(count):
             state = self._state
             if self._coming:
                 self._fail(state.time)
-            q, v = (state.q, state.v) if not len(self._decided) else self._ahead(state)
-            reference.target, reference.feedforward = self._q, self._v
+            q, v = self._ahead(state)
+            reference.target, reference.feedforward, reference.acceleration = self._q, self._v, ramp / step
+            if self._motors.limp:
+                self._idle(q, v, ramp / step)
+            self._body.wrench = self._unknown(state.q)
             self.step = controller.step(q, v)
             command.values[:] = self._compensated(self.step.torque)
             plant.apply(command)
+            self._open()
             plant.advance(step)
             self._look(self._decided[0] if len(self._decided) else self.step.a)
             self._sent[:-1], self._added[:-1] = self._sent[1:], self._added[1:]
@@ -246,6 +278,28 @@ class TorqueLoop:
         most = self._gains.friction
         against = np.maximum(np.minimum(self._motors.residual, most), -most)
         return np.maximum(np.minimum(torque - against, self._left), -self._left)
+
+    def _unknown(self, q: Array) -> Array:
+        """What acts on the body beside what is known, along the axes of the world ``[6]`` [N, N m]."""
+        turn, residual = pin.XYZQUATToSE3(q[:7]).rotation, self._motors.residual
+        return np.concatenate([turn @ residual[:3], turn @ residual[3:6]])
+
+    def _idle(self, q: Array, v: Array, a: Array) -> None:
+        """Joints whose motors are limp do what they do: others would be moved for them else."""
+        limp, robot = self._motors.limp, self.stack.walker.robot
+        target, rate, a = self._q.copy(), self._v.copy(), a.copy()
+        places = robot.position_index[limp].astype(int)
+        target[places], rate[limp], a[limp] = q[places], v[limp], self.step.a[limp]
+        self._reference.target, self._reference.feedforward, self._reference.acceleration = target, rate, a
+
+    def _open(self) -> None:
+        """Hands whose time to open has come."""
+        for frame, ticks in list(self._opening.items()):
+            if ticks:
+                self._opening[frame] = ticks - 1
+            else:
+                del self._opening[frame]
+                self._tested.release(frame)
 
     def _look(self, decided: Array | None = None, struck: bool = False) -> None:
         """Take what is read; ``decided``: the accelerations of the tick that is over; None: there was none."""
@@ -287,16 +341,19 @@ class TorqueLoop:
     def _feel(self) -> None:
         """Hands that slip on their holds."""
         state, model, data = self._state, self._model, self._data
+        if not self._closed:
+            return
         pin.framesForwardKinematics(model, data, state.q)
-        for frame, kind in self._closed.items():
-            gap = data.oMf[model.getFrameId(frame)].translation - self._items[frame, kind].target.translation
-            off, before = float(np.sqrt(gap @ gap)), self._slipping.get(frame, 0.0)
-            if off <= SLIPS:
-                continue
-            self._slipping[frame] = max(off, before)
-            if before == 0.0:
+        places = [(data.oMf[model.getFrameId(frame)].translation, self._items[frame, kind].target.translation)
+                  for frame, kind in self._closed.items()]  # fmt: skip
+        gaps = np.array([at - target for at, target in places]).reshape(-1, 3)
+        for frame, gap, own in zip(self._closed, gaps, gaps - gaps.mean(axis=0), strict=True):
+            off = float(np.sqrt(gap @ gap))
+            if off > SLIPS and frame not in self._slipping:
+                self._slipping[frame] = False
                 self._note(state.time, f"{frame} slips on its hold")
-            if off > LOST >= before:
+            if off > SLIPS and np.sqrt(own @ own) > LOST and not self._slipping[frame]:
+                self._slipping[frame] = True
                 self._note(state.time, f"{frame} has slipped by {1e3 * off:.1f} mm on its hold", ends=True)
 
     def _note(self, time: float, text: str, ends: bool = False) -> None:
@@ -306,16 +363,18 @@ class TorqueLoop:
 
     def _ahead(self, state: PlantState) -> tuple[Array, Array]:
         """Where the torque of this tick will find the robot."""
+        if not len(self._decided):
+            return state.q, state.v
         moved = len(self._decided) * self.time_step * state.v + self._lasts @ self._decided
         return pin.integrate(self._model, state.q, moved), state.v + self.time_step * self._decided.sum(axis=0)
 
     def _fail(self, time: float) -> None:
         """Faults whose time has come."""
         for fault in [fault for fault in self._coming if fault.time <= time]:
-            if not fault.begin(self._tested):
+            hand = f"{fault.what}_hand"
+            if hand in self._opening or not fault.begin(self._tested):
                 continue
             self._coming.remove(fault)
-            hand = f"{fault.what}_hand"
             if fault.kind == "break":
                 self._let_go(hand)
 

@@ -11,12 +11,13 @@ from wbc.validation import Array
 #: Of the observer [1/s], and what noise of the rates may make of it, the lesser counts: as its residual is commanded
 #: against, noise of so many rad/s moves the joints by gain times that [rad/s^2]
 GAIN, SHAKEN = 200.0, 0.05
-#: A motor is judged while more than this part of its largest torque is asked of it, and more than friction that nobody
-#: knows of may take [N m], ...
-ASKED, FRICTION = 0.08, 6.0
-#: ... and is limp when it gives less than this part of what is asked, for so long [s]: blows of hands
-#: that close pass
-GIVEN, LASTING = 0.3, 0.015
+#: A motor is judged while more than this part of its largest torque is asked of it, ...
+ASKED = 0.08
+#: ... and is limp when it gives less than this part of what is asked, ...
+GIVEN = 0.3
+#: ... for so long [s] where that is more than friction that nobody knows of may take [N m]: blows of hands that close
+#: pass; or for so long where it is more with what is added, as friction has been compensated by then
+FRICTION, LASTING, LONG = 6.0, 0.015, 0.1
 
 
 class MotorWatch:
@@ -37,17 +38,18 @@ class MotorWatch:
     def __init__(self, model: pin.Model, effort: Array, dt: float, noise: float = 0.0) -> None:
         gain = SHAKEN / max(noise, SHAKEN / GAIN)
         self._observer = MomentumObserver(model, gain, dt)
-        self._least, self._rate, self._ticks = np.maximum(ASKED * effort, FRICTION), gain * dt, round(LASTING / dt)
-        self._least[effort <= 0.0] = np.inf
+        self._least, self._rate = np.where(effort > 0.0, ASKED * effort, np.inf), gain * dt
+        self._ticks = round(LASTING / dt), round(LONG / dt)
         self.share, self.limp = np.ones(model.nv), list[int]()
         self._asked, self._added = np.zeros((2, model.nv))
-        self._low = np.zeros(model.nv, dtype=int)
+        self._low, self._long = np.zeros((2, model.nv), dtype=int)
         self.residual = self._observer.residual
 
     def begin(self, q: Array, v: Array) -> None:
         """At a state, with motors that work."""
         self._observer.begin(q, v)
-        self._asked[:], self._added[:], self._low[:], self.share[:] = 0.0, 0.0, 0, 1.0
+        self._asked[:], self._added[:], self.share[:] = 0.0, 0.0, 1.0
+        self._low[:], self._long[:] = 0, 0
         self.limp = []
 
     def struck(self, q: Array, v: Array) -> None:
@@ -67,7 +69,10 @@ class MotorWatch:
         judged = np.abs(asked) > self._least
         self.share[:] = 1.0
         np.divide(asked + more + residual, asked, out=self.share, where=judged)
-        self._low = np.where(self.share < GIVEN, self._low + 1, 0)
-        found = [int(k) for k in np.flatnonzero(self._low == self._ticks) if int(k) not in self.limp]
+        low = self.share < GIVEN
+        self._low = np.where(low & (np.abs(asked) > FRICTION), self._low + 1, 0)
+        self._long = np.where(low & (np.abs(asked + more) > FRICTION), self._long + 1, 0)
+        dead = (self._low == self._ticks[0]) | (self._long == self._ticks[1])
+        found = [int(k) for k in np.flatnonzero(dead) if int(k) not in self.limp]
         self.limp += found
         return found

@@ -17,6 +17,8 @@ from wbc.walking.torque.grasps import GRASPS
 
 #: Period of the torques [s]
 PERIOD = 0.001
+#: Name of the wrench that acts on the body and is not known
+UNKNOWN = "unknown"
 #: Weight of the body's pose, beside 1 of every joint
 BODY = 100.0
 #: So many hands that may tilt fix the body
@@ -65,6 +67,7 @@ class TorqueStack:
         effort = tuple(robot.limits.effort[robot.base_nv :].tolist())
         stack.add(tasks.JointLimits(), name="limits")
         stack.add(tasks.DriveTorqueLimits(drives, torque=effort), name="torques")
+        stack.add(tasks.ExternalWrench("body"), name=UNKNOWN)
         for arm in walker.arms:
             for kind in self.kinds:
                 grasp = GRASPS[kind](arm.hand, force=rating.force, torque=rating.torque)
