@@ -77,3 +77,29 @@ def test_on_the_way_it_has_none_and_the_next_time_it_begins_anew() -> None:
     again = landing.go(swinging, hold, True)
     assert again is not None
     assert np.allclose(again.z, FRAME[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("rolls", [True, False])
+def test_it_goes_on_to_turn_as_the_hand_turned(rolls: bool) -> None:
+    turns = np.array([0.4, -0.3, 0.0])
+    aim = Aim(PLACE + 0.05 * FRAME[:, 2], -0.3 * FRAME[:, 2], 0.99, 0.9)
+    still = cast("Any", SimpleNamespace(at=lambda _time: aim))
+    hand = FRAME @ pin.exp3(LEAN)
+    swinging = Swinging(0, 0, 0, still, 0.0, pace=1.0, x=FRAME[:, 0] if rolls else None)
+    swinging.aim, hold = aim, (PLACE, FRAME[:, 2])
+    begun = []
+    for lag in (0.0, 0.05):
+        landing = HandLanding(DT)
+        for k, near in ((-1, False), (0, True)):
+            now = pin.exp3(k * DT * turns) @ hand
+            swinging.axis, swinging.x_axis = now[:, 2], now[:, 0]
+            landing.go(swinging, hold, near, lag)
+        swinging.aim = Aim(PLACE + (0.05 - 0.3 * DT) * FRAME[:, 2], -0.3 * FRAME[:, 2], 0.99, 0.9)
+        axes = landing.go(swinging, hold, True, lag)
+        assert axes is not None
+        begun.append(axes.z_rate)
+        swinging.aim = aim
+    turned = np.cross(turns, hand[:, 2])
+    assert np.linalg.norm(begun[0] - turned) < 0.25 * np.linalg.norm(turned)
+    # Of joints that lag it is seen too late: their lean goes with the height alone
+    assert np.linalg.norm(begun[1] - turned) > 2.0 * np.linalg.norm(turned)

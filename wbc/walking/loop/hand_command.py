@@ -158,7 +158,8 @@ class HandLanding:
 
     p is its aim, p_0 that at which its wrist was let go, phi the turn that takes the axes of the hold to those which
     the hand had there; the shortest one where only z counts. mu is such that the hand goes on to turn as it turned
-    then: no wrist changes its rates from one tick to the next. As the arm brings a hand down along the normal its lean
+    then, so that no wrist changes its rates from one tick to the next; mu = phi on joints that lag, whose hands are
+    farther by then than they are seen. As the arm brings a hand down along the normal its lean
     goes with its height. To want the hold's own axis at once turns the hand by that lean in a tenth of a second, and
     with theta5 near 0, where joint 4 hardly turns it, off its path by centimetres.
 
@@ -173,12 +174,12 @@ class HandLanding:
         # Axes of the hand a tick ago
         self._before: tuple[Swinging, Array, Array] | None = None
 
-    def go(self, swinging: Swinging, hold: tuple[Array, Array], near: bool) -> Axes | None:
+    def go(self, swinging: Swinging, hold: tuple[Array, Array], near: bool, lag: float = 0.0) -> Axes | None:
         """The axes as a tick begins and their rates in it, once the aim of the hand has been moved on; None until then.
 
         Args:
             swinging: ``axis`` and ``x_axis`` are those of the hand now. hold: its place [m] and z axis.
-            near: it comes down on it.
+            near: it comes down on it. lag: of the joints [s].
         """
         if not near:
             self._swinging, self._before = None, (swinging, swinging.axis, swinging.x_axis)
@@ -187,7 +188,8 @@ class HandLanding:
         far, x = float(np.linalg.norm(swinging.aim.position - place)), swinging.x
         if swinging is not self._swinging:
             self._swinging, self._phi, self._far = swinging, _turn(swinging.axis, swinging.x_axis, z, x), far
-            self._mu, self._part = self._goes_on(swinging, place), 1.0 if far > THERE else 0.0
+            self._mu = self._goes_on(swinging, place) if lag == 0.0 else self._phi
+            self._part = 1.0 if far > THERE else 0.0
         before, self._part = self._part, min(self._part, far / self._far if self._far > THERE else 0.0)
         now, later = (pin.exp3(self._lean(part)) for part in (before, self._part))
         rate = (later - now) / self._dt

@@ -120,7 +120,7 @@ class ArmLeader:
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
         near = near and not swinging.dropped
-        self._stack.swing(arm, followed, self._landing.go(swinging, hold, near))
+        self._stack.swing(arm, followed, self._landing.go(swinging, hold, near, machine.lag))
 
 
 class Hands:
