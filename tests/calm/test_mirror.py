@@ -10,7 +10,7 @@ import pytest
 from wbc.controller.tick import reach
 from wbc.ik import descent, search
 
-NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "TOO_FAR", "CORRECTIONS")
+NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "CORRECTIONS")
 
 
 def native(file: str, name: str) -> float:
@@ -28,6 +28,7 @@ def test_of_reach(name: str) -> None:
 def test_of_margins() -> None:
     assert native("margins.h", "BRAKING_MARGIN") == reach.BRAKING_MARGIN
     assert native("settings.h", "DEAD") == reach.DEAD
+    assert native("settings.h", "TOO_FAR") == reach.TOO_FAR
 
 
 @pytest.mark.parametrize(
