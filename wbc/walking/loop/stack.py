@@ -48,8 +48,6 @@ class HoldItems:
 
     def __init__(self, stack: Stack, walker: Walker, structure: Structure, dt: float) -> None:
         self._names, self.gain = [arm.name for arm in walker.arms], 1.0 / (HOLD_TICKS * dt)
-        # What closed hands hold: the kind, and where
-        self._at: dict[int, tuple[HoldKind, pin.SE3]] = {}
         self.kinds = sorted({hold_kind(structure, k) for k in range(len(structure))})
         self._tilts = bool({"position", "roll"} & set(self.kinds))
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
@@ -85,19 +83,12 @@ class HoldItems:
             raise RangeError(f"hold {name}", kind, f"the stack was compiled for holds of the kinds {known}")
         self.release(arm)
         item, tilts = self._holds[arm][kind], kind in ("position", "roll")
-        self._at[arm] = kind, pin.SE3(frame_on(structure, hold, roll))
-        item.enabled, item.target = True, self._at[arm][1]
+        item.enabled, item.target = True, pin.SE3(frame_on(structure, hold, roll))
         if tilts:
             cone = self._cones[arm]
             cone.enabled, cone.direction = True, structure.axes[hold]
             cone.half_angle = TILT_PART * structure.tilts[hold]
         return tilts
-
-    def lead(self, arm: int, linear: Array, angular: Array) -> None:
-        """A closed hand is told to move as if its hold did: its target is as far ahead as its gain makes that of it."""
-        kind, at = self._at[arm]
-        item = self._holds[arm][kind]
-        item.target = pin.SE3(pin.exp3(angular / item.gain) @ at.rotation, at.translation + linear / item.gain)
 
     def follow(self, arm: int, gain: float) -> None:
         """What a closed hand is off its hold is taken back with a gain [1/s]."""
@@ -218,11 +209,6 @@ class WalkStack:
         self._mask[self._joints(arm)] = RESTING
         self._still(arm)
         self._rest.mask = self._mask
-
-    def lead(self, arm: int, linear: Array, angular: Array) -> None:
-        """A closed hand that has come to its hold is told to move as if that did: [m/s], [rad/s]."""
-        if arm not in self._rising:
-            self._holds.lead(arm, linear, angular)
 
     def release(self, arm: int) -> None:
         """An open hand, which follows aims."""

@@ -17,7 +17,6 @@ from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.body_command import BodyMotion
 from wbc.walking.loop.caution import Caution, Course
-from wbc.walking.loop.chain_drift import ChainDrift
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.hands import ArmLeader, HandLeader, Hands
@@ -99,8 +98,6 @@ class Walk:
         self.machine = machine = Machine(walker, structure, self.dt, plant)
         self.progress = PlanProgress(walker, plan)
         self.leader, self.replanner = leader(machine, self.progress, self.stack), replanner(machine, self.progress)
-        # An arm that moves as one has its own way to keep its hands
-        self._drift = None if self.leader.one_motion else ChainDrift(machine, self.stack)
         self.body = BodyMotion(self.dt, self.leader.stops)
         self.hands = Hands(machine, self.stack, grasps or (lambda _arm, _hold: True))
         self.events: list[Event] = []
@@ -249,9 +246,7 @@ class Walk:
         begin = time.perf_counter()
         step = self.step = self.stack.controller.step(machine.q, machine.v)
         cost = time.perf_counter() - begin
-        before, slip, fixed = machine.q, machine.move(step.v), machine.fixed
-        if self._drift is not None:
-            self._drift.go(before)
+        slip, fixed = machine.move(step.v), machine.fixed
         self.stack.follow(machine.lag)
         if hands.swinging is not None:
             self._land(hands.swinging)
