@@ -277,7 +277,6 @@ def _request(rng: np.random.Generator, walker: Walker, folder: Path) -> PathRequ
     if not walker.two_ended:
         return _path(rng)
     row, ids = grapple_row(GRAPPLES, float(rng.uniform(*PITCHES))), [str(k + 1) for k in range(GRAPPLES)]
-    folder.mkdir(parents=True, exist_ok=True)
     file = save_structure(row, folder / "grapples.csv")
     first = int(rng.integers(GRAPPLES - 1))
     goal = ids[int(rng.choice([k for k in range(GRAPPLES) if k not in (first, first + 1)]))]
