@@ -202,8 +202,9 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
             handle.target = 10.0 ** rng.uniform(-1.0, 3.0) * rng.normal(size=item.contact.components)
         elif isinstance(item, TorqueLimits):
             handle.scale = float(rng.choice([1.0, 1.0, 1.0, 0.3, 0.0]))
-            if item.slew is not None:
-                handle.slew = 10.0 ** rng.uniform(0.0, 5.0, len(item.dofs(controller.stack.robot)))
+            count = len(item.dofs(controller.stack.robot))
+            if item.slew is not None and count:  # a robot of which no motor has a rating has no slew rates to set
+                handle.slew = 10.0 ** rng.uniform(0.0, 5.0, count)
         elif isinstance(item, DriveTorqueLimits):
             handle.scale = float(rng.choice([1.0, 1.0, 1.0, 0.3, 0.0]))
         elif isinstance(item, JointFriction):
