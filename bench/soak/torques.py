@@ -121,7 +121,8 @@ class TorqueJudge(Judge):
         self._motors = controller["motors"]
         entries = controller.stack.entries
         (item,) = (e.item for e in entries if isinstance(e.item, TorqueLimits))
-        self._driven, self._slews = list(item.dofs(self._robot)), item.slew is not None
+        self._driven = list(item.dofs(self._robot))
+        self._slews = item.slew is not None and bool(self._driven)
         self._wrists = [(controller[e.name], e.item) for e in entries if isinstance(e.item, DriveTorqueLimits)]
         self._last: Array | None = None
 
