@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.clearance import Nearest
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.loop.foresight import STEP, Foresight, Timing
 from wbc.walking.loop.hand_pace import ramp_of
 from wbc.walking.loop.machine import Machine
@@ -18,14 +19,16 @@ from wbc.walking.loop.state import Swinging
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.planner.swings.swings import SETTLE
 
-#: A swing is proven again where body and hand are farther than this from where they were foreseen [m], which is looked
-#: at every so many ticks; a turn of the body counts as if it were about a point this far away [m]
+#: A swing is proven again where the body or a point of the arm is farther than this from where it was foreseen [m],
+#: which is looked at every so many ticks; a turn of the body counts as if it were about a point this far away [m]
 STRAY, EVERY, ARM = 0.002, 10, 1.3
 #: Path time that the body's way is proven ahead, and what is left of it when it is looked at again [s]
 AHEAD, LEFT = 1.0, 0.4
 #: Part of their rates that joints get of a hand that has to go slower, and the least part of its pace; what an arm is
 #: off its way does not count any more after [s]
 RATE, SLOWEST, SETTLED = 0.96, 0.3, 0.3
+#: An arm whose joints cannot follow may lag by so much, its hand less [m]
+LAGS = 0.03
 
 
 class Course(NamedTuple):
@@ -54,7 +57,7 @@ class Caution:
         self.sight, self._machine, self._progress, self._stops = sight, machine, progress, stops
         self.until = 0.0
         self._known: tuple[object, ...] = ()
-        # When the swing was proven, times since then, and where the body and the hand are then
+        # When the swing was proven, times since then, and where the body and the points of the arm are then
         self._foreseen: tuple[float, Array, Array] | None = None
         self._clock: Array = np.zeros(0)
 
@@ -97,13 +100,14 @@ class Caution:
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
 
-        A hand whose joints would need more than their rates, as the body stands that was to go with it, goes slower
-        from now on: it could not follow, and would swing beyond its way as that ends.
+        A hand whose joints would need more than their rates goes slower from now on where the body stands that was to go
+        with it, as it would swing beyond its way where that ends, and where its arm has no room to lag.
         """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
         fastest = self._fastest(swinging, when.times)
-        if course.stands and fastest > 1.0 and swinging.part > SLOWEST:
+        slower = fastest > 1.0 and swinging.part > SLOWEST
+        if slower and (course.stands or self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS):
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
@@ -111,8 +115,7 @@ class Caution:
             self._known = self._progress.plan.path, swinging, course.stands
             self.until = self._progress.path_time
             self._clock = when.clock
-            places = np.concatenate([self._rows[:, :7], self.sight.hand(swinging.arm, self._rows)], axis=1)
-            self._foreseen = self._machine.time, when.times, places
+            self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
         return found
 
     def _fastest(self, swinging: Swinging, times: Array) -> float:
@@ -125,7 +128,10 @@ class Caution:
         return float((np.abs(rates) / self._machine.walker.robot.limits.velocity[arm.v]).max())
 
     def strays(self, swinging: Swinging) -> bool:
-        """Whether body and hand are elsewhere than they were foreseen, as far as that is looked at now."""
+        """Whether body and arm are elsewhere than they were foreseen, as far as that is looked at now.
+
+        Near the axis of joint 1 a hand hardly moves with that joint, the elbow does: all points of the arm count.
+        """
         if self._foreseen is None:
             return False
         machine, (begin, times, places) = self._machine, self._foreseen
@@ -138,10 +144,16 @@ class Caution:
         row = min(int(np.searchsorted(times, since, side="right")) - 1, len(times) - 2)
         part = min((since - times[row]) / (times[row + 1] - times[row]), 1.0)
         there = places[row] + part * (places[row + 1] - places[row])
-        body, hand = machine.q[:7], machine.chain.origins[swinging.arm]
+        here = self._places(swinging.arm, machine.q[None])[0]
         # The sine of half the angle between two unit quaternions
-        turned = dist(body[3:], there[3:7]) if body[3:].dot(there[3:7]) > 0.0 else dist(body[3:], -there[3:7])
-        return dist(body[:3], there[:3]) + 2.0 * ARM * turned + dist(hand, there[7:]) > STRAY
+        turned = min(dist(here[3:7], there[3:7]), dist(here[3:7], -there[3:7]))
+        arm = np.linalg.norm((here[7:] - there[7:]).reshape(-1, 3), axis=1).max()
+        return dist(here[:3], there[:3]) + 2.0 * ARM * turned + float(arm) > STRAY
+
+    def _places(self, arm: int, q: Array) -> Array:
+        """The body's pose and the points of an arm in its frame, in configurations ``[k, nq]``: a row of numbers each."""
+        points = limb_of(self._machine.walker).points(q[:, self._machine.walker.arms[arm].q])
+        return np.concatenate([q[:, :7], points.reshape(len(q), -1)], axis=1)
 
     def timing(self, swinging: Swinging, course: Course) -> Timing:
         """Body and hand with the paces of the loop, until the hand holds."""

@@ -73,6 +73,14 @@ class Foresight:
         pairs = self_pairs(walker.robot, clearance) if walker.robot.self_pairs is not None else []
         pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
+        # Of each arm the pairs with the links that bring its hand along, but the first, which turns about itself
+        bringing = [
+            {body.name for body in bodies if body.link in arm.links[1:] and body not in mine}
+            for arm, mine in zip(walker.arms, self._hands, strict=True)
+        ]
+        self._bringing = [
+            np.flatnonzero([pair.first in names or pair.second in names for pair in pairs]) for names in bringing
+        ]
         self._tree, self._mounts = tree, dict[bytes, tuple[str, ...]]()
         self.left: Mapping[int, Sequence[Array]] = {}
         column = {name: arm.q.start + k for arm in walker.arms for k, name in enumerate(arm.joints)}
@@ -91,6 +99,16 @@ class Foresight:
         exempt = [one for arm, place in at for one in self._exemptions(arm, place, DEPTH)]
         exempt += [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
+
+    def spare(self, times: Array, q: Array, arm: int, most: float) -> float:
+        """By how much more than its clearance the arm that brings a hand along keeps from all else in a motion
+        ``[k, nq]``, as far as that is at most ``most`` [m].
+        """
+        pairs = self._bringing[arm]
+        if not len(pairs):
+            return most
+        swept = self._sweeper.sweep(self.motion(times, q), pairs, aim="least", tolerance=1e-3, far=most)
+        return float(swept.bound.min())
 
     def motion(self, times: Array, q: Array) -> Motion:
         """Of configurations ``[k, nq]`` at times [s]; joints go straight between them."""

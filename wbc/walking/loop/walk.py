@@ -557,8 +557,9 @@ class Walk:
         soonest = min([end, *self._lasting(leaving)])
         margin, landing = max(soonest - u, 0.0), None
         if swinging is not None:
-            needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
-            until = margin
+            until, needed = margin, swinging.latch
+            if swinging.state != "closing":
+                needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
             if swinging.counted and not self._changing:
                 # A hand that is late makes the body late too: the next ones then swing where they were planned to
                 until = min(until, max(self._late() - u, 0.0))
