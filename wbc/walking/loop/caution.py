@@ -100,8 +100,8 @@ class Caution:
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
 
-        A hand whose joints would need more than their rates goes slower from now on where the body stands that was to go
-        with it, as it would swing beyond its way where that ends, and where its arm has no room to lag.
+        A hand whose joints would need more than their rates goes slower from now on where the body stands that was to
+        go with it, as it would swing beyond its way where that ends, and where its arm has no room to lag.
         """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
@@ -151,7 +151,7 @@ class Caution:
         return dist(here[:3], there[:3]) + 2.0 * ARM * turned + float(arm) > STRAY
 
     def _places(self, arm: int, q: Array) -> Array:
-        """The body's pose and the points of an arm in its frame, in configurations ``[k, nq]``: a row of numbers each."""
+        """The body's pose and the points of an arm in its frame, in configurations ``[k, nq]``, as rows of numbers."""
         points = limb_of(self._machine.walker).points(q[:, self._machine.walker.arms[arm].q])
         return np.concatenate([q[:, :7], points.reshape(len(q), -1)], axis=1)
 
