@@ -213,6 +213,66 @@ def test_numbers_of_another_robot_are_refused(machine: Walker, field: str, value
         check_fits(replace(machine, data=WalkerData.read(**{field: value})))
 
 
+def test_an_elbow_that_strays_is_seen_although_the_hand_does_not(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    swinging, caution, limb = walk.swinging, walk._caution, limb_of(machine)
+    assert swinging is not None
+    assert caution is not None
+    arm, q = machine.arms[swinging.arm], walk.machine.q.copy()
+    caution._foreseen = walk.time, np.array([0.0, 1.0]), np.repeat(caution._places(swinging.arm, q[None]), 2, axis=0)
+    assert not caution.strays(swinging)
+    frame = (pin.XYZQUATToSE3(q[:7]) * arm.base).homogeneous
+    guide = q[arm.q][limb.guided :] + [0.3, 0.1, 0.0]
+    places = caution.sight.hand(swinging.arm, q[None])[None]
+    walk.machine.q[arm.q] = limb.follow(frame[None, None], places, guide[None, None], machine.margins)[0][0, 0]
+    np.testing.assert_allclose(caution.sight.hand(swinging.arm, walk.machine.q[None]), places[0], atol=1e-9)
+    assert caution.strays(swinging)
+
+
+def test_a_swing_is_slower_where_its_arm_has_no_room_to_lag(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Joints that need more than their rates; what the arm keeps from all else decides."""
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    swinging, caution = walk.swinging, walk._caution
+    assert swinging is not None
+    assert caution is not None
+    course = walk._course(swinging)
+    monkeypatch.setattr(Caution, "_fastest", lambda _self, _swinging, _times: 1.2)
+    times, rows = np.array([0.0, 1.0]), np.repeat(walk.q[None], 2, axis=0)
+    room = caution.sight.spare(times, rows, swinging.arm, 10.0)
+    pairs = caution.sight._bringing[swinging.arm]
+    here = caution.sight._sweeper.at(caution.sight.motion(times, rows), 0.0, pairs)
+    assert room == pytest.approx(min(near.distance - near.required for near in here), abs=2e-3)
+    for least, slower in ((0.1, False), (0.0, True)):
+        monkeypatch.setattr(Foresight, "spare", lambda *_given, least=least: least)
+        assert caution.swing(swinging, course) is None
+        assert (swinging.part < 1.0) is slower
+
+
+def test_a_hand_at_the_end_of_its_reach_comes_to_rest_nearer_to_the_body(
+    machine: Walker, structure: Structure, plan: Plan
+) -> None:
+    """One that has just left its hold, from which the body goes away."""
+    limb, grips, arm = limb_of(machine), plan.grips, machine.arms[0]
+    assert grips is not None
+    q, v = np.array(machine.robot.neutral), np.zeros(machine.robot.nv)
+    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(plan.path.poses[0]))
+    for mine, grip in zip(machine.arms, plan.chain, strict=True):
+        q[mine.q] = grips.posture_at(grip[0], 0)
+    q[arm.q] = [0.0, 1.5, -0.15, 0.0, 0.5, 0.0]
+    outward = q[:3] - pin.XYZQUATToSE3(q[:7]).act(arm.base.translation)
+    v[:3] = pin.XYZQUATToSE3(q[:7]).rotation.T @ outward
+    v[:3] *= 0.1 / np.linalg.norm(v[:3])
+    coasting = Coasting.of(machine, structure, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
+    assert coasting is not None
+    assert limb.margins(coasting._postures[0][-1]).min() >= machine.margins.held_angle
+
+
 def test_little_is_proven_twice(machine: Walker, structure: Structure, stack: WalkStack, plan: Plan) -> None:
     walk = Walk(machine, structure, plan, stack=stack)
     walk.tick()

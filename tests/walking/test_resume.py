@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pathlib
+from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,11 +15,13 @@ from tests.repeats import repeats
 from wbc.errors import RangeError
 from wbc.robots import Walker
 from wbc.walking import Structure
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path
 from wbc.walking.checker import Rules, check_walk
 from wbc.walking.log.body_paths import path_of
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, OPENING, WalkLog, WalkLogError
 from wbc.walking.loop.stack import WalkStack
+from wbc.walking.loop.state import State
 from wbc.walking.loop.walk import Walk
 from wbc.walking.modes.first_grasps import free_state, plan_from_state
 from wbc.walking.planner.plan import Plan
@@ -117,6 +121,39 @@ def test_a_walk_goes_on_from_any_instant(
     assert (holding[~again.log.body_fixed] >= 2).all()
     end = again.log.pose_body_in_structure[-1, :3]
     assert np.linalg.norm(end - log.pose_body_in_structure[-1, :3]) < 0.002
+
+
+def test_a_hand_that_is_nearer_to_its_reach_than_plans_let_it_still_holds(machine: Walker, structure: Structure) -> None:
+    """A body that was stopped where a hand has millimetres of its reach left."""
+    limb, margins, path = limb_of(machine), machine.margins, grid_path([(13, 6), (13, 9)], 0.1016)
+    plan = plan_walk(machine, structure, path)
+    grips, q = plan.grips, np.array(machine.robot.neutral)
+    assert grips is not None
+    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(path.poses[0]))
+    for arm, grip in zip(machine.arms, plan.chain, strict=True):
+        q[arm.q] = grips.posture_at(grip[0], 0)
+    held = {k: structure.index(hold) for k, hold in enumerate(plan.start)}
+    # The first arm's hold goes where it has a third of the margin left
+    arm, hold = machine.arms[0], held[0]
+    base = path.poses[0] @ arm.base.homogeneous
+    axis = base[:3, :3].T @ structure.axes[hold]
+    away = q[:3] - structure.positions[hold]
+    away -= structure.axes[hold] * (structure.axes[hold] @ away)
+    for far in np.arange(0.0, 1.0, 0.0005):
+        place = structure.positions[hold] - far * away / np.linalg.norm(away)
+        point = (base[:3, :3].T @ (place - base[:3, 3]))[None]
+        if float(limb.wrist_reach(limb.wrist_of(point, axis[None]))[0]) < margins.held_reach / 3:
+            break
+    pose = structure.holds[hold].pose.copy()
+    pose.translation = place
+    moved = replace(structure.holds[hold], pose=pose)
+    near = [k for k in range(len(structure.holds)) if np.linalg.norm(structure.positions[k] - place) < 0.05]
+    others = tuple(one for k, one in enumerate(structure.holds) if k not in (*near, hold))
+    there = replace(structure, holds=(*others, moved))
+    found, _ = limb.held(point, axis[None])
+    q[arm.q] = found[0, int(np.abs(found[0, :, 3:5] - q[arm.q][3:5]).sum(axis=1).argmin())]
+    state = State(q, {k: there.index(hold) for k, hold in enumerate(plan.start)})
+    assert plan_from_state(machine, there, path, state).complete
 
 
 def test_a_walk_that_went_round_goes_on_round(

@@ -21,6 +21,8 @@ PART, MOST = 0.8, 0.95
 REST = 1e-9
 #: Times of a stop that are tried, each so many times the one before
 LONGER, TRIES = 1.3, 15
+#: A hand that would stop at the end of its reach stops so much nearer to the body instead [m]
+NEARER = (0.0, 0.01, 0.02, 0.05, 0.1)
 #: A hand that is so far aside of a hold's axis is not about to lift off or to come down there [m]
 ASIDE = 0.03
 #: Of differences in time [s]
@@ -39,9 +41,10 @@ class Coasting:
 
         p(t) = p + p' T s (1 - s)^2 + (e - p) s^2 (3 - 2 s)
 
-    The end e is p + p' T / 2, straight on. Near a hold it is over that instead, and not under it: there a hand lifts
-    off or comes down, and nowhere else may it be so near to what the hold is mounted on. Where its arm cannot follow
-    that, its joints fall evenly in max |qd_i| / (PART a_i). Hands that hold stay on their holds.
+    The end e is p + p' T / 2, straight on, or as much nearer to the body as its arm needs. Near a hold it is over that
+    instead, and not under it: there a hand lifts off or comes down, and nowhere else may it be so near to what the hold
+    is mounted on. Where its arm cannot follow that, its joints fall evenly in max |qd_i| / (PART a_i). Hands that hold
+    stay on their holds.
 
     Args:
         structure: whose holds are there. state: with velocities. brake: T of the body [s]. dt: control period [s].
@@ -131,12 +134,16 @@ class Coasting:
         hand, before, after = np.asarray(limb.points(q + small))[:, -1] @ base.rotation.T + base.translation
         speed = here.rotation @ (twist[:3] + np.cross(twist[3:], hand) + (after - before) / (2.0 * STEP))
         done, place, part = fallen(times, stop)[:, None], here.act(hand), np.minimum(times / stop, 1.0)[:, None]
-        end = self._over_hold(walker, arm, place + 0.5 * stop * speed)
-        places = place + stop * part * (1.0 - part) ** 2 * speed + part**2 * (3.0 - 2.0 * part) * (end - place)
+        straight = self._over_hold(walker, arm, place + 0.5 * stop * speed)
         bodies = [self._path.at(float(t))[0] for t in fallen(times, self._brake)]
         frames = np.array([(body * base).homogeneous for body in bodies])
-        guide = (q + done * rates)[:, limb.guided :]
-        rows: Array = limb.follow(frames[None], places[None], guide[None], walker.margins)[0][0]
+        guide, rows = (q + done * rates)[:, limb.guided :], q[None]
+        for nearer in NEARER:
+            end = straight - nearer * here.rotation[:, 2]
+            places = place + stop * part * (1.0 - part) ** 2 * speed + part**2 * (3.0 - 2.0 * part) * (end - place)
+            rows = limb.follow(frames[None], places[None], guide[None], walker.margins)[0][0]
+            if float(limb.margins(rows[-1]).min()) >= walker.margins.held_angle:
+                break
         return rows if np.abs(rows[0] - q).max() < SAME else None
 
     def _over_hold(self, walker: Walker, arm: int, point: Array) -> Array:

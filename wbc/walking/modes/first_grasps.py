@@ -40,14 +40,19 @@ def free_state(walker: Walker, pose: Any, posture: Sequence[float] = FOLDED) -> 
     return State(q, {})
 
 
-def plan_from_state(walker: Walker, structure: Structure, path: BodyPath, state: State) -> Plan:
+def plan_from_state(
+    walker: Walker, structure: Structure, path: BodyPath, state: State, behind: Array | None = None
+) -> Plan:
     """A plan for a body that stands at the beginning of a path with some hands on holds, or none.
+
+    Args:
+        behind: poses ``[n, 4, 4]`` that the body had, the last ones first: it may go back there; None: it may not.
 
     Raises:
         NoPlanError: there is none, or a free hand cannot be brought to where it begins.
     """
     chain = ClosedChain(walker, structure)
     chain.place(state.q)
-    behind: Array = path.poses[:1]
+    behind = path.poses[:1] if behind is None else behind
     may = Foresight(walker, structure).may_bring
     return drained(plan_from_here(walker, structure, path, state.held, state.q, chain, behind, may))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.holds.structure import Structure
+from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.table import Grips, Ints, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
@@ -34,7 +35,7 @@ MayBring = Callable[[Plan, int, SwingLaw, Mapping[int, int], Array], bool]
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
 BACK = (0.05, 0.1, 0.2, 0.4)
-#: Part of what a hand in the air has left to its limits that its way to a hold leaves
+#: Part of what an arm has left to its limits, or to other arms, that a plan from there leaves
 PART = 0.9
 #: How far it goes towards a hold instead, at the height that it has [m], and how fast [m/s]
 TOWARDS, ASIDE = (0.15, 0.3), 0.05
@@ -142,6 +143,7 @@ def plan_from_here(
         NoPlanError: there is none.
     """
     here = np.repeat(path.poses[:1], STANDING, axis=0)
+    walker = _as_it_holds(walker, path.poses[0], held, q, hands)
     refused: NoPlanError | None = None
     for there in _asides(path.poses[0], behind, structure.positions[list(held.values())]):
         other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
@@ -153,6 +155,28 @@ def plan_from_here(
             refused = refused or error
     assert refused is not None
     raise refused
+
+
+def _as_it_holds(walker: Walker, pose: Array, held: Collection[int], q: Array, hands: HandsThere) -> Walker:
+    """The walker with margins that its holding arms keep where they are: where a body was stopped they may be nearer to
+    a limit, or to each other, than plans let them.
+
+    Args:
+        pose: of the body ``[4, 4]``.
+    """
+    limb, margins, shapes = limb_of(walker), walker.margins, LimbShapes(walker)
+    angle, reach, apart = margins.held_angle, margins.held_reach, margins.held_clearance
+    free = len(limb.position_limits) - 1
+    for arm in held:
+        frame = pose @ walker.arms[arm].base.homogeneous
+        place, axis = (hands.origins[arm] - frame[:3, 3]) @ frame[:3, :3], hands.axes[arm] @ frame[:3, :3]
+        reach = min(reach, PART * float(limb.wrist_reach(limb.wrist_of(place[None], axis[None]))[0]))
+        angle = min(angle, PART * float(np.delete(limb.margins(q[walker.arms[arm].q]), free).min()))
+    for one, other in combinations(held, 2):
+        a, b = (shapes.points(arm, q[walker.arms[arm].q])[None] for arm in (one, other))
+        apart = min(apart, PART * (float(shapes.between(a, b)[0]) + margins.held_clearance))
+    less = {"held_angle": max(angle, 0.0), "held_reach": max(reach, 0.0), "held_clearance": max(apart, 0.0)}
+    return walker if replace(margins, **less) == margins else replace(walker, margins=replace(margins, **less))
 
 
 def _asides(pose: Array, behind: Array, holds: Array) -> Iterator[Array]:

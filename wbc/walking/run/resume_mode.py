@@ -39,6 +39,8 @@ from wbc.walking.run.places import GridPlace, Place
 from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
 from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of, two_ended_request
 
+#: A body goes back along its log for so long at most [s], by straight lines over so many ticks
+TRAIL, EVERY = 20.0, 25
 #: Name of the mode in ``begun.json``
 RESUME = "resume"
 
@@ -212,8 +214,13 @@ class ResumeMode(Mode[PathRequest]):
         self.path = _rest(pin.XYZQUATToSE3(self._stands.q[:7]), whole, request)
 
     def plan(self) -> Plan:
-        """From where everything has come to rest after the state of the log."""
-        return plan_from_state(self.walker, self._there, self.path, self._stands)
+        """From where everything has come to rest after the state of the log; the body may go back as it came."""
+        log, request = self._old, self.request
+        since = int(np.searchsorted(log.t, log.t[self._row] - TRAIL))
+        came = [pin.XYZQUATToSE3(row) for row in log.pose_body_in_structure[since : self._row + 1 : EVERY][::-1]]
+        here = pin.XYZQUATToSE3(self._stands.q[:7])
+        behind = straight_path([here, *came], request.speed, request.turn_rate).poses
+        return plan_from_state(self.walker, self._there, self.path, self._stands, behind)
 
     def compiled(self, backend: str) -> WalkStack:
         """For the holds that are there."""
