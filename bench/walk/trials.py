@@ -1,5 +1,5 @@
 """Trials of walks from seeds: among random structures, by random rates, by tasks of one hand, resumed at random
-instants, as holds vanish, under torques.
+instants, as holds vanish, under torques; the last five on built-in structures between random places.
 
 ``python -m bench.walk.trials PART NAME FOLDER`` carries out one and prints its record: a process of its own, so that
 what hangs or dies costs one trial.
@@ -21,15 +21,16 @@ import wbc
 from bench.walk.machine import NECK, Record, walker_of
 from bench.walk.reference.passage import passage
 from bench.walk.second_checker import second_check
-from bench.walk.structures import FAMILIES, random_structure
+from bench.walk.structures import FAMILIES, PITCH, random_structure
 from bench.walk.torque_trials import torque, violations
 from wbc.errors import RangeError, WbcError
 from wbc.interrupts import obey_kill
 from wbc.robots import Walker
 from wbc.validation import Array
-from wbc.walking import Structure, save_structure
+from wbc.walking import PlaneSurface, Structure, save_structure
 from wbc.walking.checker import check_walk
 from wbc.walking.loop.walk import Tick
+from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.planner.planner import Objective
 from wbc.walking.report.folder import rules_of, save_run
@@ -39,13 +40,11 @@ from wbc.walking.run.resume_mode import ResumeRequest
 from wbc.walking.run.session import WalkRun, mode_of, perform_walk
 from wbc.walking.two_ended import grapple_row
 
-#: What is walked on where a part has no structure of its own, with the places between which
-GROUNDS = (
-    ("cylinder", "13,6", "13,12"),
-    ("plane", "8,6", "8,13"),
-    ("truss", "L2,6", "L2,14"),
-    ("module", "15,4", "15,10"),
-)
+#: What is walked on where a part has no structure of its own, and the places on the grid of the cylinder between which
+GROUNDS = ("cylinder", "plane", "truss", "module")
+ROUND, ALONG = (4.0, 21.0), (6.0, 19.0)
+#: How far beginning and end are apart, and from the ends of the structure [m]; part of the holds that is missing at most
+APART, MARGIN, MISSING = (0.9, 2.2), 0.8, 0.4
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
 #: Arms of those of other parts, drawn with equal chances, and what else is drawn where it has the mode
@@ -121,7 +120,7 @@ class RandomRates:
 def velocity(name: str, walker: Walker, folder: Path) -> Record:
     """A body that is driven; ``SEED``."""
     rng = np.random.default_rng([1, int(name)])
-    asked = _path(rng)
+    asked = _path(rng, walker)
     request = DriveRequest(asked.site, asked.start, asked.points, asked.speed, asked.turn_rate, "seed")
     return kept(perform_walk(request, walker, commands=RandomRates(rng)), folder)
 
@@ -129,7 +128,7 @@ def velocity(name: str, walker: Walker, folder: Path) -> Record:
 def arm(name: str, walker: Walker, folder: Path) -> Record:
     """One hand of a body that stands goes to holds and by rates; ``SEED``."""
     rng = np.random.default_rng([6, int(name)])
-    asked = _path(rng)
+    asked = _path(rng, walker)
     standing = DriveRequest(asked.site, asked.start, asked.points)
     chosen = walker.arms[int(rng.integers(len(walker.arms)))]
     holds, body = standing.site.build(), standing.beginning(walker.arm_data)
@@ -275,7 +274,7 @@ def tried(part: str, name: str, folder: Path) -> Record:
 def _request(rng: np.random.Generator, walker: Walker, folder: Path) -> PathRequest | TwoEndedRequest:
     """A way of a body with arms, or of the two-ended arm over holds of which a file is left in the folder."""
     if not walker.two_ended:
-        return _path(rng)
+        return _path(rng, walker)
     row, ids = grapple_row(GRAPPLES, float(rng.uniform(*PITCHES))), [str(k + 1) for k in range(GRAPPLES)]
     file = save_structure(row, folder / "grapples.csv")
     first = int(rng.integers(GRAPPLES - 1))
@@ -289,9 +288,39 @@ def _rate(twist: Array, seconds: float) -> str:
     return f"rate {','.join(f'{rate:.4f}' for rate in twist)} for {seconds:.2f}"
 
 
-def _path(rng: np.random.Generator) -> PathRequest:
-    ground, start, goal = GROUNDS[int(rng.integers(len(GROUNDS)))]
-    return PathRequest(Site(ground), start, (goal,), float(rng.uniform(0.05, 0.15)), 0.1)
+def _path(rng: np.random.Generator, walker: Walker) -> PathRequest:
+    """From somewhere to somewhere on a built-in structure, half of them with holds missing, with place for the body."""
+    while True:
+        ground = GROUNDS[int(rng.integers(len(GROUNDS)))]
+        fraction, seed = float(rng.uniform(0.0, MISSING)) * (rng.random() < 0.5), int(rng.integers(1000))
+        site = Site(ground, fraction=fraction, seed=seed)
+        start, goal = _grid_ends(rng) if ground == "cylinder" else _ends(rng, site.build())
+        request = PathRequest(site, start, (goal,), float(rng.uniform(0.05, 0.15)), 0.1)
+        ends = request.path(walker.arm_data).poses[[0, -1]]
+        if (around(walker, site.build()).bodies(ends) == NONE_MET).all():
+            return request
+
+
+def _grid_ends(rng: np.random.Generator) -> tuple[str, str]:
+    """Two places of the cylinder's grid that are apart, turned about its normal by up to half a turn in all."""
+    while True:
+        places = rng.uniform((ROUND[0], ALONG[0], -90.0), (ROUND[1], ALONG[1], 90.0), (2, 3))
+        off = np.linalg.norm((places[1] - places[0])[:2]) * PITCH
+        if APART[0] < off < APART[1]:
+            first, last = (",".join(f"{value:.2f}" for value in place) for place in places)
+            return first, last
+
+
+def _ends(rng: np.random.Generator, structure: Structure) -> tuple[str, str]:
+    """Two holds that are apart, and from the ends of the structure."""
+    points, plane = structure.positions, isinstance(structure.surface, PlaneSurface)
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes = high - low > 2.0 * MARGIN if plane else np.arange(3) == int((high - low).argmax())
+    inner = np.flatnonzero(((points >= low + MARGIN) & (points <= high - MARGIN))[:, axes].all(axis=1))
+    gaps = np.linalg.norm(points[inner, None] - points[inner], axis=2)
+    pairs = np.argwhere((gaps > APART[0]) & (gaps < APART[1]))
+    first, last = inner[pairs[int(rng.integers(len(pairs)))]]
+    return structure.ids[first], structure.ids[last]
 
 
 if __name__ == "__main__":

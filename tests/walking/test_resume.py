@@ -123,7 +123,7 @@ def test_a_walk_goes_on_from_any_instant(
     assert np.linalg.norm(end - log.pose_body_in_structure[-1, :3]) < 0.002
 
 
-def test_a_hand_that_is_nearer_to_its_reach_than_plans_let_it_still_holds(machine: Walker, structure: Structure) -> None:
+def test_a_hand_nearer_to_its_reach_than_plans_let_it_holds(machine: Walker, structure: Structure) -> None:
     """A body that was stopped where a hand has millimetres of its reach left."""
     limb, margins, path = limb_of(machine), machine.margins, grid_path([(13, 6), (13, 9)], 0.1016)
     plan = plan_walk(machine, structure, path)
