@@ -40,7 +40,7 @@ from wbc.walking.run.resume_mode import ResumeRequest
 from wbc.walking.run.session import WalkRun, mode_of, perform_walk
 from wbc.walking.two_ended import grapple_row
 
-#: What is walked on where a part has no structure of its own, and the places on the grid of the cylinder between which
+#: What is walked on where a part has no structure of its own; on the grid of the cylinder between which T and A
 GROUNDS = ("cylinder", "plane", "truss", "module")
 ROUND, ALONG = (4.0, 21.0), (6.0, 19.0)
 #: How far beginning and end are apart, and from the ends of the structure [m]; part of the holds that is missing at most
