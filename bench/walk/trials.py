@@ -43,7 +43,7 @@ from wbc.walking.two_ended import grapple_row
 #: What is walked on where a part has no structure of its own; on the grid of the cylinder between which T and A
 GROUNDS = ("cylinder", "plane", "truss", "module")
 ROUND, ALONG = (4.0, 21.0), (6.0, 19.0)
-#: How far beginning and end are apart, and from the ends of the structure [m]; the greatest part of holds that is missing
+#: How far beginning and end are apart, and from the ends of the structure [m]; the part of holds that may be missing
 APART, MARGIN, MISSING = (0.9, 2.2), 0.8, 0.4
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
