@@ -44,7 +44,7 @@ MOVES, PARTS = 2, 2
 #: Of more arms than FEW_ARMS so many widths of stances are put in order by their conflicts before they are checked
 FEW_ARMS, AHEAD = 3, 12
 #: Of these, searches end where so many re-grasps led no further
-STUCK = 12
+STUCK = 6
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
