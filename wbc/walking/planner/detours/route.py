@@ -36,10 +36,12 @@ CHANGE = 0.1
 #: How many detours of a mesh are tried, each away from where plans along those before ended: cells next to that cost so
 #: much more
 VARIATIONS, STUCK = 4, 3.0
+#: Detours that take so many times as long as the path come after those among other cells
+LONG = 1.7
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
 ROOMY = 0.06
-#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not far;
-#: the body may touch something between them on every route, and pass between closer ones (NARROW)
+#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not
+#: far; the body may touch something between them on every route, and pass between closer ones (NARROW)
 MESHES = (ALONG, BESIDE, WIDE)
 
 
@@ -62,6 +64,8 @@ class BodyRoute:
 
 #: Takes the sample at which a plan along the route ends, and yields another route
 Routes = Generator[BodyRoute, int | None, None]
+#: The same; returns whether the body touches something between its cells on each
+Variations = Generator[BodyRoute, int | None, bool]
 
 
 def find_route(
@@ -89,18 +93,36 @@ def find_routes(
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
 ) -> Routes:
-    """Detours, those near the path first, each with :data:`VARIATIONS`; the next one is looked for on demand.
+    """Detours, those near the path first, each with :data:`VARIATIONS`, and last such as take :data:`LONG` times as
+    long as the path; the next one is looked for on demand.
 
     Args:
         start, deadline: of :func:`find_route`.
     """
-    limb, closed = limb_of(walker), False
+    limb, closed, late = limb_of(walker), False, list[tuple[float, Variations, BodyRoute]]()
     for mesh in MESHES:
         if deadline is not None and time.perf_counter() > deadline:
             return
-        closed = yield from _variations(walker, structure, path, mesh.of(limb), start, deadline)
+        routes = _variations(walker, structure, path, mesh.of(limb), start, deadline)
+        first = next(routes)
+        if first.path is not None and first.path.duration > LONG * path.duration:
+            late.append((first.path.duration, routes, first))
+        else:
+            closed = yield from _from(first, routes)
     if closed:
         yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline)
+    for _, routes, first in sorted(late, key=lambda one: one[0]):
+        yield from _from(first, routes)
+
+
+def _from(route: BodyRoute, routes: Variations) -> Variations:
+    """A route that was found, and those that follow it."""
+    while True:
+        ended = yield route
+        try:
+            route = routes.send(ended)
+        except StopIteration as stop:
+            return bool(stop.value)
 
 
 def _variations(
@@ -110,7 +132,7 @@ def _variations(
     mesh: CellSpacing,
     start: Mapping[int, int] | None,
     deadline: float | None,
-) -> Generator[BodyRoute, int | None, bool]:
+) -> Variations:
     """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended. Returns
     whether there are some among its cells, but the body touches something between them on each.
     """
