@@ -21,6 +21,7 @@ from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.cell_grips import cell_grips
 from wbc.walking.planner.detours.cell_search import CellNode, CellSearch, Outcome
 from wbc.walking.planner.detours.cells import ALONG, BESIDE, NARROW, WIDE, Cells, CellSpacing, Ints, cells_about
+from wbc.walking.planner.slices import Allowance
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -38,6 +39,8 @@ CHANGE = 0.1
 VARIATIONS, STUCK = 4, 3.0
 #: Detours that take so many times as long as the path come after those among other cells
 LONG = 1.7
+#: Postures in cells, and landings, that count as much as a slice of work
+ROWS, LANDINGS = 2000, 2
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
 ROOMY = 0.06
 #: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not
@@ -92,27 +95,35 @@ def find_routes(
     path: BodyPath,
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
+    allowance: Allowance | None = None,
 ) -> Routes:
-    """Detours, those near the path first, each with :data:`VARIATIONS`, and last such as take :data:`LONG` times as
+    """Detours, those near the path first, each with :data:`VARIATIONS`, and then such as take :data:`LONG` times as
     long as the path; the next one is looked for on demand.
 
     Args:
-        start, deadline: of :func:`find_route`.
+        start, deadline: of :func:`find_route`. allowance: work that may be done; when it is spent no other detour is
+            looked for.
     """
     limb, closed, late = limb_of(walker), False, list[tuple[float, Variations, BodyRoute]]()
     for mesh in MESHES:
-        if deadline is not None and time.perf_counter() > deadline:
+        if _over(deadline, allowance):
             return
-        routes = _variations(walker, structure, path, mesh.of(limb), start, deadline)
+        routes = _variations(walker, structure, path, mesh.of(limb), start, deadline, allowance)
         first = next(routes)
         if first.path is not None and first.path.duration > LONG * path.duration:
             late.append((first.path.duration, routes, first))
         else:
             closed = yield from _from(first, routes)
-    if closed:
-        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline)
     for _, routes, first in sorted(late, key=lambda one: one[0]):
         yield from _from(first, routes)
+    if closed and not _over(deadline, allowance):
+        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline, allowance)
+
+
+def _over(deadline: float | None, allowance: Allowance | None) -> bool:
+    """Whether no time or no work is left."""
+    late = deadline is not None and time.perf_counter() > deadline
+    return late or (allowance is not None and allowance.spent)
 
 
 def _from(route: BodyRoute, routes: Variations) -> Variations:
@@ -132,6 +143,7 @@ def _variations(
     mesh: CellSpacing,
     start: Mapping[int, int] | None,
     deadline: float | None,
+    allowance: Allowance | None = None,
 ) -> Variations:
     """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended. Returns
     whether there are some among its cells, but the body touches something between them on each.
@@ -140,6 +152,8 @@ def _variations(
     grips = cell_grips(walker, structure, cells)
     there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
     outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
+    if allowance is not None:
+        allowance.left -= len(grips.cells) / ROWS + outcome.expanded / LANDINGS
     if not outcome.nodes:
         names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
         number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
@@ -152,8 +166,12 @@ def _variations(
     roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
     roomy[[cells.start, cells.goal]] = True
     for count in range(VARIATIONS):
+        if count and _over(deadline, allowance):
+            break
         if count == 1 and not roomy.all():
             outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
+            if allowance is not None:
+                allowance.left -= outcome.expanded / LANDINGS
             outcomes += [outcome] if outcome.nodes else []
         found = _clear(there, cells, outcomes[count % len(outcomes)], path, dear, closed)
         if found is None or found[0] in known:
