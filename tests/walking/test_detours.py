@@ -188,7 +188,7 @@ def test_detours_that_take_long_come_after_those_among_other_cells(
     machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = grid_path([(13, 9), (13, 10)], 0.1)
-    slow = straight_path(list(path.poses[[0, -1]]), 0.01)
+    slow = straight_path(list(path.poses[[0, -1]]), 0.005)
     asked = list[tuple[str, int | None]]()
 
     def variations(*args: Any) -> Generator[route.BodyRoute, int | None, bool]:

@@ -37,8 +37,8 @@ CHANGE = 0.1
 #: How many detours of a mesh are tried, each away from where plans along those before ended: cells next to that cost so
 #: much more
 VARIATIONS, STUCK = 4, 3.0
-#: Detours that take so many times as long as the path come after those among other cells
-LONG = 1.7
+#: Detours that take so many times as long as the path, and so much longer [s], come after those among other cells
+LONG, LONGER = 1.7, 30.0
 #: Postures in cells, and landings, that count as much as a slice of work
 ROWS, LANDINGS = 2000, 2
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
@@ -97,8 +97,8 @@ def find_routes(
     deadline: float | None = None,
     allowance: Allowance | None = None,
 ) -> Routes:
-    """Detours, those near the path first, each with :data:`VARIATIONS`, and then such as take :data:`LONG` times as
-    long as the path; the next one is looked for on demand.
+    """Detours, those near the path first, each with :data:`VARIATIONS`, and then such as take much longer than the
+    path (:data:`LONG`); the next one is looked for on demand.
 
     Args:
         start, deadline: of :func:`find_route`. allowance: work that may be done; when it is spent no other detour is
@@ -110,7 +110,8 @@ def find_routes(
             return
         routes = _variations(walker, structure, path, mesh.of(limb), start, deadline, allowance)
         first = next(routes)
-        if first.path is not None and first.path.duration > LONG * path.duration:
+        usual = max(LONG * path.duration, path.duration + LONGER)
+        if first.path is not None and first.path.duration > usual:
             late.append((first.path.duration, routes, first))
         else:
             closed = yield from _from(first, routes)
