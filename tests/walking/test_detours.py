@@ -12,12 +12,14 @@ import wbc
 from bench.walk.reference import Rules, fewest_along
 from tests.repeats import ALL, MORE
 from wbc.robots import Walker
-from wbc.walking import Structure, plane, remove_rows
+from wbc.walking import Structure, plane, remove_columns, remove_rows
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
+from wbc.walking.planner import planner
 from wbc.walking.planner.detours import CellSpacing, find_route, route
 from wbc.walking.planner.detours.cell_graph import round_labels
-from wbc.walking.planner.detours.cells import ALONG, WIDE
+from wbc.walking.planner.detours.cell_search import CellNode
+from wbc.walking.planner.detours.cells import ALONG, BESIDE, WIDE, cells_about
 from wbc.walking.planner.detours.cells import NARROW as CLOSE
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
@@ -152,4 +154,70 @@ def test_cells_are_closer_only_where_the_body_touches_something_between_them(
 
     monkeypatch.setattr(route, "_variations", variations)
     assert all(one.path is None for one in route.find_routes(machine, structure, grid_path([(13, 9), (13, 10)], 0.1)))
-    assert looked == ([ALONG, WIDE, CLOSE] if touches else [ALONG, WIDE])
+    assert looked == ([ALONG, BESIDE, WIDE, CLOSE] if touches else [ALONG, BESIDE, WIDE])
+
+
+def test_over_six_columns_the_body_turns_as_it_goes(machine: Walker, structure: Structure) -> None:
+    trench = remove_columns(structure, "12-17")
+    path = grid_path([(9, 12), (20, 12)], 1.5 * INCH, height=52 * INCH)
+    plan = plan_walk(machine, trench, path, objective="destination", detour=True)
+    assert plan.complete
+    np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
+    # At 1 in/s of 1.5 in/s and more
+    assert plan.path.duration + plan.delay < 1.5 * path.duration
+
+
+def test_a_chain_of_cells_is_the_quickest_one(machine: Walker, structure: Structure) -> None:
+    """The body turns and goes down while it goes on, as that takes no longer."""
+    path = grid_path([(13, 9), (13, 12)], 2 * INCH)
+    cells = cells_about(path, structure, CellSpacing(0.14, 0.2, 1, (0.0, 0.1), 24))
+    whole, everywhere = np.array([cells.goal]), np.arange(len(cells))
+    chain = route.shortest(cells, (CellNode((), everywhere, whole, 0, None, 0),), whole, np.zeros(len(cells)))
+    assert chain is not None
+    assert len(chain) == cells.shape[0]
+    # To a cell that is lower and turned by two steps, with the same stations
+    lower = int(np.ravel_multi_index((cells.shape[0] - 1, 1, 1, 2), cells.shape))
+    end = np.array([lower])
+    chain = route.shortest(cells, (CellNode((), everywhere, end, 0, None, 0),), end, np.zeros(len(cells)), pace=0.05)
+    assert chain is not None
+    assert len(chain) == cells.shape[0]
+    assert chain[-1] == lower
+
+
+def test_detours_that_take_long_come_after_those_among_other_cells(
+    machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = grid_path([(13, 9), (13, 10)], 0.1)
+    slow = straight_path(list(path.poses[[0, -1]]), 0.005)
+    asked = list[tuple[str, int | None]]()
+
+    def variations(*args: Any) -> Generator[route.BodyRoute, int | None, bool]:
+        way, name = (slow, "slow") if args[3] == BESIDE else (path, "quick")
+        for count in range(2):
+            asked.append((f"{name} {count}", (yield route.BodyRoute(way, True, (), f"{name} {count}"))))
+        return False
+
+    monkeypatch.setattr(route, "_variations", variations)
+    routes = route.find_routes(machine, structure, path)
+    found = [next(routes).text]
+    for ended in range(1, 6):
+        found.append(routes.send(ended).text)
+    assert found == ["quick 0", "quick 1", "quick 0", "quick 1", "slow 0", "slow 1"]
+    # Each is told where the plan along it ended
+    assert asked == [(name, ended) for ended, name in enumerate(found[:-1], start=1)]
+
+
+def test_refusals_end_when_their_work_is_done(
+    machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same every time, and the reason says so."""
+    trench = remove_rows(structure, "10-17")
+    path = grid_path([(13, 8), (13, 19.5)], 2 * INCH)
+    monkeypatch.setattr(route, "MESHES", (NARROW,))
+    monkeypatch.setattr(planner, "WORK", 1.0)
+    reasons = set[str]()
+    for _ in range(2):
+        with pytest.raises(NoPlanError, match="would take too long") as caught:
+            plan_walk(machine, trench, path, objective="destination", width=4, detour=True)
+        reasons.add(str(caught.value))
+    assert len(reasons) == 1

@@ -5,6 +5,8 @@
 #include "world.h"
 
 enum { BRANCHES = 2, LIMITS = 8, FREE = 5 };
+/* What a posture meets was not looked at yet */
+enum { UNKNOWN = -2 };
 
 /* Margins of reach [m] and angles [rad], largest steps of joints 1 to 5 [rad], least cosine between approach and
    body, samples of a grip at least, reach that hands lean for [m], the part of a tilt that they use, and the least
@@ -118,16 +120,21 @@ static int wrist_on(const Arm *arm, const Keeping *keep, const double *spans, co
                     const double *normal, double tilt, double *w, double *axis, double *left)
 {
     const double whole = arm->offset + arm->upper + arm->fore + arm->hand, *f = frame;
+    const double from[3] = { place[0] - f[3], place[1] - f[7], place[2] - f[11] };
     double p[3];
-    for (int k = 0; k < 3; ++k) {
-        p[k] = f[k] * (place[0] - f[3]) + f[4 + k] * (place[1] - f[7]) + f[8 + k] * (place[2] - f[11]);
+    p[2] = f[2] * from[0] + f[6] * from[1] + f[10] * from[2];
+    /* Most holds are too far away: from the neck's end */
+    if (dot(from, from) + arm->neck * (arm->neck - 2.0 * p[2]) >= whole * whole)
+        return 0;
+    axis[2] = f[2] * normal[0] + f[6] * normal[1] + f[10] * normal[2];
+    if (axis[2] <= keep->facing)
+        return 0;
+    w[2] = p[2] - arm->hand * axis[2];
+    for (int k = 0; k < 2; ++k) {
+        p[k] = f[k] * from[0] + f[4 + k] * from[1] + f[8 + k] * from[2];
         axis[k] = f[k] * normal[0] + f[4 + k] * normal[1] + f[8 + k] * normal[2];
         w[k] = p[k] - arm->hand * axis[k];
     }
-    const double up = p[2] - arm->neck;
-    if (axis[2] <= keep->facing || p[0] * p[0] + p[1] * p[1] + up * up >= whole * whole)
-        return 0;
-    /* Most that are out of reach are too far away */
     const double z = w[2] - arm->neck, far = w[0] * w[0] + w[1] * w[1] - arm->offset * arm->offset + z * z;
     if (tilt < keep->least_tilt && far > spans[0] * spans[0])
         return 0;
@@ -160,6 +167,7 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
             const double *place = positions + 3 * h, *normal = axes + 3 * h;
             const int there = i < n && wrist_on(arm, keep, spans, f, place, normal, tilts[h], w, axis, &left);
             const int solved = there && postures(arm, keep, w, axis, q);
+            long met = UNKNOWN;
             for (int b = 0; b < BRANCHES; ++b) {
                 double *mine = work + JOINTS * n * b, least = 0.0;
                 const int limit = there ? nearest_limit(arm, q[b], &least) : 0;
@@ -167,10 +175,14 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
                 long meets = fits && world ? blocked[i] : NOTHING;
                 fits &= meets == NOTHING;
                 if (fits && world) {
-                    const double posture[JOINTS] = { q[b][0], q[b][1], q[b][2], q[b][3], q[b][4] };
-                    const long own[2] = { holds[h], -1 };
-                    const Frame frame = frame_of(f);
-                    meets = posture_meets(world, arm, row, &frame, posture, own);
+                    /* With either branch of the wrist the links are at the same places */
+                    if (met == UNKNOWN) {
+                        const double posture[JOINTS] = { q[b][0], q[b][1], q[b][2], q[b][3], q[b][4] };
+                        const long own[2] = { holds[h], -1 };
+                        const Frame frame = frame_of(f);
+                        met = posture_meets(world, arm, row, &frame, posture, own);
+                    }
+                    meets = met;
                     fits = meets == NOTHING;
                 }
                 const int fast = there && since[b] >= 0 ? too_fast(keep->most, mine + JOINTS * (i - 1), q[b]) : -1;
@@ -202,7 +214,7 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
    reach that is left, and the wrist's distance from the base's z axis are larger than the three of `landing`, the first
    in any case; and their six angles, joint 6 at 0. Both are long enough for all. Returns how many there are. */
 long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const World *world, long row, long n,
-              const double *frames, long m, const double *positions, const double *axes, const long *holds, long *table,
+              const double *frames, long m, const double *positions, const double *axes, const long *holds, int *table,
               double *rows)
 {
     const double spans[2] = { span(arm, arm->elbow), span(arm, -arm->limits[2]) };
@@ -215,6 +227,7 @@ long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const 
                 || !postures(arm, keep, w, axis, q))
                 continue;
             const long own[2] = { holds[h], -1 }, lands = left > landing[1] && hypot(w[0], w[1]) > landing[2];
+            int clear = -1;
             for (int b = 0; b < BRANCHES; ++b) {
                 double *mine = rows + JOINTS * found;
                 nearest_limit(arm, q[b], &least);
@@ -222,9 +235,12 @@ long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const 
                     continue;
                 memcpy(mine, q[b], sizeof q[b]);
                 mine[FREE] = 0.0;
-                if (posture_meets(world, arm, row, &frame, mine, own) != NOTHING)
-                    continue;
-                const long where[4] = { i, h, b, lands };
+                /* With either branch of the wrist the links are at the same places */
+                if (clear < 0)
+                    clear = posture_meets(world, arm, row, &frame, mine, own) == NOTHING;
+                if (!clear)
+                    break;
+                const int where[4] = { (int)i, (int)h, b, (int)lands };
                 memcpy(table + 4 * found++, where, sizeof where);
             }
         }

@@ -9,17 +9,26 @@ typedef struct {
     double origin[3], axis[3], radius;
 } Surface;
 
+/* From a cylinder's axis straight to a point. */
+static void across(const Surface *surface, const double *p, double *out)
+{
+    for (int k = 0; k < 3; ++k)
+        out[k] = p[k] - surface->origin[k];
+    const double along = dot(out, surface->axis);
+    for (int k = 0; k < 3; ++k)
+        out[k] -= along * surface->axis[k];
+}
+
 static double above(const Surface *surface, const double *p)
 {
-    double local[3], square = 0.0;
+    double local[3];
+    if (surface->radius > 0.0) {
+        across(surface, p, local);
+        return sqrt(dot(local, local)) - surface->radius;
+    }
     for (int k = 0; k < 3; ++k)
         local[k] = p[k] - surface->origin[k];
-    const double along = dot(local, surface->axis);
-    if (surface->radius <= 0.0)
-        return along;
-    for (int k = 0; k < 3; ++k)
-        square += (local[k] - along * surface->axis[k]) * (local[k] - along * surface->axis[k]);
-    return sqrt(square) - surface->radius;
+    return dot(local, surface->axis);
 }
 
 #endif

@@ -199,22 +199,24 @@ static int apart(const World *world, const Thing *thing, const double *a, const 
     return apart(world, thing, a, middle, least) && apart(world, thing, middle, b, least);
 }
 
-/* Least height of a segment above a surface is `least` at least. */
+/* Least height of a segment above a surface is `least` at least: over a cylinder a chord may be lower than its ends. */
 static int over(const Surface *surface, const double *a, const double *b, double least)
 {
-    const double one = above(surface, a), other = above(surface, b);
-    if (one < least || other < least)
-        return 0;
-    double span[3], middle[3];
+    if (surface->radius <= 0.0)
+        return above(surface, a) >= least && above(surface, b) >= least;
+    double from[3], span[3], square = 0.0, along = 0.0, length = 0.0, part;
+    across(surface, a, from);
+    across(surface, b, span);
     for (int k = 0; k < 3; ++k) {
-        span[k] = b[k] - a[k];
-        middle[k] = 0.5 * (a[k] + b[k]);
+        span[k] -= from[k];
+        along -= from[k] * span[k];
+        length += span[k] * span[k];
     }
-    const double half = 0.5 * sqrt(dot(span, span));
-    /* Outside a cylinder a chord may be lower than its ends */
-    if (surface->radius <= 0.0 || smaller(one, other) - least >= half || half < SHORT)
-        return 1;
-    return over(surface, a, middle, least) && over(surface, middle, b, least);
+    part = along <= 0.0 ? 0.0 : along >= length ? 1.0 : along / length;
+    for (int k = 0; k < 3; ++k)
+        square += (from[k] + part * span[k]) * (from[k] + part * span[k]);
+    const double far = least + surface->radius;
+    return far <= 0.0 || square >= far * far;
 }
 
 /* Distance of a point from all that stands around. */

@@ -22,7 +22,7 @@ from wbc.walking.planner.detours.route import BodyRoute, Routes, find_routes
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
-from wbc.walking.planner.slices import Slices, drained
+from wbc.walking.planner.slices import Allowance, Slices, drained
 from wbc.walking.planner.sound import sound_slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
@@ -42,6 +42,8 @@ WIDELY = 3
 WIDEST = 12
 #: Where so little is left of a detour, it is searched widely at once [s]
 NEARLY = 2.5
+#: Slices of work that are spent on wide searches and detours, and at most on wide searches before there are detours
+WORK, AT_FIRST = 2900.0, 2200.0
 #: With more arms than this detours, along which all but one must hold, come after the wider search
 USUAL_ARMS = 3
 
@@ -114,34 +116,49 @@ def _beside(
     hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
     wide = [(DELAYS[-1], WIDER * width)] if width is not None else []
     tried = [(plan.path.duration - plan.reached, path, "")]
+    allowance = None if width is None else Allowance(WORK)
+
+    def along(way: BodyPath, tries: Sequence[tuple[float, int | None]], most: float = WORK) -> Plan:
+        """With at most so much of the allowance."""
+        part = None if allowance is None else Allowance(min(most, allowance.left))
+        before = 0.0 if part is None else part.left
+        found = drained(search(way, beginning, objective="destination", tries=tries, allowance=part))
+        if allowance is not None and part is not None:
+            allowance.left -= before - part.left
+        return found
+
     if width is not None and len(walker.arms) > USUAL_ARMS:
-        widest = (DELAYS[-1], WIDEST * width)
-        found = drained(search(path, beginning, objective="destination", tries=[*wide, widest]))
+        found = along(path, [*wide, (DELAYS[-1], WIDEST * width)], AT_FIRST)
         if found.complete:
             return found
         tried.clear()
-    routes, ended = find_routes(walker, structure, path, hands, deadline), None
+    routes, ended = find_routes(walker, structure, path, hands, deadline, allowance), None
     while (route := _next(routes, ended)) is not None:
         if route.path is None:
             plan, ended = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating), None
             continue
-        found = drained(search(route.path, beginning, objective="destination", tries=[(DELAYS[-1], width)]))
+        found = along(route.path, [(DELAYS[-1], width)])
         if found.complete:
             return found
         ended, left = round(found.reached / path.spacing), route.path.duration - found.reached
         if wide and left <= NEARLY:
-            found = drained(search(route.path, beginning, objective="destination", tries=wide))
+            found = along(route.path, wide)
             if found.complete:
                 return found
         else:
             tried.append((left, route.path, f"on a detour {route.text} {found.reason}"))
     tried.sort(key=lambda one: one[0])
     for _, way, _ in tried[:WIDELY] if wide else ():
-        found = drained(search(way, beginning, objective="destination", tries=wide))
+        if allowance is not None and allowance.spent:
+            break
+        found = along(way, wide)
         if found.complete:
             return found
     best = next((text for *_, text in tried if text), "")
-    return replace(plan, reason=f"{plan.reason}; {best}") if best else plan
+    reasons = [plan.reason, *([best] if best else [])]
+    if allowance is not None and allowance.spent:
+        reasons.append("what may be left was not looked at, as it would take too long")
+    return replace(plan, reason="; ".join(reasons))
 
 
 def _next(routes: Routes, ended: int | None) -> BodyRoute | None:
@@ -195,6 +212,7 @@ def plan_slices(
     thorough: bool = False,
     tries: Sequence[tuple[float, int | None]] = (),
     first: tuple[int, int] | None = None,
+    allowance: Allowance | None = None,
 ) -> Slices[Plan]:
     """The best plan along one path, complete or not, in slices of some milliseconds of work; the same every time.
 
@@ -207,6 +225,7 @@ def plan_slices(
             fewer re-grasps than were found (:mod:`wbc.walking.planner.fewest`).
         tries: delays and widths of the searches, one after the other, instead of what objective and width say.
         first: row of an arm and of a hold: the first re-grasp, whether it is needed or not.
+        allowance: work that the searches may take.
 
     Raises:
         as :func:`plan_walk`, where no stance is possible at the beginning.
@@ -224,7 +243,7 @@ def plan_slices(
     thorough = thorough and objective == "destination"
     most = ALL_STARTS if thorough else STARTS
     for delay, wide in tries or usual:
-        more = {"longest_delay": delay, "width": wide, "first": first}
+        more = {"longest_delay": delay, "width": wide, "first": first, "allowance": allowance}
         search = BodySearch(walker, structure, path, grips, known=search, patient=thorough, **more)
         starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
         yield None
@@ -232,6 +251,8 @@ def plan_slices(
         if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
             best = found, laws
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
+            break
+        if allowance is not None and allowance.spent:
             break
     assert best is not None
     if thorough and search is not None and best[0].complete and not (stance or first):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
@@ -35,13 +33,12 @@ def round_labels(flags: Flags) -> NDArray[np.int32]:
     return np.unique(same, return_inverse=True)[1].astype(np.int32)[out]
 
 
-def distances(cells: Cells, fits: Sequence[Flags], least: int, goal: int) -> Array:
+def distances(cells: Cells, counts: Ints, least: int, goal: int) -> Array:
     """How far cells are from the goal through cells at which enough arms have holds [stations]; inf where none lead.
 
     Args:
-        fits: of the grips of each arm, ``[grips, cells]``. least: so many arms must hold.
+        counts: of the grips of each arm ``[arms, cells]``. least: so many arms must hold.
     """
-    counts = np.array([mine.sum(axis=0) for mine in fits])
     arms = (counts > 0).sum(axis=0)
     flags = (arms >= least).reshape(cells.shape)
     out = np.full(len(cells), np.inf)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ from wbc.walking.planner.grips.stretches import postures_at
 
 Flags = NDArray[np.bool_]
 
+#: Numbers of branches of an arm's wrist are below this
+BRANCHES = 8
+
 
 @dataclass(frozen=True, eq=False)
 class CellGrips:
@@ -25,28 +30,75 @@ class CellGrips:
 
     Attributes:
         arm, hold, branch: ``[grips]``.
-        fits: at each cell ``[grips, cells]``. lands: a hand may land there.
-        row: of :attr:`postures` ``[grips, cells]``; -1 where it does not fit.
-        postures: ``[rows, joints]`` [rad].
+        count: of cells.
+        begin: first row of each grip, and the end of the last one ``[grips + 1]``.
+        cells: at which they hold, grip by grip in their order ``[rows]``. lands: a hand may land there.
+        at: row of :attr:`postures` ``[rows]``.
+        postures: [rad] ``[k, joints]``.
     """
 
     arm: Ints
     hold: Ints
     branch: Ints
-    fits: Flags
+    count: int
+    begin: Ints
+    cells: NDArray[np.int32]
     lands: Flags
-    row: NDArray[np.int32]
+    at: NDArray[np.int32]
     postures: Array
+
+    def __len__(self) -> int:
+        return len(self.arm)
+
+    def rows(self, grip: int) -> slice:
+        """Rows of a grip."""
+        return slice(int(self.begin[grip]), int(self.begin[grip + 1]))
+
+    @cached_property
+    def fits(self) -> NDArray[np.uint8]:
+        """Whether grips hold at cells, eight cells a byte ``[grips, cells / 8]``."""
+        return self._bits(np.ones(len(self.cells), dtype=bool))
+
+    @cached_property
+    def landing(self) -> NDArray[np.uint8]:
+        """Whether hands may land on grips at cells, eight cells a byte ``[grips, cells / 8]``."""
+        return self._bits(self.lands)
+
+    def fits_at(self, grips: Ints, cell: int) -> Flags:
+        """Whether grips hold at a cell."""
+        return np.asarray(self.fits[grips, cell >> 3] >> (7 - (cell & 7)) & 1, dtype=bool)
+
+    def flags(self, bits: NDArray[np.uint8]) -> Flags:
+        """Eight cells a byte -> one flag a cell."""
+        return np.unpackbits(bits, axis=-1, count=self.count).view(bool)
+
+    def arms_at(self) -> Ints:
+        """How many grips each arm has at each cell ``[arms, cells]``."""
+        arms = int(self.arm.max(initial=-1)) + 1
+        first = np.searchsorted(self.arm, np.arange(arms + 1))
+        ends = self.begin[first].tolist()
+        return np.array([np.bincount(self.cells[a:b], minlength=self.count) for a, b in pairwise(ends)])
 
     def only(self, cells: Flags) -> CellGrips:
         """The same at some cells ``[cells]`` alone."""
-        left = (self.fits & cells).any(axis=1)
-        fits, lands, row = self.fits[left] & cells, self.lands[left] & cells, np.where(cells, self.row[left], -1)
-        return CellGrips(self.arm[left], self.hold[left], self.branch[left], fits, lands, row, self.postures)
+        there = cells[self.cells]
+        which = np.repeat(np.arange(len(self)), np.diff(self.begin))[there]
+        left, begin = np.unique(which, return_index=True)
+        begin = np.append(begin, len(which))
+        rest = self.cells[there], self.lands[there], self.at[there], self.postures
+        return CellGrips(self.arm[left], self.hold[left], self.branch[left], self.count, begin, *rest)
 
     def of_arm(self, arm: int) -> Ints:
         """Grips of an arm."""
         return np.nonzero(self.arm == arm)[0]
+
+    def _bits(self, rows: Flags) -> NDArray[np.uint8]:
+        out = np.zeros((len(self), -(-self.count // 8)), dtype=np.uint8)
+        for grip, (a, b) in enumerate(pairwise(self.begin.tolist())):
+            here = np.zeros(self.count, dtype=bool)
+            here[self.cells[a:b]] = rows[a:b]
+            out[grip] = np.packbits(here)
+        return out
 
 
 def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
@@ -54,11 +106,13 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
     limb, margins, about = limb_of(walker), walker.margins, around(walker, structure)
     free = about.bodies(cells.frames) == NONE_MET
     block = len(cells) // cells.shape[0]
-    parts, found = list[Array](), list[tuple[Ints, Flags]]()
+    # What there is: arm, hold and branch in one number, cell, whether the hand may land; and joints
+    codes, places = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
+    landing, joints = [np.zeros(0, dtype=bool)], [np.zeros((0, len(limb.position_limits)))]
     for arm in range(len(walker.arms)):
         base = walker.arms[arm].base.homogeneous
         for begin in range(0, len(cells), block):
-            here = begin + np.nonzero(free[begin : begin + block])[0]
+            here = begin + np.nonzero(free[begin : begin + block])[0].astype(np.int32)
             if not len(here):
                 continue
             frames = cells.frames[here] @ base
@@ -67,25 +121,29 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
             (poses, holds, branch, lands), q = (
                 _postures(about, margins, arm, frames, among) if quick is None else (quick[0].T, quick[1])
             )
-            found.append((np.column_stack([np.full(len(q), arm), here[poses], holds, branch]), lands.astype(bool)))
-            parts.append(q)
-    if not found:
-        found, parts = (
-            [(np.zeros((0, 4), dtype=np.int64), np.zeros(0, bool))],
-            [np.zeros((0, len(limb.position_limits)))],
-        )
-    keys, lands = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    branches = 1 + int(keys[:, 3].max(initial=0))
-    packed = (keys[:, 0] * len(structure) + keys[:, 2]) * branches + keys[:, 3]
-    there_is = np.bincount(packed, minlength=len(walker.arms) * len(structure) * branches) > 0
-    names, number = np.nonzero(there_is)[0], (np.cumsum(there_is) - 1)[packed]
-    row = np.full((len(names), len(cells)), -1, dtype=np.int32)
-    row[number, keys[:, 1]] = np.arange(len(keys), dtype=np.int32)
-    landing = np.zeros(row.shape, dtype=bool)
-    landing[number, keys[:, 1]] = lands
-    rest, branch = np.divmod(names, branches)
-    arms, holds = np.divmod(rest, len(structure))
-    return CellGrips(arms, holds, branch, row >= 0, landing, row, np.concatenate(parts))
+            codes.append(((arm * len(structure) + holds) * BRANCHES + branch).astype(np.int32))
+            places.append(here[poses])
+            landing.append(lands.astype(bool))
+            joints.append(q)
+    code, cell = np.concatenate(codes), np.concatenate(places)
+    there = np.bincount(code, minlength=1)
+    names = np.nonzero(there)[0]
+    # Cells of a grip stay in their order
+    order = np.argsort(code, kind="stable").astype(np.int32)
+    begin = np.concatenate([[0], np.cumsum(there[names])])
+    rest, branches = np.divmod(names, BRANCHES)
+    arms, held_on = np.divmod(rest, len(structure))
+    return CellGrips(
+        arms,
+        held_on,
+        branches,
+        len(cells),
+        begin,
+        cell[order],
+        np.concatenate(landing)[order],
+        order,
+        np.concatenate(joints),
+    )
 
 
 def _postures(

@@ -11,7 +11,7 @@ import heapq
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,14 @@ from wbc.walking.planner.detours.cells import Cells, Ints
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.stances.together import together
 
-#: A re-grasp counts as so many stations; nodes that are looked at before the search gives up
+#: A re-grasp counts as so many stations; landings of three arms that are looked at before the search gives up: each
+#: leads to two nodes, of more arms to more
 STRIDE, LIMIT = 0.1, 2_000
 #: Landings at fewer cells than WIDE come later, by so many stations
 WIDE, NARROW = 4, 4.0
-#: Grips of an arm that a start may have, and starts; nodes that differ only in the hold that the free hand left
-START_GRIPS, START_STANCES, LEFTS = 12, 2000, 2
+#: Grips of an arm that a start may have, nodes that the search begins with, and nodes that differ only in the hold that
+#: the free hand left
+START_GRIPS, START_NODES, LEFTS = 12, 1500, 2
 
 Grips = tuple[int, ...]
 #: Grips that hold and a number of a connected set -> grips that free hands left
@@ -84,17 +86,19 @@ class CellSearch:
         self._by_arm = [grips.of_arm(arm) for arm in range(self._arms)]
         self._together: dict[tuple[int, int], Flags] = {}
         self._named: dict[int, Array] = {}
-        self._rank: dict[int, Ints] = {}
         self._parts: dict[Grips, NDArray[np.int32]] = {}
+        self._counts = np.zeros((self._arms, len(cells)), dtype=np.int64)
+        counts = grips.arms_at()
+        self._counts[: len(counts)] = counts
         self._far = self._distances(cells.goal)
-        self._bits, self._landing = np.packbits(grips.fits, axis=1), np.packbits(grips.lands, axis=1)
         # The least that is left when a grip holds, a little less where it holds at many cells
-        least = np.array([self._far[fits].min() for fits in grips.fits])
-        self._left = least - 0.3 * np.log1p(grips.fits.sum(axis=1))
+        least = np.minimum.reduceat(self._far[grips.cells], grips.begin[:-1]) if len(grips) else np.zeros(0)
+        self._many = np.diff(grips.begin)
+        self._left = least - 0.3 * np.log1p(self._many)
 
     def _distances(self, goal: int) -> Array:
         """As of :func:`distances`."""
-        return distances(self.cells, [self.grips.fits[mine] for mine in self._by_arm], self._least, goal)
+        return distances(self.cells, self._counts, self._least, goal)
 
     def run(self, start: Mapping[int, int] | None = None, deadline: float | None = None) -> Outcome:
         """From the first cell to the last.
@@ -109,14 +113,14 @@ class CellSearch:
         queue: list[tuple[float, int, CellNode, int, bool]] = []
         near: tuple[float, tuple[int, ...]] = np.inf, ()
         fresh, pushed, expanded = self._first(start or {}, seen), 0, 0
-        goal = self.cells.goal
+        goal, limit = self.cells.goal, 2 * LIMIT // max(self._least, 2)
         while True:
             for node in fresh:
                 near = min(near, (float(self._far[node.cells].min()), node.held))
                 for estimate, grip in self._next(node):
                     heapq.heappush(queue, (estimate, pushed, node, grip, False))
                     pushed += 1
-            if not queue or expanded >= LIMIT or (deadline is not None and time.perf_counter() > deadline):
+            if not queue or expanded >= limit or (deadline is not None and time.perf_counter() > deadline):
                 return Outcome((), np.zeros(0, dtype=np.int64), not queue, near[1], expanded)
             estimate, _, node, grip, narrow = heapq.heappop(queue)
             expanded += 1
@@ -140,7 +144,9 @@ class CellSearch:
         # Where it comes furthest along the path
         ours.reshape(cells.shape)[: stations[-1]] = False
         ends = np.nonzero(ours)[0]
-        grips = np.nonzero(self.grips.fits[:, ends].any(axis=1))[0]
+        some = np.zeros(len(cells), dtype=bool)
+        some[ends] = True
+        grips = np.nonzero((self.grips.fits & np.packbits(some)).any(axis=1))[0]
         return Outcome((), np.zeros(0, dtype=np.int64), True, tuple(grips.tolist()), 0)
 
     def _first(self, start: Mapping[int, int], seen: Seen) -> list[CellNode]:
@@ -149,15 +155,16 @@ class CellSearch:
         choices = []
         for arm in range(self._arms):
             mine = self._by_arm[arm]
-            mine = mine[grips.fits[mine, cell]]
+            mine = mine[grips.fits_at(mine, cell)]
             if arm in start:
                 mine = mine[grips.hold[mine] == start[arm]]
             # Grips that hold at many cells first
-            choices.append(mine[np.argsort(-grips.fits[mine].sum(axis=1), kind="stable")][:START_GRIPS].tolist())
+            choices.append(mine[np.argsort(-self._many[mine], kind="stable")][:START_GRIPS].tolist())
         out: list[CellNode] = []
         met: set[tuple[Grips, int]] = set()  # many stances share their grips
-        stances = islice(together(choices, lambda one, other: bool(self.together(one, other)[cell])), START_STANCES)
-        for stance in stances:
+        for stance in together(choices, lambda one, other: bool(self.together(one, other)[cell])):
+            if len(out) >= START_NODES:
+                break
             for left in stance:
                 held = tuple(g for g in stance if g != left)
                 if (held, left) not in met:
@@ -191,19 +198,21 @@ class CellSearch:
         here = np.zeros(len(self.cells), dtype=bool)
         here[node.cells] = True
         here = np.packbits(here)
-        out = []
+        # Most of the cells are elsewhere
+        some = np.nonzero(here)[0]
+        here, out = here[some], []
         for arm in set(range(self._arms)) - used:
             mine = self._by_arm[arm]
             for g in node.held:
                 mine = mine[grips.hold[mine] != grips.hold[g]]
-            mine = mine[(self._landing[mine] & here).any(axis=1)]
+            mine = mine[(grips.landing[np.ix_(mine, some)] & here).any(axis=1)]
             estimate = 0.5 * (self._left[mine] + self._far[node.cells].min()) + STRIDE * node.count
             out += list(zip(estimate.tolist(), mine.tolist(), strict=True))
         return out
 
     def _landings(self, node: CellNode, grip: int) -> Ints:
         """Cells of a node at which a hand can land; how it swings there is known of the hand that was lifted last."""
-        cells: Ints = node.cells[self.grips.lands[grip, node.cells]]
+        cells: Ints = node.cells[self.grips.flags(self.grips.landing[grip])[node.cells]]
         for g in node.held:
             cells = cells[self.together(g, grip)[cells]]
         cells = cells[self._in_order((*node.held, grip), cells)]
@@ -226,7 +235,8 @@ class CellSearch:
         if held not in self._parts:
             out = np.zeros(self.cells.shape, dtype=np.int32)
             pairs = [self.together(*pair) for pair in combinations(held, 2)]
-            together = np.logical_and.reduce([self.grips.fits[held[0]], *pairs]).reshape(self.cells.shape)
+            alone = self.grips.flags(self.grips.fits[held[0]])
+            together = np.logical_and.reduce([alone, *pairs]).reshape(self.cells.shape)
             places = np.nonzero(together)
             if len(places[0]):
                 box = tuple(slice(int(place.min()), int(place.max()) + 1) for place in places[:3])
@@ -238,8 +248,7 @@ class CellSearch:
         """Cells at which two grips hold, clear of each other."""
         pair = (one, other) if one < other else (other, one)
         if pair not in self._together:
-            bits = self._bits[one] & self._bits[other]
-            out = np.unpackbits(bits, count=len(self.cells)).view(bool)
+            out = self.grips.flags(self.grips.fits[one] & self.grips.fits[other])
             cells = np.nonzero(out)[0]
             out[cells] = self._shapes.between(self._points(one, cells), self._points(other, cells)) >= 0.0
             self._together[pair] = out
@@ -247,12 +256,11 @@ class CellSearch:
 
     def _points(self, grip: int, cells: Ints) -> Array:
         """Named points of an arm at some cells of a grip ``[n, points, 3]``."""
+        grips, rows = self.grips, self.grips.rows(grip)
         if grip not in self._named:
-            rows = self.grips.row[grip]
-            rows = rows[rows >= 0]
-            self._named[grip] = self._shapes.points(int(self.grips.arm[grip]), self.grips.postures[rows])
-            self._rank[grip] = np.cumsum(self.grips.fits[grip]) - 1
-        out: Array = self._named[grip][self._rank[grip][cells]]
+            postures = grips.postures[grips.at[rows]]
+            self._named[grip] = self._shapes.points(int(grips.arm[grip]), postures)
+        out: Array = self._named[grip][np.searchsorted(grips.cells[rows], cells)]
         return out
 
 

@@ -46,9 +46,10 @@ class CellSpacing:
 
 #: Reach of the arm that the meshes below were chosen for, a PUMA 600 from neck to hand [m]
 HAND_SPAN = 1.1684
-#: Along the path alone, beside it, and beside it through gaps that are little wider than the body; 54 to 44 in for a
-#: path at 52 in
+#: Along the path alone, as closely a little beside it, far beside it, and beside it through gaps that are little wider
+#: than the body; 54 to 44 in for a path at 52 in
 ALONG = CellSpacing(0.1175, 0.0, 0, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0)), 24)
+BESIDE = replace(ALONG, side=0.2, beside=2)
 WIDE = CellSpacing(0.14, 0.2, 7, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 4.0, 8.0)), 18)
 NARROW = CellSpacing(0.12, 0.1, 12, tuple(inch * 0.0254 for inch in (-2.0, 0.0, 3.0, 6.0, 8.0)), 24)
 

@@ -20,7 +20,8 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.cell_grips import cell_grips
 from wbc.walking.planner.detours.cell_search import CellNode, CellSearch, Outcome
-from wbc.walking.planner.detours.cells import ALONG, NARROW, WIDE, Cells, CellSpacing, Ints, cells_about
+from wbc.walking.planner.detours.cells import ALONG, BESIDE, NARROW, WIDE, Cells, CellSpacing, Ints, cells_about
+from wbc.walking.planner.slices import Allowance
 
 #: How fast the body goes down [m/s] and turns [rad/s]
 DOWN_SPEED, TURN_SPEED = 0.05, 0.1
@@ -30,16 +31,21 @@ CORNER = 0.3
 SLOW = 0.01
 #: What a cell off the path costs for each m beside, m lower and rad turned; a step along the path costs 1
 DEAR = np.array([0.1, 0.2, 0.1])
-
+#: What each of the ways costs in which a cell differs from the next one
+CHANGE = 0.1
 
 #: How many detours of a mesh are tried, each away from where plans along those before ended: cells next to that cost so
 #: much more
 VARIATIONS, STUCK = 4, 3.0
+#: Detours that take so many times as long as the path, and so much longer [s], come after those among other cells
+LONG, LONGER = 1.7, 30.0
+#: Postures in cells, and landings, that count as much as a slice of work
+ROWS, LANDINGS = 2000, 2
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
 ROOMY = 0.06
-#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too; the body may
-#: touch something between them on every route, and pass between closer ones (NARROW)
-MESHES = (ALONG, WIDE)
+#: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not
+#: far; the body may touch something between them on every route, and pass between closer ones (NARROW)
+MESHES = (ALONG, BESIDE, WIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +67,8 @@ class BodyRoute:
 
 #: Takes the sample at which a plan along the route ends, and yields another route
 Routes = Generator[BodyRoute, int | None, None]
+#: The same; returns whether the body touches something between its cells on each
+Variations = Generator[BodyRoute, int | None, bool]
 
 
 def find_route(
@@ -87,19 +95,46 @@ def find_routes(
     path: BodyPath,
     start: Mapping[int, int] | None = None,
     deadline: float | None = None,
+    allowance: Allowance | None = None,
 ) -> Routes:
-    """Detours, those near the path first, each with :data:`VARIATIONS`; the next one is looked for on demand.
+    """Detours, those near the path first, each with :data:`VARIATIONS`, and then such as take much longer than the
+    path (:data:`LONG`); the next one is looked for on demand.
 
     Args:
-        start, deadline: of :func:`find_route`.
+        start, deadline: of :func:`find_route`. allowance: work that may be done; when it is spent no other detour is
+            looked for.
     """
-    limb, closed = limb_of(walker), False
+    limb, closed, late = limb_of(walker), False, list[tuple[float, Variations, BodyRoute]]()
     for mesh in MESHES:
-        if deadline is not None and time.perf_counter() > deadline:
+        if _over(deadline, allowance):
             return
-        closed = yield from _variations(walker, structure, path, mesh.of(limb), start, deadline)
-    if closed:
-        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline)
+        routes = _variations(walker, structure, path, mesh.of(limb), start, deadline, allowance)
+        first = next(routes)
+        usual = max(LONG * path.duration, path.duration + LONGER)
+        if first.path is not None and first.path.duration > usual:
+            late.append((first.path.duration, routes, first))
+        else:
+            closed = yield from _from(first, routes)
+    for _, routes, first in sorted(late, key=lambda one: one[0]):
+        yield from _from(first, routes)
+    if closed and not _over(deadline, allowance):
+        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline, allowance)
+
+
+def _over(deadline: float | None, allowance: Allowance | None) -> bool:
+    """Whether no time or no work is left."""
+    late = deadline is not None and time.perf_counter() > deadline
+    return late or (allowance is not None and allowance.spent)
+
+
+def _from(route: BodyRoute, routes: Variations) -> Variations:
+    """A route that was found, and those that follow it."""
+    while True:
+        ended = yield route
+        try:
+            route = routes.send(ended)
+        except StopIteration as stop:
+            return bool(stop.value)
 
 
 def _variations(
@@ -109,7 +144,8 @@ def _variations(
     mesh: CellSpacing,
     start: Mapping[int, int] | None,
     deadline: float | None,
-) -> Generator[BodyRoute, int | None, bool]:
+    allowance: Allowance | None = None,
+) -> Variations:
     """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended. Returns
     whether there are some among its cells, but the body touches something between them on each.
     """
@@ -117,6 +153,8 @@ def _variations(
     grips = cell_grips(walker, structure, cells)
     there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
     outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
+    if allowance is not None:
+        allowance.left -= len(grips.cells) / ROWS + outcome.expanded / LANDINGS
     if not outcome.nodes:
         names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
         number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
@@ -129,8 +167,12 @@ def _variations(
     roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
     roomy[[cells.start, cells.goal]] = True
     for count in range(VARIATIONS):
+        if count and _over(deadline, allowance):
+            break
         if count == 1 and not roomy.all():
             outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
+            if allowance is not None:
+                allowance.left -= outcome.expanded / LANDINGS
             outcomes += [outcome] if outcome.nodes else []
         found = _clear(there, cells, outcomes[count % len(outcomes)], path, dear, closed)
         if found is None or found[0] in known:
@@ -157,7 +199,7 @@ def _clear(
     and the samples of its cells; steps at which it would are added to ``closed``. None if there is none.
     """
     while True:
-        chain = shortest(cells, outcome.nodes, outcome.final, dear, closed)
+        chain = shortest(cells, outcome.nodes, outcome.final, dear, closed, _pace(path))
         if chain is None:
             return None
         route, at = as_path(cells, chain, path)
@@ -176,12 +218,15 @@ def shortest(
     final: Ints,
     off: Array,
     closed: Collection[tuple[int, int]] = (),
+    pace: float = SLOW,
 ) -> list[int] | None:
     """The quickest chain of cells through the sets of nodes, each left where the next hand lands; None: there is none.
 
     Args:
         off: what each cell costs more ``[cells]``. closed: steps from cell to cell that are not made.
+        pace: of the body beside the path [m/s].
     """
+    steps_of = _Steps(cells, pace)
     sets = [set(node.cells.tolist()) for node in nodes]
     doors = [*(set(node.landed.tolist()) for node in nodes[1:]), set(final.tolist())]
     begin = (0, cells.start)
@@ -196,7 +241,7 @@ def shortest(
         layer, cell = here
         if layer == len(nodes):
             return _chain(came, here)
-        steps = [((layer, there), price) for there, price in _neighbours(cells, cell) if there in sets[layer]]
+        steps = [((layer, there), price) for there, price in steps_of(cell) if there in sets[layer]]
         steps = [(there, price) for there, price in steps if (cell, there[1]) not in closed]
         if cell in doors[layer]:
             steps.append(((layer + 1, cell), 0.0))
@@ -215,7 +260,7 @@ def as_path(cells: Cells, chain: list[int], path: BodyPath) -> tuple[BodyPath, I
     out = [poses[0].homogeneous[None]]
     pace = _pace(path)
     for (one, other), (first, last) in zip(itertools.pairwise(off), itertools.pairwise(poses), strict=True):
-        seconds = _seconds(other - one, pace)
+        seconds = float(_seconds(other - one, pace))
         count = max(ceil(seconds / path.spacing - 1e-9), 1)
         step = pin.log6(first.actInv(last))
         out.append(np.array([(first * pin.exp6(step * (k / count))).homogeneous for k in range(1, count + 1)]))
@@ -243,10 +288,12 @@ def _pace(path: BodyPath) -> float:
     return max(length / path.duration, SLOW)
 
 
-def _seconds(change: Array, pace: float) -> float:
-    time, side, lower, turned = np.abs(change).tolist()
-    turned = min(turned, 2.0 * pi - turned)
-    return float(max(np.hypot(time, side / pace), lower / DOWN_SPEED, turned / TURN_SPEED))
+def _seconds(change: Array, pace: float) -> Array:
+    """How long the body takes for changes of its offsets from the path ``[..., 4]`` [s]."""
+    time, side, lower, turned = np.moveaxis(np.abs(change), -1, 0)
+    turned = np.minimum(turned, 2.0 * pi - turned)
+    out: Array = np.maximum(np.hypot(time, side / pace), np.maximum(lower / DOWN_SPEED, turned / TURN_SPEED))
+    return out
 
 
 def _dear(cells: Cells) -> Array:
@@ -255,21 +302,34 @@ def _dear(cells: Cells) -> Array:
     return out
 
 
-def _neighbours(cells: Cells, cell: int) -> list[tuple[int, float]]:
-    """Cells next to one, diagonal ones too, and what it costs to go there."""
-    place = np.array(np.unravel_index(cell, cells.shape))
-    there = place + _AROUND
-    price = np.abs(there - place) @ _PRICES
+class _Steps:
+    """Cells next to one, diagonal ones too, and what it costs to go there: the time that it takes, in steps along the
+    path, and a little for each change.
+    """
+
+    def __init__(self, cells: Cells, pace: float) -> None:
+        self._cells, self._pace = cells, pace
+        self._offsets = cells.offsets(np.arange(len(cells)))
+        self._usual = (float(cells.at[-1] - cells.at[0]) / max(len(cells.at) - 1, 1)) or 1.0
+
+    def __call__(self, cell: int) -> list[tuple[int, float]]:
+        numbers, changes = _neighbours(self._cells, cell)
+        seconds = _seconds(self._offsets[numbers] - self._offsets[cell], self._pace)
+        price = seconds / self._usual + CHANGE * changes
+        return list(zip(numbers.tolist(), price.tolist(), strict=True))
+
+
+def _neighbours(cells: Cells, cell: int) -> tuple[Ints, Ints]:
+    """Cells next to one, diagonal ones too, and in how many ways they differ from it."""
+    there = np.array(np.unravel_index(cell, cells.shape)) + _AROUND
     there[:, 3] %= cells.shape[3]
     inside = ((there >= 0) & (there < cells.shape)).all(axis=1)
-    there, price = there[inside], price[inside]
-    numbers = np.ravel_multi_index(tuple(there.T), cells.shape)
-    return list(zip(numbers.tolist(), price.tolist(), strict=True))
+    return np.ravel_multi_index(tuple(there[inside].T), cells.shape), _CHANGES[inside]
 
 
 def _near(cells: Cells, cell: int) -> Ints:
     """A cell and those next to it."""
-    return np.array([cell, *(there for there, _ in _neighbours(cells, cell))], dtype=np.int64)
+    return np.append(_neighbours(cells, cell)[0], cell)
 
 
 def _chain(came: dict[tuple[int, int], tuple[int, int] | None], end: tuple[int, int]) -> list[int]:
@@ -283,5 +343,4 @@ def _chain(came: dict[tuple[int, int], tuple[int, int] | None], end: tuple[int, 
 
 
 _AROUND = np.array([step for step in itertools.product((-1, 0, 1), repeat=4) if any(step)])
-#: What a step along the path, beside, lower and turned costs
-_PRICES = np.array([1.0, 1.0, 0.4, 0.6])
+_CHANGES = np.abs(_AROUND).sum(axis=1)

@@ -92,8 +92,11 @@ def near_holds(limb: BodyLimb, structure: Structure, frames: Array) -> Ints:
     # Samples that are LOOSE apart stand for those between them
     far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pivots, axis=0), axis=1))])
     some = np.unique(np.searchsorted(far, np.arange(0.0, far[-1] + LOOSE, LOOSE), side="right") - 1)
-    square = ((structure.positions[None] - pivots[some, None]) ** 2).sum(axis=2).min(axis=0)
-    return np.nonzero(square < (limb.hand_span + LOOSE) ** 2)[0]
+    # |p - c|^2 = |p|^2 + (|c|^2 - 2 c p), about a centre, so that nothing is lost to rounding
+    centre = pivots.mean(axis=0)
+    holds, bases = structure.positions - centre, pivots[some] - centre
+    nearest = ((bases**2).sum(axis=1)[:, None] - 2.0 * bases @ holds.T).min(axis=0)
+    return np.nonzero((holds**2).sum(axis=1) + nearest < (limb.hand_span + LOOSE) ** 2)[0]
 
 
 def _postures(

@@ -81,7 +81,7 @@ def stretches(
 
 def postures_at(
     there: Around, arm: int, frames: Array, among: NDArray[np.int64], margins: Margins
-) -> tuple[NDArray[np.int64], Array] | None:
+) -> tuple[NDArray[np.int32], Array] | None:
     """Postures of an arm (its row) on some holds (their rows) from frames of its base ``[n, 4, 4]``, in a cell of a
     detour: row of the frame, of the hold, branch, and whether a hand may land there ``[k, 4]``; and ``[k, 6]`` [rad].
 
@@ -92,7 +92,7 @@ def postures_at(
     if library is None or data is None or world is None:
         return None
     most = 2 * len(frames) * len(among)
-    table, rows = np.empty((most, 4), dtype=np.int64), np.empty((most, 6))
+    table, rows = np.empty((most, 4), dtype=np.int32), np.empty((most, 6))
     given = [compiled.packed(a) for a in (frames, structure.positions[among], structure.axes[among])]
     where, holds = [compiled.at(a) for a in given], np.ascontiguousarray(among, dtype=np.int64)
     library.grips_at.restype = ctypes.c_long

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
@@ -85,9 +86,21 @@ class Outlook:
         return out
 
 
-def following(
-    fan: Fan, level: Sequence[tuple[Key, Node]], outlook: Outlook, most: int | None
-) -> Iterator[tuple[Key, list[Node]]]:
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A stance that moves lead to.
+
+    Attributes:
+        key: its grips. sample, delay: of the earliest of the moves. nodes: one for each move, the earliest first.
+    """
+
+    key: Key
+    sample: int
+    delay: int
+    nodes: Callable[[], list[Node]]
+
+
+def following(fan: Fan, level: Sequence[tuple[Key, Node]], outlook: Outlook, most: int | None) -> Iterator[Candidate]:
     """Stances that moves lead to, the promising ones first, each by at most so many moves, the earliest ones first."""
     if not len(fan):
         return
@@ -100,12 +113,12 @@ def following(
     heads, ends = np.nonzero(new)[0], np.append(np.nonzero(new)[0][1:], len(rows))
     first = rows[heads]
     promise = outlook.promise(outlook.last[keys[first]], fan.land[first], delays[first])
-    for place in outlook.order(keys[first], fan.land[first], promise).tolist():
-        begin, end = int(heads[place]), int(ends[place])
+
+    def nodes(begin: int, end: int) -> list[Node]:
         mine = rows[begin : end if most is None else min(begin + most, end)].tolist()
-        parents = [level[fan.parent[row]][0] for row in mine]
-        nodes = [
-            Node(int(fan.land[row]), int(delays[row]), parent, fan.move(row))
-            for row, parent in zip(mine, parents, strict=True)
-        ]
-        yield tuple(keys[mine[0]].tolist()), nodes
+        return [Node(int(fan.land[k]), int(delays[k]), level[fan.parent[k]][0], fan.move(k)) for k in mine]
+
+    for place in outlook.order(keys[first], fan.land[first], promise).tolist():
+        row = first[place]
+        of_moves = partial(nodes, int(heads[place]), int(ends[place]))
+        yield Candidate(tuple(keys[row].tolist()), int(fan.land[row]), int(delays[row]), of_moves)

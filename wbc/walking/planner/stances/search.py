@@ -25,8 +25,8 @@ import numpy as np
 
 from wbc.walking.body_path import BodyPath
 from wbc.walking.planner.grips.table import Grips
-from wbc.walking.planner.slices import Slices, drained
-from wbc.walking.planner.stances.candidates import QUANTUM, Fan, Outlook, following
+from wbc.walking.planner.slices import Allowance, Slices, counted, drained
+from wbc.walking.planner.stances.candidates import QUANTUM, Candidate, Fan, Outlook, following
 from wbc.walking.planner.stances.nodes import Conflicts, Found, Node, StanceEnds, SwingTable, moves_to
 from wbc.walking.planner.swings.move import Key, Move, Swing
 
@@ -43,8 +43,8 @@ USUAL, SLACK = 2.1, 0.5
 MOVES, PARTS = 2, 2
 #: Of more arms than FEW_ARMS so many widths of stances are put in order by their conflicts before they are checked
 FEW_ARMS, AHEAD = 3, 12
-#: Of these, searches end where so many re-grasps led no further
-STUCK = 12
+#: Of these, searches end where so many re-grasps led no further; with six arms plans were found after at most two such
+STUCK = 6
 #: Stances, and pairs of grips, of one slice of the search
 NODES, PAIRS = 16, 96
 #: Arm, grips and sample of a swing that was looked at
@@ -63,6 +63,7 @@ class StanceSearch(Generic[S]):
         width: stances stored for each number of re-grasps, None: all.
         first: row of an arm and of a hold: the first move, whether it is needed or not; None: any.
         spare: samples before the end of a grip until which other hands land.
+        allowance: slices of work; where they are spent the search ends with the best of what is known.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class StanceSearch(Generic[S]):
         width: int | None = 200,
         first: tuple[int, int] | None = None,
         spare: int = SPARE,
+        allowance: Allowance | None = None,
     ) -> None:
         self.path, self.grips, self.conflicts, self.swings = path, grips, conflicts, swings
         self._usual = round(USUAL / path.spacing)
@@ -87,6 +89,7 @@ class StanceSearch(Generic[S]):
         self._levels, self._asked = list[dict[Key, Node]](), list[set[SwingKey]]()
         self.patient, self._longest_wait = patient, np.inf if patient else hover
         self.longest_delay, self.width, self.first = longest_delay, width, first
+        self.allowance = allowance
         self.expanded = 0
         # The end of the path is no limit of the arm
         lasting = grips.last == len(path) - 1
@@ -114,7 +117,9 @@ class StanceSearch(Generic[S]):
             if deadline is not None and time.perf_counter() > deadline:
                 break
             if len(levels) == len(self._levels):
-                following_level, asked = yield from self._next(level)
+                if self.allowance is not None and self.allowance.spent:
+                    break
+                following_level, asked = yield from counted(self._next(level), self.allowance)
                 self._levels.append(following_level)
                 self._asked.append(asked)
             level = self._levels[len(levels)]
@@ -148,7 +153,8 @@ class StanceSearch(Generic[S]):
         if self.width and len(self._by_arm) > FEW_ARMS:
             order = yield from self._reordered(order, AHEAD * self.width)
         kept: dict[Key, Node] = {}
-        while part := list(islice(order, PARTS * self.width if self.width else None)):
+        while some := list(islice(order, PARTS * self.width if self.width else None)):
+            part = [(one.key, one.nodes()) for one in some]
             found = yield from self._prepare(level, part)
             for (key, nodes), swings in zip(part, found, strict=True):
                 asked.update((s.arm, s.source, s.target, s.lift) for s in swings if s is not None)
@@ -161,16 +167,14 @@ class StanceSearch(Generic[S]):
                 break
         return self._best(kept), asked
 
-    def _reordered(
-        self, order: Iterator[tuple[Key, list[Node]]], most: int
-    ) -> Slices[Iterator[tuple[Key, list[Node]]]]:
+    def _reordered(self, order: Iterator[Candidate], most: int) -> Slices[Iterator[Candidate]]:
         """The first stances of an order by their promise as conflicts end them, then the others."""
         some = list(islice(order, most))
         if not some:
             return order
-        yield from self._compared([key for key, _ in some])
-        keys, heads = np.array([key for key, _ in some], dtype=np.int64), [nodes[0] for _, nodes in some]
-        samples, delays = np.array([(node.sample, node.delay) for node in heads], dtype=np.int64).T
+        yield from self._compared([one.key for one in some])
+        keys = np.array([one.key for one in some], dtype=np.int64)
+        samples, delays = np.array([(one.sample, one.delay) for one in some], dtype=np.int64).T
         promise = self._outlook.promise(self.ends.by_arm(keys, samples), samples, delays)
         return chain((some[k] for k in self._outlook.order(keys, samples, promise).tolist()), order)
 
