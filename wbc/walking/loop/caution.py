@@ -172,11 +172,11 @@ class Caution:
         machine, progress = self._machine, self._progress
         rows = self._rows = self.sight.rows(machine, progress, swinging, when)
         held = dict(machine.held)
-        at = list[tuple[int, Array]]()
+        left, to = list[tuple[int, Array]](), list[tuple[int, Array]]()
         for arm in set(range(len(machine.walker.arms))) - set(machine.held):
-            at += self.sight.around(arm, machine.hand(arm)[0])
+            left += self.sight.around(arm, machine.hand(arm)[0])
         if swinging is not None:
             # It is on the hold that it is about to leave
-            leaving = {swinging.arm: held.pop(swinging.arm, -1)}
-            at += [*self.sight.holds({swinging.arm: swinging.hold}), *self.sight.holds(leaving)]
-        return self.sight.nearest(when.times, rows, at, held)
+            left += self.sight.holds({swinging.arm: held.pop(swinging.arm, -1)})
+            to = self.sight.holds({swinging.arm: swinging.hold})
+        return self.sight.nearest(when.times, rows, left, to, held)
