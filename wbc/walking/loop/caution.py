@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.clearance import Nearest
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.loop.foresight import STEP, Foresight, Timing
 from wbc.walking.loop.hand_pace import ramp_of
 from wbc.walking.loop.machine import Machine
@@ -97,13 +98,15 @@ class Caution:
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
 
-        A hand whose joints would need more than their rates, as the body stands that was to go with it, goes slower
-        from now on: it could not follow, and would swing beyond its way as that ends.
+        A hand whose joints would need more than they can, as the body stands or goes elsewhere that was to go with it,
+        goes slower from now on: it could not follow, and would swing beyond its way as that ends.
         """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
         fastest = self._fastest(swinging, when.times)
-        if course.stands and fastest > 1.0 and swinging.part > SLOWEST:
+        path, led, _ = self._known or (None, None, False)
+        changed = course.stands or (led is swinging and path is not self._progress.plan.path)
+        if changed and fastest > 1.0 and swinging.part > SLOWEST:
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
@@ -116,13 +119,18 @@ class Caution:
         return found
 
     def _fastest(self, swinging: Swinging, times: Array) -> float:
-        """The greatest rate of the swinging arm's joints in what was foreseen last, in parts of their limits, once it
-        is back on its way.
+        """How many times too fast the swinging arm is in what was foreseen last, once it is back on its way: the
+        greatest of its joints' rates, and of the roots of the accelerations of those that lead the hand's place, in
+        parts of their limits.
         """
-        arm = self._machine.walker.arms[swinging.arm]
+        walker = self._machine.walker
+        arm, limits, leading = walker.arms[swinging.arm], walker.robot.limits, limb_of(walker).guided
         since = min(int(np.searchsorted(times, SETTLED)), len(times) - 2)
-        rates = np.diff(self._rows[since:, arm.q], axis=0) / np.diff(times[since:])[:, None]
-        return float((np.abs(rates) / self._machine.walker.robot.limits.velocity[arm.v]).max())
+        steps = np.diff(times[since:])[:, None]
+        rates = np.diff(self._rows[since:, arm.q], axis=0) / steps
+        changes = np.diff(rates, axis=0) / (0.5 * (steps[1:] + steps[:-1]))
+        fastest, hardest = np.abs(rates) / limits.velocity[arm.v], np.abs(changes) / limits.acceleration[arm.v]
+        return max(float(fastest.max()), float(np.sqrt(hardest[:, :leading].max(initial=0.0))))
 
     def strays(self, swinging: Swinging) -> bool:
         """Whether body and hand are elsewhere than they were foreseen, as far as that is looked at now."""

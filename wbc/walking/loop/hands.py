@@ -12,7 +12,8 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.rotations import quaternion
 from wbc.validation import Array
-from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
+from wbc.walking.arms.puma import limb_of
+from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, axis_part, braking
 from wbc.walking.loop.hand_pace import LANDING, at_rest, hand_pace, ramp_of, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
@@ -69,7 +70,11 @@ class ArmLeader:
         if machine.walker.two_ended:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
-        self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
+        self._hand, self._landing, self._limb = (
+            HandCommand(machine.dt),
+            HandLanding(machine.dt),
+            limb_of(machine.walker),
+        )
         self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
@@ -120,7 +125,10 @@ class ArmLeader:
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
         near = near and not swinging.dropped
-        self._stack.swing(arm, followed, self._landing.go(swinging, hold, near, machine.lag))
+        axes = self._landing.go(swinging, hold, near, machine.lag)
+        # Of the joints as they are: only near its hold the axis counts
+        part = 1.0 if axes is None else axis_part(float(self._limb.wrist_bend(machine.q[machine.walker.arms[arm].q])))
+        self._stack.swing(arm, followed, axes, part)
 
 
 class Hands:
