@@ -16,7 +16,7 @@ from wbc.walking.arms.fits import check_fits
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
-from wbc.walking.loop.caution import Caution
+from wbc.walking.loop.caution import RATE, SETTLED, Caution
 from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
@@ -222,6 +222,31 @@ def test_little_is_proven_twice(machine: Walker, structure: Structure, stack: Wa
     assert 0.0 < until <= 1.0
     assert caution.ahead(plan.path.duration) is None
     assert caution.until == until
+
+
+def test_a_hand_whose_body_goes_elsewhere_is_no_faster_than_its_joints_can(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    caution, swinging = walk._caution, walk.swinging
+    assert caution is not None
+    assert swinging is not None
+    # Joint 1 speeds up four times as hard as it can; of joint 4, which does not lead the hand's place, only rates count
+    times, arm = SETTLED + 1e-3 * np.arange(6), machine.arms[swinging.arm]
+    for joint, fastest in ((0, 2.0), (3, 0.1)):
+        caution._rows = np.zeros((6, machine.robot.nq))
+        changes = 2.0 * machine.robot.limits.acceleration[arm.v.start + joint] * (times - SETTLED) ** 2
+        caution._rows[:, arm.q.start + joint] = changes
+        assert caution._fastest(swinging, times) == pytest.approx(fastest, rel=1e-6 if joint == 0 else 0.9)
+    monkeypatch.setattr(caution, "_fastest", lambda _swinging, _times: 1.5)
+    course = walk._course(swinging)
+    assert caution.swing(swinging, course) is None
+    assert swinging.part == 1.0
+    # It was planned for the path that the body was on when it was lifted
+    caution._known = None, swinging, False
+    caution.swing(swinging, course)
+    assert swinging.part == pytest.approx(RATE / 1.5)
 
 
 def test_a_hand_may_be_near_what_a_hold_is_on_until_it_has_left_that_hold(

@@ -93,6 +93,7 @@ class ArmLeader:
     def lead(self, swinging: Swinging, early: float, pace: float, aborted: bool) -> None:
         """Along the law by the hand's clock; near its hold the hand turns upright."""
         machine, progress, arm = self._machine, self._progress, swinging.arm
+        swinging.earlier = swinging.axis
         swinging.place, swinging.axis, swinging.x_axis = machine.hand(arm)
         # Beyond theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
         at_branch = turned(swinging, machine.q[machine.walker.arms[arm].q].tolist()[3:])
@@ -231,18 +232,21 @@ class Hands:
             return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
             before = swinging.place, swinging.axis, swinging.x_axis
-            if self.rests(swinging.arm, swinging.hold, before, swinging.x):
+            if self.rests(swinging.arm, swinging.hold, before, swinging.x, swinging.earlier):
                 swinging.state, swinging.latch = "closing", self.data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.machine.dt
             return swinging.latch <= 1e-9
         return False
 
-    def rests(self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None) -> bool:
-        """Whether a hand is on a hold and still; ``before`` as of :func:`at_rest`."""
-        structure = self.machine.structure
+    def rests(
+        self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None, earlier: Array | None
+    ) -> bool:
+        """Whether a hand is on a hold and still; ``before`` and ``earlier`` as of :func:`at_rest`."""
+        structure, machine = self.machine.structure, self.machine
         there = structure.positions[hold], structure.axes[hold]
-        return at_rest(before, self.machine.hand(arm), there, x, structure.tilts[hold], self.data, self.machine.dt)
+        earlier = earlier if machine.lag == 0.0 else None
+        return at_rest(before, machine.hand(arm), there, x, structure.tilts[hold], self.data, machine.dt, earlier)
 
     def missed(self, swinging: Swinging) -> bool:
         """The latch did not close: the hand tries again; whether it has tried often enough."""
