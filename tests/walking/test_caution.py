@@ -16,7 +16,7 @@ from wbc.walking.arms.fits import check_fits
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
-from wbc.walking.loop.caution import Caution
+from wbc.walking.loop.caution import RATE, SETTLED, Caution
 from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
@@ -55,9 +55,9 @@ def test_swings_are_foreseen_as_they_are(
     seen = list[tuple[float, np.ndarray, np.ndarray]]()
     nearest = Foresight.nearest
 
-    def kept(sight, times, q, at, held=None):  # type: ignore[no-untyped-def]
+    def kept(sight, times, q, left, to=(), held=None):  # type: ignore[no-untyped-def]
         seen.append((walk.time, times, q))
-        return nearest(sight, times, q, at, held)
+        return nearest(sight, times, q, left, to, held)
 
     monkeypatch.setattr(Foresight, "nearest", kept)
     walk = Walk(machine, structure, plan, stack=stack)
@@ -242,7 +242,7 @@ def test_a_swing_is_slower_where_its_arm_has_no_room_to_lag(
     assert swinging is not None
     assert caution is not None
     course = walk._course(swinging)
-    monkeypatch.setattr(Caution, "_fastest", lambda _self, _swinging, _times: 1.2)
+    monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (1.2, 0.0))
     times, rows = np.array([0.0, 1.0]), np.repeat(walk.q[None], 2, axis=0)
     room = caution.sight.spare(times, rows, swinging.arm, 10.0)
     pairs = caution.sight._bringing[swinging.arm]
@@ -282,3 +282,80 @@ def test_little_is_proven_twice(machine: Walker, structure: Structure, stack: Wa
     assert 0.0 < until <= 1.0
     assert caution.ahead(plan.path.duration) is None
     assert caution.until == until
+
+
+def test_a_hand_whose_body_goes_elsewhere_is_no_faster_than_its_joints_can(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    caution, swinging = walk._caution, walk.swinging
+    assert caution is not None
+    assert swinging is not None
+    # Joint 1 speeds up four times as hard as it can; of joint 4, which does not lead the hand's place, only rates count
+    times, arm = SETTLED + 1e-3 * np.arange(6), machine.arms[swinging.arm]
+    for joint, fastest in ((0, 2.0), (3, 0.1)):
+        caution._rows = np.zeros((6, machine.robot.nq))
+        changes = 2.0 * machine.robot.limits.acceleration[arm.v.start + joint] * (times - SETTLED) ** 2
+        caution._rows[:, arm.q.start + joint] = changes
+        assert max(caution._needs(swinging, times)) == pytest.approx(fastest, rel=1e-6 if joint == 0 else 0.9)
+    monkeypatch.setattr(caution, "_needs", lambda _swinging, _times: (0.5, 1.5))
+    course = walk._course(swinging)
+    assert caution.swing(swinging, course) is None
+    assert swinging.part == 1.0
+    # It was planned for the path that the body was on when it was lifted
+    caution._known = None, swinging, False
+    caution.swing(swinging, course)
+    assert swinging.part == pytest.approx(RATE / 1.5)
+
+
+def test_a_hand_may_be_near_what_a_hold_is_on_until_it_has_left_that_hold(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    """A hand that comes back to a hold from beyond its neighbourhood is as far from everything as any link."""
+    walk = Walk(machine, structure, plan, stack=stack)
+    sight, arm = Foresight(machine, structure), machine.arms[1]
+    place, held = structure.positions[walk.held[1]], {k: hold for k, hold in walk.held.items() if k != 1}
+    near, far = walk.q.copy(), walk.q.copy()
+    for q, up in ((near, 0.05), (far, 0.12)):
+        pose = arm.base.actInv(pin.XYZQUATToSE3(q[:7]).actInv(lifted(walk, 1, up)))
+        found, valid = limb_of(machine).inverse(pose.homogeneous[None])
+        q[arm.q] = limb_of(machine).nearest(found, valid, q[arm.q])[0]
+    times = np.array([0.0, 1.0, 2.0])
+    left, to = [(1, place)], [(1, place)]
+    assert sight.nearest(times, np.array([near, near, near]), left, held=held) is None
+    assert sight.nearest(times, np.array([near, far, far]), left, held=held) is None
+    assert sight.nearest(times, np.array([near, far, near]), left, held=held) is not None
+    assert sight.nearest(times, np.array([near, far, near]), left, to, held) is None
+
+
+def lifted(walk: Walk, arm: int, up: float) -> pin.SE3:
+    """Of a hand that is moved off its hold along its own axis [m]."""
+    origin, z, x = walk.machine.hand(arm)
+    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), origin - up * z)
+
+
+def test_a_machine_forgets_the_holds_that_its_hands_have_left(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    walk = Walk(machine, structure, plan, stack=stack)
+    place, near = structure.positions[walk.held[1]], machine.tolerances.exempt_distance
+    walk.machine.open(1)
+    z = np.array([0.0, 0.0, 1.0])
+    for before, now, kept in ((0.0, 0.9, 1), (1.2, 1.1, 1), (0.99, 1.01, 0)):
+        walk.machine.left[1] = [place]
+        walk.machine.chain.origins[1] = place + before * near * z
+        walk.machine._place = at_once(walk, place + now * near * z)  # type: ignore[method-assign]
+        walk.machine.move(np.zeros(machine.robot.nv))
+        assert len(walk.machine.left[1]) == kept
+
+
+def at_once(walk: Walk, place: np.ndarray):  # type: ignore[no-untyped-def]
+    """What takes the second hand to a place."""
+
+    def put(_joints: np.ndarray) -> float:
+        walk.machine.chain.origins = walk.machine.chain.origins.copy()
+        walk.machine.chain.origins[1] = place
+        return 0.0
+
+    return put

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -18,9 +19,10 @@ from wbc.walking.holds.built_in import grid_pose
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.modes.commands import CommandTable, NumberTableError, read_commands
+from wbc.walking.modes.courses import Course, course_slices
 from wbc.walking.modes.drive import Drive, standing_plan
 from wbc.walking.modes.steering import Steering
-from wbc.walking.planner.plan import Plan
+from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.run.recording import WalkRecorder
 
 INCH = 0.0254
@@ -229,3 +231,19 @@ def test_a_bad_command_changes_nothing(machine: Walker, structure: Structure, st
     with pytest.raises(ShapeError):
         drive.steer("fast", 0.0, 0.0)  # type: ignore[arg-type]
     assert drive.command == pytest.approx([0.0, 0.05, 0.0])
+
+
+def test_a_hand_that_swings_lands_on_another_path_with_its_elbow_bent(
+    machine: Walker, structure: Structure, begin: Plan
+) -> None:
+    """Hands that hold may have straight elbows; a hand that is to land then goes on to where it can."""
+    straight = replace(machine, margins=replace(machine.margins, landing_elbow=3.0))
+    hands, here = tuple((chain[0],) for chain in begin.chain), (0,) * len(machine.arms)
+    for walker, swings, possible in ((machine, 0, True), (straight, -1, True), (straight, 0, False)):
+        begun = Course(0.0, 0.0, 0, (), (), hands, here, swings)
+        slices = course_slices(walker, structure, begin, begun, begin.path, quick=True)
+        if possible:
+            assert next(plan for plan in slices if plan is not None).start == begin.start
+            continue
+        with pytest.raises(NoPlanError, match="cannot hold it on the new path"):
+            list(slices)

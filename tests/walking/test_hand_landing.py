@@ -10,7 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.walking.loop.hand_command import HandLanding
+from wbc.robots import WalkerData
+from wbc.walking.loop.hand_command import BENT, HandLanding, axis_part
+from wbc.walking.loop.hand_pace import at_rest
 from wbc.walking.loop.state import Axes, Swinging
 from wbc.walking.planner.swings.law import Aim
 
@@ -103,3 +105,27 @@ def test_it_goes_on_to_turn_as_the_hand_turned(rolls: bool) -> None:
     assert np.linalg.norm(begun[0] - turned) < 0.25 * np.linalg.norm(turned)
     # Of joints that lag it is seen too late: their lean goes with the height alone
     assert np.linalg.norm(begun[1] - turned) > 2.0 * np.linalg.norm(turned)
+
+
+def test_the_axis_of_a_hand_counts_less_against_its_place_where_joint_4_hardly_turns_it() -> None:
+    assert axis_part(1.0) == axis_part(BENT) == 1.0
+    assert axis_part(0.1 * BENT) == pytest.approx(0.01)
+    assert axis_part(0.0) == 0.0
+
+
+def test_a_hand_that_leans_and_turns_back_is_not_at_rest() -> None:
+    data, z, x = WalkerData.read(), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+
+    def rests(*leans: float, known: bool = True) -> bool:
+        """Of the last three ticks [rad]."""
+        earlier, before, now = (np.array([np.sin(lean), 0.0, np.cos(lean)]) for lean in leans)
+        hands = (np.zeros(3), before, x), (np.zeros(3), now, x)
+        return at_rest(*hands, (np.zeros(3), z), None, 0.05, data, DT, earlier if known else None)
+
+    # At the turning point it is slow, and it would be faster in the next tick
+    assert not rests(1.7e-3, 1.8e-3, 1.8e-3)
+    assert rests(1.7e-3, 1.8e-3, 1.8e-3, known=False)
+    assert rests(1.8e-3, 1.8e-3, 1.8e-3)
+    assert not rests(1.9e-3, 1.86e-3, 1.82e-3)
+    # Upright it cannot become faster than its gain makes it
+    assert rests(0.28e-3, 0.24e-3, 0.2e-3)

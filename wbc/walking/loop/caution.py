@@ -100,14 +100,17 @@ class Caution:
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
 
-        A hand whose joints would need more than their rates goes slower from now on where the body stands that was to
-        go with it, as it would swing beyond its way where that ends, and where its arm has no room to lag.
+        A hand whose joints would need more than they can goes slower from now on where the body stands, or goes
+        elsewhere, that was to go with it, as it would swing beyond its way where that ends; and where its arm has no
+        room to lag.
         """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
-        fastest = self._fastest(swinging, when.times)
-        slower = fastest > 1.0 and swinging.part > SLOWEST
-        if slower and (course.stands or self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS):
+        rate, root = self._needs(swinging, when.times)
+        path, led, _ = self._known or (None, None, False)
+        changed = course.stands or (led is swinging and path is not self._progress.plan.path)
+        fastest = max(rate, root) if changed else rate
+        if fastest > 1.0 and swinging.part > SLOWEST and (changed or self._no_room(swinging, when)):
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
@@ -118,14 +121,23 @@ class Caution:
             self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
         return found
 
-    def _fastest(self, swinging: Swinging, times: Array) -> float:
-        """The greatest rate of the swinging arm's joints in what was foreseen last, in parts of their limits, once it
-        is back on its way.
+    def _no_room(self, swinging: Swinging, when: Timing) -> bool:
+        """Whether an arm that lags in what was foreseen last may touch something."""
+        return self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS
+
+    def _needs(self, swinging: Swinging, times: Array) -> tuple[float, float]:
+        """How many times too fast the swinging arm is in what was foreseen last, once it is back on its way: the
+        greatest of its joints' rates, and of the roots of the accelerations of those that lead the hand's place, in
+        parts of their limits.
         """
-        arm = self._machine.walker.arms[swinging.arm]
+        walker = self._machine.walker
+        arm, limits, leading = walker.arms[swinging.arm], walker.robot.limits, limb_of(walker).guided
         since = min(int(np.searchsorted(times, SETTLED)), len(times) - 2)
-        rates = np.diff(self._rows[since:, arm.q], axis=0) / np.diff(times[since:])[:, None]
-        return float((np.abs(rates) / self._machine.walker.robot.limits.velocity[arm.v]).max())
+        steps = np.diff(times[since:])[:, None]
+        rates = np.diff(self._rows[since:, arm.q], axis=0) / steps
+        changes = np.diff(rates, axis=0) / (0.5 * (steps[1:] + steps[:-1]))
+        fastest, hardest = np.abs(rates) / limits.velocity[arm.v], np.abs(changes) / limits.acceleration[arm.v]
+        return float(fastest.max()), float(np.sqrt(hardest[:, :leading].max(initial=0.0)))
 
     def strays(self, swinging: Swinging) -> bool:
         """Whether body and arm are elsewhere than they were foreseen, as far as that is looked at now.
@@ -184,11 +196,11 @@ class Caution:
         machine, progress = self._machine, self._progress
         rows = self._rows = self.sight.rows(machine, progress, swinging, when)
         held = dict(machine.held)
-        at = list[tuple[int, Array]]()
+        left, to = list[tuple[int, Array]](), list[tuple[int, Array]]()
         for arm in set(range(len(machine.walker.arms))) - set(machine.held):
-            at += self.sight.around(arm, machine.hand(arm)[0])
+            left += self.sight.around(arm, machine.hand(arm)[0])
         if swinging is not None:
             # It is on the hold that it is about to leave
-            leaving = {swinging.arm: held.pop(swinging.arm, -1)}
-            at += [*self.sight.holds({swinging.arm: swinging.hold}), *self.sight.holds(leaving)]
-        return self.sight.nearest(when.times, rows, at, held)
+            left += self.sight.holds({swinging.arm: held.pop(swinging.arm, -1)})
+            to = self.sight.holds({swinging.arm: swinging.hold})
+        return self.sight.nearest(when.times, rows, left, to, held)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Mapping
 from itertools import combinations
-from math import sqrt
+from math import ceil, sqrt
 
 import casadi as ca
 import numpy as np
@@ -17,7 +17,7 @@ from wbc.robots import Walker
 from wbc.stack.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.operators import quick_operators
-from wbc.symbolic.rotations import exp3, from_quaternion, quaternion_product
+from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, quaternion_product
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.rolls import allowed_x
@@ -29,8 +29,11 @@ SWEEPS = 6
 TINY = 1e-300
 
 _KNOWN: weakref.WeakKeyDictionary[object, ca.Function] = weakref.WeakKeyDictionary()
-#: A body that is farther from where the hands have it than this is put there at once [m, rad]
+#: Where the hands of a body would be farther off the fit than this, or one that may not tilt turned by more, the body
+#: is put there at once [m, rad]
 NEAR = 0.002, 0.005
+#: What a body takes back in the time that is the least for it; more takes as much longer [m, rad]
+QUICKLY = 5e-4, 5e-4
 #: Metres that a unit of misalignment of a hand's axis counts for: hands turn before they slip
 AXIS_LENGTH = 0.05
 #: The same of a compliant hold: origins keep their place to 1e-7 m against it
@@ -41,8 +44,8 @@ def chain_function(walker: Walker) -> ca.Function:
     """f(q, weights, mean, centre, mask, holds, off): see :class:`wbc.walking.loop.closed_chain.ClosedChain`.
 
     Of n arms, with 3 n rows of numbers for origins, z axes and x axes of the hands: ``weights`` ``[9 n]`` by rows,
-    ``mean`` ``[n]``, ``centre`` ``[3]`` [m], ``mask`` ``[n]``, ``holds`` ``[3 n]`` [m], ``off`` ``[6]``: by which the
-    body is off the place that fits, along and about the structure's axes [m, rad].
+    ``mean`` ``[n]``, ``centre`` ``[3]`` [m], ``mask`` ``[n]``, ``holds`` ``[3 n]`` [m], ``off`` ``[6]``: twist
+    (linear; angular) whose exponential takes the body from the pose that fits, in the structure [m, rad].
 
     Returns:
         q with the body where the holds have it, and off that, its quaternion with the sign nearest to the one given;
@@ -64,8 +67,9 @@ def _function(walker: Walker) -> ca.Function:
     ours = ca.reshape(rows(joints), 3, 3 * n).T
     quaternion = largest(davenport(ca.reshape(weights, 3, 3 * n) @ ours))
     quaternion = ca.if_else(ca.dot(quaternion, q[3:7]) < 0.0, -quaternion, quaternion)
-    place = centre - (ours[:n, :] @ from_quaternion(quaternion).T).T @ mean + off[:3]
-    quaternion = quaternion_product(exp3(off[3:]), quaternion)
+    place, away = centre - (ours[:n, :] @ from_quaternion(quaternion).T).T @ mean, exp3(off[3:])
+    place = from_quaternion(away) @ place + left_jacobian(off[3:]) @ off[:3]
+    quaternion = quaternion_product(away, quaternion)
     moved = ours @ from_quaternion(quaternion).T
     moved[:n, :] += ca.repmat(place.T, n, 1)
     gaps = moved[:n, :] - ca.reshape(holds, 3, n).T
@@ -136,24 +140,26 @@ class ClosedChain:
     Davenport's q method: with A = sum (h_k - mean h) p_k' + L^2 a_k z_k', tr(R' A) = q' K q for the quaternion q of R.
 
     Where other hands hold than before, the best fit jumps by some tenths of a millimetre: with three hands the last
-    microns of one decide the turn about the line between the two others. A latch is not as sudden as that: the body
-    goes on from where it is, and what it is off the fit is taken back over ``ease`` calls, by 1 - 10 s^3 + 15 s^4 - 6
-    s^5.
+    microns of one decide the turn about the line between the two others; by centimetres where two are left that lean,
+    and what leaned the other way has let go. A latch is not as sudden as that: the body goes on from where it is, and
+    the motion by which it is off the fit is taken back by 1 - 10 s^3 + 15 s^4 - 6 s^5: over ``ease`` calls, or as many
+    more as it is beyond :data:`QUICKLY`.
 
     Args:
-        walker: its joints are what moves. structure: whose holds are meant. ease: calls of :meth:`settle`; 0: at once.
+        walker: its joints are what moves. structure: whose holds are meant. ease: least calls of :meth:`settle`; 0: at
+            once.
 
     Attributes:
         origins, axes, x_axes: of all hands in the structure, and their z and x axes, after the last :meth:`settle`:
             ``[arms, 3]`` each, origins in m.
+        away: turn by which the body is off the fit after it; None: it is not.
     """
 
     def __init__(self, walker: Walker, structure: Structure, ease: int = 0) -> None:
         self.walker, self.structure = walker, structure
-        s = np.linspace(1.0, 0.0, ease + 1)[1:]
-        self._parts: list[float] = (s**3 * (10.0 - 15.0 * s + 6.0 * s * s)).tolist()
-        # What the body was off the fit when other hands held, and calls since then
-        self._jump, self._calls = np.zeros(6), ease
+        # What the body was off the fit when other hands held, in how many calls it is taken back, and those left
+        self._jump, self._ease, self._calls, self._left = np.zeros(6), ease, ease, 0
+        self.away: Array | None = None
         model = walker.robot.model
         self._model, self._data = model, model.createData()
         self._still = np.array(pin.neutral(model))
@@ -169,7 +175,7 @@ class ClosedChain:
 
     def on(self, structure: Structure) -> ClosedChain:
         """The same robot, at the same place, on another structure."""
-        out = ClosedChain(self.walker, structure, len(self._parts))
+        out = ClosedChain(self.walker, structure, self._ease)
         out.origins, out.axes, out.x_axes = self.origins, self.axes, self.x_axes
         return out
 
@@ -198,13 +204,17 @@ class ClosedChain:
         """
         if held != self._held:
             self._take(held, q)
-            if self._parts:
-                self._begin_easing(q)
+            if self._ease:
+                self._begin_easing(held, q)
         elif self._leans:
             self._take(held, q)
-        if self._calls < len(self._parts):
-            self._off[:] = self._parts[self._calls] * self._jump
-            self._calls += 1
+        if self._left:
+            self._left -= 1
+            s = self._left / self._calls
+            self._off[:] = s**3 * (10.0 - 15.0 * s + 6.0 * s * s) * self._jump
+            self.away = pin.exp3(self._off[3:])
+        else:
+            self.away = None
         self._q[:] = q
         if joints is not None:
             self._q[7:] = joints
@@ -214,16 +224,20 @@ class ClosedChain:
         self.origins, self.axes, self.x_axes = moved[:count], moved[count : 2 * count], moved[2 * count :]
         return found[:nq], found.item(nq)
 
-    def _begin_easing(self, q: Array) -> None:
+    def _begin_easing(self, held: Mapping[int, int], q: Array) -> None:
         """The body goes on from a configuration."""
         self._off[:] = 0.0
         self._q[:] = q
         self._fit.run()
-        found = self._fit.output
-        turn = pin.Quaternion(q[3:7]).matrix() @ pin.Quaternion(found[3:7]).matrix().T
-        self._jump[:3], self._jump[3:] = q[:3] - found[:3], pin.log3(turn)
-        far, turned = (float(np.linalg.norm(part)) for part in (self._jump[:3], self._jump[3:]))
-        self._calls = 0 if far < NEAR[0] and turned < NEAR[1] else len(self._parts)
+        found, hands = self._fit.output, list(held)
+        fit = pin.XYZQUATToSE3(found[:7])
+        self._jump[:] = pin.log6(pin.XYZQUATToSE3(q[:7]) * fit.inverse()).vector
+        far, turned = float(np.linalg.norm(q[:3] - found[:3])), float(np.linalg.norm(self._jump[3:]))
+        origins = found[len(q) + 1 :].reshape(-1, 3)[hands]
+        off = float(np.linalg.norm(self._hands(q)[0][hands] + q[:3] - origins, axis=1).max())
+        tilts = bool((self.structure.tilts[list(held.values())] >= LEAST_TILT).all())
+        self._calls = ceil(self._ease * max(1.0, far / QUICKLY[0], turned / QUICKLY[1]))
+        self._left = self._calls if off < NEAR[0] and (tilts or turned < NEAR[1]) else 0
 
     def _take(self, held: Mapping[int, int], q: Array) -> None:
         """What depends on the holds alone, until other ones are held.

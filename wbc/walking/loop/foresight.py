@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import inf
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc.clearance import (
     Exemption,
@@ -87,17 +89,30 @@ class Foresight:
         self._columns = [column[name] for name in tree.coordinates]
 
     def nearest(
-        self, times: Array, q: Array, at: Sequence[tuple[int, Array]], held: Mapping[int, int] | None = None
+        self,
+        times: Array,
+        q: Array,
+        left: Sequence[tuple[int, Array]],
+        to: Sequence[tuple[int, Array]] = (),
+        held: Mapping[int, int] | None = None,
     ) -> Nearest | None:
         """The first instant found at which two bodies are too near in a motion ``[k, nq]``; None: proven clear.
 
         Args:
-            times: of the rows [s]. at: (row of an arm, place of a hold [m]): its hand may touch what it is on.
+            times: of the rows [s]. left, to: (row of an arm, place of a hold [m]): its hand may touch what a hold is on
+                until it is no longer near it, and from where it comes near to the one that it goes to.
             held: row of an arm -> row of the hold, of hands that hold all the time.
         """
         motion = self.motion(times, q)
-        exempt = [one for arm, place in at for one in self._exemptions(arm, place, DEPTH)]
-        exempt += [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
+        exempt = [one for arm, place in self.holds(held or {}) for one in self._exemptions(arm, place, HELD_DEPTH)]
+        for arm, place in left:
+            far = self._far(arm, q, place)
+            until = float(times[far[0]]) if len(far) else inf
+            exempt += self._exemptions(arm, place, DEPTH, until=until)
+        for arm, place in to:
+            far = self._far(arm, q, place)
+            since = float(times[far[-1]]) if len(far) else -inf
+            exempt += self._exemptions(arm, place, DEPTH, since=since)
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
 
     def spare(self, times: Array, q: Array, arm: int, most: float) -> float:
@@ -188,12 +203,12 @@ class Foresight:
         frames = np.repeat((pose * mine.base).homogeneous[None], count, axis=0)
         angles, _ = limb.follow(frames[None], places[None], guide[None], self.walker.margins)
         out[:, mine.q] = angles[0]
-        at = [*self.holds(there), *self.around(arm, places[0])]
+        left = self.around(arm, places[0])
         for k in range(arm + 1, len(self.walker.arms)):
             if k not in held:
                 # It is still where it left its hold
-                at += self.around(k, self.hand(k, out[:1])[0])
-        return self.nearest(times, out, at, held) is None
+                left += self.around(k, self.hand(k, out[:1])[0])
+        return self.nearest(times, out, left, self.holds(there), held) is None
 
     def holds(self, held: Mapping[int, int]) -> list[tuple[int, Array]]:
         """(arm, place) of hands on holds."""
@@ -218,12 +233,19 @@ class Foresight:
                 out.append(SweptBody(body.name, body.shape, body.link, body.placement, grasp))
         return out
 
-    def _exemptions(self, arm: int, point: Array, deep: float) -> list[Exemption]:
+    def _far(self, arm: int, q: Array, place: Array) -> NDArray[np.int64]:
+        """Rows ``[k, nq]`` in which a hand is not near a hold at a place [m]."""
+        away = np.linalg.norm(self.hand(arm, q) - place, axis=1)
+        return np.flatnonzero(away > self.walker.tolerances.exempt_distance)
+
+    def _exemptions(
+        self, arm: int, point: Array, deep: float, since: float = -inf, until: float = inf
+    ) -> list[Exemption]:
         name, distance = point.tobytes(), self.walker.tolerances.exempt_distance
         if name not in self._mounts:
             self._mounts[name] = tuple(_mounted(self.structure, point))
         return [
-            Exemption(hand.name, mount, point, distance, deep + float(getattr(hand.shape, "radius", 0.0)))
+            Exemption(hand.name, mount, point, distance, deep + float(getattr(hand.shape, "radius", 0.0)), since, until)
             for hand, mount in product(self._hands[arm], self._mounts[name])
         ]
 

@@ -142,6 +142,22 @@ class HandCommand:
         return inside - low
 
 
+#: A wrist that turns the hand's axis less well than this, of 1, is not to turn it at the cost of the hand's place
+BENT = 0.6
+
+
+def axis_part(bend: float) -> float:
+    """Part of the weight with which the axis of a hand that comes down counts against its place, (bend / BENT)^2.
+
+    Joint 4 turns the axis by |sin theta5| times its own turn. Where that is little it needs a while for it at its rate
+    and acceleration; with all of the weight the other joints would help, and take the hand off its way by centimetres.
+
+    Args:
+        bend: how well the wrist turns the hand's axis, see :meth:`wbc.robots.Limb.wrist_bend`.
+    """
+    return min(bend / BENT, 1.0) ** 2
+
+
 #: A hand turns upright when its aim is within this of its hold [m]; until then its wrist follows its law
 UPRIGHT = 0.05
 #: A hand whose law ends within this of its hold turns at once [m]

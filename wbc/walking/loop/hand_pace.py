@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc.robots import WalkerData
 from wbc.validation import Array
-from wbc.walking.loop.stack import SWING_GAIN
+from wbc.walking.loop.stack import AXIS_GAIN, SWING_GAIN
 from wbc.walking.loop.state import Swinging
 
 #: The place that a hand is pulled to is no farther from it than this [m]
@@ -23,6 +23,8 @@ OVER = (0.06, 0.16)
 LANDING, TURNED = 0.97, 0.5
 #: Part of the tolerances within which a hand closes: it is still moving a little as it does
 SURE = 0.7
+#: A hand that leans is at rest where it turns by less than this part of what one may that is upright
+TURNING = 0.5
 #: A hand closes on a compliant hold when it leans by less than this part of what it may
 CLOSING_TILT = 0.5
 #: The pace of a hand changes from nothing to all in [s]; after a pause, which may be where its law is fastest, in
@@ -70,12 +72,14 @@ def at_rest(
     tilt: float,
     data: WalkerData,
     dt: float,
+    earlier: Array | None = None,
 ) -> bool:
     """Whether a hand is on its hold and still, so that it may close.
 
     Args:
         before, hand: its place [m], z axis and x axis a tick ago and now. hold: place and z axis.
         x: the x axis that it is to have, None if it may roll. tilt: ``max_tilt`` of the hold [rad].
+        earlier: z axis two ticks ago; None: not known, or measured too coarsely to say how the hand turns on.
     """
     (place, axis, x_axis), (there, wanted) = hand, hold
     # A hand at the turning point of an overshoot is slow, but what is left brings it up to speed again
@@ -87,8 +91,12 @@ def at_rest(
         turn = hypot(turn, angle(x_axis, before[2]))
         if abs(np.arctan2(x_axis @ np.cross(wanted, x), x_axis @ x)) >= SURE * data.close_angle:
             return False
-    leaned = max(SURE * data.close_angle, CLOSING_TILT * tilt)
-    return turn / dt < SURE * data.close_rate and angle(axis, wanted) < leaned
+    leans, leaned, rate = angle(axis, wanted), max(SURE * data.close_angle, CLOSING_TILT * tilt), SURE * data.close_rate
+    if earlier is not None and AXIS_GAIN * leans >= rate:
+        # Nor is one at rest that leans and turns back: in the next tick it is as much faster, or more
+        ahead = 2.0 * np.cross(before[1], axis) - np.cross(earlier, before[1])
+        turn, rate = max(turn, float(np.linalg.norm(ahead))), TURNING * rate
+    return turn / dt < rate and leans < leaned
 
 
 def turned(swinging: Swinging, wrist: Sequence[float]) -> bool:

@@ -12,7 +12,8 @@ import pinocchio as pin
 from wbc.errors import ShapeError
 from wbc.rotations import quaternion
 from wbc.validation import Array
-from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, braking
+from wbc.walking.arms.puma import limb_of
+from wbc.walking.loop.hand_command import UPRIGHT, HandCommand, HandLanding, axis_part, braking
 from wbc.walking.loop.hand_pace import LANDING, at_rest, hand_pace, ramp_of, turned
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
@@ -69,7 +70,11 @@ class ArmLeader:
         if machine.walker.two_ended:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
-        self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
+        self._hand, self._landing, self._limb = (
+            HandCommand(machine.dt),
+            HandLanding(machine.dt),
+            limb_of(machine.walker),
+        )
         self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
@@ -88,6 +93,7 @@ class ArmLeader:
     def lead(self, swinging: Swinging, early: float, pace: float, aborted: bool) -> None:
         """Along the law by the hand's clock; near its hold the hand turns upright."""
         machine, progress, arm = self._machine, self._progress, swinging.arm
+        swinging.earlier = swinging.axis
         swinging.place, swinging.axis, swinging.x_axis = machine.hand(arm)
         # Beyond theta5 = 0 the wrist cannot align the hand: it turns to its branch before the hand lands
         at_branch = turned(swinging, machine.q[machine.walker.arms[arm].q].tolist()[3:])
@@ -120,7 +126,10 @@ class ArmLeader:
         hold = machine.structure.positions[swinging.hold], machine.structure.axes[swinging.hold]
         near = swinging.aim.blend > LANDING and at_branch and dist(swinging.aim.position, hold[0]) < UPRIGHT
         near = near and not swinging.dropped
-        self._stack.swing(arm, followed, self._landing.go(swinging, hold, near, machine.lag))
+        axes = self._landing.go(swinging, hold, near, machine.lag)
+        # Of the joints as they are: only near its hold the axis counts
+        part = 1.0 if axes is None else axis_part(float(self._limb.wrist_bend(machine.q[machine.walker.arms[arm].q])))
+        self._stack.swing(arm, followed, axes, part)
 
 
 class Hands:
@@ -223,18 +232,21 @@ class Hands:
             return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
             before = swinging.place, swinging.axis, swinging.x_axis
-            if self.rests(swinging.arm, swinging.hold, before, swinging.x):
+            if self.rests(swinging.arm, swinging.hold, before, swinging.x, swinging.earlier):
                 swinging.state, swinging.latch = "closing", self.data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.machine.dt
             return swinging.latch <= 1e-9
         return False
 
-    def rests(self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None) -> bool:
-        """Whether a hand is on a hold and still; ``before`` as of :func:`at_rest`."""
-        structure = self.machine.structure
+    def rests(
+        self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None, earlier: Array | None
+    ) -> bool:
+        """Whether a hand is on a hold and still; ``before`` and ``earlier`` as of :func:`at_rest`."""
+        structure, machine = self.machine.structure, self.machine
         there = structure.positions[hold], structure.axes[hold]
-        return at_rest(before, self.machine.hand(arm), there, x, structure.tilts[hold], self.data, self.machine.dt)
+        earlier = earlier if machine.lag == 0.0 else None
+        return at_rest(before, machine.hand(arm), there, x, structure.tilts[hold], self.data, machine.dt, earlier)
 
     def missed(self, swinging: Swinging) -> bool:
         """The latch did not close: the hand tries again; whether it has tried often enough."""

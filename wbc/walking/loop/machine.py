@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import dist
 
 import numpy as np
 import pinocchio as pin
@@ -36,7 +37,8 @@ class Machine:
         q: configuration, the body's pose in the structure. v: last command. rates: of the joints, means over the last
             period, and the body's velocity as the plant has it.
         time: [s]. held: row of the arm -> row of the hold.
-        left: row of the arm -> places of the holds that an open hand has left, or was to go to, last [m].
+        left: row of the arm -> places of the holds that an open hand has left, or was to go to, last, until it is no
+            longer near them [m].
         lag: by how much the joints are later than what they are commanded, as far as that shows [s].
         fixed: fewer hands hold than the body needs, and have since the beginning: it is declared fixed.
         structure, chain: the holds that are there, and the hands on them.
@@ -98,7 +100,21 @@ class Machine:
             # It did something else than was commanded: what lasts for a period is its mean
             self.rates[6:] = (state.q[7:] - self.q[7:]) / self.dt
             self._watch(before)
-        return self._place(state.q[7:])
+        places = self.chain.origins
+        slip = self._place(state.q[7:])
+        for arm, left in self.left.items():
+            if left:
+                self.left[arm] = [hold for hold in left if not self._leaves(hold, places[arm], self.chain.origins[arm])]
+        return slip
+
+    def _leaves(self, hold: Array, before: Array, now: Array) -> bool:
+        """Whether a hand goes away from a hold that it is not near any more; one that still comes has to stop first.
+
+        Args:
+            hold: its place. before, now: places of the hand [m].
+        """
+        far = dist(now, hold)
+        return far > self.walker.tolerances.exempt_distance and far >= dist(before, hold)
 
     def _watch(self, before: Array) -> None:
         """Of commands u and rates v of all joints the lag is sum (u - v) du / dt over sum (du / dt)^2, of late."""

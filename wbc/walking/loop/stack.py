@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerArm
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
+from wbc.walking.loop.curvature import Curvature
 from wbc.walking.loop.state import Axes
 from wbc.walking.planner.grips.rolls import ANY, frame_on
 from wbc.walking.planner.grips.tilt import LEAST_TILT, TILT_PART
@@ -27,6 +29,8 @@ KINDS: dict[tuple[bool, bool], HoldKind] = {
     (True, True): "position",
     (False, True): "roll",
 }
+#: Where the position is in the numbers of a pose: behind the rotation
+PLACE = slice(9, 12)
 #: Gain of holds [1/s] is 1 / (HOLD_TICKS dt)
 HOLD_TICKS = 5
 #: A hand that rolls into its hold: weight, gain [1/s]
@@ -48,6 +52,8 @@ class HoldItems:
 
     def __init__(self, stack: Stack, walker: Walker, structure: Structure, dt: float) -> None:
         self._names, self.gain = [arm.name for arm in walker.arms], 1.0 / (HOLD_TICKS * dt)
+        # Where closed hands hold [m], and that place in the stack
+        self._at: dict[int, tuple[InputGroup, Array]] = {}
         self.kinds = sorted({hold_kind(structure, k) for k in range(len(structure))})
         self._tilts = bool({"position", "roll"} & set(self.kinds))
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
@@ -68,6 +74,10 @@ class HoldItems:
         self._turned = [items[f"{name} x axis"] for name in self._names] if self._rolls else []
         self.gains = [(turned, ROLL_GAIN) for turned in self._turned]
         self.gains += [(hold, self.gain) for kinds in self._holds for hold in kinds.values()]
+        self._targets = [
+            {kind: InputGroup(core_of(controller), [(f"{name} hold {kind}", "target", PLACE)]) for kind in self.kinds}
+            for name in self._names
+        ]
         for arm in range(len(self._names)):
             self.release(arm)
 
@@ -83,12 +93,19 @@ class HoldItems:
             raise RangeError(f"hold {name}", kind, f"the stack was compiled for holds of the kinds {known}")
         self.release(arm)
         item, tilts = self._holds[arm][kind], kind in ("position", "roll")
-        item.enabled, item.target = True, pin.SE3(frame_on(structure, hold, roll))
+        frame = frame_on(structure, hold, roll)
+        item.enabled, item.target = True, pin.SE3(frame)
+        self._at[arm] = self._targets[arm][kind], frame[:3, 3]
         if tilts:
             cone = self._cones[arm]
             cone.enabled, cone.direction = True, structure.axes[hold]
             cone.half_angle = TILT_PART * structure.tilts[hold]
         return tilts
+
+    def lead(self, arm: int, ahead: Array) -> None:
+        """The target of a closed hand is ahead of its hold by so much [m]."""
+        target, place = self._at[arm]
+        target.write(place + ahead)
 
     def follow(self, arm: int, gain: float) -> None:
         """What a closed hand is off its hold is taken back with a gain [1/s]."""
@@ -162,6 +179,7 @@ class WalkStack:
         self._near = (-1, False)
         # Row of an arm that has closed of late -> part of the gains of its hold and its axis
         self._rising: dict[int, float] = {}
+        self._curvature = Curvature(walker, dt)
         items: Any = self.controller
         self._body = InputGroup(core_of(self.controller), [("body", "target", None), ("body", "feedforward", None)])
         self._rest = items["posture"]
@@ -232,19 +250,37 @@ class WalkStack:
         for arm in tuple(self._rising):
             self._rise(arm, self._rising[arm] + self.dt / RISING)
 
-    def swing(self, arm: int, followed: Array, at_hold: Axes | None) -> None:
+    def lead(self, q: Array, v: Array, held: Mapping[int, int], away: Array | None = None) -> None:
+        """Closed hands are told what keeps them on their holds, see :class:`Curvature`.
+
+        Args:
+            q: configuration. v: rates of the last tick ``[nv]``. held: row of the arm -> row of the hold.
+            away: turn by which the body is off where its hands would have it; None: it is not. They lean by it, and no
+                joint could take that back: it would move the body.
+        """
+        self._curvature.go(q, v)
+        for arm, hold in held.items() if away is not None else ():
+            self._axes[arm].target = away @ self.structure.axes[hold]
+        for arm in held:
+            gain = self._hold_gain(self._rising.get(arm, 1.0))
+            if gain > 0.0:
+                # As far ahead as the gain makes that rate of it
+                self._holds.lead(arm, self._curvature.drift(arm, -1.0 / gain))
+
+    def swing(self, arm: int, followed: Array, at_hold: Axes | None, part: float = 1.0) -> None:
         """What a free hand follows.
 
         Args:
             followed: its position [m] and velocity [m/s], joints 4 to 6 [rad] and their rates [rad/s] ``[12]``.
             at_hold: axes of a hand near its hold: they then count and not the wrist; else None.
+            part: of the weight of its z axis.
         """
         near = at_hold is not None
         if self._near != (arm, near):
             self._catch_up()
             aligned, resting, joints = self._axes[arm], self._rest, self._joints(arm)
             self._posture[7:][joints][3:], self._turning[6:][joints][3:] = followed[6:9], followed[9:]
-            aligned.weight = AXIS if near else FREE_AXIS
+            aligned.weight = part * AXIS if near else FREE_AXIS
             self._mask[joints][:3] = 0.0
             self._mask[joints][3:] = 1.0 if near else FREE_WRIST
             self._holds.turn(arm, None)
@@ -252,6 +288,7 @@ class WalkStack:
             self._near = arm, near
         if at_hold is not None:
             self._axes[arm].target, self._axes[arm].feedforward = at_hold.z, at_hold.z_rate
+            self._axes[arm].weight = part * AXIS
             self._holds.turn(arm, at_hold.x, at_hold.x_rate)
         self._hands[arm].write(followed)
 
@@ -275,12 +312,15 @@ class WalkStack:
     def _rise(self, arm: int, part: float) -> None:
         """The gains of a hand's hold and of its axis become a part of what they are to be."""
         if arm in self._rising:
-            most = CRITICAL / max(self._lag, 1e-9)
-            self._axes[arm].gain = min(part, 1.0) * min(AXIS_GAIN, most)
-            self._holds.follow(arm, min(part, 1.0) * min(self._holds.gain, most))
+            self._axes[arm].gain = min(part, 1.0) * min(AXIS_GAIN, CRITICAL / max(self._lag, 1e-9))
+            self._holds.follow(arm, self._hold_gain(part))
             self._rising[arm] = part
             if part >= 1.0:
                 del self._rising[arm]
+
+    def _hold_gain(self, part: float) -> float:
+        """A part, of 1 at most, of the gain of holds on joints that lag as these do [1/s]."""
+        return min(part, 1.0) * min(self._holds.gain, CRITICAL / max(self._lag, 1e-9))
 
     def _still(self, arm: int) -> None:
         """Wrists of arms that do not swing have no rates of their own."""

@@ -47,7 +47,8 @@ class Swinging:
         arm: its row. hold: row of the hold that it goes to. grip: which it is to be.
         law: the aims. clock: time on the law [s]. aim: the one at that time.
         pace: part of full speed. latch: time until the latch is through [s].
-        place, axis, x_axis: of the hand one tick before and its z and x axes, for speeds.
+        place, axis, x_axis: of the hand one tick before and its z and x axes, for speeds. earlier: z axis two ticks
+            before; None: not known.
         x: the x axis that the hand has on its hold; None if it may roll there.
         first_wrist: joints 4 to 6 of a hand that was in the air when it was sent [rad]; None: those of the grip that it
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
@@ -76,6 +77,7 @@ class Swinging:
     tries: int = 0
     place: Array = field(default_factory=lambda: np.zeros(3))
     axis: Array = field(default_factory=lambda: np.zeros(3))
+    earlier: Array | None = None
     x_axis: Array = field(default_factory=lambda: np.zeros(3))
     x: Array | None = None
     shift: Array = field(default_factory=lambda: np.zeros(3))

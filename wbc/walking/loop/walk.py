@@ -243,6 +243,7 @@ class Walk:
         if hands.swinging is not None:
             early = self._due(hands.swinging) - self.path_time
             self.leader.lead(hands.swinging, early, self.body.wanted, self.aborted)
+        self.stack.lead(machine.q, machine.v, machine.held, machine.chain.away)
         begin = time.perf_counter()
         step = self.step = self.stack.controller.step(machine.q, machine.v)
         cost = time.perf_counter() - begin

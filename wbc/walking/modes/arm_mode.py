@@ -210,11 +210,13 @@ class ArmMode:
         walk, name = self.walk, self.walk.structure.ids[row]
         x = None if number == ANY else frame.rotation[:, 0]
         walk.stack.settle(self.arm, walk.structure.positions[row], walk.structure.axes[row], x)
+        earlier: Array | None = None
         for _ in range(REST):
-            before = self.pose
+            place, z, x_axis = walk.machine.hand(self.arm)
             self._tick("open")
-            if walk.hands.rests(self.arm, row, (before.translation, before.rotation[:, 2], before.rotation[:, 0]), x):
+            if walk.hands.rests(self.arm, row, (place, z, x_axis), x, earlier):
                 break
+            earlier = z
         else:
             raise ArmRefused("hold", name, "the hand does not come to rest on it")
         for _ in range(round(walk.hands.data.latch_time / walk.dt)):

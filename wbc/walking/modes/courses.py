@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.robots import Walker, WalkerData
 from wbc.validation import Array
+from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.state import Swinging
@@ -38,6 +39,7 @@ class Course:
         laws: of ``kept``.
         hands: for each arm the grips of the present plan that it has, or swings to, and then those of ``kept``.
         sample: of the new path, at which the first of each arm's grips holds.
+        swings: row of the arm that is swinging, -1 for none.
     """
 
     begins: float
@@ -47,6 +49,7 @@ class Course:
     laws: tuple[SwingLaw, ...]
     hands: tuple[tuple[int, ...], ...]
     sample: tuple[int, ...]
+    swings: int
 
 
 def course(walk: Walk, lead: float, lifts: bool = True) -> Course:
@@ -76,7 +79,8 @@ def course(walk: Walk, lead: float, lifts: bool = True) -> Course:
         before = sum(step.arm == arm.name for step in plan.regrasps[:since])
         more = sum(step.arm == arm.name for step in steps)
         hands.append(tuple(chain[before : before + more + 1]))
-    return Course(begins, splice, since, kept, plan.laws[since : since + len(kept)], tuple(hands), tuple(sample))
+    laws, swings = plan.laws[since : since + len(kept)], -1 if swinging is None else swinging.arm
+    return Course(begins, splice, since, kept, laws, tuple(hands), tuple(sample), swings)
 
 
 def course_slices(
@@ -102,7 +106,7 @@ def course_slices(
     if quick:
         rows = [int(old.hold[grips[-1]]) for grips in begun.hands]
         few = yield from grip_slices(walker, structure, path, rows, holding)
-        chain = _chain(structure, old, few, begun, lands, shift)
+        chain = _chain(walker, structure, old, few, begun, lands, shift)
         search = BodySearch(walker, structure, path, few)
         until = search.until([grips[-1] for grips in chain], max(samples[-1] for samples in lands))
         # The plan needs a stance that goes on behind it
@@ -110,7 +114,7 @@ def course_slices(
         start = tuple(structure.ids[few.hold[grips[0]]] for grips in chain)
         yield Plan(path, start, (), False, sample * path.spacing, "being planned", few, chain)
     grips = yield from grip_slices(walker, structure, path, holding=holding)
-    chain = _chain(structure, old, grips, begun, lands, shift)
+    chain = _chain(walker, structure, old, grips, begun, lands, shift)
     stance = tuple(grips[-1] for grips in chain)
     rest = yield from plan_slices(walker, structure, path, grips=grips, stance=stance, sample=sample, tries=TRIES)
     start = tuple(structure.ids[grips.hold[mine[0]]] for mine in chain)
@@ -127,17 +131,33 @@ def _holding(old: Grips, begun: Course, lands: Sequence[Sequence[int]], shift: i
 
 
 def _chain(
-    structure: Structure, old: Grips, new: Grips, begun: Course, lands: Sequence[Sequence[int]], shift: int
+    walker: Walker,
+    structure: Structure,
+    old: Grips,
+    new: Grips,
+    begun: Course,
+    lands: Sequence[Sequence[int]],
+    shift: int,
 ) -> tuple[tuple[int, ...], ...]:
     """The grips of a course in another table, at the samples at which they begin to be held."""
     out = []
-    for hands, samples in zip(begun.hands, lands, strict=True):
+    for arm, (hands, samples) in enumerate(zip(begun.hands, lands, strict=True)):
         found = [same_grip(old, grip, new, at, shift) for grip, at in zip(hands, samples, strict=True)]
-        if min(found) < 0:
-            hold = structure.ids[old.hold[hands[found.index(-1)]]]
+        # The first one is held already, but by a hand that swings to it
+        landing = range(0 if arm == begun.swings else 1, len(found))
+        fits = [grip >= 0 and (k not in landing or bent(walker, new, grip, samples[k])) for k, grip in enumerate(found)]
+        if not all(fits):
+            hold = structure.ids[old.hold[hands[fits.index(False)]]]
             raise NoPlanError("course", hold, "the hand that is there, or swings there, cannot hold it on the new path")
         out.append(tuple(found))
     return tuple(out)
+
+
+def bent(walker: Walker, grips: Grips, grip: int, sample: int) -> bool:
+    """Whether the elbow is bent, and the wrist, as planned hands land, at a sample of the path."""
+    limb, margins, posture = limb_of(walker), walker.margins, grips.posture_at(grip, sample)
+    elbow, wrist = float(limb.elbow_bend(posture)), float(limb.wrist_bend(posture))
+    return elbow >= margins.landing_elbow and wrist >= margins.landing_wrist
 
 
 def time_left(swinging: Swinging, data: WalkerData) -> float:

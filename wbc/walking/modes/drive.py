@@ -12,9 +12,9 @@ from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import SPACING, TURN_RADIUS, BodyPath, standing_path
 from wbc.walking.holds.structure import Structure
-from wbc.walking.loop.state import Tick
+from wbc.walking.loop.state import Swinging, Tick
 from wbc.walking.loop.walk import Walk
-from wbc.walking.modes.courses import Course, course, course_slices, time_left
+from wbc.walking.modes.courses import Course, bent, course, course_slices, time_left
 from wbc.walking.modes.steering import PARTS, Steering, displaced, displacement, towards, undisplaced
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_walk
@@ -149,7 +149,7 @@ class Drive:
                 self.reason, swinging = str(error), walk.swinging
                 if swinging is not None and not self._waited:
                     # The body may have to wait for the hand, where it can land
-                    there = float(walk.progress.grips.first[swinging.grip]) * walk.plan.path.spacing - walk.path_time
+                    there = self._lands(swinging) - walk.path_time
                     self._begin(max(there, 0.0) + LEAD, quick=True, wait=time_left(swinging, walk.hands.data) + SURE)
                 elif walk.pace == 0.0 and swinging is None and len(self._order) > 1:
                     # Its hands cannot hold as fast as that where it stands
@@ -162,7 +162,7 @@ class Drive:
                     walk.go_over(plan, begun.begins, begun.since)
                     self._on = walk.plan.path
                     walk.halted = False
-                    self._work = Course(0.0, 0.0, 0, (), (), (), ()), slices
+                    self._work = Course(0.0, 0.0, 0, (), (), (), (), -1), slices
                     walk.limit = None
 
     def _begin(self, lead: float, quick: bool, wait: float = 0.0) -> None:
@@ -202,6 +202,14 @@ class Drive:
         self._work = begun, course_slices(walk.walker, walk.structure, walk.plan, begun, other, quick)
         self._asked, self._waited, self._on = self.command.copy(), waits, path
         walk.limit = max(begun.splice - 0.5 * spacing, walk.path_time), begun.since + len(begun.kept)
+
+    def _lands(self, swinging: Swinging) -> float:
+        """Path time from which on a swinging hand can land on the present path [s]."""
+        walk, grips = self.walk, self.walk.progress.grips
+        first, last = int(grips.first[swinging.grip]), int(grips.last[swinging.grip])
+        now = max(first, int(walk.progress.sample))
+        found = next((k for k in range(now, last + 1) if bent(walk.walker, grips, swinging.grip, k)), first)
+        return found * walk.plan.path.spacing
 
     def _displacement(self, path: BodyPath, u: float) -> Array:
         """Of the body at a path time, from where its command has it; on a path of another origin it stays."""

@@ -160,11 +160,11 @@ class Standing:
         mine, held = self.walker.arms[self.arm], dict(self.held)
         q = np.repeat(self.q[None], len(rows), axis=0)
         q[:, mine.q] = rows
-        leaving, sight = {self.arm: held.pop(self.arm, -1)}, self.sight
-        at = [*sight.holds(to), *sight.holds(leaving)]
-        if min(leaving.values()) < 0:
-            at += sight.around(self.arm, (self._base * pin.SE3(self._kinematics.forward(rows[0]))).translation)
-        found = sight.nearest(np.arange(len(rows), dtype=np.float64) * self.dt, q, at, held)
+        sight, hold = self.sight, held.pop(self.arm, -1)
+        left = sight.holds({self.arm: hold})
+        if hold < 0:
+            left = sight.around(self.arm, (self._base * pin.SE3(self._kinematics.forward(rows[0]))).translation)
+        found = sight.nearest(np.arange(len(rows), dtype=np.float64) * self.dt, q, left, sight.holds(to), held)
         if found is not None:
             raise ArmRefused("poses", len(rows), f"the arm would come too near: {found}")
 
