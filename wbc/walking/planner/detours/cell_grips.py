@@ -130,7 +130,7 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
     names = np.nonzero(there)[0]
     # Cells of a grip stay in their order
     order = np.argsort(code, kind="stable").astype(np.int32)
-    begin = np.concatenate([[0], np.cumsum(there[names])])
+    ends = np.concatenate([[0], np.cumsum(there[names])])
     rest, branches = np.divmod(names, BRANCHES)
     arms, held_on = np.divmod(rest, len(structure))
     return CellGrips(
@@ -138,7 +138,7 @@ def cell_grips(walker: Walker, structure: Structure, cells: Cells) -> CellGrips:
         held_on,
         branches,
         len(cells),
-        begin,
+        ends,
         cell[order],
         np.concatenate(landing)[order],
         order,

@@ -41,6 +41,8 @@ VARIATIONS, STUCK = 4, 3.0
 LONG, LONGER = 1.7, 30.0
 #: Postures in cells, and landings, that count as much as a slice of work
 ROWS, LANDINGS = 2000, 2
+#: Where less work is left, cells are not looked at
+CELLS = 300.0
 #: Room that the body has beyond its clearance at the cells that are looked at first [m]
 ROOMY = 0.06
 #: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not
@@ -106,6 +108,8 @@ def find_routes(
     """
     limb, closed, late = limb_of(walker), False, list[tuple[float, Variations, BodyRoute]]()
     for mesh in MESHES:
+        if allowance is not None and allowance.left < CELLS:
+            allowance.left = min(allowance.left, 0.0)
         if _over(deadline, allowance):
             return
         routes = _variations(walker, structure, path, mesh.of(limb), start, deadline, allowance)
