@@ -64,7 +64,7 @@ class ArmLeader:
         ShapeError: another machine.
     """
 
-    one_motion, late = False, 0.05
+    one_motion, late = False, 0.15
 
     def __init__(self, machine: Machine, progress: PlanProgress, stack: WalkStack) -> None:
         if machine.walker.two_ended:
