@@ -52,8 +52,15 @@ def _sparse(value: object, check_only: bool = True) -> object:
     return type(value) is not ca.SX and _from_csc(value, check_only)
 
 
-#: Of one call of C; CasADi's has two of Python and two of C
-_SHAPE, _shape = property(_size), ca.SX.shape
+#: Where CasADi asks, and quick answers; the shape of one call of C, where CasADi's has two of Python and two of C
+_ANSWERS = ((ca.SX, "shape", property(_size)), (ca, "DM_from_array", _array), (ca, "DM_from_csc", _sparse))
+#: What is there outside of :func:`quick_operators`
+_outside = tuple((place, name, vars(place)[name]) for place, name, _ in _ANSWERS)
+
+
+def _answer(quick: bool) -> None:
+    for place, name, answer in _ANSWERS if quick else _outside:
+        setattr(place, name, answer)
 
 
 @contextmanager
@@ -63,7 +70,7 @@ def quick_operators() -> Iterator[None]:
         _within[0] += 1
         for name, operator in _QUICK.items():
             setattr(ca.SX, name, operator)
-        ca.SX.shape, ca.DM_from_array, ca.DM_from_csc = _SHAPE, _array, _sparse
+        _answer(True)
     try:
         yield
     finally:
@@ -72,4 +79,4 @@ def quick_operators() -> Iterator[None]:
             if not _within[0]:
                 for name in _QUICK:
                     delattr(ca.SX, name)
-                ca.SX.shape, ca.DM_from_array, ca.DM_from_csc = _shape, _from_array, _from_csc
+                _answer(False)
