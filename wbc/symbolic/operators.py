@@ -39,7 +39,9 @@ _QUICK = {
 }
 
 
-_size, _from_array, _from_csc = ca._casadi.GenSX_size, ca.DM_from_array, ca.DM_from_csc
+# Not in CasADi's stub
+_from_array, _from_csc = vars(ca)["DM_from_array"], vars(ca)["DM_from_csc"]
+_size = vars(ca)["_casadi"].GenSX_size
 
 
 def _array(value: object, check_only: bool = True) -> object:
