@@ -97,15 +97,16 @@ def numbers(item: Item, robot: Robot) -> Numbers:
         value = item.error(robot, tracer, symbols.values) if isinstance(item, Task) else None
         value = item.margins(robot, tracer, symbols.values) if value is None else value
         own = item.jacobian(robot, tracer, symbols.values) if isinstance(item, Task) else None
-        outputs["value"] = tracer.expand(value)
-        outputs["jacobian"] = tracer.jacobian(value) if own is None else tracer.expand(own)
-        outputs["drift"] = tracer.expand(drift(robot, kinematics, item, symbols, value))
+        slopes = tracer.slope(value) if own is None else own
+        parts = tracer.expanded(value, slopes, drift(robot, kinematics, item, symbols, value))
+        outputs = dict(zip(("value", "jacobian", "drift"), parts, strict=True))
     elif item.form == "rows":
         rows = item.velocity_rows(robot, tracer, symbols.values, dt)
-        outputs = {name: tracer.expand(ca.SX(getattr(rows, name))) for name in ("matrix", "lower", "upper")}
+        names = ("matrix", "lower", "upper")
+        outputs = dict(zip(names, tracer.expanded(*(ca.SX(getattr(rows, name)) for name in names)), strict=True))
     else:
         bounds = item.bounds(robot, tracer, symbols.values, dt)
-        outputs = {name: tracer.expand(getattr(bounds, name)) for name in ("lower", "upper")}
+        outputs = dict(zip(("lower", "upper"), tracer.expanded(bounds.lower, bounds.upper), strict=True))
     for name, output in outputs.items():
         assert output.shape[0] == len(item.rows(robot)), name
     arguments = [kinematics.q, kinematics.v, symbols.vector, dt]

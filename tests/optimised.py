@@ -15,6 +15,13 @@ import pytest
 from wbc.native import toolchain
 
 _ask = toolchain.identity.__wrapped__
+#: The flags for the tick of each context that the process is in
+_within: list[str] = []
+
+
+def busy() -> bool:
+    """Stacks that are compiled now will run thousands of ticks."""
+    return bool(_within)
 
 
 @contextmanager
@@ -24,7 +31,11 @@ def ticks(tick: str = "-Og", rows: str = "-O0") -> Iterator[None]:
         patch.setattr(toolchain, "TICK_FLAGS", (tick,))
         patch.setattr(toolchain, "ROWS_FLAGS", (rows,))
         patch.setattr(toolchain, "identity", partial(_identity, tick, rows))
-        yield
+        _within.append(tick)
+        try:
+            yield
+        finally:
+            _within.pop()
 
 
 @cache

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.sparse import csc_matrix
 
 from wbc.symbolic.operators import quick_operators
 
@@ -85,3 +86,15 @@ def test_they_are_gone_after_the_last_of_those_who_asked() -> None:
     with pytest.raises(ValueError, match="ended"), quick_operators():
         raise ValueError("ended")
     assert ca.SX.__add__ is own
+
+
+@pytest.mark.parametrize("x", [symbol("a", 3, 2), ca.SX(0, 1), ca.SX.sym("a", ca.Sparsity.lower(3))])
+def test_shapes_are_the_same(x: ca.SX) -> None:
+    with quick_operators():
+        assert x.shape == (x.size1(), x.size2())
+
+
+def test_arrays_and_sparse_matrices_are_taken_as_before() -> None:
+    x = symbol("a", 2, 2)
+    for given in (np.arange(4.0).reshape(2, 2), csc_matrix(np.diag([1.0, 2.0])), np.eye(2, dtype=int), 2.0):
+        same(lambda given=given: ca.mtimes(ca.SX(given), x) if np.ndim(given) else x * given, x, None)

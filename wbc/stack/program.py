@@ -214,15 +214,16 @@ class _Builder:
         robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         error = self.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
-        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))
-        jacobian, rest = jacobian[:, : robot.nv], jacobian[:, robot.nv :]
+        jacobian = tracer.slope(error) if own is None else ca.SX(own)
         if self.stack.calm and block.span.stop <= self.layout.leading:
             self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
-        desired = tracer.expand(-gain * error - self.drift(block, error)) - ca.sum2(rest)
+        desired = -gain * error - self.drift(block, error)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
-        out = self.tasks[block.entry.name] = tracer.expand(error), desired, tracer.expand(factor), jacobian
+        error, desired, factor, jacobian = tracer.expanded(error, desired, factor, jacobian)
+        jacobian, rest = jacobian[:, : robot.nv], jacobian[:, robot.nv :]
+        out = self.tasks[block.entry.name] = error, desired - ca.sum2(rest), factor, jacobian
         return out
 
     def general(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
@@ -247,9 +248,9 @@ class _Builder:
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
-            matrix = tracer.expand(ca.SX(rows.matrix))
+            matrix, low, high = tracer.expanded(ca.SX(rows.matrix), low, high)
             matrix, rest = matrix[:, : robot.nv], ca.sum2(matrix[:, robot.nv :])
-            return Rows(matrix, tracer.expand(low) - rest, tracer.expand(high) - rest), None, None
+            return Rows(matrix, low - rest, high - rest), None, None
         if block.entry.name in self.balls:
             return (
                 Rows(ca.SX(count, self.layout.nv), ca.SX(count, 1), ca.SX.inf(count)),
@@ -260,16 +261,17 @@ class _Builder:
         assert margins is not None
         margin = self.column(block, "margins", margins)
         rate = self.p[block.slots["rate"].span]
-        low = tracer.expand(-rate * margin - self.drift(block, margin))
+        low = -rate * margin - self.drift(block, margin)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
         sensed = item.sensed_rows(robot)
-        matrix = tracer.jacobian(margin[: count - sensed, :])
+        matrix = tracer.slope(margin[: count - sensed, :])
+        margin, low, factor, matrix = tracer.expanded(margin, low, factor, matrix)
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
             matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
         rows = Rows(matrix, low, ca.SX.inf(count))
-        return rows, tracer.expand(margin), tracer.expand(factor)
+        return rows, margin, factor
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
         """Rows of sensed pairs, see :meth:`Constraint.sensed_rows`."""
@@ -382,4 +384,9 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, ca.cse(outputs), ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)
+    return ca.Function(name, inputs, shared(outputs), ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)
+
+
+def shared(outputs: list[ca.SX]) -> list[ca.SX]:
+    """The same expressions, with what occurs in them twice computed once."""
+    return list(ca.cse(outputs))

@@ -333,6 +333,10 @@ class Tracer:
 
     def jacobian(self, expression: ca.SX) -> ca.SX:
         """Derivative along the tangent space, rows x nv, of an expression in this tracer's symbols."""
+        return self.expand(self.slope(expression))
+
+    def slope(self, expression: ca.SX) -> ca.SX:
+        """:meth:`jacobian` before the robot's kinematics are put in, to be expanded with others."""
         total = ca.jacobian(expression, self.q) @ self.kinematics.tangent_map
         for known in self._symbols:
             if not known.motion.nnz():
@@ -340,7 +344,7 @@ class Tracer:
             change = ca.jacobian(expression, known.symbol)
             if change.nnz():
                 total = total + ca.sparsify(change @ known.motion) @ known.jacobian()
-        return self.expand(ca.sparsify(total))
+        return ca.sparsify(total)
 
     def second(
         self,
@@ -386,7 +390,7 @@ class Tracer:
             rate += along(own, kinematics.v)
         for symbols, rates in moving:
             rate += ca.jtimes(expression, symbols, rates)
-        rate = self._without_inner(ca.densify(rate))
+        rate = self._without_inner([ca.densify(rate)])[0]
         variables, changes = [self.q], [speed]
         for known in self._symbols:
             if not known.inner and known.motion.nnz() and ca.jacobian_sparsity(rate, known.symbol).nnz():
@@ -424,16 +428,20 @@ class Tracer:
 
     def expand(self, expression: ca.SX) -> ca.SX:
         """The expression with every placeholder replaced by the kinematics that it stands for."""
-        expression = self._without_inner(expression)
+        return self.expanded(expression)[0]
+
+    def expanded(self, *expressions: ca.SX) -> list[ca.SX]:
+        """Each of them expanded; at once, so that they still share what they share."""
+        out = self._without_inner(expressions)
         if all(s.inner for s in self._symbols):
-            return expression
+            return out
         known = self._outer.get(len(self._symbols))
         if known is None:
             outer = [s for s in self._symbols if not s.inner]
             # A chain of coordinate axes has structural zeros that its placeholders have not
             values = ca.densify(ca.vertcat(*[s.value() for s in outer]))
             known = self._outer[len(self._symbols)] = ca.vertcat(*[s.symbol for s in outer]), values
-        return ca.substitute(expression, *known)
+        return list(ca.substitute(out, known[:1], known[1:]))
 
     def formula(self, expression: ca.SX) -> tuple[ca.SX, dict[str, ca.SX]]:
         """The expression before the robot's kinematics are put in, and its symbols by what they stand for.
@@ -441,16 +449,14 @@ class Tracer:
         It has as many operations as the user wrote, so it is cheap to compare and to hash.
         """
         symbols = {"q": self.q} | {s.name: s.symbol for s in self._symbols if not s.inner}
-        return self._without_inner(expression), symbols
+        return self._without_inner([expression])[0], symbols
 
-    def _without_inner(self, expression: ca.SX) -> ca.SX:
+    def _without_inner(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         inner = [s for s in self._symbols if s.inner]
         if not inner:
-            return expression
-        _, (out,) = ca.substitute_inplace(
-            [s.symbol for s in inner], [ca.densify(s.value()) for s in inner], [expression]
-        )
-        return out
+            return list(expressions)
+        symbols, values = [s.symbol for s in inner], [ca.densify(s.value()) for s in inner]
+        return list(ca.substitute_inplace(symbols, values, list(expressions))[1])
 
 
 @dataclass

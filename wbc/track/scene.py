@@ -7,6 +7,7 @@ import math
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
@@ -209,8 +210,21 @@ class Scene:
             self._key.append((colour, label))
 
 
+#: Meshes of robots that were drawn, for as long as the robots live: to read them takes longer than to draw them
+_READ: WeakKeyDictionary[Robot, list[tuple[str, Array]]] = WeakKeyDictionary()
+
+
 def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
-    """(frame, triangles in it): the URDF's visual meshes, else the collision shapes."""
+    """(frame, triangles in it): the URDF's visual meshes, else the collision shapes. Not to be written to."""
+    known = _READ.get(robot)
+    if known is None:
+        known = _READ[robot] = _link_meshes(robot)
+        for _, triangles in known:
+            triangles.setflags(write=False)
+    return known
+
+
+def _link_meshes(robot: Robot) -> list[tuple[str, Array]]:
     out = []
     for link, placement, geometry in bodies_of(robot, pin.GeometryType.VISUAL):
         if isinstance(geometry, coal.BVHModelBase):
