@@ -273,6 +273,18 @@ def test_a_hand_at_the_end_of_its_reach_comes_to_rest_nearer_to_the_body(
     assert limb.margins(coasting._postures[0][-1]).min() >= machine.margins.held_angle
 
 
+def test_a_hand_that_swings_about_closes_when_it_has_rested_for_a_while(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hands, law = Walk(machine, structure, plan, stack=stack).hands, plan.laws[0]
+    for steady, rested, closes in ((1, [False, True], 2), (3, [True, True, False, True, True, True], 6)):
+        swinging = Swinging(0, 0, 0, law, latch=0.0, state="open", clock=law.duration, steady=steady)
+        for tick, rests in enumerate(rested, start=1):
+            monkeypatch.setattr(hands, "rests", lambda *_, rests=rests: rests)
+            assert not hands.settle(swinging)
+            assert (swinging.state == "closing") is (tick == closes)
+
+
 def test_little_is_proven_twice(machine: Walker, structure: Structure, stack: WalkStack, plan: Plan) -> None:
     walk = Walk(machine, structure, plan, stack=stack)
     walk.tick()

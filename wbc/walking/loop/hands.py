@@ -27,6 +27,8 @@ from wbc.walking.planner.swings.law import SwingLaw
 SETTLING = 8.0
 #: and at most this part of the gain with which it follows
 PART = 0.33
+#: A hand whose wrist hardly turns its axis swings about a little as it comes to rest: it closes after so many ticks
+STEADY = 3
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
 
@@ -129,6 +131,7 @@ class ArmLeader:
         axes = self._landing.go(swinging, hold, near, machine.lag)
         # Of the joints as they are: only near its hold the axis counts
         part = 1.0 if axes is None else axis_part(float(self._limb.wrist_bend(machine.q[machine.walker.arms[arm].q])))
+        swinging.steady = 1 if part == 1.0 else STEADY
         self._stack.swing(arm, followed, axes, part)
 
 
@@ -232,7 +235,9 @@ class Hands:
             return False
         if swinging.state == "open" and swinging.clock >= swinging.law.duration - 1e-9:
             before = swinging.place, swinging.axis, swinging.x_axis
-            if self.rests(swinging.arm, swinging.hold, before, swinging.x, swinging.earlier):
+            rests = self.rests(swinging.arm, swinging.hold, before, swinging.x, swinging.earlier)
+            swinging.rests = swinging.rests + 1 if rests else 0
+            if swinging.rests >= swinging.steady:
                 swinging.state, swinging.latch = "closing", self.data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.machine.dt

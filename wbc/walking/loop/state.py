@@ -54,6 +54,7 @@ class Swinging:
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
         shift: added to what the hand follows on its hold [m].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
+        rests: ticks in which it has been at rest on its hold. steady: so many it has to be before it closes.
         waits: the body stands until the hand has landed.
         pauses: hand and body come to rest where they are, and then it goes on. paused: how often they have.
         part: of full speed that its joints allow while the body goes as it does now.
@@ -66,6 +67,8 @@ class Swinging:
     law: SwingLaw
     latch: float
     counted: bool = True
+    rests: int = 0
+    steady: int = 1
     waits: bool = False
     pauses: bool = False
     paused: int = 0
