@@ -9,6 +9,7 @@ import os
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from textwrap import shorten
 
 from bench.goals import Goal
 from bench.sheet import Sheet
@@ -24,6 +25,10 @@ FORKS.set_forkserver_preload(["bench.walk.trials"])
 #: Ends of a walk that did what it was to do, and of one that was refused with a reason
 WELL, REFUSED = ("arrived", "time"), ("refused", "hold lost", "HoldLost", "NoPlanError", "late")
 CRASHED = ("crash", "error")
+#: Letters of a reason that a table has room for
+WHY = 200
+#: Arms of the published machine
+USUAL = 3
 
 
 def trial_jobs(it: Machine, part: str, count: int, folder: Path) -> list[Job]:
@@ -79,29 +84,16 @@ def group(record: Record) -> str:
 
 
 def trial_sheet(part: str, records: list[Record]) -> Sheet:
-    """Counts a family, then the trials that went wrong, each with its seed."""
-    rows = []
-    for family in dict.fromkeys(group(r) for r in records):
-        mine = [r for r in records if group(r) == family]
-        well, refused = ([r for r in mine if r["outcome"] in some] for some in (WELL, REFUSED))
-        bad = [r for r in well if r.get("violations")]
-        other = [r for r in well if r.get("second")]
-        counts = (len(mine), len(well), len(bad), len(other), sum(touching(r, "second") for r in well))
-        refusals = len(refused), sum(impossible(r) for r in refused), sum(r["outcome"] in CRASHED for r in mine)
-        spent = ranged(sorted(r["plan_s"] for r in mine if "plan_s" in r), -1)
-        rows.append(
-            (
-                family or part,
-                *map(str, (*counts, *refusals)),
-                spent,
-                ranged(sorted(filter(None, map(pace, mine))), 0),
-                "",
-            )
-        )
+    """Counts a family and a number of arms, then the trials that went wrong, each with its seed."""
+    families = {family: [r for r in records if group(r) == family] for family in dict.fromkeys(map(group, records))}
+    rows = [_counts(family or part, mine) for family, mine in families.items()]
+    numbers = sorted({r["arms"] for r in records if "arms" in r}, key=str)
+    if len(numbers) > 1:
+        rows += [_counts(_of_arms(n), [r for r in records if r.get("arms") == n]) for n in numbers]
     for r in records:
         wrong = [*r.get("violations", ())[:1], *r.get("second", ())[:1]]
         if r["outcome"] not in WELL:
-            wrong.append(f"{r['outcome']}: {r['reason']}")
+            wrong.append(shorten(f"{r['outcome']}: {r['reason']}", WHY, placeholder=" ..."))
         if wrong:
             spent = f"{r['plan_s']:.1f}" if "plan_s" in r else "-"
             rows.append((f"{part} {r['trial']}", *[""] * 8, spent, "", "; ".join(wrong)))
@@ -110,6 +102,20 @@ def trial_sheet(part: str, records: list[Record]) -> Sheet:
         *("plan: median, most, s", "real time with planning: median, least", "what"),
     )
     return Sheet(f"Trials from seeds: {part}", columns, rows)
+
+
+def _counts(name: str, records: list[Record]) -> tuple[str, ...]:
+    """A row of how trials ended."""
+    well, refused = ([r for r in records if r["outcome"] in some] for some in (WELL, REFUSED))
+    bad, other = ([r for r in well if r.get(checker)] for checker in ("violations", "second"))
+    counts = len(records), len(well), len(bad), len(other), sum(touching(r, "second") for r in well)
+    refusals = len(refused), sum(impossible(r) for r in refused), sum(r["outcome"] in CRASHED for r in records)
+    spent = ranged(sorted(r["plan_s"] for r in records if "plan_s" in r), -1)
+    return name, *map(str, (*counts, *refusals)), spent, ranged(sorted(filter(None, map(pace, records))), 0), ""
+
+
+def _of_arms(number: int | str) -> str:
+    return f"{number} arms" if isinstance(number, int) else number
 
 
 def impossible(record: Record) -> bool:
@@ -121,6 +127,11 @@ def pace(record: Record) -> float | None:
     """Real time factor of a walk with its planning; None of one that was not walked."""
     spent = record.get("plan_s", 0.0) + record.get("walking_s", 0.0)
     return record["walk_s"] / spent if record.get("walking_s") and record["outcome"] in WELL else None
+
+
+def _not_walked(records: list[Record]) -> float:
+    """Part of trials that did not end well."""
+    return 1.0 - sum(r["outcome"] in WELL for r in records) / len(records)
 
 
 def ranged(numbers: list[float], end: int) -> str:
@@ -142,9 +153,15 @@ def trial_goals(part: str, records: list[Record]) -> list[Goal]:
     open_ = [r for r in records if not impossible(r)]
     if part == "structures" and open_:
         paces = sorted(filter(None, map(pace, well)))
+        usual = [r for r in open_ if r.get("arms", USUAL) == USUAL]
+        more = [r for r in open_ if r not in usual]
         longest = max((r["plan_s"] for r in records if "plan_s" in r), default=0.0)
         out += [
-            Goal("structures that may be possible and are not walked", 1.0 - len(well) / len(open_), 0.05, ""),
+            *(
+                Goal(f"structures that may be possible and are not walked, {who}", _not_walked(some), 0.05, "")
+                for who, some in (("three arms", usual), ("four to six", more))
+                if some
+            ),
             Goal("structures: longest plan or refusal", longest, 15.0, "s"),
         ]
         if paces:
