@@ -27,8 +27,8 @@ AHEAD, LEFT = 1.0, 0.4
 #: Part of their rates that joints get of a hand that has to go slower, and the least part of its pace; what an arm is
 #: off its way does not count any more after [s]
 RATE, SLOWEST, SETTLED = 0.96, 0.3, 0.3
-#: An arm whose joints cannot follow may lag by so much, its hand less [m]
-LAGS = 0.03
+#: An arm may lag by so much, its hand less, whose joints cannot follow for their rates, or for their accelerations [m]
+LAGS, LAGS_LESS = 0.03, 0.005
 
 
 class Course(NamedTuple):
@@ -109,8 +109,8 @@ class Caution:
         rate, root = self._needs(swinging, when.times)
         path, led, _ = self._known or (None, None, False)
         changed = course.stands or (led is swinging and path is not self._progress.plan.path)
-        fastest = max(rate, root) if changed else rate
-        if fastest > 1.0 and swinging.part > SLOWEST and (changed or self._no_room(swinging, when)):
+        fastest, lags = max(rate, root), LAGS if rate > 1.0 else LAGS_LESS
+        if fastest > 1.0 and swinging.part > SLOWEST and (changed or self._near_by(swinging, when, lags)):
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
@@ -121,9 +121,9 @@ class Caution:
             self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
         return found
 
-    def _no_room(self, swinging: Swinging, when: Timing) -> bool:
-        """Whether an arm that lags in what was foreseen last may touch something."""
-        return self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS
+    def _near_by(self, swinging: Swinging, when: Timing, lags: float) -> bool:
+        """Whether an arm that lags by so much in what was foreseen last may touch something [m]."""
+        return self.sight.spare(when.times, self._rows, swinging.arm, lags) < lags
 
     def _needs(self, swinging: Swinging, times: Array) -> tuple[float, float]:
         """How many times too fast the swinging arm is in what was foreseen last, once it is back on its way: the
