@@ -133,6 +133,23 @@ class Corners:
         return sqrt(max(min(self._here[row], self._reach[row + 1] - self._gain * u), 0.0))
 
 
+def wanted_pace(
+    stops: Stops, margin: float, left: float, landing: tuple[float, float] | None, most: float = 1.0
+) -> float:
+    """The pace that a body should have: as fast as asked, as slow as the hands need. Braking from p in a time T takes
+    p^2 T / 2 of path time.
+
+    Args:
+        margin: path time until a holding hand reaches the end of its grip [s]. left: until the end of the path or of
+            what is planned [s]. landing: path time that is left until the swinging hand has to hold, and the time that
+            it needs until then [s]; None: no hand is swinging. most: that the path allows.
+    """
+    wanted = min(1.0, most, sqrt(2.0 * margin / stops.brake * PART), sqrt(2.0 * left / stops.ramp * PART))
+    if landing is not None and landing[0] < landing[1]:
+        wanted = min(wanted, landing[0] / landing[1])
+    return wanted
+
+
 class BodyMotion:
     """The pace of the body, 1 the path's own, and its command; how fast it changes says :class:`Stops`.
 
@@ -159,22 +176,16 @@ class BodyMotion:
     def choose(
         self, margin: float, left: float, landing: tuple[float, float] | None, stands: bool, most: float = 1.0
     ) -> None:
-        """The pace of this tick: as fast as asked, as slow as the hands need. Braking from p in a time T takes
-        p^2 T / 2 of path time.
+        """The pace of this tick: as fast as asked, as slow as the hands need.
 
         Args:
-            margin: path time until a holding hand reaches the end of its grip [s]. left: until the end of the path or
-                of what is planned [s]. landing: path time that is left until the swinging hand has to hold, and the
-                time that it needs until then [s]; None: no hand is swinging. stands: the body is to come to rest.
-            most: that the path allows.
+            margin, left, landing, most: as of :func:`wanted_pace`. stands: the body is to come to rest.
         """
-        brake = self._stops.brake
-        wanted = min(1.0, most, sqrt(2.0 * margin / brake * PART), sqrt(2.0 * left / self._stops.ramp * PART))
-        if landing is not None and landing[0] < landing[1]:
-            wanted = min(wanted, landing[0] / landing[1])
+        wanted = wanted_pace(self._stops, margin, left, landing, most)
         self.wanted = 0.0 if stands else wanted
         self.pace = max(
-            self.pace + min(max(self.wanted - self.pace, -self._dt / brake), self._dt / self._stops.ramp), 0.0
+            self.pace + min(max(self.wanted - self.pace, -self._dt / self._stops.brake), self._dt / self._stops.ramp),
+            0.0,
         )
 
     def go(self, path: BodyPath, begin: float) -> tuple[Array, float]:

@@ -11,6 +11,7 @@ import numpy as np
 from wbc.clearance import Nearest
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
+from wbc.walking.loop.body_command import wanted_pace
 from wbc.walking.loop.foresight import STEP, Foresight, Timing
 from wbc.walking.loop.hand_pace import ramp_of
 from wbc.walking.loop.machine import Machine
@@ -35,12 +36,16 @@ class Course(NamedTuple):
     """How body and swinging hand are about to go on.
 
     Attributes:
-        pace: of the body now. end: path time that it does not pass [s]. due: path time at which the hand is to be on
-            its hold [s]. stands: the body comes to rest. most: pace that the path allows at a path time [s].
+        pace: of the body now. end: path time that it does not pass before the hand holds [s]. holds: at which the grips
+            of the other hands end, and last: at which the path does, or what may be gone of it [s].
+        due: path time at which the hand is to be on its hold [s]. stands: the body comes to rest.
+        most: pace that the path allows at a path time [s].
     """
 
     pace: float
     end: float
+    holds: float
+    last: float
     due: float
     stands: bool
     most: Callable[[float], float]
@@ -176,7 +181,8 @@ class Caution:
         while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
             left = law.duration - clock
             needed, until = latch + left / most + closing, max(course.end - u, 0.0)
-            wanted = 0.0 if course.stands else min(1.0, until / needed, course.most(u))
+            left_on = max(course.holds - u, 0.0), max(course.last - u, 0.0), (until, needed)
+            wanted = 0.0 if course.stands else wanted_pace(self._stops, *left_on, course.most(u))
             pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
             wait = course.due - u - wanted * left
             aim = min(1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0, most)

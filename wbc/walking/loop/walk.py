@@ -494,12 +494,12 @@ class Walk:
 
     def _course(self, swinging: Swinging) -> Course:
         """How body and hand are about to go on."""
-        end, stands = self._end(), self._stands() or swinging.waits
-        soonest = min([end, *self._lasting(swinging.arm)])
+        end, stands, u = self._end(), self._stands() or swinging.waits, self.path_time
+        holds = soonest = min([end, *self._lasting(swinging.arm)])
         if swinging.counted and not self._changing:
             soonest = min(soonest, self._late())
         corners = self.body.corners(self.plan.path)
-        return Course(self.pace, max(soonest, self.path_time), self._due(swinging), stands, corners.pace)
+        return Course(self.pace, max(soonest, u), holds, end, self._due(swinging), stands, corners.pace)
 
     def _late(self) -> float:
         """Path time that the body does not pass before the swinging hand holds [s]: where the body has to wait for it,
