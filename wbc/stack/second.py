@@ -94,16 +94,15 @@ class SecondOrder:
         error = b.column(block, "error", item.error(robot, tracer, inputs))
         own = item.jacobian(robot, tracer, inputs)
         rate, bias = tracer.second(error, self._motion, own, self._moving(block))
-        jacobian = tracer.jacobian(error) if own is None else tracer.expand(ca.SX(own))[:, : robot.nv]
-        value = tracer.expand(error)
+        jacobian = tracer.slope(error) if own is None else ca.SX(own)[:, : robot.nv]
+        fade = item.row_factor(robot, tracer, inputs)
+        factor = ca.SX.ones(count) if fade is None else b.column(block, "row_factor", fade)
+        value, jacobian, factor = tracer.expanded(error, jacobian, factor)
         asked = item.acceleration(inputs, value, rate)
         if asked is None:
             stiffness, damping = (b.p[block.slots[name].span] for name in ("stiffness", "damping"))
             asked = -stiffness * value - damping * rate
-        desired = asked - bias
-        fade = item.row_factor(robot, tracer, inputs)
-        factor = ca.SX.ones(count) if fade is None else b.column(block, "row_factor", fade)
-        return value, desired, tracer.expand(factor), self._wide(jacobian)
+        return value, asked - bias, factor, self._wide(jacobian)
 
     def constraint(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
         """Rows over all variables of a constraint, its margins and their factors."""
@@ -133,12 +132,12 @@ class SecondOrder:
         assert margins is not None
         margin = self._b.column(block, "margins", margins)
         first, bias = tracer.second(margin, self._motion, None, self._moving(block))
-        value, rate = tracer.expand(margin), self._b.p[block.slots["rate"].span]
-        low = -bias - rate * (2.0 * first + rate * value) / (1.0 + 0.5 * rate * self._b.dt)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self._b.column(block, "row_factor", fade)
-        rows = Rows(self._wide(tracer.jacobian(margin)), low, ca.SX.inf(len(block.rows)))
-        return rows, value, tracer.expand(factor)
+        value, jacobian, factor = tracer.expanded(margin, tracer.slope(margin), factor)
+        rate = self._b.p[block.slots["rate"].span]
+        low = -bias - rate * (2.0 * first + rate * value) / (1.0 + 0.5 * rate * self._b.dt)
+        return Rows(self._wide(jacobian), low, ca.SX.inf(len(block.rows))), value, factor
 
     def _rates(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
         """Rows on velocities: what they are off decays at ``rate``."""
