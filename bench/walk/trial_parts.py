@@ -154,7 +154,7 @@ def trial_goals(part: str, records: list[Record]) -> list[Goal]:
     if part == "structures" and open_:
         paces = sorted(filter(None, map(pace, well)))
         usual = [r for r in open_ if r.get("arms", USUAL) == USUAL]
-        more = [r for r in open_ if r not in usual]
+        more = [r for r in open_ if r.get("arms", USUAL) != USUAL]
         longest = max((r["plan_s"] for r in records if "plan_s" in r), default=0.0)
         out += [
             *(

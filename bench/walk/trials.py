@@ -294,10 +294,11 @@ def _path(rng: np.random.Generator, walker: Walker) -> PathRequest:
         ground = GROUNDS[int(rng.integers(len(GROUNDS)))]
         fraction, seed = float(rng.uniform(0.0, MISSING)) * (rng.random() < 0.5), int(rng.integers(1000))
         site = Site(ground, fraction=fraction, seed=seed)
-        start, goal = _grid_ends(rng) if ground == "cylinder" else _ends(rng, site.build())
+        structure = site.build()
+        start, goal = _grid_ends(rng) if ground == "cylinder" else _ends(rng, structure)
         request = PathRequest(site, start, (goal,), float(rng.uniform(0.05, 0.15)), 0.1)
         ends = request.path(walker.arm_data).poses[[0, -1]]
-        if (around(walker, site.build()).bodies(ends) == NONE_MET).all():
+        if (around(walker, structure).bodies(ends) == NONE_MET).all():
             return request
 
 

@@ -72,11 +72,8 @@ class ArmLeader:
         if machine.walker.two_ended:
             raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
-        self._hand, self._landing, self._limb = (
-            HandCommand(machine.dt),
-            HandLanding(machine.dt),
-            limb_of(machine.walker),
-        )
+        self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
+        self._limb = limb_of(machine.walker)
         self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
