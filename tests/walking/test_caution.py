@@ -316,7 +316,7 @@ def test_a_hand_whose_body_goes_elsewhere_is_no_faster_than_its_joints_can(
     assert caution.swing(swinging, course) is None
     assert swinging.part == 1.0
     # It was planned for the path that the body was on when it was lifted
-    caution._known = None, swinging, False
+    caution._known = None, swinging, False, course.end
     caution.swing(swinging, course)
     assert swinging.part == pytest.approx(RATE / 1.5)
 

@@ -28,8 +28,8 @@ AHEAD, LEFT = 1.0, 0.4
 #: Part of their rates that joints get of a hand that has to go slower, and the least part of its pace; what an arm is
 #: off its way does not count any more after [s]
 RATE, SLOWEST, SETTLED = 0.96, 0.3, 0.3
-#: An arm may lag by so much, its hand less, whose joints cannot follow for their rates, or for their accelerations [m]
-LAGS, LAGS_LESS = 0.03, 0.005
+#: An arm may lag by so much, its hand less, whose joints cannot follow for their accelerations [m]
+LAGS = 0.005
 
 
 class Course(NamedTuple):
@@ -70,9 +70,13 @@ class Caution:
         """Nothing is proven any more."""
         self._known, self.until = (), self._progress.path_time
 
-    def new(self, swinging: Swinging | None, stands: bool) -> bool:
-        """Whether what body and hand do has changed since it was proven."""
-        return self._known != (self._progress.plan.path, swinging, stands)
+    def new(self, swinging: Swinging | None, stands: bool, end: float = inf) -> bool:
+        """Whether what body and hand do has changed since it was proven.
+
+        Args:
+            end: path time that the body does not pass before the swinging hand holds [s].
+        """
+        return self._known != (self._progress.plan.path, swinging, stands, end)
 
     def ahead(self, end: float, lift: float | None = None) -> Nearest | None:
         """Prove the body's way on, all hands as they hold, if little of it is left; what is too near on it.
@@ -84,7 +88,7 @@ class Caution:
         progress = self._progress
         path, u = progress.plan.path, progress.path_time
         if self.new(None, False) or (lift is None and self.until == inf):
-            self._known, self.until = (path, None, False), u
+            self._known, self.until = (path, None, False, inf), u
         if self.until - u > LEFT or self.until >= end - 1e-9:
             return None
         end = min(u + AHEAD, end)
@@ -105,30 +109,31 @@ class Caution:
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
         """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
 
-        A hand whose joints would need more than they can goes slower from now on where the body stands, or goes
-        elsewhere, that was to go with it, as it would swing beyond its way where that ends; and where its arm has no
-        room to lag.
+        A hand goes slower from now on whose joints would need higher rates than they have: it would lag, and swing
+        beyond its way when it catches up. So does one whose joints would need higher accelerations, where the body
+        stands, or goes elsewhere, that was to go with it, and where its arm has no room to lag.
         """
         when = self.timing(swinging, course)
         found = self._near(swinging, when)
         rate, root = self._needs(swinging, when.times)
-        path, led, _ = self._known or (None, None, False)
+        path, led, *_ = self._known or (None, None)
         changed = course.stands or (led is swinging and path is not self._progress.plan.path)
-        fastest, lags = max(rate, root), LAGS if rate > 1.0 else LAGS_LESS
-        if fastest > 1.0 and swinging.part > SLOWEST and (changed or self._near_by(swinging, when, lags)):
+        fastest = max(rate, root)
+        rushed = rate > 1.0 or (root > 1.0 and (changed or self._near_by(swinging, when)))
+        if rushed and swinging.part > SLOWEST:
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
         if found is None:
-            self._known = self._progress.plan.path, swinging, course.stands
+            self._known = self._progress.plan.path, swinging, course.stands, course.end
             self.until = self._progress.path_time
             self._clock = when.clock
             self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
         return found
 
-    def _near_by(self, swinging: Swinging, when: Timing, lags: float) -> bool:
-        """Whether an arm that lags by so much in what was foreseen last may touch something [m]."""
-        return self.sight.spare(when.times, self._rows, swinging.arm, lags) < lags
+    def _near_by(self, swinging: Swinging, when: Timing) -> bool:
+        """Whether an arm that lags in what was foreseen last may touch something."""
+        return self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS
 
     def _needs(self, swinging: Swinging, times: Array) -> tuple[float, float]:
         """How many times too fast the swinging arm is in what was foreseen last, once it is back on its way: the
@@ -175,18 +180,19 @@ class Caution:
     def timing(self, swinging: Swinging, course: Course) -> Timing:
         """Body and hand with the paces of the loop, until the hand holds."""
         law, latch = swinging.law, swinging.latch if swinging.state == "opening" else 0.0
+        end = max(course.end, self._progress.path_time)
         u, clock, pace, hand, t = self._progress.path_time, swinging.clock, course.pace, swinging.pace, 0.0
         closing = self._machine.walker.tolerances.latch_time + SETTLE
         rows, most, ramp = [(0.0, u, clock)], swinging.most, ramp_of(swinging)
         while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
             left = law.duration - clock
-            needed, until = latch + left / most + closing, max(course.end - u, 0.0)
+            needed, until = latch + left / most + closing, end - u
             left_on = max(course.holds - u, 0.0), max(course.last - u, 0.0), (until, needed)
             wanted = 0.0 if course.stands else wanted_pace(self._stops, *left_on, course.most(u))
             pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
             wait = course.due - u - wanted * left
             aim = min(1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0, most)
-            u, t = min(u + pace * STEP, course.end), t + STEP
+            u, t = min(u + pace * STEP, end), t + STEP
             if latch > 1e-9:
                 latch -= STEP
             else:
@@ -195,7 +201,7 @@ class Caution:
             rows.append((t, u, clock))
             if len(rows) > 4 * (law.duration + 2.0) / STEP:
                 break
-        rows.append((t + closing, u if course.stands else max(u, min(u + pace * closing, course.end)), clock))
+        rows.append((t + closing, u if course.stands else min(u + pace * closing, end), clock))
         return Timing(*np.array(rows).T)
 
     def _near(self, swinging: Swinging | None, when: Timing) -> Nearest | None:

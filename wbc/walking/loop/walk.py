@@ -446,7 +446,7 @@ class Walk:
             if self.pace == 0.0 and (swinging.state == "opening" or swinging.pace == 0.0):
                 swinging.pauses = False
                 self._go_on(swinging)
-        elif caution.new(swinging, stands):
+        elif caution.new(swinging, stands, self._before_landing(swinging)):
             self._go_on(swinging)
         elif caution.strays(swinging) and caution.swing(swinging, self._course(swinging)) is not None:
             # At rest it is where it is to be, and can go on from there
@@ -494,12 +494,15 @@ class Walk:
 
     def _course(self, swinging: Swinging) -> Course:
         """How body and hand are about to go on."""
-        end, stands, u = self._end(), self._stands() or swinging.waits, self.path_time
-        holds = soonest = min([end, *self._lasting(swinging.arm)])
-        if swinging.counted and not self._changing:
-            soonest = min(soonest, self._late())
-        corners = self.body.corners(self.plan.path)
-        return Course(self.pace, max(soonest, u), holds, end, self._due(swinging), stands, corners.pace)
+        end, stands = self._end(), self._stands() or swinging.waits
+        holds, corners = min([end, *self._lasting(swinging.arm)]), self.body.corners(self.plan.path)
+        before = self._before_landing(swinging)
+        return Course(self.pace, before, holds, end, self._due(swinging), stands, corners.pace)
+
+    def _before_landing(self, swinging: Swinging) -> float:
+        """Path time that the body does not pass before the swinging hand holds [s]."""
+        end = min([self._end(), *self._lasting(swinging.arm)])
+        return min(end, self._late()) if swinging.counted and not self._changing else end
 
     def _late(self) -> float:
         """Path time that the body does not pass before the swinging hand holds [s]: where the body has to wait for it,
