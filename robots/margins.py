@@ -21,8 +21,6 @@ _LENGTHS = (
     "across",
     "higher",
     "cell_reach",
-    "cell_landing_reach",
-    "cell_landing_axis",
 )
 
 
@@ -47,9 +45,6 @@ class Margins:
         landing_wrist: least \\|sin theta5\\| of a hand that lands: joint 4 turns its axis only then.
         landing_elbow: least angle of its elbow: nearly straight arms correct slowly [rad].
         cell_angle, cell_reach: to the limits at cells of a detour, as there is less between them [rad, m].
-        cell_swing_angle: of joints 1 to 3 in swings there [rad].
-        cell_landing_reach, cell_landing_axis: of a hand that lifts or lands there [m].
-        cell_order: angle between hands about the body's z axis; nearer ones could not pass each other [rad].
         hover: how long a hand may be in the air for a hold that is not in reach yet [s]. long_wait: if it is longer, it
             may wait where it goes with the body instead [s]. slower: a swing may last so much longer than the search
             thought [s]. spare: of the time until the next lift that a slow, jerk-limited swing leaves [s].
@@ -81,10 +76,6 @@ class Margins:
     landing_elbow: float = 0.5
     cell_angle: float = radians(4.0)
     cell_reach: float = 0.01016
-    cell_swing_angle: float = 0.04
-    cell_landing_reach: float = 0.02286
-    cell_landing_axis: float = 0.19304
-    cell_order: float = radians(10.0)
     hover: float = 0.75
     long_wait: float = 3.0
     slower: float = 0.08

@@ -188,7 +188,7 @@ def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeyp
     code, _, err = run("walk", *SHORT, *changed, "--remove-rows", "1-9,12-24", "--out", folder, "--force")
     assert code == 3
     assert "refused" in err
-    assert "no route beyond" in err
+    assert "no hand can be moved in time" in err
     told = json.loads((folder / "summary.json").read_text())
     assert told["outcome"] == "refused"
     assert told["reason"]

@@ -235,14 +235,16 @@ def test_an_elbow_that_strays_is_seen_although_the_hand_does_not(
 def test_a_swing_is_slower_where_its_arm_has_no_room_to_lag(
     machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Joints that need more than their rates; what the arm keeps from all else decides."""
+    """Joints that need more than their accelerations; what the arm keeps from all else decides. A hand whose joints
+    need more than their rates is slower anywhere.
+    """
     walk = Walk(machine, structure, plan, stack=stack)
     at_the_first_lift(walk, plan).tick()
     swinging, caution = walk.swinging, walk._caution
     assert swinging is not None
     assert caution is not None
     course = walk._course(swinging)
-    monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (1.2, 0.0))
+    monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (0.9, 1.2))
     times, rows = np.array([0.0, 1.0]), np.repeat(walk.q[None], 2, axis=0)
     room = caution.sight.spare(times, rows, swinging.arm, 10.0)
     pairs = caution.sight._bringing[swinging.arm]
@@ -252,6 +254,11 @@ def test_a_swing_is_slower_where_its_arm_has_no_room_to_lag(
         monkeypatch.setattr(Foresight, "spare", lambda *_given, least=least: least)
         assert caution.swing(swinging, course) is None
         assert (swinging.part < 1.0) is slower
+    swinging.part = 1.0
+    monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (1.2, 0.0))
+    monkeypatch.setattr(Foresight, "spare", lambda *_given: 0.1)
+    assert caution.swing(swinging, course) is None
+    assert swinging.part == pytest.approx(RATE / 1.2)
 
 
 def test_a_hand_at_the_end_of_its_reach_comes_to_rest_nearer_to_the_body(

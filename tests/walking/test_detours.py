@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,10 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.planner import planner
 from wbc.walking.planner.detours import CellSpacing, find_route, route
-from wbc.walking.planner.detours.cell_graph import round_labels
-from wbc.walking.planner.detours.cell_search import CellNode
-from wbc.walking.planner.detours.cells import ALONG, BESIDE, WIDE, cells_about
+from wbc.walking.planner.detours import cell_grips as gripping
+from wbc.walking.planner.detours.cell_graph import CellGraph
+from wbc.walking.planner.detours.cell_grips import CellGrips, cell_grips
+from wbc.walking.planner.detours.cells import BESIDE, WIDE, Cells, cells_about
 from wbc.walking.planner.detours.cells import NARROW as CLOSE
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.planner import plan_walk
@@ -116,15 +118,96 @@ def test_a_start_without_holds_is_refused_with_those_in_reach(machine: Walker, s
     assert set(caught.value.separating) <= {"13,6"}
 
 
-def test_connected_sets_go_on_after_a_full_turn() -> None:
-    flags = np.zeros((2, 1, 1, 6), dtype=bool)
-    flags[0, 0, 0, [0, 1, 3, 5]] = True
-    flags[1, 0, 0, [0, 5]] = True
-    numbers = round_labels(flags)
-    assert len(set(numbers[flags].tolist())) == 2
-    assert numbers[0, 0, 0, 0] == numbers[0, 0, 0, 5] == numbers[1, 0, 0, 5] == numbers[1, 0, 0, 0]
-    assert numbers[0, 0, 0, 3] not in (0, numbers[0, 0, 0, 0])
-    assert (numbers[~flags] == 0).all()
+def plain_cells(machine: Walker, structure: Structure, path: BodyPath, sides: int = 1) -> Cells:
+    return cells_about(path, structure, CellSpacing(0.14, 0.2, sides, (0.0, 0.1), 24))
+
+
+def grips_at(cells: Cells, *of_arms: list[np.ndarray]) -> CellGrips:
+    """Of each arm grips that hold at some cells each."""
+    whole = [(arm, there) for arm, mine in enumerate(of_arms) for there in mine]
+    rows = [np.full(len(there), k, dtype=np.int32) for k, (_, there) in enumerate(whole)]
+    arms = np.array([arm for arm, _ in whole])
+    there = np.concatenate([there for _, there in whole]).astype(np.int32)
+    return CellGrips(arms, np.arange(len(whole)), len(cells), np.concatenate(rows), there)
+
+
+def graph_of(cells: Cells, grips: CellGrips, arms: int, pace: float = 0.05) -> CellGraph:
+    return CellGraph(cells, grips, arms, lambda change: route._seconds(change, pace))
+
+
+def test_a_body_goes_on_where_its_arms_have_a_grip_at_both_cells(machine: Walker, structure: Structure) -> None:
+    """Which grip it is may change at every cell; one arm at most has none, where there is no other way."""
+    cells = plain_cells(machine, structure, grid_path([(13, 9), (13, 13)], 2 * INCH))
+    station, side, *_ = np.unravel_index(np.arange(len(cells)), cells.shape)
+    numbers, last = np.arange(len(cells)), cells.shape[0] - 1
+    first, then, later = (numbers[flags] for flags in (station <= 2, station >= 2, station >= 3))
+    assert graph_of(cells, grips_at(cells, [first, then], [numbers]), 2).shortest() is not None
+    # Two arms that have no grip in common from the third station to the fourth
+    graph = graph_of(cells, grips_at(cells, [first, later], [first, later]), 2)
+    assert graph.shortest() is None
+    assert graph.furthest().tolist() == [0, 2]
+    # One arm alone is left without, or goes where it has a grip: beside the path
+    gap = grips_at(cells, [first, later], [numbers], [numbers])
+    chain = graph_of(cells, gap, 3).shortest()
+    assert chain is not None
+    assert station[chain].tolist() == list(range(last + 1))
+    beside = grips_at(cells, [first, later, numbers[side == 2]], [numbers], [numbers])
+    chain = graph_of(cells, beside, 3).shortest()
+    assert chain is not None
+    assert {2, 3} <= set(station[[cell for cell in chain if side[cell] == 2]].tolist())
+
+
+def test_a_chain_of_cells_is_the_quickest_one(machine: Walker, structure: Structure) -> None:
+    """The body turns and goes down while it goes on, as that takes no longer; and on beyond a whole turn."""
+    path = grid_path([(13, 9), (13, 12)], 2 * INCH)
+    cells = plain_cells(machine, structure, path)
+    chain = graph_of(cells, grips_at(cells, [np.arange(len(cells))]), 1, pace=2 * INCH).shortest()
+    assert chain is not None
+    assert len(chain) == cells.shape[0]
+    # In the middle it must be lower, and turned by two steps in the other sense
+    station, _, lower, turned = np.unravel_index(np.arange(len(cells)), cells.shape)
+    between = (station == cells.shape[0] // 2) & ~((lower == 1) & (turned == 22))
+    two = grips_at(cells, [np.flatnonzero(~between)], [np.flatnonzero(~between)])
+    chain = graph_of(cells, two, 2, pace=2 * INCH).shortest()
+    assert chain is not None
+    assert len(chain) == cells.shape[0]
+    assert (lower[chain[cells.shape[0] // 2]], turned[chain[cells.shape[0] // 2]]) == (1, 22)
+
+
+def test_chains_keep_away_from_steps_and_cells(machine: Walker, structure: Structure) -> None:
+    cells = plain_cells(machine, structure, grid_path([(13, 9), (13, 13)], 2 * INCH))
+    everywhere = np.arange(len(cells))
+    few = np.flatnonzero(np.unravel_index(everywhere, cells.shape)[1] != 0)
+    graph = graph_of(cells, grips_at(cells, [everywhere, few], [everywhere]), 2)
+    first = graph.shortest()
+    assert first is not None
+    graph.close([(first[2], first[1])])
+    second = graph.shortest()
+    assert second is not None
+    assert (first[1], first[2]) not in set(pairwise(second))
+    for _ in range(20):
+        graph.avoid([second[2]], [0])
+    third = graph.shortest()
+    assert third is not None
+    assert second[2] not in third
+
+
+@pytest.mark.parametrize("arms", range(2, 7))
+def test_an_arm_has_the_grips_that_the_first_one_has_where_the_body_is_turned(
+    structure: Structure, monkeypatch: pytest.MonkeyPatch, arms: int
+) -> None:
+    machine = wbc.robots.walker(arms, (8 + 3 * arms) * INCH)
+    mesh = CellSpacing(0.2, 0.2, 0, (0.0,), 12).of(limb_of(machine), arms)
+    cells = cells_about(grid_path([(13, 9), (13, 10)], 2 * INCH), structure, mesh)
+    assert all(gripping._turned(gripping.around(machine, structure), cells, arm) is not None for arm in range(arms))
+    quick = cell_grips(machine, structure, cells)
+    monkeypatch.setattr(gripping, "_turned", lambda *_given: None)
+    slow = cell_grips(machine, structure, cells)
+    rows = [
+        set(zip(g.arm[g.grip].tolist(), g.hold[g.grip].tolist(), g.cell.tolist(), strict=True)) for g in (quick, slow)
+    ]
+    assert rows[0] == rows[1]
+    assert {arm for arm, *_ in rows[0]} == set(range(arms))
 
 
 @pytest.mark.parametrize("arms", range(2, 7) if MORE >= ALL else (2, 5))
@@ -147,14 +230,14 @@ def test_cells_are_closer_only_where_the_body_touches_something_between_them(
 ) -> None:
     looked = list[CellSpacing]()
 
-    def variations(*args: Any) -> Generator[route.BodyRoute, int | None, bool]:
+    def variations(*args: Any) -> Generator[route.BodyRoute, Any, bool]:
         looked.append(args[3])
-        yield route.BodyRoute(None, False, (), "none")
+        yield route.BodyRoute(None, (), "none")
         return touches and args[3] == WIDE
 
     monkeypatch.setattr(route, "_variations", variations)
     assert all(one.path is None for one in route.find_routes(machine, structure, grid_path([(13, 9), (13, 10)], 0.1)))
-    assert looked == ([ALONG, BESIDE, WIDE, CLOSE] if touches else [ALONG, BESIDE, WIDE])
+    assert looked == ([BESIDE, WIDE, CLOSE] if touches else [BESIDE, WIDE])
 
 
 def test_over_six_columns_the_body_turns_as_it_goes(machine: Walker, structure: Structure) -> None:
@@ -167,23 +250,6 @@ def test_over_six_columns_the_body_turns_as_it_goes(machine: Walker, structure: 
     assert plan.path.duration + plan.delay < 1.5 * path.duration
 
 
-def test_a_chain_of_cells_is_the_quickest_one(machine: Walker, structure: Structure) -> None:
-    """The body turns and goes down while it goes on, as that takes no longer."""
-    path = grid_path([(13, 9), (13, 12)], 2 * INCH)
-    cells = cells_about(path, structure, CellSpacing(0.14, 0.2, 1, (0.0, 0.1), 24))
-    whole, everywhere = np.array([cells.goal]), np.arange(len(cells))
-    chain = route.shortest(cells, (CellNode((), everywhere, whole, 0, None, 0),), whole, np.zeros(len(cells)))
-    assert chain is not None
-    assert len(chain) == cells.shape[0]
-    # To a cell that is lower and turned by two steps, with the same stations
-    lower = int(np.ravel_multi_index((cells.shape[0] - 1, 1, 1, 2), cells.shape))
-    end = np.array([lower])
-    chain = route.shortest(cells, (CellNode((), everywhere, end, 0, None, 0),), end, np.zeros(len(cells)), pace=0.05)
-    assert chain is not None
-    assert len(chain) == cells.shape[0]
-    assert chain[-1] == lower
-
-
 def test_detours_that_take_long_come_after_those_among_other_cells(
     machine: Walker, structure: Structure, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,18 +257,18 @@ def test_detours_that_take_long_come_after_those_among_other_cells(
     slow = straight_path(list(path.poses[[0, -1]]), 0.005)
     asked = list[tuple[str, int | None]]()
 
-    def variations(*args: Any) -> Generator[route.BodyRoute, int | None, bool]:
+    def variations(*args: Any) -> Generator[route.BodyRoute, Any, bool]:
         way, name = (slow, "slow") if args[3] == BESIDE else (path, "quick")
         for count in range(2):
-            asked.append((f"{name} {count}", (yield route.BodyRoute(way, True, (), f"{name} {count}"))))
+            asked.append((f"{name} {count}", (yield route.BodyRoute(way, (), f"{name} {count}"))))
         return False
 
     monkeypatch.setattr(route, "_variations", variations)
     routes = route.find_routes(machine, structure, path)
     found = [next(routes).text]
-    for ended in range(1, 6):
+    for ended in range(1, 4):
         found.append(routes.send(ended).text)
-    assert found == ["quick 0", "quick 1", "quick 0", "quick 1", "slow 0", "slow 1"]
+    assert found == ["quick 0", "quick 1", "slow 0", "slow 1"]
     # Each is told where the plan along it ended
     assert asked == [(name, ended) for ended, name in enumerate(found[:-1], start=1)]
 

@@ -210,12 +210,10 @@ long grips_along(const Arm *arm, const Keeping *keep, const World *world, long r
 }
 
 /* Postures of an arm on m holds at n frames of its base (4 x 4), straight along the holds' axes and clear of the world:
-   `table`, four numbers each: frame, hold, branch, and whether a hand may land there, for which |sin theta5|, the
-   reach that is left, and the wrist's distance from the base's z axis are larger than the three of `landing`, the first
-   in any case; and their six angles, joint 6 at 0. Both are long enough for all. Returns how many there are. */
-long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const World *world, long row, long n,
-              const double *frames, long m, const double *positions, const double *axes, const long *holds, int *table,
-              double *rows)
+   `table`, long enough for all, three numbers each: frame, hold and branch; |sin theta5| is larger than `wrist`.
+   Returns how many there are. */
+long grips_at(const Arm *arm, const Keeping *keep, double wrist, const World *world, long row, long n,
+              const double *frames, long m, const double *positions, const double *axes, const long *holds, int *table)
 {
     const double spans[2] = { span(arm, arm->elbow), span(arm, -arm->limits[2]) };
     long found = 0;
@@ -226,22 +224,21 @@ long grips_at(const Arm *arm, const Keeping *keep, const double *landing, const 
             if (!wrist_on(arm, keep, spans, frames + 16 * i, positions + 3 * h, axes + 3 * h, 0.0, w, axis, &left)
                 || !postures(arm, keep, w, axis, q))
                 continue;
-            const long own[2] = { holds[h], -1 }, lands = left > landing[1] && hypot(w[0], w[1]) > landing[2];
+            const long own[2] = { holds[h], -1 };
             int clear = -1;
             for (int b = 0; b < BRANCHES; ++b) {
-                double *mine = rows + JOINTS * found;
+                double mine[JOINTS] = { 0.0 };
                 nearest_limit(arm, q[b], &least);
-                if (!(least > keep->angle_margin && fabs(sin(q[b][4])) > landing[0]))
+                if (!(least > keep->angle_margin && fabs(sin(q[b][4])) > wrist))
                     continue;
                 memcpy(mine, q[b], sizeof q[b]);
-                mine[FREE] = 0.0;
                 /* With either branch of the wrist the links are at the same places */
                 if (clear < 0)
                     clear = posture_meets(world, arm, row, &frame, mine, own) == NOTHING;
                 if (!clear)
                     break;
-                const int where[4] = { (int)i, (int)h, b, (int)lands };
-                memcpy(table + 4 * found++, where, sizeof where);
+                const int where[3] = { (int)i, (int)h, b };
+                memcpy(table + 3 * found++, where, sizeof where);
             }
         }
     }

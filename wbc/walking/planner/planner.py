@@ -6,6 +6,7 @@ import functools
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -34,18 +35,11 @@ Objective = Literal["velocity", "destination"]
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, 0.25, float("inf"))
-#: Where all searches fail, the one with any delay is made again, so many times as wide
-WIDER = 5
-#: So many of the path and its detours are searched that widely, those first on which plans came furthest
-WIDELY = 3
-#: Of more than :data:`USUAL_ARMS` the stances differ in more, and one more search is so many times as wide
-WIDEST = 12
-#: Where so little is left of a detour, it is searched widely at once [s]
-NEARLY = 2.5
-#: Slices of work that are spent on wide searches and detours, and at most on wide searches before there are detours
-WORK, AT_FIRST = 2900.0, 2200.0
-#: With more arms than this detours, along which all but one must hold, come after the wider search
-USUAL_ARMS = 3
+#: Where all searches fail, the one with any delay is made again, so many times as wide; along detours they are so many
+#: times as wide, as another detour leads on more often than another stance
+WIDER, NARROWER = 5, 0.5
+#: Slices of work that are spent on detours, and on one of them
+WORK, ROUTE = 3400.0, 400.0
 
 
 def plan_walk(
@@ -107,64 +101,42 @@ def _beside(
     deadline: float | None,
     width: int | None,
 ) -> Plan:
-    """A plan along a detour, or by a wider search, in place of one that does not lead to the end; else that one.
+    """A plan along a detour in place of one that does not lead to the end; else that one.
 
     Args:
         search: as of :func:`plan_slices`, without path and beginning.
     """
-    rows = {arm.name: k for k, arm in enumerate(walker.arms)}
-    hands = {rows[name]: structure.index(hold) for name, hold in beginning[0].items()}
-    wide = [(DELAYS[-1], WIDER * width)] if width is not None else []
-    tried = [(plan.path.duration - plan.reached, path, "")]
     allowance = None if width is None else Allowance(WORK)
-
-    def along(way: BodyPath, tries: Sequence[tuple[float, int | None]], most: float = WORK) -> Plan:
-        """With at most so much of the allowance."""
-        part = None if allowance is None else Allowance(min(most, allowance.left))
-        before = 0.0 if part is None else part.left
-        found = drained(search(way, beginning, objective="destination", tries=tries, allowance=part))
-        if allowance is not None and part is not None:
-            allowance.left -= before - part.left
-        return found
-
-    if width is not None and len(walker.arms) > USUAL_ARMS:
-        found = along(path, [*wide, (DELAYS[-1], WIDEST * width)], AT_FIRST)
-        if found.complete:
-            return found
-        tried.clear()
-    routes, ended = find_routes(walker, structure, path, hands, deadline, allowance), None
-    while (route := _next(routes, ended)) is not None:
+    tries, best = [(DELAYS[-1], None if width is None else max(round(NARROWER * width), 1))], (inf, "")
+    routes, found = find_routes(walker, structure, path, deadline, allowance), None
+    while (route := _next(routes, found)) is not None:
+        found = None
         if route.path is None:
-            plan, ended = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating), None
+            plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
             continue
-        found = along(route.path, [(DELAYS[-1], width)])
+        part = None if allowance is None else Allowance(min(ROUTE, allowance.left))
+        before = 0.0 if part is None else part.left
+        try:
+            found = drained(search(route.path, beginning, objective="destination", tries=tries, allowance=part))
+        except NoPlanError as error:
+            best = min(best, (route.path.duration, f"on a detour {route.text} {error}"))
+            continue
+        finally:
+            if allowance is not None and part is not None:
+                allowance.left -= before - part.left
         if found.complete:
             return found
-        ended, left = round(found.reached / path.spacing), route.path.duration - found.reached
-        if wide and left <= NEARLY:
-            found = along(route.path, wide)
-            if found.complete:
-                return found
-        else:
-            tried.append((left, route.path, f"on a detour {route.text} {found.reason}"))
-    tried.sort(key=lambda one: one[0])
-    for _, way, _ in tried[:WIDELY] if wide else ():
-        if allowance is not None and allowance.spent:
-            break
-        found = along(way, wide)
-        if found.complete:
-            return found
-    best = next((text for *_, text in tried if text), "")
-    reasons = [plan.reason, *([best] if best else [])]
+        best = min(best, (route.path.duration - found.reached, f"on a detour {route.text} {found.reason}"))
+    reasons = [plan.reason, *([best[1]] if best[1] else [])]
     if allowance is not None and allowance.spent:
         reasons.append("what may be left was not looked at, as it would take too long")
     return replace(plan, reason="; ".join(reasons))
 
 
-def _next(routes: Routes, ended: int | None) -> BodyRoute | None:
-    """The next route after the one along which a plan ended at a sample; None: no other."""
+def _next(routes: Routes, plan: Plan | None) -> BodyRoute | None:
+    """The next route after the one along which a plan does not lead to the end; None: no other."""
     try:
-        return next(routes) if ended is None else routes.send(ended)
+        return next(routes) if plan is None else routes.send(plan)
     except StopIteration:
         return None
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from heapq import nlargest
 from itertools import combinations, product
 from typing import Any
 
@@ -17,7 +16,7 @@ from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, around
 from wbc.walking.planner.grips.held import held, near_holds
-from wbc.walking.planner.grips.table import Grips, Holding
+from wbc.walking.planner.grips.table import Grips, Holding, Ints
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.slices import Slices, drained
 from wbc.walking.planner.stances.search import PAIRS, StanceSearch
@@ -179,22 +178,30 @@ def _lasting_longest(
     grips: Grips, search: StanceSearch[Any], choices: Sequence[Sequence[int]], sample: int
 ) -> Iterator[tuple[int, ...]]:
     """Stances that last beyond a sample, grown arm by arm from the :data:`ENOUGH` that last longest."""
-    last, ends = grips.last.tolist(), {g: dict[int, int]() for mine in choices for g in mine}
-    for one, other in combinations(choices, 2):
-        for a, b in product(one, other):
-            if grips.hold[a] != grips.hold[b]:
-                ends[b][a] = min(last[a], last[b], search.conflicts.first_conflict(a, b, 0) - 1)
-    some: list[tuple[int, int, tuple[int, ...]]] = [(last[g], 0, (g,)) for g in choices[0]]
-    for mine in choices[1:]:
-        longer = []
-        for (until, total, stance), g in product(some, mine):
-            mate = ends[g]
-            each = [mate.get(other, -1) for other in stance]
-            if min(each) > sample:
-                longer.append((min(until, *each), total + sum(each), (*stance, g)))
+    mine = [np.array(one, dtype=np.int64) for one in choices]
+    some, until, total = mine[0][:, None], grips.last[mine[0]], np.zeros(len(mine[0]), dtype=np.int64)
+    places = np.arange(len(mine[0]))[:, None]
+    for k in range(1, len(mine)):
+        each = np.stack([_lasting(grips, search, one, mine[k])[places[:, j]] for j, one in enumerate(mine[:k])])
+        row, column = np.nonzero(each.min(axis=0) > sample)
+        until = np.minimum(until[row], each.min(axis=0)[row, column])
+        total = total[row] + each.sum(axis=0)[row, column]
+        some = np.column_stack([some[row], mine[k][column]])
         # Of those that last as long, the ones whose pairs last longer
-        some = nlargest(ENOUGH, longer)
-    yield from (stance for _, _, stance in some)
+        order = np.lexsort([*-some.T[::-1], -total, -until])[:ENOUGH]
+        some, until, total = some[order], until[order], total[order]
+        places = np.column_stack([places[row], column])[order]
+    yield from map(tuple, some.tolist())
+
+
+def _lasting(grips: Grips, search: StanceSearch[Any], some: Ints, others: Ints) -> Ints:
+    """Last samples that every two grips of two arms hold together from the first on; -1 on one hold ``[n, m]``."""
+    out = np.full((len(some), len(others)), -1, dtype=np.int64)
+    for i, a in enumerate(some.tolist()):
+        for j, b in enumerate(others.tolist()):
+            if grips.hold[a] != grips.hold[b]:
+                out[i, j] = min(grips.last[a], grips.last[b], search.conflicts.first_conflict(a, b, 0) - 1)
+    return out
 
 
 def _why_no_stance(

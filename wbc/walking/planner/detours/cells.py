@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi, radians
+from math import ceil, pi, radians
 
 import numpy as np
 import pinocchio as pin
@@ -37,11 +37,14 @@ class CellSpacing:
     lower: tuple[float, ...]
     turns: int
 
-    def of(self, limb: BodyLimb) -> CellSpacing:
-        """As large for an arm as this one is for a PUMA 600."""
+    def of(self, limb: BodyLimb, arms: int) -> CellSpacing:
+        """As large for an arm as this one is for a PUMA 600; turned from heading to heading, each of some arms comes to
+        where the first one was.
+        """
         scale = round(limb.hand_span / HAND_SPAN, 9)
         lower = tuple(scale * height for height in self.lower)
-        return replace(self, step=scale * self.step, side=scale * self.side, lower=lower)
+        turns = ceil(self.turns / arms) * arms
+        return CellSpacing(scale * self.step, scale * self.side, self.beside, lower, turns)
 
 
 #: Reach of the arm that the meshes below were chosen for, a PUMA 600 from neck to hand [m]

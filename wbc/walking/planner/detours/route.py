@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import time
-from collections.abc import Collection, Generator, Mapping
+from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, pi
 
 import numpy as np
@@ -18,9 +18,10 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
+from wbc.walking.planner.detours.cell_graph import CellGraph
 from wbc.walking.planner.detours.cell_grips import cell_grips
-from wbc.walking.planner.detours.cell_search import CellNode, CellSearch, Outcome
 from wbc.walking.planner.detours.cells import ALONG, BESIDE, NARROW, WIDE, Cells, CellSpacing, Ints, cells_about
+from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.slices import Allowance
 
 #: How fast the body goes down [m/s] and turns [rad/s]
@@ -29,25 +30,16 @@ DOWN_SPEED, TURN_SPEED = 0.05, 0.1
 CORNER = 0.3
 #: Least speed beside the path [m/s]
 SLOW = 0.01
-#: What a cell off the path costs for each m beside, m lower and rad turned; a step along the path costs 1
-DEAR = np.array([0.1, 0.2, 0.1])
-#: What each of the ways costs in which a cell differs from the next one
-CHANGE = 0.1
 
-#: How many detours of a mesh are tried, each away from where plans along those before ended: cells next to that cost so
-#: much more
-VARIATIONS, STUCK = 4, 3.0
+#: How many detours of a mesh are tried, each away from where plans along those before ended
+VARIATIONS = 16
 #: Detours that take so many times as long as the path, and so much longer [s], come after those among other cells
 LONG, LONGER = 1.7, 30.0
-#: Postures in cells, and landings, that count as much as a slice of work
-ROWS, LANDINGS = 2000, 2
-#: Where less work is left, cells are not looked at
-CELLS = 300.0
-#: Room that the body has beyond its clearance at the cells that are looked at first [m]
-ROOMY = 0.06
+#: Grips at cells that count as much as a slice of work; where less work is left than CELLS, cells are not looked at
+ROWS, CELLS = 6000, 150.0
 #: Cells that are looked at, in the order of trying: higher, lower and turned, then beside the path too, at first not
 #: far; the body may touch something between them on every route, and pass between closer ones (NARROW)
-MESHES = (ALONG, BESIDE, WIDE)
+MESHES = (BESIDE, WIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,46 +48,34 @@ class BodyRoute:
 
     Attributes:
         path: of the body; None if there is none.
-        complete: the search looked at all that it can reach, so there is none among its cells.
         separating: ids of the holds at which it ends; empty if there is one.
         text: how far the body goes off its path, or why there is none.
     """
 
     path: BodyPath | None
-    complete: bool
     separating: tuple[str, ...]
     text: str
 
 
-#: Takes the sample at which a plan along the route ends, and yields another route
-Routes = Generator[BodyRoute, int | None, None]
+#: Takes the plan along a route, where it does not lead to the end, and yields another route
+Routes = Generator[BodyRoute, Plan | None, None]
 #: The same; returns whether the body touches something between its cells on each
-Variations = Generator[BodyRoute, int | None, bool]
+Variations = Generator[BodyRoute, Plan | None, bool]
 
 
-def find_route(
-    walker: Walker,
-    structure: Structure,
-    path: BodyPath,
-    *,
-    mesh: CellSpacing = ALONG,
-    start: Mapping[int, int] | None = None,
-    deadline: float | None = None,
-) -> BodyRoute:
+def find_route(walker: Walker, structure: Structure, path: BodyPath, *, mesh: CellSpacing = ALONG) -> BodyRoute:
     """A detour from a path's beginning to its end, along it, beside it, lower and turned.
 
     Args:
         mesh: how far beside the path, how low, and how closely it is looked.
-        start: arm -> hold (rows) of hands that hold at the beginning. deadline: of ``time.perf_counter``.
     """
-    return next(_variations(walker, structure, path, mesh, start, deadline))
+    return next(_variations(walker, structure, path, mesh))
 
 
 def find_routes(
     walker: Walker,
     structure: Structure,
     path: BodyPath,
-    start: Mapping[int, int] | None = None,
     deadline: float | None = None,
     allowance: Allowance | None = None,
 ) -> Routes:
@@ -103,16 +83,17 @@ def find_routes(
     path (:data:`LONG`); the next one is looked for on demand.
 
     Args:
-        start, deadline: of :func:`find_route`. allowance: work that may be done; when it is spent no other detour is
-            looked for.
+        deadline: of ``time.perf_counter``. allowance: work that may be done; when it is spent no other detour is looked
+            for.
     """
-    limb, closed, late = limb_of(walker), False, list[tuple[float, Variations, BodyRoute]]()
+    limb, arms = limb_of(walker), len(walker.arms)
+    closed, late = False, list[tuple[float, Variations, BodyRoute]]()
     for mesh in MESHES:
         if allowance is not None and allowance.left < CELLS:
             allowance.left = min(allowance.left, 0.0)
         if _over(deadline, allowance):
             return
-        routes = _variations(walker, structure, path, mesh.of(limb), start, deadline, allowance)
+        routes = _variations(walker, structure, path, mesh.of(limb, arms), deadline, allowance)
         first = next(routes)
         usual = max(LONG * path.duration, path.duration + LONGER)
         if first.path is not None and first.path.duration > usual:
@@ -122,7 +103,7 @@ def find_routes(
     for _, routes, first in sorted(late, key=lambda one: one[0]):
         yield from _from(first, routes)
     if closed and not _over(deadline, allowance):
-        yield from _variations(walker, structure, path, NARROW.of(limb), start, deadline, allowance)
+        yield from _variations(walker, structure, path, NARROW.of(limb, arms), deadline, allowance)
 
 
 def _over(deadline: float | None, allowance: Allowance | None) -> bool:
@@ -134,9 +115,9 @@ def _over(deadline: float | None, allowance: Allowance | None) -> bool:
 def _from(route: BodyRoute, routes: Variations) -> Variations:
     """A route that was found, and those that follow it."""
     while True:
-        ended = yield route
+        plan = yield route
         try:
-            route = routes.send(ended)
+            route = routes.send(plan)
         except StopIteration as stop:
             return bool(stop.value)
 
@@ -146,114 +127,64 @@ def _variations(
     structure: Structure,
     path: BodyPath,
     mesh: CellSpacing,
-    start: Mapping[int, int] | None,
-    deadline: float | None,
+    deadline: float | None = None,
     allowance: Allowance | None = None,
 ) -> Variations:
-    """Detours of one mesh: the quickest one, then such as have room, and keep away from where plans ended. Returns
-    whether there are some among its cells, but the body touches something between them on each.
+    """Detours of one mesh: the quickest one, then such as keep away from where plans ended. Returns whether there are
+    some among its cells, but the body touches something between them on each.
     """
-    cells = cells_about(path, structure, mesh)
+    cells, pace = cells_about(path, structure, mesh), _pace(path)
     grips = cell_grips(walker, structure, cells)
-    there, dear, closed = around(walker, structure), _dear(cells), set[tuple[int, int]]()
-    outcome = CellSearch(walker, structure, cells, grips).run(start, deadline)
+    graph = CellGraph(cells, grips, len(walker.arms), partial(_seconds, pace=pace))
     if allowance is not None:
-        allowance.left -= len(grips.cells) / ROWS + outcome.expanded / LANDINGS
-    if not outcome.nodes:
-        names = tuple(structure.ids[k] for k in sorted({int(grips.hold[g]) for g in outcome.reached}))
-        number = f"{outcome.expanded} landings looked at{'' if outcome.complete else ', more are left'}"
+        allowance.left -= len(grips.cell) / ROWS
+    beside = f"up to {mesh.beside * mesh.side:.2f} m beside the path"
+    if graph.shortest() is None:
+        names = tuple(structure.ids[k] for k in np.unique(grips.hold[graph.furthest()]))
         where = f"beyond {', '.join(names)}" if names else "from the start"
-        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path there is no route {where} ({number})"
-        yield BodyRoute(None, outcome.complete, names, text)
+        yield BodyRoute(None, names, f"{beside} there is no route {where}")
         return False
-    outcomes, known, seen = [outcome], list[list[int]](), 0
-    # Then through cells at which the body has more place than it needs
-    roomy = there.bodies(cells.frames, ROOMY) == NONE_MET
-    roomy[[cells.start, cells.goal]] = True
-    for count in range(VARIATIONS):
-        if count and _over(deadline, allowance):
+    there, known = around(walker, structure), list[list[int]]()
+    for _ in range(VARIATIONS):
+        found = None if known and _over(deadline, allowance) else _clear(there, graph, path)
+        if found is None:
             break
-        if count == 1 and not roomy.all():
-            outcome = CellSearch(walker, structure, cells, grips.only(roomy)).run(start, deadline)
-            if allowance is not None:
-                allowance.left -= outcome.expanded / LANDINGS
-            outcomes += [outcome] if outcome.nodes else []
-        found = _clear(there, cells, outcomes[count % len(outcomes)], path, dear, closed)
-        if found is None or found[0] in known:
-            continue
         chain, route, at = found
-        known.append(chain)
-        off = cells.offsets(np.array(chain))
-        far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
-        text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
-        ended = yield BodyRoute(route, True, (), text)
-        seen += 1
-        if ended is not None:
-            dear[_near(cells, chain[min(int(np.searchsorted(at, ended)), len(chain) - 1)])] += STUCK
-    if not seen:
-        text = f"up to {mesh.beside * mesh.side:.2f} m beside the path the body touches something on each route"
-        yield BodyRoute(None, False, (), text)
-    return not seen
+        if chain not in known:
+            known.append(chain)
+            off = cells.offsets(np.array(chain))
+            far = np.abs(off[:, 1]).max(), off[:, 2].max(), np.degrees(np.abs(off[:, 3]).max())
+            text = f"up to {far[0]:.2f} m beside, {far[1]:.2f} m lower, turned by {far[2]:.0f} deg"
+            plan = yield BodyRoute(route, (), text)
+            ended, arms = (0.0, []) if plan is None else (plan.reached, _ended(plan))
+        end = min(int(np.searchsorted(at, round(ended / route.spacing))), len(chain) - 1)
+        graph.avoid(chain[max(end - 3, 0) : end + 2], arms)
+    if not known:
+        yield BodyRoute(None, (), f"{beside} the body touches something on each route")
+    return not known
 
 
-def _clear(
-    there: Around, cells: Cells, outcome: Outcome, path: BodyPath, dear: Array, closed: set[tuple[int, int]]
-) -> tuple[list[int], BodyPath, Ints] | None:
-    """The quickest chain of cells along which the body touches nothing on its way from cell to cell either, as a path,
-    and the samples of its cells; steps at which it would are added to ``closed``. None if there is none.
+def _ended(plan: Plan) -> list[int]:
+    """Rows of the arms whose grips end where a plan does."""
+    if plan.grips is None:
+        return []
+    lasts = [plan.grips.last[chain[-1]] * plan.path.spacing for chain in plan.chain]
+    return [arm for arm, last in enumerate(lasts) if last <= plan.reached + 1e-9]
+
+
+def _clear(there: Around, graph: CellGraph, path: BodyPath) -> tuple[list[int], BodyPath, Ints] | None:
+    """The best chain of cells along which the body touches nothing on its way from cell to cell either, as a path, and
+    the samples of its cells; steps at which it would are closed. None if there is none.
     """
-    while True:
-        chain = shortest(cells, outcome.nodes, outcome.final, dear, closed, _pace(path))
-        if chain is None:
-            return None
-        route, at = as_path(cells, chain, path)
+    while (chain := graph.shortest()) is not None:
+        route, at = as_path(graph.cells, chain, path)
         met = np.flatnonzero(there.bodies(route.poses) != NONE_MET)
         if not len(met):
             return chain, route, at
-        for k in np.unique(np.clip(np.searchsorted(at, met), 1, max(len(chain) - 1, 1))).tolist():
-            if k >= len(chain):
-                return None
-            closed |= {(chain[k - 1], chain[k]), (chain[k], chain[k - 1])}
-
-
-def shortest(
-    cells: Cells,
-    nodes: tuple[CellNode, ...],
-    final: Ints,
-    off: Array,
-    closed: Collection[tuple[int, int]] = (),
-    pace: float = SLOW,
-) -> list[int] | None:
-    """The quickest chain of cells through the sets of nodes, each left where the next hand lands; None: there is none.
-
-    Args:
-        off: what each cell costs more ``[cells]``. closed: steps from cell to cell that are not made.
-        pace: of the body beside the path [m/s].
-    """
-    steps_of = _Steps(cells, pace)
-    sets = [set(node.cells.tolist()) for node in nodes]
-    doors = [*(set(node.landed.tolist()) for node in nodes[1:]), set(final.tolist())]
-    begin = (0, cells.start)
-    cost: dict[tuple[int, int], float] = {begin: 0.0}
-    came: dict[tuple[int, int], tuple[int, int] | None] = {begin: None}
-    queue, done = [(0.0, begin)], set[tuple[int, int]]()
-    while queue:
-        spent, here = heapq.heappop(queue)
-        if here in done:
-            continue
-        done.add(here)
-        layer, cell = here
-        if layer == len(nodes):
-            return _chain(came, here)
-        steps = [((layer, there), price) for there, price in steps_of(cell) if there in sets[layer]]
-        steps = [(there, price) for there, price in steps if (cell, there[1]) not in closed]
-        if cell in doors[layer]:
-            steps.append(((layer + 1, cell), 0.0))
-        for there, price in steps:
-            total = spent + price + (off[there[1]] if price else 0.0)
-            if total < cost.get(there, np.inf):
-                cost[there], came[there] = total, here
-                heapq.heappush(queue, (total, there))
+        if len(chain) < 2:
+            return None
+        steps = np.unique(np.clip(np.searchsorted(at, met), 1, len(chain) - 1)).tolist()
+        graph.close((chain[k - 1], chain[k]) for k in steps)
     return None
 
 
@@ -298,53 +229,3 @@ def _seconds(change: Array, pace: float) -> Array:
     turned = np.minimum(turned, 2.0 * pi - turned)
     out: Array = np.maximum(np.hypot(time, side / pace), np.maximum(lower / DOWN_SPEED, turned / TURN_SPEED))
     return out
-
-
-def _dear(cells: Cells) -> Array:
-    off = np.abs(cells.offsets(np.arange(len(cells))))
-    out: Array = off[:, 1:] @ DEAR
-    return out
-
-
-class _Steps:
-    """Cells next to one, diagonal ones too, and what it costs to go there: the time that it takes, in steps along the
-    path, and a little for each change.
-    """
-
-    def __init__(self, cells: Cells, pace: float) -> None:
-        self._cells, self._pace = cells, pace
-        self._offsets = cells.offsets(np.arange(len(cells)))
-        self._usual = (float(cells.at[-1] - cells.at[0]) / max(len(cells.at) - 1, 1)) or 1.0
-
-    def __call__(self, cell: int) -> list[tuple[int, float]]:
-        numbers, changes = _neighbours(self._cells, cell)
-        seconds = _seconds(self._offsets[numbers] - self._offsets[cell], self._pace)
-        price = seconds / self._usual + CHANGE * changes
-        return list(zip(numbers.tolist(), price.tolist(), strict=True))
-
-
-def _neighbours(cells: Cells, cell: int) -> tuple[Ints, Ints]:
-    """Cells next to one, diagonal ones too, and in how many ways they differ from it."""
-    there = np.array(np.unravel_index(cell, cells.shape)) + _AROUND
-    there[:, 3] %= cells.shape[3]
-    inside = ((there >= 0) & (there < cells.shape)).all(axis=1)
-    return np.ravel_multi_index(tuple(there[inside].T), cells.shape), _CHANGES[inside]
-
-
-def _near(cells: Cells, cell: int) -> Ints:
-    """A cell and those next to it."""
-    return np.append(_neighbours(cells, cell)[0], cell)
-
-
-def _chain(came: dict[tuple[int, int], tuple[int, int] | None], end: tuple[int, int]) -> list[int]:
-    out = [end[1]]
-    at = came[end]
-    while at is not None:
-        if at[1] != out[-1]:
-            out.append(at[1])
-        at = came[at]
-    return out[::-1]
-
-
-_AROUND = np.array([step for step in itertools.product((-1, 0, 1), repeat=4) if any(step)])
-_CHANGES = np.abs(_AROUND).sum(axis=1)

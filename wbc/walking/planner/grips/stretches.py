@@ -81,9 +81,9 @@ def stretches(
 
 def postures_at(
     there: Around, arm: int, frames: Array, among: NDArray[np.int64], margins: Margins
-) -> tuple[NDArray[np.int32], Array] | None:
+) -> NDArray[np.int32] | None:
     """Postures of an arm (its row) on some holds (their rows) from frames of its base ``[n, 4, 4]``, in a cell of a
-    detour: row of the frame, of the hold, branch, and whether a hand may land there ``[k, 4]``; and ``[k, 6]`` [rad].
+    detour: row of the frame, of the hold, and branch ``[k, 3]``.
 
     None as of :func:`stretches`, and where nothing stands around.
     """
@@ -91,26 +91,25 @@ def postures_at(
     library, data = _for(there, among)
     if library is None or data is None or world is None:
         return None
-    most = 2 * len(frames) * len(among)
-    table, rows = np.empty((most, 4), dtype=np.int32), np.empty((most, 6))
+    table = np.empty((2 * len(frames) * len(among), 3), dtype=np.int32)
     given = [compiled.packed(a) for a in (frames, structure.positions[among], structure.axes[among])]
     where, holds = [compiled.at(a) for a in given], np.ascontiguousarray(among, dtype=np.int64)
     library.grips_at.restype = ctypes.c_long
     found = library.grips_at(
         ctypes.byref(compiled.arm(data)),
         _keeping(margins.cell_reach, margins.cell_angle, [np.inf] * 5, margins.facing, 1, 0.0),
-        compiled.doubles([margins.landing_wrist, margins.cell_landing_reach, margins.cell_landing_axis]),
+        ctypes.c_double(margins.landing_wrist),
         world.pointer,
         ctypes.c_long(arm),
         ctypes.c_long(len(frames)),
         where[0],
         ctypes.c_long(len(among)),
         *where[1:],
-        *(compiled.at(a) for a in (holds, table, rows)),
+        *(compiled.at(a) for a in (holds, table)),
     )
     out = table[:found]
     out[:, 1] = among[out[:, 1]]
-    return out, rows[:found]
+    return out
 
 
 def _for(there: Around, among: NDArray[np.int64]) -> tuple[ctypes.PyDLL | None, WalkerData | None]:
