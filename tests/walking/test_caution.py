@@ -181,6 +181,66 @@ def test_a_swing_waits_for_a_hand_that_leaves_its_hold_late() -> None:
         assert pace == pytest.approx(LEAST_PACE if slow else 1.0)
 
 
+def test_a_swing_waits_for_a_hand_beside_its_way_and_not_for_one_that_cannot_brake_as_hard() -> None:
+    """4 mm beside the aim, where the hand is over its hold: behind it or ahead."""
+    times = np.linspace(0.0, 1.0, 201)
+    places = np.stack([np.zeros(201), np.zeros(201), times], axis=1)
+    swinging = Swinging(0, 0, 0, SwingLaw(times, places, times), latch=0.0, state="open")
+    swinging.aim = swinging.law.at(0.9)
+    for ahead, waits in ((-0.004, True), (0.0, True), (0.004, False)):
+        place = swinging.aim.position + [0.004, 0.0, ahead]
+        assert (hand_pace(swinging, place, True, 0.0, 1.0, (0.9, 0.1)) < 1.0) is waits
+
+
+def test_a_swing_is_proven_anew_where_the_body_is_to_stop_before_the_hand_holds(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As while another course is planned; and again when it may go on."""
+    walk = Walk(machine, structure, plan, stack=stack)
+    at_the_first_lift(walk, plan).tick()
+    swinging, proven = walk.swinging, list[float]()
+    assert swinging is not None
+    real = Caution.swing
+    monkeypatch.setattr(Caution, "swing", lambda *given: (proven.append(given[2].end), real(*given))[1])
+    walk._foresee()
+    assert proven == []
+    for limit in ((walk.path_time + 0.05, 1), None):
+        walk.limit = limit
+        for _ in range(2):
+            walk._foresee()
+    assert proven == [pytest.approx(walk.path_time + 0.05), walk._before_landing(swinging)]
+
+
+@pytest.mark.parametrize("lasts", [0.0, 1.0])
+def test_a_swing_that_is_not_clear_is_refused_while_the_body_can_stop_within_the_grip_of_its_hand(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch, lasts: float
+) -> None:
+    """An arm whose grip ends where it was to be lifted would be pulled straight; one that can hold on is not looked at
+    before.
+    """
+    lift, spacing = plan.regrasps[0].lift, plan.path.spacing
+    walk = Walk(machine, structure, plan, stack=stack)
+    walk.progress.path_time, walk.body.pace = lift - 0.2, 1.0
+    ends, grip = list(walk.progress.grips.ends_at(spacing)), walk.progress.grip[walk.progress.arm_of(plan.regrasps[0])]
+    ends[grip] = lift + lasts
+    monkeypatch.setattr(type(walk.progress.grips), "ends_at", lambda _self, _spacing: ends)
+    latches = list[float]()
+
+    def looked(_self: Caution, swinging: Swinging, _course: object) -> str:
+        latches.append(swinging.latch)
+        return "something"
+
+    refused = list[tuple[str, object]]()
+    monkeypatch.setattr(Caution, "looked", looked)
+    monkeypatch.setattr(Walk, "_refuse", lambda _self, *given: refused.append(given))
+    for _ in range(2):
+        walk._look_ahead(plan.regrasps[0])
+    step = plan.regrasps[0]
+    assert refused == ([] if lasts else [(f"{step.arm} from {step.source} to {step.target}", "something")])
+    assert all(latch == pytest.approx(0.2 + machine.tolerances.latch_time) for latch in latches)
+    assert bool(latches) is (lasts == 0.0)
+
+
 def test_a_body_slows_down_before_a_corner(plan: Plan) -> None:
     here, there = pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0]))
     path = straight_path([here, there, here], 0.1)

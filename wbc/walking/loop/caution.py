@@ -131,6 +131,13 @@ class Caution:
             self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
         return found
 
+    def looked(self, swinging: Swinging, course: Course) -> Nearest | None:
+        """As :meth:`swing`, of a hand that is lifted later; what is proven stays as it is."""
+        before = self._known, self.until, self._clock, self._foreseen
+        found = self.swing(swinging, course)
+        self._known, self.until, self._clock, self._foreseen = before
+        return found
+
     def _near_by(self, swinging: Swinging, when: Timing) -> bool:
         """Whether an arm that lags in what was foreseen last may touch something."""
         return self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS

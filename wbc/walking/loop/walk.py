@@ -37,6 +37,8 @@ ARRIVED = 0.002
 PATIENCE, SLACK = 4.0, 20.0
 #: Slices of planning between two ticks
 SLICES = 3
+#: A swing is looked at so long before its hand is lifted [s]
+EARLY = 0.3
 #: So often a swing is stopped on its way because it is not where it was foreseen
 PAUSES = 3
 #: So often in a row what was planned may turn out to be too near to something, before the walk is given up
@@ -117,6 +119,7 @@ class Walk:
         self.hands.begin([int(grips.roll[grip]) for grip in mine])
         self._caution: Caution | None = None
         self._refusals, self._refused = 0, ""
+        self._looked: Regrasp | None = None
         if foresees and not self.leader.one_motion:
             sight = Foresight(walker, structure)
             self.replanner.sight, sight.left = sight, machine.left
@@ -416,9 +419,7 @@ class Walk:
         arm = self.progress.arm_of(step)
         if self.hands.just_landed(arm):
             return
-        law, grip = self.plan.laws[self.progress.next], self.progress.next_grip(arm)
-        swinging = self.hands.going(arm, self._grip(grip), law, latch=self.hands.data.latch_time)
-        swinging.wrist = self.leader.wrist(arm)
+        swinging = self._next_swing(step)
         if not self._may_swing(swinging, f"{step.arm} from {step.source} to {step.target}"):
             return
         if not self.machine.may_open(arm):
@@ -442,6 +443,8 @@ class Walk:
             found = caution.ahead(min([self._end(), *self._lasting(leaving)]), None if lift is None else lift.lift)
             if found is not None:
                 self._refuse("the body's way", found)
+            elif lift is not None:
+                self._look_ahead(lift)
         elif swinging.pauses:
             if self.pace == 0.0 and (swinging.state == "opening" or swinging.pace == 0.0):
                 swinging.pauses = False
@@ -453,6 +456,30 @@ class Walk:
             swinging.pauses, swinging.paused = swinging.paused < PAUSES, swinging.paused + 1
             if not swinging.pauses:
                 self._go_on(swinging)
+
+    def _look_ahead(self, step: Regrasp) -> None:
+        """Prove the next swing before its hand is lifted, where the body could not stop any more before its grip ends:
+        an arm that is not lifted then would be pulled straight.
+        """
+        caution, before = self._caution, step.lift - self.path_time
+        if caution is None or self._looked is step or before > EARLY or self.pace == 0.0:
+            return
+        self._looked = step
+        grip = self.progress.grip[self.progress.arm_of(step)]
+        lasts = self.progress.grips.ends_at(self.plan.path.spacing)[grip]
+        if lasts - step.lift > 0.5 * self.leader.stops.brake:
+            return
+        found = self._in_the_way(self._next_swing(step, before / self.pace), caution.looked, step.lift)
+        if found is not None:
+            self._refuse(f"{step.arm} from {step.source} to {step.target}", found)
+
+    def _next_swing(self, step: Regrasp, later: float = 0.0) -> Swinging:
+        """The swing of the next re-grasp, which begins so much later [s]."""
+        arm, law = self.progress.arm_of(step), self.plan.laws[self.progress.next]
+        grip = self._grip(self.progress.next_grip(arm))
+        swinging = self.hands.going(arm, grip, law, latch=later + self.hands.data.latch_time)
+        swinging.wrist = self.leader.wrist(arm)
+        return swinging
 
     def _go_on(self, swinging: Swinging) -> None:
         """A hand goes on to its hold, or not."""
@@ -468,18 +495,26 @@ class Walk:
         caution = self._caution
         if caution is None:
             return True
-        course = self._course(swinging)
-        found = caution.swing(swinging, course)
+        found = self._in_the_way(swinging, caution.swing, self.path_time)
         if found is None:
             return True
-        stop = self.path_time + 0.5 * self.leader.stops.brake * self.pace**2
-        if not course.stands and swinging.counted and self._soonest(swinging) <= stop:
-            swinging.waits = True
-            if caution.swing(swinging, course._replace(stands=True)) is None:
-                return True
-            swinging.waits = False
         self._refuse(what, found)
         return False
+
+    def _in_the_way(
+        self, swinging: Swinging, prove: Callable[[Swinging, Course], Nearest | None], begins: float
+    ) -> Nearest | None:
+        """What is too near to a hand that goes on to its hold from a path time on [s], also where the body stops."""
+        course = self._course(swinging)
+        found = prove(swinging, course)
+        stop = begins + 0.5 * self.leader.stops.brake * self.pace**2
+        if found is None or course.stands or not swinging.counted or self._soonest(swinging) > stop:
+            return found
+        swinging.waits = True
+        if prove(swinging, course._replace(stands=True)) is None:
+            return None
+        swinging.waits = False
+        return found
 
     def _refuse(self, what: str, found: Nearest) -> None:
         """The body stops, and the rest is planned from there; given up where that has led nowhere before."""

@@ -40,6 +40,8 @@ SOON = (0.0, 0.25, float("inf"))
 WIDER, NARROWER = 5, 0.5
 #: Slices of work that are spent on detours, and on one of them
 WORK, ROUTE = 3400.0, 400.0
+#: With more arms than this, whose stances differ in more, the path itself is searched widely first, with so much more
+USUAL_ARMS, WIDE = 3, 900.0
 
 
 def plan_walk(
@@ -106,27 +108,38 @@ def _beside(
     Args:
         search: as of :func:`plan_slices`, without path and beginning.
     """
-    allowance = None if width is None else Allowance(WORK)
-    tries, best = [(DELAYS[-1], None if width is None else max(round(NARROWER * width), 1))], (inf, "")
-    routes, found = find_routes(walker, structure, path, deadline, allowance), None
-    while (route := _next(routes, found)) is not None:
-        found = None
-        if route.path is None:
-            plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
-            continue
-        part = None if allowance is None else Allowance(min(ROUTE, allowance.left))
+    allowance, best = None if width is None else Allowance(WORK), (inf, "")
+
+    def along(way: BodyPath, times: float, most: float) -> Plan:
+        """By a search so many times as wide, with at most so much of the allowance."""
+        tries = [(DELAYS[-1], None if width is None else max(round(times * width), 1))]
+        part = None if allowance is None else Allowance(min(most, allowance.left))
         before = 0.0 if part is None else part.left
         try:
-            found = drained(search(route.path, beginning, objective="destination", tries=tries, allowance=part))
-        except NoPlanError as error:
-            best = min(best, (route.path.duration, f"on a detour {route.text} {error}"))
-            continue
+            return drained(search(way, beginning, objective="destination", tries=tries, allowance=part))
         finally:
             if allowance is not None and part is not None:
                 allowance.left -= before - part.left
+
+    if allowance is not None and len(walker.arms) > USUAL_ARMS:
+        allowance.left += WIDE
+        found = along(path, WIDER, WIDE)
         if found.complete:
             return found
-        best = min(best, (route.path.duration - found.reached, f"on a detour {route.text} {found.reason}"))
+    routes, ended = find_routes(walker, structure, path, deadline, allowance), None
+    while (route := _next(routes, ended)) is not None:
+        ended = None
+        if route.path is None:
+            plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
+            continue
+        try:
+            ended = along(route.path, NARROWER, ROUTE)
+        except NoPlanError as error:
+            best = min(best, (route.path.duration, f"on a detour {route.text} {error}"))
+            continue
+        if ended.complete:
+            return ended
+        best = min(best, (route.path.duration - ended.reached, f"on a detour {route.text} {ended.reason}"))
     reasons = [plan.reason, *([best[1]] if best[1] else [])]
     if allowance is not None and allowance.spent:
         reasons.append("what may be left was not looked at, as it would take too long")
