@@ -117,4 +117,5 @@ def _pairs(numbers: Ints, step: Ints) -> Ints:
 def _common(sets: NDArray[np.uint64], here: Ints, there: Ints) -> NDArray[np.uint8]:
     """How many numbers are in both of two sets each, of sets of bits ``[cells, words]``; 255 is that many or more."""
     counts = np.bitwise_count(sets[here] & sets[there]).sum(axis=1, dtype=np.int64)
-    return np.minimum(counts, 255).astype(np.uint8)
+    out: NDArray[np.uint8] = np.minimum(counts, 255).astype(np.uint8)
+    return out
