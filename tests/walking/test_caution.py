@@ -181,17 +181,6 @@ def test_a_swing_waits_for_a_hand_that_leaves_its_hold_late() -> None:
         assert pace == pytest.approx(LEAST_PACE if slow else 1.0)
 
 
-def test_a_swing_waits_for_a_hand_beside_its_way_and_not_for_one_that_cannot_brake_as_hard() -> None:
-    """4 mm beside the aim, where the hand is over its hold: behind it or ahead."""
-    times = np.linspace(0.0, 1.0, 201)
-    places = np.stack([np.zeros(201), np.zeros(201), times], axis=1)
-    swinging = Swinging(0, 0, 0, SwingLaw(times, places, times), latch=0.0, state="open")
-    swinging.aim = swinging.law.at(0.9)
-    for ahead, waits in ((-0.004, True), (0.0, True), (0.004, False)):
-        place = swinging.aim.position + [0.004, 0.0, ahead]
-        assert (hand_pace(swinging, place, True, 0.0, 1.0, (0.9, 0.1)) < 1.0) is waits
-
-
 def test_a_swing_is_proven_anew_where_the_body_is_to_stop_before_the_hand_holds(
     machine: Walker, structure: Structure, stack: WalkStack, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

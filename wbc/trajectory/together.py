@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from wbc import validation
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.trajectory.laws.law import Law, State
 from wbc.validation import Array
@@ -25,10 +26,15 @@ class Laws(Sequence[Law]):
     Attributes:
         errors: by number, why a motion has no law.
         durations: of each [s], n; inf where there is none.
+
+    Raises:
+        ShapeError: no sequence.
     """
 
     def __init__(self, made: Sequence[Made]) -> None:
-        self._made = tuple(made)
+        self._made = tuple(
+            validation.instance("made", made, (list, tuple), "a list of laws, and errors of what has none")
+        )
         self.errors = {k: one for k, one in enumerate(self._made) if isinstance(one, WbcError)}
         self.durations: Array = np.array([one.duration if isinstance(one, Law) else np.inf for one in self._made])
 

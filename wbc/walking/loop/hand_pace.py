@@ -49,8 +49,8 @@ def hand_pace(
     x, y, z, speed = a - x, b - y, c - z, sqrt(u * u + v * v + w * w)
     along = (x * u + y * v + z * w) / speed if speed > 1e-6 else 0.0
     across = sqrt(max(x * x + y * y + z * z - along * along, 0.0))
-    # A hand that is ahead must not be stopped: it brakes as hard as it can, and would go farther beside its way
-    off = max(along, 0.0) + max(across - max(-along, 0.0), 0.0)
+    # A hand that is ahead must not be stopped: it could not
+    off = max(along, 0.0) + across
     least, most = (BESIDE, WAITS) if far[0] < OVER[1] or OVER[0] < far[1] < OVER[1] else (0.5 * BEHIND, 1.5 * BEHIND)
     wanted = min(max((most - off) / (most - least), LEAST_PACE), 1.0)
     wait = early - pace * (swinging.law.duration - swinging.clock)
