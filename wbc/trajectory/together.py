@@ -9,7 +9,6 @@ from typing import Any, overload
 
 import numpy as np
 
-from wbc import validation
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.trajectory.laws.law import Law, State
 from wbc.validation import Array
@@ -32,9 +31,9 @@ class Laws(Sequence[Law]):
     """
 
     def __init__(self, made: Sequence[Made]) -> None:
-        self._made = tuple(
-            validation.instance("made", made, (list, tuple), "a list of laws, and errors of what has none")
-        )
+        if not isinstance(made, Sequence):
+            raise ShapeError("made", made, "expected a list of laws, and errors of what has none")
+        self._made = tuple(made)
         self.errors = {k: one for k, one in enumerate(self._made) if isinstance(one, WbcError)}
         self.durations: Array = np.array([one.duration if isinstance(one, Law) else np.inf for one in self._made])
 
