@@ -107,7 +107,21 @@ class Caution:
         return self._near(None, Timing(times, np.full(2, self._progress.path_time), times))
 
     def swing(self, swinging: Swinging, course: Course) -> Nearest | None:
-        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear.
+        """What is too near while a hand goes on to its hold and the body as its pace has it; None: proven clear."""
+        found, when = self._looked(swinging, course)
+        if found is None:
+            self._known = self._progress.plan.path, swinging, course.stands, course.end
+            self.until = self._progress.path_time
+            self._clock = when.clock
+            self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
+        return found
+
+    def looked(self, swinging: Swinging, course: Course) -> Nearest | None:
+        """As :meth:`swing`, of a hand that is lifted later; what is proven stays as it is."""
+        return self._looked(swinging, course)[0]
+
+    def _looked(self, swinging: Swinging, course: Course) -> tuple[Nearest | None, Timing]:
+        """What is too near, and the motion that was foreseen.
 
         A hand goes slower from now on whose joints would need higher rates than they have: it would lag, and swing
         beyond its way when it catches up. So does one whose joints would need higher accelerations, where the body
@@ -124,19 +138,7 @@ class Caution:
             swinging.part = max(swinging.part * RATE / fastest, SLOWEST)
             when = self.timing(swinging, course)
             found = self._near(swinging, when)
-        if found is None:
-            self._known = self._progress.plan.path, swinging, course.stands, course.end
-            self.until = self._progress.path_time
-            self._clock = when.clock
-            self._foreseen = self._machine.time, when.times, self._places(swinging.arm, self._rows)
-        return found
-
-    def looked(self, swinging: Swinging, course: Course) -> Nearest | None:
-        """As :meth:`swing`, of a hand that is lifted later; what is proven stays as it is."""
-        before = self._known, self.until, self._clock, self._foreseen
-        found = self.swing(swinging, course)
-        self._known, self.until, self._clock, self._foreseen = before
-        return found
+        return found, when
 
     def _near_by(self, swinging: Swinging, when: Timing) -> bool:
         """Whether an arm that lags in what was foreseen last may touch something."""

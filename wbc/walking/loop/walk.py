@@ -440,7 +440,7 @@ class Walk:
                 return
             lift = self._may_lift()
             leaving = -1 if lift is None else self.progress.arm_of(lift)
-            found = caution.ahead(min([self._end(), *self._lasting(leaving)]), None if lift is None else lift.lift)
+            found = caution.ahead(self._until(leaving), None if lift is None else lift.lift)
             if found is not None:
                 self._refuse("the body's way", found)
             elif lift is not None:
@@ -465,9 +465,7 @@ class Walk:
         if caution is None or self._looked is step or before > EARLY or self.pace == 0.0:
             return
         self._looked = step
-        grip = self.progress.grip[self.progress.arm_of(step)]
-        lasts = self.progress.grips.ends_at(self.plan.path.spacing)[grip]
-        if lasts - step.lift > 0.5 * self.leader.stops.brake:
+        if self._lasts(self.progress.arm_of(step)) - step.lift > 0.5 * self.leader.stops.brake:
             return
         found = self._in_the_way(self._next_swing(step, before / self.pace), caution.looked, step.lift)
         if found is not None:
@@ -529,14 +527,14 @@ class Walk:
 
     def _course(self, swinging: Swinging) -> Course:
         """How body and hand are about to go on."""
-        end, stands = self._end(), self._stands() or swinging.waits
-        holds, corners = min([end, *self._lasting(swinging.arm)]), self.body.corners(self.plan.path)
-        before = self._before_landing(swinging)
-        return Course(self.pace, before, holds, end, self._due(swinging), stands, corners.pace)
+        before, holds, last = self._before_landing(swinging), self._until(swinging.arm), self._end()
+        due, stands = self._due(swinging), self._stands() or swinging.waits
+        return Course(self.pace, before, holds, last, due, stands, self.body.corners(self.plan.path).pace)
 
     def _before_landing(self, swinging: Swinging) -> float:
         """Path time that the body does not pass before the swinging hand holds [s]."""
-        end = min([self._end(), *self._lasting(swinging.arm)])
+        end = self._until(swinging.arm)
+        # A hand that is late makes the body late too: the next ones then swing where they were planned to
         return min(end, self._late()) if swinging.counted and not self._changing else end
 
     def _late(self) -> float:
@@ -552,10 +550,13 @@ class Walk:
         end = plan.path.duration if plan.complete else plan.reached
         return end if self.limit is None else min(end, self.limit[0])
 
-    def _lasting(self, leaving: int) -> list[float]:
-        """Path times at which the grips of the holding hands end [s], but of an arm that is to leave."""
-        lasts = self.progress.grips.ends_at(self.plan.path.spacing)
-        return [lasts[self.progress.grip[arm]] for arm in self.held if arm != leaving]
+    def _until(self, leaving: int) -> float:
+        """Path time to which the body may go with the hands that hold, but that of an arm that is to leave [s]."""
+        return min([self._end(), *(self._lasts(arm) for arm in self.held if arm != leaving)])
+
+    def _lasts(self, arm: int) -> float:
+        """Path time at which the grip of a hand ends [s]."""
+        return self.progress.grips.ends_at(self.plan.path.spacing)[self.progress.grip[arm]]
 
     def _bring(self, arm: int) -> None:
         """A hand that is in the air goes to where the plan begins, while the body stands still."""
@@ -593,16 +594,12 @@ class Walk:
                 end = min(end, step.lift)
             if self._caution is not None:
                 end = min(end, max(self._caution.until, u))
-        soonest = min([end, *self._lasting(leaving)])
-        margin, landing = max(soonest - u, 0.0), None
+        margin, landing = max(min(end, self._until(leaving)) - u, 0.0), None
         if swinging is not None:
-            until, needed = margin, swinging.latch
+            needed = swinging.latch
             if swinging.state != "closing":
                 needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
-            if swinging.counted and not self._changing:
-                # A hand that is late makes the body late too: the next ones then swing where they were planned to
-                until = min(until, max(self._late() - u, 0.0))
-            landing = until, needed
+            landing = max(self._before_landing(swinging) - u, 0.0), needed
         most = 1.0 if self.leader.one_motion else self.body.corners(path).pace(u)
         self.body.choose(margin, max(end - u, 0.0), landing, self._stands(), most)
         aim, progress.path_time = self.body.go(path, u)

@@ -179,18 +179,20 @@ def _lasting_longest(
 ) -> Iterator[tuple[int, ...]]:
     """Stances that last beyond a sample, grown arm by arm from the :data:`ENOUGH` that last longest."""
     mine = [np.array(one, dtype=np.int64) for one in choices]
-    some, until, total = mine[0][:, None], grips.last[mine[0]], np.zeros(len(mine[0]), dtype=np.int64)
+    until, total = grips.last[mine[0]], np.zeros(len(mine[0]), dtype=np.int64)
     places = np.arange(len(mine[0]))[:, None]
+    some = mine[0][:, None]
     for k in range(1, len(mine)):
         each = np.stack([_lasting(grips, search, one, mine[k])[places[:, j]] for j, one in enumerate(mine[:k])])
-        row, column = np.nonzero(each.min(axis=0) > sample)
-        until = np.minimum(until[row], each.min(axis=0)[row, column])
+        least = each.min(axis=0)
+        row, column = np.nonzero(least > sample)
+        until = np.minimum(until[row], least[row, column])
         total = total[row] + each.sum(axis=0)[row, column]
-        some = np.column_stack([some[row], mine[k][column]])
+        places = np.column_stack([places[row], column])
+        some = np.stack([one[places[:, j]] for j, one in enumerate(mine[: k + 1])], axis=1)
         # Of those that last as long, the ones whose pairs last longer
         order = np.lexsort([*-some.T[::-1], -total, -until])[:ENOUGH]
-        some, until, total = some[order], until[order], total[order]
-        places = np.column_stack([places[row], column])[order]
+        some, places, until, total = some[order], places[order], until[order], total[order]
     yield from map(tuple, some.tolist())
 
 

@@ -59,11 +59,12 @@ class CellGraph:
         self._price, self._few = np.concatenate(prices), np.full((arms, 1), FEW)
         self._off = np.abs(offsets[:, 1:]) @ DEAR
         self._open = np.ones(len(self._price), dtype=bool)
+        self._found: tuple[Array, Ints] | None = None
 
     def shortest(self) -> list[int] | None:
         """The chain of cells from the first to the last that costs least; None: there is none."""
         start, goal = self.cells.start, self.cells.goal
-        spent, before = self._from(start)
+        spent, before = self._reached()
         if not np.isfinite(spent[goal]):
             return None
         chain = [goal]
@@ -73,11 +74,13 @@ class CellGraph:
 
     def close(self, steps: Iterable[tuple[int, int]]) -> None:
         """Steps between two cells each that are not made."""
+        self._found = None
         for one, other in steps:
             self._open &= ~((self._ends == [[one], [other]]).all(axis=0) | (self._ends == [[other], [one]]).all(axis=0))
 
     def avoid(self, cells: Sequence[int], arms: Collection[int]) -> None:
         """Keep away from cells at which a plan ended, and from where some arms have few grips."""
+        self._found = None
         there = np.unravel_index(np.arange(len(self.cells)), self.cells.shape)
         for cell in cells:
             here = np.unravel_index(cell, self.cells.shape)
@@ -88,19 +91,21 @@ class CellGraph:
 
     def furthest(self) -> Ints:
         """Grips at the cells that lie furthest along the path of those that lead on from the first."""
-        stations = np.unravel_index(np.flatnonzero(np.isfinite(self._from(self.cells.start)[0])), self.cells.shape)
+        stations = np.unravel_index(np.flatnonzero(np.isfinite(self._reached()[0])), self.cells.shape)
         reached = np.flatnonzero(stations[0] == stations[0].max())
         ends = np.ravel_multi_index(tuple(axis[reached] for axis in stations), self.cells.shape)
         return self._grips.at_any(ends)
 
-    def _from(self, start: int) -> tuple[Array, Ints]:
-        """What cells cost from one on; and the cells before them."""
+    def _reached(self) -> tuple[Array, Ints]:
+        """What cells cost from the first on, and the cells before them; known until prices change."""
+        if self._found is not None:
+            return self._found
         one, other = self._ends[:, self._open]
         few = (self._few / np.maximum(self._common[:, self._open], NONE)).max(axis=0)
         price = self._price[self._open] * (1.0 + few) + 0.5 * (self._off[one] + self._off[other])
         graph = coo_array((price, (one, other)), shape=(len(self.cells),) * 2).tocsr()
-        spent, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
-        return spent, before
+        self._found = dijkstra(graph, directed=False, indices=self.cells.start, return_predecessors=True)
+        return self._found
 
 
 def _pairs(numbers: Ints, step: Ints) -> Ints:

@@ -106,7 +106,7 @@ def _turned(about: Around, cells: Cells, arm: int) -> int | None:
     count = round(angle / (2.0 * pi) * steps)
     turn = pin.SE3(pin.utils.rotate("z", 2.0 * pi * count / steps), np.zeros(3)).homogeneous
     alike = np.abs(turn @ bases[0] - bases[arm]).max() < SAME and _beside(about, arm) == _beside(about, 0)
-    return count if alike and cells.shape[3] == steps else None
+    return count if alike else None
 
 
 def _beside(about: Around, arm: int) -> set[tuple[float, ...]]:
