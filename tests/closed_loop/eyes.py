@@ -79,6 +79,7 @@ class Eyes:
 
     def __init__(self, robot: Robot) -> None:
         self.robot, self.model, self.data = robot, robot.model, robot.model.createData()
+        self._numbers: dict[str, int] = {}
 
     def pose(self, q: Array, frame: str) -> pin.SE3:
         """Pose of a frame in the world."""
@@ -92,7 +93,10 @@ class Eyes:
     def _placement(self, frame: str) -> pin.SE3:
         if frame == "world":
             return pin.SE3.Identity()
-        return pin.updateFramePlacement(self.model, self.data, self.model.getFrameId(frame)).copy()
+        number = self._numbers.get(frame)
+        if number is None:
+            number = self._numbers[frame] = self.model.getFrameId(frame)
+        return pin.updateFramePlacement(self.model, self.data, number).copy()
 
     def center_of_mass(self, q: Array) -> Array:
         """Centre of mass in the world [m]."""

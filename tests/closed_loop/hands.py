@@ -13,10 +13,9 @@ import pinocchio as pin
 import wbc.robots
 from tests.closed_loop.eyes import Array, Eyes
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import STARTS
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
-from tests.repeats import ALL, MORE
+from tests.repeats import ALL, MORE, repeats
 from wbc.robot import Robot
 from wbc.tasks import Item, RelativePose
 
@@ -93,7 +92,7 @@ def subject(kind: str, error: Any) -> Subject:
 
 
 SUBJECTS: dict[str, Subject] = {
-    "object": replace(subject("pose", midway), starts=4 * STARTS),
+    "object": replace(subject("pose", midway), starts=repeats(48)),
     "pivot": subject("position", apart),
     "parallel": subject("orientation", turned),
 }

@@ -11,7 +11,8 @@ import numpy as np
 from tests.closed_loop.eyes import Array, Eyes, length
 from tests.closed_loop.limit_trials import AXIS, NORMALS, POINT, Maker, Trial, axis_cone, gaze, point, sided, walls
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import STARTS, anywhere, near
+from tests.closed_loop.machines import anywhere, near
+from tests.repeats import repeats
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
 from wbc.tasks import (
@@ -131,7 +132,7 @@ def limit_items(name: str, robot: Robot, mutations: dict[str, Any] | None = None
     return items | {"rest": Posture(joints=robot.joint_names), "caps": JointLimits(acceleration=False)}
 
 
-def check(loop: Loop, name: str, seed: int = 31, starts: int = STARTS) -> Figures:
+def check(loop: Loop, name: str, seed: int = 31, starts: int = repeats(12)) -> Figures:
     """Tick by tick every margin h, by Pinocchio, is at least (1 - rate dt) h - curvature of the tick before; none falls
     below zero by more than curvature allows, here 2 mm or mrad; and most trials end at the limit.
     """

@@ -20,8 +20,9 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 TASK_ROBOTS = ("kinova", "talos") if MORE < ALL else ("panda", "kinova", "talos")
 CONSTRAINT_ROBOTS = ("panda", "talos") if MORE < ALL else ("panda", "ur5", "talos")
 
-#: Random starts of a check, and of one that repeats what another shows, or whose robot takes longer
-STARTS, FEWER = repeats(12), repeats(8)
+#: Random starts of a check, and of one that repeats what another shows, or whose robot takes longer; so many show every
+#: mutation
+STARTS, FEWER = repeats(8), repeats(5)
 
 
 @cache
