@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -81,7 +82,8 @@ def _waves(ring: TrigRing, p: Poly) -> dict[Wave, tuple[Fraction, Fraction]]:
     """Coefficients of e^(i w.q), for w = 0 and those whose first entry that is not zero is positive."""
     lengths = list(ring.symbols.values())
     start = len(ring.names) - len(lengths)
-    sums: dict[Wave, tuple[Fraction, Fraction]] = {}
+    places = tuple((k, s, c) for k, (s, c, _) in ring.circles.items())
+    terms: list[tuple[Fraction, dict[Wave, Pair]]] = []
     for powers, number in p.terms():
         for k, index in ring.slides.items():
             if powers[index]:
@@ -91,15 +93,30 @@ def _waves(ring: TrigRing, p: Poly) -> dict[Wave, tuple[Fraction, Fraction]]:
         scale = fraction(number)
         for value, power in zip(lengths, powers[start:], strict=True):
             scale *= value ** int(power)
-        parts: dict[Wave, Pair] = {(0,) * len(ring.coordinates): (1, 0)}
-        for k, (s, c, _) in ring.circles.items():
-            for sines in [False] * int(powers[c]) + [True] * int(powers[s]):
-                parts = _times(parts, k, sines)
-                scale /= 2
+        factors = tuple((k, int(powers[c]), int(powers[s])) for k, s, c in places if powers[c] or powers[s])
+        terms.append((scale / 2 ** sum(c + s for _, c, s in factors), _product(len(ring.coordinates), factors)))
+    # Whole numbers over one denominator add up far faster than fractions
+    below = math.lcm(*(scale.denominator for scale, _ in terms))
+    sums: dict[Wave, Pair] = {}
+    for scale, parts in terms:
+        above = scale.numerator * (below // scale.denominator)
         for wave, (a, b) in parts.items():
-            before = sums.get(wave, (Fraction(0), Fraction(0)))
-            sums[wave] = before[0] + scale * a, before[1] + scale * b
-    return {w: ab for w, ab in sums.items() if any(ab) and next((x for x in w if x), 1) > 0}
+            real, imaginary = sums.get(wave, (0, 0))
+            sums[wave] = real + above * a, imaginary + above * b
+    kept = {w: ab for w, ab in sums.items() if any(ab) and next((x for x in w if x), 1) > 0}
+    return {w: (Fraction(a, below), Fraction(b, below)) for w, (a, b) in kept.items()}
+
+
+@lru_cache(maxsize=4096)
+def _product(joints: int, factors: tuple[tuple[int, int, int], ...]) -> dict[Wave, Pair]:
+    """The waves of the product of (2 cos q_k)^c (2 sin q_k)^s over (k, c, s); not to be changed."""
+    if not factors:
+        return {(0,) * joints: (1, 0)}
+    *others, (k, cosines, sines) = factors
+    parts = _product(joints, tuple(others))
+    for sine in [False] * cosines + [True] * sines:
+        parts = _times(parts, k, sine)
+    return parts
 
 
 def _times(parts: dict[Wave, Pair], joint: int, sine: bool) -> dict[Wave, Pair]:

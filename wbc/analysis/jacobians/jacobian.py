@@ -99,8 +99,9 @@ def symbolic_jacobian(model: ExactModel, rows: Sequence[Rows], *, axes: str | No
     names: list[str] = []
     chosen: list[str] = []
     for declared in checked("rows", rows):
-        block, frame = _block(model, declared, axes)
-        matrix += block
+        key = declared, axes
+        block, frame = model.blocks[key] if key in model.blocks else model.blocks.setdefault(key, _block(model, *key))
+        matrix += [[*row] for row in block]
         chosen.append(frame)
         names += [str(declared) if len(block) == 1 else f"{declared}.{_label(declared, i)}" for i in range(len(block))]
     return SymbolicJacobian(model.ring, matrix, tuple(names), tuple(chosen))

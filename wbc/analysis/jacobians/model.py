@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.analysis.algebra.ring import Coordinate, TrigRing
+from wbc.analysis.algebra.ring import Coordinate, Matrix, TrigRing
 from wbc.analysis.algebra.transforms import SNAP, Transform, Vector, apply, exact_placement, exact_rotation, identity
 from wbc.errors import UnsupportedJointError
 from wbc.robot import Robot
@@ -56,6 +56,8 @@ class ExactModel:
         ]
         self._frames: dict[str, tuple[int, Transform]] = {WORLD: (0, identity(self.ring))}
         self._seen: dict[tuple[str, int], Transform] = {}
+        #: Rows of declarations as they were worked out before, see :func:`symbolic_jacobian`
+        self.blocks: dict[Any, tuple[Matrix, str]] = {}
 
     def frame(self, name: str) -> tuple[int, Transform]:
         """The joint that moves a frame (0: none) and the frame's placement on it.
