@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from tests.controller.stacks import arm, humanoid
+from tests.controller.stacks import arm
 from tests.torque.problems import controller as torques
 from wbc.controller import Controller
 from wbc.shapes import Sphere
@@ -44,10 +44,19 @@ def ur5(backend: str = "native") -> Controller:
     return c
 
 
-def talos(backend: str = "native") -> Controller:
-    """A humanoid on held feet."""
-    c = humanoid().compile(backend=backend)
-    c.reset(c.stack.robot.neutral)
+def legged(backend: str = "native") -> Controller:
+    """A quadruped on two held feet; it has half the joints of a humanoid, and its rows compile in a third of the time."""
+    robot = wbc.robots.load("hyq")
+    stack = wbc.Stack(robot, dt=0.005, calm=True)
+    for name in ("front_left_foot", "hind_right_foot"):
+        stack.add(wbc.tasks.Hold(robot.frames[name], kind="position"), name=name)
+    stack.add(wbc.tasks.EndEffector(robot.frames["front_right_foot"], kind="position"), name="hand")
+    stack.add(wbc.tasks.EndEffector(robot.frames["base"]), name="body")
+    stack.add(wbc.tasks.CenterOfMass(), name="com")
+    stack.add(wbc.tasks.Posture(), name="posture", weight=1e-3)
+    stack.add(wbc.tasks.JointLimits(), name="limits")
+    c = stack.compile(backend=backend)
+    c.reset(robot.neutral)
     return c
 
 
@@ -58,7 +67,7 @@ def grips(backend: str = "native") -> Controller:
     return c
 
 
-CASES = {"panda": panda, "ur5": ur5, "talos": talos, "grips": grips}
+CASES = {"panda": panda, "ur5": ur5, "legged": legged, "grips": grips}
 
 
 def run(*command: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
