@@ -45,7 +45,7 @@ def ur5(backend: str = "native") -> Controller:
 
 
 def legged(backend: str = "native") -> Controller:
-    """A quadruped on two held feet; it has half the joints of a humanoid, and its rows compile in a third of the time."""
+    """A quadruped on two held feet; its rows compile in a third of the time of a humanoid."""
     robot = wbc.robots.load("hyq")
     stack = wbc.Stack(robot, dt=0.005, calm=True)
     for name in ("front_left_foot", "hind_right_foot"):
