@@ -90,7 +90,10 @@ def scalar(
 def ordinary_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
     """:func:`real_array` of numbers whose products are numbers: finite ones are at most 1e60 in size."""
     out = real_array(field, value, shape, finite=finite)
-    if (np.isfinite(out) & (np.abs(out) > LARGEST)).any():
+    large = np.abs(out) > LARGEST
+    if not finite:
+        large &= np.isfinite(out)
+    if large.any():
         raise RangeError(field, value, f"expected numbers of at most {LARGEST:g} in size")
     return out
 

@@ -92,6 +92,7 @@ def test_smooth_laws_and_the_place_that_is_named(seed: int) -> None:
 
 
 @cache
+@cache
 def pose_laws() -> list[Law]:
     random = np.random.default_rng(3)
     poses = [pin.SE3(pin.exp3(0.6 * random.normal(size=3)), random.normal(size=3)) for _ in range(5)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -94,9 +95,7 @@ class Timing:
         local, out = t - self.times[at], np.zeros(len(t))
         highest = self.degree
         for k in range(highest - order + 1):
-            power = highest - k
-            factor = float(np.prod(np.arange(power, power - order, -1)))
-            out = out * local + factor * self.coefficients[k, at]
+            out = out * local + float(math.perm(highest - k, order)) * self.coefficients[k, at]
         return out
 
     def scaled(self, factor: float) -> Timing:

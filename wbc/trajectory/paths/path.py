@@ -10,6 +10,7 @@ Where all pieces are polynomials, what a law does with the path can be bounded e
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import Any, Literal
 
@@ -145,9 +146,7 @@ class PolynomialPath(Path):
         out = np.zeros((len(s), self.dof))
         highest = self.coefficients.shape[0] - 1
         for k in range(highest - order + 1):
-            power = highest - k
-            factor = float(np.prod(np.arange(power, power - order, -1)))
-            out = out * local + factor * self.coefficients[k, at]
+            out = out * local + float(math.perm(highest - k, order)) * self.coefficients[k, at]
         return out
 
 
