@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -98,17 +99,24 @@ def part_of(module: str) -> str:
     return ".".join(parts[:2])
 
 
+@cache
+def telling(path: Path) -> list[ast.AST]:
+    """The few nodes of a file that can tell of a module: imports, strings and conditions."""
+    return [node for node in nodes(path) if isinstance(node, (ast.Import, ast.ImportFrom, ast.Constant, ast.If))]
+
+
+@cache
 def imported(path: Path, types: bool = False) -> list[tuple[int, str]]:
     """(line, module) of every import of this package that runs, in functions too, and of those for types if wanted."""
     idle = {
         id(inner)
-        for node in nodes(path)
+        for node in telling(path)
         if isinstance(node, ast.If) and getattr(node.test, "id", getattr(node.test, "attr", "")) == "TYPE_CHECKING"
         for statement in node.body
         for inner in ast.walk(statement)
     }
     found: list[tuple[int, str]] = []
-    for node in nodes(path):
+    for node in telling(path):
         if id(node) in idle and not types:
             continue
         if isinstance(node, ast.Import):
@@ -119,16 +127,17 @@ def imported(path: Path, types: bool = False) -> list[tuple[int, str]]:
     return found
 
 
+@cache
 def named(path: Path) -> list[tuple[int, str]]:
     """(line, module) of every string that is the name of a module of this package."""
-    strings = [n for n in nodes(path) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+    strings = [n for n in telling(path) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
     return [(n.lineno, n.value.rstrip(".")) for n in strings if NAMED.fullmatch(n.value)]
 
 
 def files_imported(path: Path, types: bool, modules: Mapping[str, Path]) -> set[str]:
     """Modules that a file imports, a name of a package as the module that it is."""
     out = {module for _, module in imported(path, types)}
-    for node in nodes(path):
+    for node in telling(path):
         if isinstance(node, ast.ImportFrom) and node.module in out:
             inner = {f"{node.module}.{a.name}" for a in node.names} & modules.keys()
             if inner:
@@ -157,10 +166,11 @@ def circles(files: list[Path], types: bool) -> Iterator[list[str]]:
         left = [name for name in left if name not in group]
 
 
+@cache
 def mentioned(path: Path) -> list[tuple[int, str]]:
     """(line, module) of every module that a file imports or names in a string; ``from package import module`` too."""
-    found = imported(path)
-    for node in nodes(path):
+    found = [*imported(path)]
+    for node in telling(path):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "wbc":
             found += [(node.lineno, f"{node.module}.{alias.name}") for alias in node.names]
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("wbc."):
