@@ -50,7 +50,7 @@ def test_both_algorithms_find_one_locus_of_the_dexterous_arm(chosen: str, verdic
 
 def test_singular_vectors_end_on_the_space_station_arm() -> None:
     """11 x 7, (4.33): the published program never converged on it."""
-    found = run("ssrms", "elbow, beta, gamma", "singular_vectors")
+    found = known("ssrms", "elbow, beta, gamma", "singular_vectors", Budget())
     assert Notation(found.exact.half).branches(found.locus.branches) == [
         "q3 = +-pi/2 and q4 in {0, pi} and q5 = +-pi/2"
     ]
@@ -99,12 +99,12 @@ def test_a_keyboard_interrupt_is_answered_with_what_is_known(
 def test_open_branches_contain_all_that_was_not_decided() -> None:
     """On 4R every branch of the whole locus lies within a branch of the cut one, or within an open one."""
     for algorithm in ALGORITHMS:
-        whole = run("spherical_4r", "elbow, beta", algorithm)
+        whole = known("spherical_4r", "elbow, beta", algorithm, Budget())
         for most in (1, 2, 4, 7):
-            cut = run("spherical_4r", "elbow, beta", algorithm, Budget(most))
-            known = (*cut.locus.branches, *cut.locus.open)
+            cut = known("spherical_4r", "elbow, beta", algorithm, Budget(most))
+            every = (*cut.locus.branches, *cut.locus.open)
             arithmetic = cut.exact.branches
-            assert all(any(arithmetic.within(b, k) for k in known) for b in whole.locus.branches)
+            assert all(any(arithmetic.within(b, k) for k in every) for b in whole.locus.branches)
             assert all(any(arithmetic.within(b, w) for w in whole.locus.branches) for b in cut.locus.branches)
 
 

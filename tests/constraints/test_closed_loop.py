@@ -33,7 +33,7 @@ from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.obstacle import Obstacle
 
 ROBOTS = ("panda", "ur5", "talos")
-STARTS, TICKS, DT, RATE = repeats(15), 30, 0.005, 20.0
+STARTS, TICKS, DT, RATE = repeats(8), 30, 0.005, 20.0
 
 
 def nearest_allowed(wish: np.ndarray, matrix: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
