@@ -23,7 +23,7 @@ from wbc.walking.checker.report import Finding, Report
 from wbc.walking.holds.built_in import BUILT_IN, plane
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.walk import Walk
-from wbc.walking.planner.detours import ALONG
+from wbc.walking.planner.detours import ALONG, beside
 from wbc.walking.planner.detours import route as detours
 from wbc.walking.report.figures import CHECKED
 from wbc.walking.run.places import over_holds
@@ -180,6 +180,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
 
 def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(detours, "MESHES", (ALONG,))
+    monkeypatch.setattr(beside, "WORK", 200.0)
     folder = tmp_path / "run"
     folder.mkdir()
     for name in ("summary.json", "run.npz", "still_7.png", "mine.txt"):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,15 +19,16 @@ from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_columns, remove_rows
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.planner import planner
-from wbc.walking.planner.detours import CellSpacing, find_route, route
+from wbc.walking.planner.detours import CellSpacing, beside, find_route, route
 from wbc.walking.planner.detours import cell_grips as gripping
 from wbc.walking.planner.detours.cell_graph import CellGraph
 from wbc.walking.planner.detours.cell_grips import CellGrips, cell_grips
 from wbc.walking.planner.detours.cells import BESIDE, WIDE, Cells, cells_about
 from wbc.walking.planner.detours.cells import NARROW as CLOSE
-from wbc.walking.planner.plan import NoPlanError
-from wbc.walking.planner.planner import plan_walk
+from wbc.walking.planner.follow import follow_plan
+from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.planner.planner import plan_slices, plan_walk, rest_of
+from wbc.walking.planner.slices import Allowance, drained
 from wbc.walking.planner.swings.curve import ALTERNATIVES
 from wbc.walking.run.places import over_holds
 
@@ -280,10 +284,45 @@ def test_refusals_end_when_their_work_is_done(
     trench = remove_rows(structure, "10-17")
     path = grid_path([(13, 8), (13, 19.5)], 2 * INCH)
     monkeypatch.setattr(route, "MESHES", (NARROW,))
-    monkeypatch.setattr(planner, "WORK", 1.0)
+    monkeypatch.setattr(beside, "WORK", 1.0)
     reasons = set[str]()
     for _ in range(2):
         with pytest.raises(NoPlanError, match="would take too long") as caught:
             plan_walk(machine, trench, path, objective="destination", width=4, detour=True)
         reasons.add(str(caught.value))
     assert len(reasons) == 1
+
+
+def test_a_plan_that_ends_near_the_end_is_gone_on_with_by_a_wider_search(machine: Walker, structure: Structure) -> None:
+    """From some re-grasps before its end, as long as each leads further; the kept ones stay as they were."""
+    path = grid_path([(13, 8), (13, 19.5)], 2 * INCH)
+    whole = plan_walk(machine, structure, path, objective="destination")
+    asked = list[tuple[int, int | None]]()
+
+    def go_on(plan: Plan, kept: int, width: int | None, _work: Allowance | None) -> Plan:
+        asked.append((kept, width))
+        return whole if len(asked) == 2 else replace(plan, reached=plan.reached + 1.0)
+
+    ends = whole.cut([arm.name for arm in machine.arms], len(whole.regrasps), 0.7 * path.duration)
+    search = beside.Search(lambda *_: ends, go_on, 16, None)
+    assert search.along(path, None) is whole
+    assert asked == [(len(whole.regrasps) - beside.BACK, 40)] * 2
+    # One that ends early is left, and one that leads no further
+    asked.clear()
+    early = replace(ends, reached=0.5 * path.duration)
+    assert beside.Search(lambda *_: early, go_on, 16, None).along(path, None) is early
+    assert not asked
+    assert beside.Search(lambda *_: ends, lambda plan, *_: plan, 16, None).along(path, None) is ends
+
+
+def test_what_is_gone_on_with_begins_with_the_same_regrasps(machine: Walker, structure: Structure) -> None:
+    path = grid_path([(13, 8), (13, 19.5)], 2 * INCH)
+    whole = plan_walk(machine, structure, path, objective="destination")
+    kept = len(whole.regrasps) - beside.BACK
+    search = partial(plan_slices, machine, structure)
+    again = drained(rest_of(machine, search, whole, kept, tries=[(inf, 16)]))
+    assert again.complete
+    assert again.start == whole.start
+    assert again.regrasps[:kept] == whole.regrasps[:kept]
+    # And can be carried out as a whole
+    assert follow_plan(machine, structure, again).regrasps == again.regrasps

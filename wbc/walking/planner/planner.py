@@ -5,9 +5,7 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
-from math import inf
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -19,11 +17,11 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
-from wbc.walking.planner.detours.route import BodyRoute, Routes, find_routes
+from wbc.walking.planner.detours.beside import Search, plan_beside
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
-from wbc.walking.planner.slices import Allowance, Slices, drained
+from wbc.walking.planner.slices import Allowance, Slices, counted, drained
 from wbc.walking.planner.sound import sound_slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
@@ -35,13 +33,8 @@ Objective = Literal["velocity", "destination"]
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))
 SOON = (0.0, 0.25, float("inf"))
-#: Where all searches fail, the one with any delay is made again, so many times as wide; along detours they are so many
-#: times as wide, as another detour leads on more often than another stance
-WIDER, NARROWER = 5, 0.5
-#: Slices of work that are spent on detours, and on one of them
-WORK, ROUTE = 3400.0, 400.0
-#: With more arms than this, whose stances differ in more, the path itself is searched widely first, with so much more
-USUAL_ARMS, WIDE = 3, 900.0
+#: Where all searches fail, the one with any delay is made again, so many times as wide
+WIDER = 5
 
 
 def plan_walk(
@@ -87,71 +80,18 @@ def plan_walk(
     narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
     plan = drained(search(path, beginning, objective=objective, tries=narrow))
     if not plan.complete and detour:
-        plan = _beside(walker, structure, path, beginning, plan, search, deadline, width)
+
+        def begin(way: BodyPath, wide: int | None, work: Allowance | None) -> Plan:
+            tries = [(DELAYS[-1], wide)]
+            return drained(search(way, beginning, objective="destination", tries=tries, allowance=work))
+
+        def go_on(begun: Plan, kept: int, wide: int | None, work: Allowance | None) -> Plan:
+            return drained(rest_of(walker, search, begun, kept, tries=[(DELAYS[-1], wide)], allowance=work))
+
+        plan = plan_beside(walker, structure, path, plan, Search(begin, go_on, width, deadline))
     if not plan.complete and not partial:
         raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
     return plan
-
-
-def _beside(
-    walker: Walker,
-    structure: Structure,
-    path: BodyPath,
-    beginning: Beginning,
-    plan: Plan,
-    search: Callable[..., Slices[Plan]],
-    deadline: float | None,
-    width: int | None,
-) -> Plan:
-    """A plan along a detour in place of one that does not lead to the end; else that one.
-
-    Args:
-        search: as of :func:`plan_slices`, without path and beginning.
-    """
-    allowance, best = None if width is None else Allowance(WORK), (inf, "")
-
-    def along(way: BodyPath, times: float, most: float) -> Plan:
-        """By a search so many times as wide, with at most so much of the allowance."""
-        tries = [(DELAYS[-1], None if width is None else max(round(times * width), 1))]
-        part = None if allowance is None else Allowance(min(most, allowance.left))
-        before = 0.0 if part is None else part.left
-        try:
-            return drained(search(way, beginning, objective="destination", tries=tries, allowance=part))
-        finally:
-            if allowance is not None and part is not None:
-                allowance.left -= before - part.left
-
-    if allowance is not None and len(walker.arms) > USUAL_ARMS:
-        allowance.left += WIDE
-        found = along(path, WIDER, WIDE)
-        if found.complete:
-            return found
-    routes, ended = find_routes(walker, structure, path, deadline, allowance), None
-    while (route := _next(routes, ended)) is not None:
-        ended = None
-        if route.path is None:
-            plan = replace(plan, reason=f"{plan.reason}; {route.text}", separating=route.separating)
-            continue
-        try:
-            ended = along(route.path, NARROWER, ROUTE)
-        except NoPlanError as error:
-            best = min(best, (route.path.duration, f"on a detour {route.text} {error}"))
-            continue
-        if ended.complete:
-            return ended
-        best = min(best, (route.path.duration - ended.reached, f"on a detour {route.text} {ended.reason}"))
-    reasons = [plan.reason, *([best[1]] if best[1] else [])]
-    if allowance is not None and allowance.spent:
-        reasons.append("what may be left was not looked at, as it would take too long")
-    return replace(plan, reason="; ".join(reasons))
-
-
-def _next(routes: Routes, plan: Plan | None) -> BodyRoute | None:
-    """The next route after the one along which a plan does not lead to the end; None: no other."""
-    try:
-        return next(routes) if plan is None else routes.send(plan)
-    except StopIteration:
-        return None
 
 
 def _check_ends(walker: Walker, structure: Structure, path: BodyPath) -> None:
@@ -232,7 +172,7 @@ def plan_slices(
         search = BodySearch(walker, structure, path, grips, known=search, patient=thorough, **more)
         starts = [stance] if stance else (yield from stance_slices(walker, structure, search, beginning, sample, most))
         yield None
-        found, laws = yield from sound_slices(search, starts, sample, deadline)
+        found, laws = yield from counted(sound_slices(search, starts, sample, deadline), allowance)
         if best is None or (found.complete, found.reached) > (best[0].complete, best[0].reached):
             best = found, laws
         if found.complete or (deadline is not None and time.perf_counter() > deadline):
@@ -243,6 +183,19 @@ def plan_slices(
     if thorough and search is not None and best[0].complete and not (stance or first):
         best = (yield from fewer_slices(search, beginning, best[0], sample)) or best
     return plan_found(walker, structure, path, grips, *best)
+
+
+def rest_of(walker: Walker, search: Callable[..., Slices[Plan]], plan: Plan, kept: int, **more: Any) -> Slices[Plan]:
+    """A plan that keeps the first re-grasps of one, the others searched for anew.
+
+    Args:
+        search, more: :func:`plan_slices`, and what it is given.
+    """
+    begun = plan.cut([arm.name for arm in walker.arms], kept, 0.0)
+    stance, sample = tuple(grips[-1] for grips in begun.chain), round(begun.regrasps[-1].land / plan.path.spacing)
+    more |= {"grips": plan.grips, "stance": stance, "sample": sample}
+    rest = yield from search(plan.path, objective="destination", **more)
+    return begun.then(rest)
 
 
 def _roll(structure: Structure, grips: Grips, grip: int) -> float | None:

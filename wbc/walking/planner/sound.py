@@ -46,10 +46,12 @@ def sound_slices(
             if not law.possible or needed > planned + search.walker.margins.slower:
                 search.correct(move, needed, law.possible)
                 break
+            yield None
             if proof.of_swing(move, law, key):
                 search.correct(move, needed, False)
                 break
             key[move.arm], at = move.target, move.land
+            yield None
             if proof.of_stance(key, at, following.lift if following else found.reached):
                 search.exclude(move)
                 break

@@ -25,7 +25,7 @@ import numpy as np
 
 from wbc.walking.body_path import BodyPath
 from wbc.walking.planner.grips.table import Grips
-from wbc.walking.planner.slices import Allowance, Slices, counted, drained
+from wbc.walking.planner.slices import Allowance, Slices, drained
 from wbc.walking.planner.stances.candidates import QUANTUM, Candidate, Fan, Outlook, following
 from wbc.walking.planner.stances.nodes import Conflicts, Found, Node, StanceEnds, SwingTable, moves_to
 from wbc.walking.planner.swings.move import Key, Move, Swing
@@ -119,7 +119,7 @@ class StanceSearch(Generic[S]):
             if len(levels) == len(self._levels):
                 if self.allowance is not None and self.allowance.spent:
                     break
-                following_level, asked = yield from counted(self._next(level), self.allowance)
+                following_level, asked = yield from self._next(level)
                 self._levels.append(following_level)
                 self._asked.append(asked)
             level = self._levels[len(levels)]
