@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, product
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from wbc.walking.planner.grips.table import Grips, Ints, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import Objective, plan_slices
 from wbc.walking.planner.proof import EVERY, clear_scene
+from wbc.walking.planner.slices import Allowance
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.starts import Beginning, holding_of, stances
 from wbc.walking.planner.swings.curve import Pivots, between
@@ -35,6 +36,8 @@ MayBring = Callable[[Plan, int, SwingLaw, Mapping[int, int], Array], bool]
 STANDING = 10
 #: How far the body goes back to where a hand may be lifted [m]
 BACK = (0.05, 0.1, 0.2, 0.4)
+#: Slices of work on plans from there, all together
+WORK = 2000.0
 #: Part of what an arm has left to its limits, or to other arms, that a plan from there leaves
 PART = 0.9
 #: How far it goes towards a hold instead, at the height that it has [m], and how fast [m/s]
@@ -145,14 +148,17 @@ def plan_from_here(
     here = np.repeat(path.poses[:1], STANDING, axis=0)
     walker = _as_it_holds(walker, path.poses[0], held, q, hands)
     refused: NoPlanError | None = None
+    work = Allowance(WORK)
     for there in _asides(path.poses[0], behind, structure.positions[list(held.values())]):
         other = BodyPath(np.concatenate([here, there, there[::-1], path.poses]), path.spacing)
         sample = STANDING + len(there) if len(there) else 0
         try:
-            plan = yield from _from_here(walker, structure, other, held, q, hands, sample, may)
+            plan = yield from _from_here(walker, structure, other, held, q, hands, sample, may, work)
             return plan
         except NoPlanError as error:
             refused = refused or error
+        if work.spent:
+            break
     assert refused is not None
     raise refused
 
@@ -203,6 +209,7 @@ def _from_here(
     hands: HandsThere,
     sample: int,
     may: MayBring | None,
+    work: Allowance,
 ) -> PlanSlices:
     """Along one path, with free hands where they can be brought to."""
     arms, avoid = walker.arms, dict[str, set[str]]()
@@ -214,7 +221,8 @@ def _from_here(
     )
     while True:
         beginning: Beginning = start, postures, avoid
-        asked = plan_slices(walker, structure, path, beginning, objective="destination", grips=grips, sample=sample)
+        more: dict[str, Any] = {"grips": grips, "sample": sample, "allowance": work}
+        asked = plan_slices(walker, structure, path, beginning, objective="destination", **more)
         plan = _complete(structure, (yield from asked))
         far = list[int]()
         for arm in free:
