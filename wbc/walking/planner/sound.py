@@ -15,6 +15,8 @@ from wbc.walking.planner.swings.move import Move
 
 #: Searches again, each without a swing that turned out to be impossible or slower by more than the margins allow
 AGAIN = 40
+#: Slices of work that the proofs of one move count as
+PROOFS = 2.0
 
 
 def sound_slices(
@@ -46,12 +48,12 @@ def sound_slices(
             if not law.possible or needed > planned + search.walker.margins.slower:
                 search.correct(move, needed, law.possible)
                 break
-            yield None
+            if search.allowance is not None:
+                search.allowance.left -= PROOFS
             if proof.of_swing(move, law, key):
                 search.correct(move, needed, False)
                 break
             key[move.arm], at = move.target, move.land
-            yield None
             if proof.of_stance(key, at, following.lift if following else found.reached):
                 search.exclude(move)
                 break
