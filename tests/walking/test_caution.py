@@ -16,11 +16,12 @@ from wbc.walking.arms.fits import check_fits
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
 from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
-from wbc.walking.loop.caution import RATE, SETTLED, Caution
+from wbc.walking.loop.caution import RATE, SETTLED, Caution, Course
 from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.hand_pace import LEAST_PACE, RAMP_AGAIN, hand_pace
+from wbc.walking.loop.rest import quickest
 from wbc.walking.loop.stack import DT, WalkStack
 from wbc.walking.loop.state import AFTER_PAUSE, State, Swinging
 from wbc.walking.loop.stopping import Stops
@@ -129,7 +130,7 @@ def test_everything_comes_to_rest_from_its_velocity(machine: Walker, plan: Plan,
     assert coasting is not None
     assert coasting.free == [0]
     assert coasting.duration >= 0.25
-    np.testing.assert_allclose(coasting.end.translation, q[:3] + 0.5 * coasting.duration * v[:3])
+    np.testing.assert_allclose(coasting.end.translation, q[:3] + 0.5 * 0.25 * v[:3])
     at_rest = coasting.state(State(q, {1: 0, 2: 1}, v=v))
     assert at_rest.v is None
     assert at_rest.time == coasting.duration
@@ -213,10 +214,10 @@ def test_a_swing_that_is_not_clear_is_refused_while_the_body_can_stop_within_the
     ends, grip = list(walk.progress.grips.ends_at(spacing)), walk.progress.grip[walk.progress.arm_of(plan.regrasps[0])]
     ends[grip] = lift + lasts
     monkeypatch.setattr(type(walk.progress.grips), "ends_at", lambda _self, _spacing: ends)
-    latches = list[float]()
+    lifts = list[tuple[float, float]]()
 
-    def looked(_self: Caution, swinging: Swinging, _course: object) -> str:
-        latches.append(swinging.latch)
+    def looked(_self: Caution, swinging: Swinging, course: Course) -> str:
+        lifts.append((swinging.latch, course.lifts))
         return "something"
 
     refused = list[tuple[str, object]]()
@@ -226,8 +227,45 @@ def test_a_swing_that_is_not_clear_is_refused_while_the_body_can_stop_within_the
         walk._look_ahead(plan.regrasps[0])
     step = plan.regrasps[0]
     assert refused == ([] if lasts else [(f"{step.arm} from {step.source} to {step.target}", "something")])
-    assert all(latch == pytest.approx(0.2 + machine.tolerances.latch_time) for latch in latches)
-    assert bool(latches) is (lasts == 0.0)
+    assert all(one == (machine.tolerances.latch_time, lift) for one in lifts)
+    assert bool(lifts) is (lasts == 0.0)
+
+
+def test_a_swing_is_foreseen_from_where_its_hand_is_lifted(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    """Of a body that has hardly begun to move, as after a hand that was waited for, too: it speeds up until then."""
+    step = plan.regrasps[0]
+    walk = Walk(machine, structure, plan, stack=stack)
+    walk.progress.path_time, walk.body.pace = step.lift - 0.05, 0.02
+    caution, swinging = walk._caution, walk._next_swing(step)
+    assert caution is not None
+    for pace, stands in ((0.02, False), (1.0, False), (0.02, True)):
+        walk.body.pace = pace
+        when = caution.timing(swinging, walk._course(swinging)._replace(lifts=step.lift, stands=stands))
+        opened = int(np.flatnonzero(when.clock > 0.0)[0])
+        lifted = float(np.interp(step.lift, when.path_times, when.times)) if not stands else 0.0
+        assert when.times[opened] == pytest.approx(lifted + machine.tolerances.latch_time, abs=0.06)
+        assert stands or when.path_times[opened] >= step.lift
+
+
+def test_a_slow_hand_and_the_body_that_waits_for_it_keep_their_order(
+    machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
+) -> None:
+    """A hand whose joints allow a part of its pace makes the body as slow, and is not early because that is."""
+    walk = at_the_first_lift(Walk(machine, structure, plan, stack=stack), plan)
+    walk.body.pace = 1.0
+    step, caution = plan.regrasps[0], walk._caution
+    assert caution is not None
+    swinging = walk._next_swing(step)
+    swinging.part = 0.6
+    when = caution.timing(swinging, walk._course(swinging))
+    planned = np.clip(when.path_times - step.lift - machine.tolerances.latch_time, 0.0, swinging.law.duration)
+    assert np.abs(when.clock - planned).max() < 0.25
+    swinging.state, left = "open", swinging.law.duration
+    full = hand_pace(swinging, swinging.aim.position, True, left, 0.6, (1.0, 1.0))
+    assert full == pytest.approx(1.0)
+    assert hand_pace(swinging, swinging.aim.position, True, left, 0.5, (1.0, 1.0)) < 0.7
 
 
 def test_a_body_slows_down_before_a_corner(plan: Plan) -> None:
@@ -327,6 +365,19 @@ def test_a_hand_at_the_end_of_its_reach_comes_to_rest_nearer_to_the_body(
     coasting = Coasting.of(machine, structure, State(q, {1: 0, 2: 1}, v=v), 0.25, DT)
     assert coasting is not None
     assert limb.margins(coasting._postures[0][-1]).min() >= machine.margins.held_angle
+
+
+def test_joints_come_to_rest_as_fast_as_they_can() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        q, v, end = rng.normal(size=(3, 4)) * [[0.1], [1.0], [0.1]]
+        most = rng.uniform(3.0, 9.0, 4)
+        rows = quickest(q, v, end, most, DT, 0.25)
+        assert len(rows) >= 26
+        np.testing.assert_array_equal(rows[0], q)
+        np.testing.assert_allclose(rows[-1], end, atol=1e-12)
+        rates = np.concatenate([v[None], np.diff(rows, axis=0) / DT, np.zeros((1, 4))])
+        assert (np.abs(np.diff(rates, axis=0)) <= DT * most * (1.0 + 1e-9)).all()
 
 
 def test_a_hand_that_swings_about_closes_when_it_has_rested_for_a_while(

@@ -64,6 +64,43 @@ def walked(machine: Walker, stack: WalkStack, tmp_path_factory: pytest.TempPathF
     return run, folder
 
 
+@pytest.fixture(scope="module")
+def stretched(machine: Walker, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A walk in which an arm is nearly straight as it is lifted."""
+    folder = tmp_path_factory.mktemp("stretched")
+    run = perform_walk(PathRequest(Site(), (13.0, 6.0, 0.0), ((13.0, 18.0, 0.0),), 0.1016), machine)
+    assert run.outcome == "arrived"
+    save_run(run, folder, check=False)
+    return folder
+
+
+@pytest.mark.parametrize("before", [0.05, 0.0, -0.1])
+def test_a_walk_goes_on_from_where_an_arm_is_about_to_be_straight(
+    stretched: pathlib.Path, machine: Walker, structure: Structure, before: float, tmp_path: pathlib.Path
+) -> None:
+    """An arm that cannot hold on while the body comes to rest lets go, as it was about to; as one that has just let
+    go, it neither gets straight nor brings its hand too deep.
+    """
+    log, bend = WalkLog.load(stretched), limb_of(machine).elbow_bend
+    opened = [
+        (row, arm)
+        for arm in range(3)
+        for row in np.flatnonzero(np.diff((log.hand_state[:, arm] == OPENING).astype(int)) == 1) + 1
+    ]
+    column = {name: k for k, name in enumerate(log.joints)}
+    bends = [float(bend(log.q[row, [column[joint] for joint in machine.arms[arm].joints]])) for row, arm in opened]
+    row, arm = opened[int(np.argmin(bends))]
+    assert min(bends) < 0.2
+    again = perform_walk(ResumeRequest(stretched, float(log.t[row]) - before), machine)
+    assert again.outcome == "arrived"
+    assert again.log is not None
+    report = check_walk(again.log, machine.urdf(tmp_path / "robot.urdf"), again.structure)
+    assert report.ok, str(report)
+    since = row - round(before / log.dt)
+    joints = again.log.q[since : since + 50, [column[joint] for joint in machine.arms[arm].joints]]
+    assert bend(joints).min() > 0.0
+
+
 @pytest.mark.parametrize("state", [OPENING, OPEN, CLOSING])
 def test_a_walk_goes_on_from_any_state(
     walked: tuple[WalkRun, pathlib.Path], machine: Walker, stack: WalkStack, state: int, tmp_path: pathlib.Path

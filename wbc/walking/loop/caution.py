@@ -40,6 +40,7 @@ class Course(NamedTuple):
             of the other hands end, and last: at which the path does, or what may be gone of it [s].
         due: path time at which the hand is to be on its hold [s]. stands: the body comes to rest.
         most: pace that the path allows at a path time [s].
+        lifts: path time at which the hand is lifted [s], or where the body comes to rest before; until then it holds.
     """
 
     pace: float
@@ -49,6 +50,7 @@ class Course(NamedTuple):
     due: float
     stands: bool
     most: Callable[[float], float]
+    lifts: float = -inf
 
 
 class Caution:
@@ -199,10 +201,13 @@ class Caution:
             left_on = max(course.holds - u, 0.0), max(course.last - u, 0.0), (until, needed)
             wanted = 0.0 if course.stands else wanted_pace(self._stops, *left_on, course.most(u))
             pace = max(pace + min(max(wanted - pace, -STEP / self._stops.brake), STEP / self._stops.ramp), 0.0)
-            wait = course.due - u - wanted * left
+            wait = course.due - u - wanted * left / most
             aim = min(1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0, most)
+            holds = u < course.lifts - 1e-9 and pace > 0.0
             u, t = min(u + pace * STEP, end), t + STEP
-            if latch > 1e-9:
+            if holds:
+                pass
+            elif latch > 1e-9:
                 latch -= STEP
             else:
                 hand += min(max(aim - hand, -STEP / ramp), STEP / ramp)

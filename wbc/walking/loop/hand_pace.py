@@ -53,7 +53,7 @@ def hand_pace(
     off = max(along, 0.0) + across
     least, most = (BESIDE, WAITS) if far[0] < OVER[1] or OVER[0] < far[1] < OVER[1] else (0.5 * BEHIND, 1.5 * BEHIND)
     wanted = min(max((most - off) / (most - least), LEAST_PACE), 1.0)
-    wait = early - pace * (swinging.law.duration - swinging.clock)
+    wait = early - pace * (swinging.law.duration - swinging.clock) / swinging.most
     if wait > 0.0:
         wanted /= 1.0 + 4.0 * wait
     return 0.0 if aim.blend > LANDING and not turned else wanted

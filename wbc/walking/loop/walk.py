@@ -126,7 +126,8 @@ class Walk:
             self._caution = Caution(sight, machine, self.progress, self.leader.stops)
         self._coasting = None
         if state is not None:
-            self._coasting = Coasting.of(walker, structure, state, self.leader.stops.brake, self.dt)
+            known = None if self._caution is None else self._caution.sight
+            self._coasting = Coasting.of(walker, structure, state, self.leader.stops.brake, self.dt, known)
             self.hands.over = {} if self._coasting is None else self._coasting.over
 
     @property
@@ -467,15 +468,15 @@ class Walk:
         self._looked = step
         if self._lasts(self.progress.arm_of(step)) - step.lift > 0.5 * self.leader.stops.brake:
             return
-        found = self._in_the_way(self._next_swing(step, before / self.pace), caution.looked, step.lift)
+        found = self._in_the_way(self._next_swing(step), caution.looked, step.lift)
         if found is not None:
             self._refuse(f"{step.arm} from {step.source} to {step.target}", found)
 
-    def _next_swing(self, step: Regrasp, later: float = 0.0) -> Swinging:
-        """The swing of the next re-grasp, which begins so much later [s]."""
+    def _next_swing(self, step: Regrasp) -> Swinging:
+        """The swing of the next re-grasp."""
         arm, law = self.progress.arm_of(step), self.plan.laws[self.progress.next]
         grip = self._grip(self.progress.next_grip(arm))
-        swinging = self.hands.going(arm, grip, law, latch=later + self.hands.data.latch_time)
+        swinging = self.hands.going(arm, grip, law, latch=self.hands.data.latch_time)
         swinging.wrist = self.leader.wrist(arm)
         return swinging
 
@@ -503,7 +504,7 @@ class Walk:
         self, swinging: Swinging, prove: Callable[[Swinging, Course], Nearest | None], begins: float
     ) -> Nearest | None:
         """What is too near to a hand that goes on to its hold from a path time on [s], also where the body stops."""
-        course = self._course(swinging)
+        course = self._course(swinging)._replace(lifts=begins)
         found = prove(swinging, course)
         stop = begins + 0.5 * self.leader.stops.brake * self.pace**2
         if found is None or course.stands or not swinging.counted or self._soonest(swinging) > stop:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from wbc.walking.log.folder import BEGUN, STRUCTURE, machine_made, read_begun, w
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.coasting import Coasting
+from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.stack import DT, WalkStack
 from wbc.walking.loop.state import Manual, State
 from wbc.walking.loop.stopping import Stops
@@ -69,6 +70,18 @@ def resumed_state(log: WalkLog, row: int, walker: Walker, structure: Structure) 
     for limb in walker.arms:
         v[limb.v] = log.v[row - 1, [column[joint] for joint in limb.joints]]
     return State(configuration(walker, log, row), held, float(log.t[row]), opening, v)
+
+
+def _let_go(state: State, arm: int, least: int) -> State:
+    """A hand whose arm cannot hold on while the body comes to rest, as it was about to be lifted, opens at once.
+
+    Args:
+        least: so many hands must hold.
+    """
+    if len(state.held) <= least:
+        return state
+    others = {one: hold for one, hold in state.held.items() if one != arm}
+    return replace(state, held=others, opening=(arm, state.held[arm]))
 
 
 def row_at(log: WalkLog, at: float | None) -> int:
@@ -209,7 +222,11 @@ class ResumeMode(Mode[PathRequest]):
         self._state = resumed_state(old, row, walker, self._there)
         asked = resume.points or "way" not in old.meta
         whole = request.path(walker.arm_data) if asked else path_of(old.meta["way"])
-        coasting = Coasting.of(walker, self._there, self._state, Stops.of(walker, DT).brake, DT)
+        brake, sight = Stops.of(walker, DT).brake, Foresight(walker, self._there)
+        coasting = Coasting.of(walker, self._there, self._state, brake, DT, sight)
+        if coasting is not None and len(coasting.pulled) == 1 and not coasting.free:
+            self._state = _let_go(self._state, coasting.pulled[0], walker.min_holds)
+            coasting = Coasting.of(walker, self._there, self._state, brake, DT, sight)
         self._stands = self._state if coasting is None else coasting.state(self._state)
         self.path = _rest(pin.XYZQUATToSE3(self._stands.q[:7]), whole, request)
 
