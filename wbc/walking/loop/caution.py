@@ -205,11 +205,9 @@ class Caution:
             aim = min(1.0 / (1.0 + 4.0 * wait) if wait > 0.0 else 1.0, most)
             holds = u < course.lifts - 1e-9 and pace > 0.0
             u, t = min(u + pace * STEP, end), t + STEP
-            if holds:
-                pass
-            elif latch > 1e-9:
+            if not holds and latch > 1e-9:
                 latch -= STEP
-            else:
+            elif not holds:
                 hand += min(max(aim - hand, -STEP / ramp), STEP / ramp)
                 clock = min(clock + hand * STEP, law.duration)
             rows.append((t, u, clock))
