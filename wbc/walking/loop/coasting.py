@@ -232,7 +232,7 @@ class Coasting:
         times = self._times(count)
         q = np.repeat(state.q[None], count, axis=0)
         q[:, 7:] += fallen(times, self._brake)[:, None] * state.v[6:]
-        q[:, :7] = [pin.SE3ToXYZQUAT(self._path.at(float(t))[0]) for t in fallen(times, self._brake)]
+        q[:, :7] = [pin.SE3ToXYZQUAT(body) for body in self._bodies(times)]
         for one, held in self._held.items():
             columns = range(self._joints[one].start, self._joints[one].stop - 1)
             q[:, columns] = held[np.minimum(np.arange(count), len(held) - 1)]
@@ -244,6 +244,10 @@ class Coasting:
             if one in self.over:
                 to.append((one, self._structure.positions[self.over[one]]))
         return self._sight.nearest(times, q, left, to, state.held) is None
+
+    def _bodies(self, times: Array) -> list[pin.SE3]:
+        """Where the body is at times [s]."""
+        return [self._path.at(float(t))[0] for t in fallen(times, self._brake)]
 
     def _times(self, count: int) -> Array:
         """Of ticks from the first on [s]."""
@@ -260,8 +264,8 @@ class Coasting:
             return False
         if arm not in self.over:
             return True
-        hands, gone = np.asarray(limb.points(rows))[:, -1], fallen(self._times(len(rows)), self._brake)
-        places = [(self._path.at(float(t))[0] * mine.base).act(hand) for t, hand in zip(gone, hands, strict=True)]
+        hands, bodies = np.asarray(limb.points(rows))[:, -1], self._bodies(self._times(len(rows)))
+        places = [(body * mine.base).act(hand) for body, hand in zip(bodies, hands, strict=True)]
         hold = self.over[arm]
         heights = (self._structure.positions[hold] - np.array(places)) @ self._structure.axes[hold]
         return bool(heights.min() >= min(heights[0] - DEEPER, -DEEPEST))
@@ -298,8 +302,7 @@ class Coasting:
         speed = here.rotation @ (twist[:3] + np.cross(twist[3:], hand) + (after - before) / (2.0 * STEP))
         done, place, part = fallen(times, stop)[:, None], here.act(hand), np.minimum(times / stop, 1.0)[:, None]
         straight = self._over_hold(walker, arm, place + 0.5 * stop * speed)
-        bodies = [self._path.at(float(t))[0] for t in fallen(times, self._brake)]
-        frames = np.array([(body * base).homogeneous for body in bodies])
+        frames = np.array([(body * base).homogeneous for body in self._bodies(times)])
         guide, rows = (q + done * rates)[:, limb.guided :], q[None]
         most = -np.inf
         for nearer in NEARER:
