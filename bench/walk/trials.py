@@ -161,9 +161,10 @@ def resume(name: str, walker: Walker, folder: Path) -> Record:
 
 
 def vanish(name: str, walker: Walker, folder: Path) -> Record:
-    """A walk on which holds vanish that are held, or that a hand is on its way to; ``SEED``."""
+    """A walk on which holds vanish that are held, or that a hand is on its way to, but no goal; ``SEED``."""
     rng = np.random.default_rng([3, int(name)])
-    mode = mode_of(_request(rng, walker, folder), walker)
+    request = _request(rng, walker, folder)
+    mode, goal = mode_of(request, walker), request.goal if isinstance(request, TwoEndedRequest) else ""
     structure = mode.structure
     cpu = time.process_time()
     try:
@@ -183,6 +184,7 @@ def vanish(name: str, walker: Walker, folder: Path) -> Record:
             # Not so many that the body would fall
             some = list(walk.held.values()) if len(walk.held) > walker.min_holds else []
             some += [walk.swinging.hold] if walk.swinging is not None else []
+            some = [hold for hold in some if walk.structure.ids[hold] != goal]
             walk.vanish([walk.structure.ids[int(rng.choice(some))]] if some else [])
 
     try:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from math import pi, sin
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbc
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
 from wbc.walking import Structure
@@ -16,7 +20,10 @@ from wbc.walking.loop.walk import Tick, Walk
 from wbc.walking.modes.arm_mode import ArmMode, ArmStopped
 from wbc.walking.modes.hand_motion import ArmRefused
 from wbc.walking.planner.planner import plan_walk
+from wbc.walking.report.folder import rules_of
+from wbc.walking.run import ArmRequest, Site, perform_walk
 from wbc.walking.run.recording import WalkRecorder
+from wbc.walking.run.request import arm_task
 
 
 @pytest.fixture
@@ -97,3 +104,15 @@ def test_refusals_say_why_and_nothing_moves(walk: Walk) -> None:
     walk.body.pace = 0.5
     with pytest.raises(ArmRefused, match="the body moves"):
         ArmMode(walk, "arm1")
+
+
+def test_a_log_ends_at_rest_where_an_arm_was_turning_upright(machine: Walker, tmp_path: Path) -> None:
+    """A hand that leans where it stands turns upright meanwhile; its first task is refused at once."""
+    six = wbc.robots.walker(6, machine.data.shoulder_radius * sin(pi / 3) / sin(pi / 6))
+    site = Site("truss", fraction=0.33149961941237777, seed=271)
+    tasks = (arm_task("rate 0,0,0.0594,0,0,0 for 1.17"),)
+    run = perform_walk(ArmRequest(site, "L3,9", ("L1,16",), arm="arm5", tasks=tasks), six)
+    assert run.outcome == "refused"
+    assert run.log is not None
+    report = check_walk(run.log, six.urdf(tmp_path / "robot.urdf"), run.structure, rules_of(six))
+    assert report.ok, str(report)

@@ -14,9 +14,11 @@ from wbc.errors import RangeError
 from wbc.robots import TwoEndedData, Walker
 from wbc.walking.checker import check_walk
 from wbc.walking.log.log import CLOSED, OPENING
+from wbc.walking.loop.state import Tick
 from wbc.walking.report.folder import rules_of, save_run
 from wbc.walking.run import ResumeRequest, WalkRun, perform_walk
 from wbc.walking.run.request import TwoEndedRequest
+from wbc.walking.two_ended import TwoEndedWalk
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +66,34 @@ def test_a_hand_that_opens_opens_and_another_goal_comes_after_the_swing(
     last = [again.log.hold_id[hold] for hold in again.log.hand_hold[-1]]
     assert (again.log.hand_state[-1] == CLOSED).all()
     assert "4" in last
+
+
+@pytest.mark.parametrize("later", [0.0, 0.2, 1.0])
+def test_a_hand_that_comes_out_of_the_air_stops_and_goes_on(
+    arm: Walker, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, later: float
+) -> None:
+    tick = TwoEndedWalk.tick
+
+    def vanishing(self: TwoEndedWalk) -> Tick:
+        swinging = self.swinging
+        if swinging is not None and swinging.clock > 1.0 and "4" in self.structure.ids:
+            self.vanish(["4"])
+            self.go_to("5")
+        return tick(self)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(TwoEndedWalk, "tick", vanishing)
+        run = perform_walk(TwoEndedRequest(goal="4"), arm)
+    save_run(run, tmp_path, check=False)
+    assert run.log is not None
+    gone = float(run.log.t[np.argmax(run.log.hand_hold.min(axis=1) < 0)])
+    again = perform_walk(ResumeRequest(tmp_path, gone + later, ("5",)), arm)
+    assert again.outcome == "arrived", again.reason
+    assert again.log is not None
+    rules = replace(rules_of(arm), sub_samples=1, twist_speed=0.05, jump_speed=0.1, jump_rate=0.1)
+    report = check_walk(again.log, arm.urdf(tmp_path / "robot.urdf"), again.structure, rules)
+    assert report.ok, str(report)
+    assert "4" in again.structure.ids
 
 
 def test_what_is_not_of_this_arm_is_refused(arm: Walker, walked: tuple[WalkRun, pathlib.Path]) -> None:

@@ -38,6 +38,8 @@ Progress = Callable[[str, float | None], None]
 STRIDE = 25
 #: Ticks that are made after a stop, in which everything comes to rest
 REST = 10
+#: Ticks at most that a walk which is over has for joints that move while the body stands, as an arm turns upright
+SETTLING = 300
 #: Slower than this counts as at rest, where bodies have masses: the body [m/s] and joints [rad/s]
 CREEP, TURN = 0.01, 0.05
 #: So many joints that move are named
@@ -145,6 +147,16 @@ class CarryingOut:
                 far[1] = max(far[1], float(np.linalg.norm(moved)))
             left -= int(walk.still)
         self.figures = (travelled((float(far[0]), float(far[1])), bounds),)
+
+
+def settle(walk: Walk, recorder: WalkRecorder) -> None:
+    """Ticks until joints are so slow that they can stand from one tick to the next: a log ends at rest."""
+    slow = walk.walker.robot.limits.acceleration[6:] * walk.dt
+    walk.abort()
+    for _ in range(SETTLING):
+        if not (np.abs(walk.v[6:]) > slow).any():
+            return
+        recorder.tick(walk.tick())
 
 
 def farthest(body: float, hand: float) -> Figure:

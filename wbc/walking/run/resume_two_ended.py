@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import pathlib
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from wbc.errors import RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
+from wbc.validation import Array
 from wbc.walking.holds.files import read_structure
 from wbc.walking.log.folder import STRUCTURE
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
+from wbc.walking.planner.grips.rolls import frame_on
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.run.mode import Result
 from wbc.walking.run.path_mode import TwoEndedMode
@@ -24,6 +28,12 @@ from wbc.walking.run.recording import Before, as_walked
 from wbc.walking.run.request import TwoEndedRequest, request_of, two_ended_request
 from wbc.walking.run.resume_mode import RESUME, ResumeRequest, resumed_state, row_at
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
+from wbc.walking.two_ended.planner import plan_from_air
+from wbc.walking.two_ended.postures import Grip
+from wbc.walking.two_ended.swing_path import TurnLaw
+
+#: Joints that are farther from a swing are not on it [rad]
+SAME = 5e-4
 
 
 class TwoEndedResumeMode(TwoEndedMode):
@@ -46,34 +56,68 @@ class TwoEndedResumeMode(TwoEndedMode):
         if resume.points:
             request = two_ended_request(request.site, " ".join(request.start), tuple(map(str, resume.points)), "any")
         super().__init__(request, walker)
-        self._whole = read_structure(self._folder / STRUCTURE)
+        self.structure = read_structure(self._folder / STRUCTURE)
         self._row = row = row_at(self._old, resume.at)
         here = self._old.present(np.arange(len(self._old.hold_id)), float(self._old.t[row]))
         gone = [name for name, there in zip(self._old.hold_id, here, strict=True) if not there]
-        self.structure = self._whole.without(gone)
-        self._state = resumed_state(self._old, row, walker, self.structure)
+        self._there = self.structure.without(gone)
+        self._state = resumed_state(self._old, row, walker, self._there)
 
     def plan(self) -> TwoEndedPlan:
-        """From the stance that the arm had last, beginning with the swing that it is in."""
+        """From the stance that the arm had last, beginning with the swing that it is in; where it is on none from hold
+        to hold, it comes to rest, and its hand goes to another one.
+        """
         start, request = dict[str, str](), self.request
         for arm, name in enumerate(self._old.arms):
             closed = np.flatnonzero(self._old.hand_state[: self._row + 1, arm] == CLOSED)
             start[name] = self._old.hold_id[self._old.hand_hold[closed[-1], arm]]
         self._arm, target = self._swing()
+        grips = [self._grip(arm) for arm in range(len(start))]
+        near, far = (None if grip is None else grip.roll for grip in grips)
 
         def to(goal: Any, gait: str) -> TwoEndedPlan:
-            return plan_two_ended(self.walker, self.structure, start, goal, gait=gait)
+            return plan_two_ended(self.walker, self._there, start, goal, gait=gait, rolls=(near, far))
 
-        plan = to(request.goal, request.gait)
-        if self._arm is None or _begins(plan, self._old.arms[self._arm], target):
-            return plan
-        if target:
-            # The way to the goal begins otherwise from here: first to where the hand is on its way
-            plan = to(target, "any")
-            if _begins(plan, self._old.arms[self._arm], target) and len(plan.regrasps) == 1:
-                return plan
-        name = self._old.arms[self._arm]
-        raise NoPlanError("resume", name, f"no plan goes on with its swing from {start[name]} to {target or 'a hold'}")
+        if self._arm is None:
+            return to(request.goal, request.gait)
+        # The way to the goal may begin otherwise from here: then first to where the hand is on its way
+        for goal, gait in ((request.goal, request.gait), (target, "any")):
+            if not goal or not set(start.values()) <= set(self._there.ids):
+                break
+            with suppress(NoPlanError):
+                plan = to(goal, gait)
+                if self._goes_on(plan, target) and (goal == request.goal or len(plan.regrasps) == 1):
+                    return plan
+        held, free = grips[1 - self._arm], self._old.arms[self._arm]
+        assert held is not None
+        joints, rates = (self._ordered(all_, part) for all_, part in ((self._state.q, "q"), (self._state.v, "v")))
+        more: dict[str, Any] = {"gait": request.gait, "left": start[free], "rates": rates}
+        return plan_from_air(self.walker, self._there, (1 - self._arm, held), joints, request.goal, **more)
+
+    def _grip(self, arm: int) -> Grip | None:
+        """That a hand holds by, at the roll nearest to how it is turned; None: it does not hold."""
+        hold, robot = self._state.held.get(arm), self.walker.robot
+        if hold is None:
+            return None
+        data = robot.model.createData()
+        pin.framesForwardKinematics(robot.model, data, self._state.q)
+        x = data.oMf[robot.model.getFrameId(self.walker.arms[arm].hand)].rotation[:, 0]
+        rolls = range(len(self._there.holds[hold].rolls))
+        return Grip(hold, max(rolls, key=lambda roll: float(frame_on(self._there, hold, roll)[:3, 0] @ x)))
+
+    def _ordered(self, of_all: Array | None, part: str) -> Array:
+        """What joints 1 to 7 have of a configuration or a velocity."""
+        assert of_all is not None
+        near, far = (of_all[getattr(arm, part)] for arm in self.walker.arms)
+        return np.concatenate([near[::-1], far])
+
+    def _goes_on(self, plan: TwoEndedPlan, target: str) -> bool:
+        """Whether a plan begins with the swing that the arm is in, to a hold; "": to any."""
+        step, law = (plan.regrasps[0], plan.laws[0]) if plan.regrasps else (None, None)
+        if self._arm is None or step is None or not isinstance(law, TurnLaw):
+            return False
+        q = self._state.q[self.walker.arms[self._arm].q]
+        return step.arm == self._old.arms[self._arm] and target in ("", step.target) and law.found(q, 0.0 * q)[2] < SAME
 
     def _swing(self) -> tuple[int | None, str]:
         """The arm whose hand is in the air or opens, None for none, and the hold that it goes to, "" where none is."""
@@ -88,7 +132,7 @@ class TwoEndedResumeMode(TwoEndedMode):
         """From the state of the log."""
         if not isinstance(plan, TwoEndedPlan) or not isinstance(stack, TwoEndedStack):
             raise ShapeError("stack", stack, "expected a TwoEndedStack")
-        walk = TwoEndedWalk(self.walker, self.structure, plan, stack=stack, plant=plant, state=self._state)
+        walk = TwoEndedWalk(self.walker, self._there, plan, stack=stack, plant=plant, state=self._state)
         walk.go_on(self._arm, self._state)
         goal = self.request.goal
         if plan.to != goal:
@@ -103,7 +147,7 @@ class TwoEndedResumeMode(TwoEndedMode):
 
     def before(self) -> Before:
         """What was walked until it goes on."""
-        return Before(self._old, self._ticks, self._row, self._whole)
+        return Before(self._old, self._ticks, self._row, self.structure)
 
     def meta(self, plan: Plan) -> dict[str, Any]:
         """What the old log has, and when it was gone on with."""
@@ -120,8 +164,3 @@ class TwoEndedResumeMode(TwoEndedMode):
         """The log of the run up to then and of the new walk; the plan is what was done."""
         plan, ticks = as_walked(log, ticks, walk.progress.steps)
         return Result(plan, log, ticks, self.figures(log))
-
-
-def _begins(plan: TwoEndedPlan, arm: str, target: str) -> bool:
-    """Whether a plan begins with a swing of an arm, to a hold; "": to any."""
-    return bool(plan.regrasps) and plan.regrasps[0].arm == arm and target in ("", plan.regrasps[0].target)

@@ -22,9 +22,9 @@ from wbc.walking.log.log import WalkLog
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.modes.commands import Commands
-from wbc.walking.planner.plan import NoPlanError, Plan
+from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan
 from wbc.walking.run.arm_tasks_mode import ArmTasksMode
-from wbc.walking.run.carrying_out import WELL, Outcome, Progress
+from wbc.walking.run.carrying_out import WELL, Outcome, Progress, settle
 from wbc.walking.run.drive_mode import DriveMode
 from wbc.walking.run.mode import Mode
 from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
@@ -197,6 +197,8 @@ def perform(
     recorder = WalkRecorder(walk, mode.request.site.seed, meta, folder=folder, before=mode.before())
     try:
         ending = mode.carry_out(walk, recorder, report, stop)
+        with contextlib.suppress(HoldLost, PlantError):
+            settle(walk, recorder)
     finally:
         with contextlib.suppress(PlantError):
             walk.machine.rest()

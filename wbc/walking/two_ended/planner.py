@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,7 @@ def plan_two_ended(
     *,
     gait: str = "any",
     width: int | None = 200,
+    rolls: tuple[int | None, int | None] = (None, None),
 ) -> TwoEndedPlan:
     """Which hand of the two-ended arm to move where, by the planner's search: the fewest swings, then the least time.
 
@@ -59,35 +61,90 @@ def plan_two_ended(
         to: id of a hold that a hand is to hold, or a point [m] that the elbow is to be as near to as it can be.
         gait: ``inchworm``: hands keep their order along the route; ``turnaround``: each swing changes it; ``any``.
         width: stances stored for each number of re-grasps; None: all.
+        rolls: number of the roll at which each hand holds; None: any.
 
     Raises:
         UnknownNameError: another arm, hold or gait. ShapeError: another machine, or a start without both hands.
         RangeError: a hold on which a hand may roll or lean: it does not say where the arm is.
         NoPlanError: there is none, or the elbow comes nowhere near to a place.
     """
-    validation.one_of("gait", gait, tuple(GAITS))
     rows = _start(structure, start)
-    postures = PairPostures(walker, structure)
-    for hold in structure.holds:
-        if not hold.rolls or hold.max_tilt > 0.0:
-            raise RangeError("structure", hold.id, "one hand must fix the arm: no free roll, no tilt")
-    goal, there = _goal(postures, to)
-    paths = TurnPaths(postures)
-    here = structure.positions[list(rows)].mean(axis=0)
-    search = TurnSearch(walker, structure, paths, (structure.positions - here) @ _unit(there - here), goal, gait, width)
+    search, paths = _search(walker, structure, structure.positions[list(rows)].mean(axis=0), to, gait, width)
     grips = search.grips
-    stances = [
-        (near, far)
-        for near in grips.of_arm(0)[grips.hold[grips.of_arm(0)] == rows[0]]
-        for far in grips.of_arm(1)[grips.hold[grips.of_arm(1)] == rows[1]]
-        if search.until((near, far), 0) > 0
+    hands = [
+        [grip for grip in grips.of_arm(arm) if grips.hold[grip] == row and roll in (None, grips.roll[grip])]
+        for arm, (row, roll) in enumerate(zip(rows, rolls, strict=True))
     ]
+    stances = [pair for pair in product(*hands) if search.until(pair, 0) > 0]
     if not stances:
         raise NoPlanError("start", dict(start), "the arm has no posture between these holds", separating=start.values())
     found = search.run(stances)
     if not found.complete:
         raise _refused(structure, search, found, to)
-    return replace(_plan(walker, structure, paths, search, found), to=to, gait=gait)
+    near, far = (search.pairs.named(grip) for grip in found.start)
+    first = paths.postures.between(near, far)
+    assert first is not None
+    plan = _plan(walker, paths, Turn(0, near, near, far), first, _swings(paths, search, found))
+    return replace(plan, to=to, gait=gait)
+
+
+def plan_from_air(
+    walker: Walker,
+    structure: Structure,
+    held: tuple[int, Grip],
+    joints: Array,
+    to: str | Sequence[float],
+    *,
+    gait: str = "any",
+    width: int | None = 200,
+    left: str = "",
+    rates: Array | None = None,
+) -> TwoEndedPlan:
+    """As :func:`plan_two_ended`, of an arm with one hand in the air, which first goes to any hold: to one from which
+    the fewest swings lead to the goal.
+
+    Args:
+        held: row of the arm whose hand holds, and its grip. joints: 1 to 7 ``[7]`` [rad].
+        left: id of the hold that the hand in the air had.
+        rates: of the joints ``[7]``, which first come to rest [rad/s]; None: they are at rest.
+    """
+    arm, grip = held
+    free = 1 - arm
+    search, paths = _search(walker, structure, structure.positions[grip.hold], to, gait, width)
+    pairs, stop = search.pairs, joints[None] if rates is None else paths.stop(joints, rates, SPACING)
+    ways = dict[tuple[int, ...], Array]()
+    (holding,) = (one for one in search.grips.of_arm(arm) if pairs.named(one) == grip)
+    for other in search.grips.of_arm(free):
+        stance, target = (holding, other) if arm == 0 else (other, holding), pairs.named(other)
+        if target.hold != grip.hold and search.until(stance, 0) > 0:
+            way = paths.from_air(Turn(free, target, target, grip), stop)
+            if way is not None:
+                ways[stance] = way
+    if not ways:
+        where, name = structure.ids[grip.hold], walker.arms[free].name
+        raise NoPlanError("hands", name, f"from where it is in the air it reaches no hold beside {where}")
+    found = search.run(list(ways))
+    if not found.complete:
+        raise _refused(structure, search, found, to)
+    target = pairs.named(found.start[free])
+    turn, way = Turn(free, target, target, grip), paths.timed(ways[tuple(found.start)], SPACING)
+    swings = [(turn, np.concatenate([stop[:-1], way])), *_swings(paths, search, found)]
+    stand = STAND if len(stop) == 1 else 0
+    return replace(_plan(walker, paths, turn, joints, swings, left, stand), to=to, gait=gait)
+
+
+def _search(
+    walker: Walker, structure: Structure, here: Array, to: str | Sequence[float], gait: str, width: int | None
+) -> tuple[TurnSearch, TurnPaths]:
+    """From a place to a goal."""
+    validation.one_of("gait", gait, tuple(GAITS))
+    postures = PairPostures(walker, structure)
+    for hold in structure.holds:
+        if not hold.rolls or hold.max_tilt > 0.0:
+            raise RangeError("structure", hold.id, "one hand must fix the arm: no free roll, no tilt")
+    goal, there = _goal(postures, to)
+    paths, towards = TurnPaths(postures), (structure.positions - here) @ _unit(there - here)
+    return TurnSearch(walker, structure, paths, towards, goal, gait, width), paths
 
 
 def _start(structure: Structure, start: Mapping[str, str]) -> tuple[int, int]:
@@ -137,37 +194,54 @@ def _refused(structure: Structure, search: TurnSearch, found: Found, to: Any) ->
     return NoPlanError("to", to, f"no swing leads on from {' and '.join(names)}", separating=names)
 
 
-def _plan(walker: Walker, structure: Structure, paths: TurnPaths, search: TurnSearch, found: Found) -> TwoEndedPlan:
-    """The whole plan: standing, swinging, standing."""
-    grips, postures = search.grips, paths.postures
-    hands = [Grip(int(grips.hold[g]), int(grips.roll[g])) for g in found.start]
-    first = postures.between(*hands)
-    assert first is not None
-    base = postures.frame(hands[0])
-    joints, poses = [np.repeat(first[None], STAND, axis=0)], []
-    poses.append(np.repeat((base @ postures.kinematics.frames(first)[3])[None], STAND, axis=0))
-    count, steps, laws, spans = STAND, list[Regrasp](), list[TurnLaw](), [[(hands[k], 0)] for k in range(2)]
+def _swings(paths: TurnPaths, search: TurnSearch, found: Found) -> list[tuple[Turn, Array]]:
+    """Swings from stance to stance, with their joints over time."""
+    hands, out = [search.pairs.named(grip) for grip in found.start], list[tuple[Turn, Array]]()
     for move in found.moves:
         turn = Turn(move.arm, hands[move.arm], search.pairs.named(move.target), hands[1 - move.arm])
-        q = paths.timed(turn, SPACING)
-        q = np.concatenate([np.repeat(q[:1], STAND, axis=0), q, np.repeat(q[-1:], STAND, axis=0)])
+        path = paths.path(turn)
+        assert path is not None
+        out.append((turn, paths.timed(path, SPACING)))
+        hands[move.arm] = turn.target
+    return out
+
+
+def _plan(
+    walker: Walker,
+    paths: TurnPaths,
+    standing: Turn,
+    first: Array,
+    swings: list[tuple[Turn, Array]],
+    left: str = "",
+    stand: int = STAND,
+) -> TwoEndedPlan:
+    """The whole plan: standing, swinging, standing.
+
+    Args:
+        standing: grips at the beginning, by a turn that changes nothing. first: posture there ``[7]`` [rad].
+        swings: with their joints over time. left: id of the hold that the first hand comes from; "": of its grip.
+        stand: samples that the arm stands at the beginning, and again before the first swing.
+    """
+    structure, joints = paths.postures.structure, [np.repeat(first[None], stand, axis=0)]
+    poses, hands = [paths.frames(standing, joints[0])[:, 3]], paths.pair(standing, standing.source)
+    count, steps, laws, spans = stand, list[Regrasp](), list[TurnLaw](), [[(hands[k], 0)] for k in range(2)]
+    for turn, way in swings:
+        q = np.concatenate([np.repeat(way[:1], stand, axis=0), way, np.repeat(way[-1:], STAND, axis=0)])
         joints.append(q)
         frames = paths.frames(turn, q)
         poses.append(frames[:, 3])
-        hand, mine = (frames[:, 0], q[:, 2::-1]) if move.arm == 0 else (frames[:, 7], q[:, 3:])
+        hand, mine = (frames[:, 0], q[:, 2::-1]) if turn.arm == 0 else (frames[:, 7], q[:, 3:])
         laws.append(TurnLaw(hand[:-STAND, :3, 3], mine[:-STAND], SPACING))
         lift, land = count, count + len(q) - STAND
-        names = structure.ids[turn.source.hold], structure.ids[turn.target.hold]
+        names = left or structure.ids[turn.source.hold], structure.ids[turn.target.hold]
         spent, roll = round((land - lift) * SPACING, 6), structure.holds[turn.target.hold].rolls[turn.target.roll]
         times = round(lift * SPACING, 9), round(land * SPACING, 9), spent, 0.0, 0.0
-        steps.append(Regrasp(walker.arms[move.arm].name, *names, 0, *times, "end of the path", 0.0, roll=roll))
-        hands[move.arm] = turn.target
-        spans[move.arm].append((turn.target, land))
-        count += len(q)
-    whole = np.concatenate(joints)
+        steps.append(Regrasp(walker.arms[turn.arm].name, *names, 0, *times, "end of the path", 0.0, roll=roll))
+        spans[turn.arm].append((turn.target, land))
+        count, left, stand = count + len(q), "", STAND
     path = BodyPath(np.concatenate(poses), SPACING)
-    table, chain = _grips(walker, whole, spans, steps)
-    start = tuple(structure.ids[grips.hold[g]] for g in found.start)
+    table, chain = _grips(walker, np.concatenate(joints), spans, steps)
+    start = tuple(structure.ids[hand.hold] for hand in hands)
     return TwoEndedPlan(path, start, tuple(steps), True, path.duration, "", table, chain, (), tuple(laws))
 
 

@@ -60,10 +60,42 @@ class TurnPaths:
         turned = float(np.abs(np.diff(path, axis=0)).max(axis=1).sum())
         return turned / (self.postures.margins.swing_rate * limb.data.joint_rate) + 2.0 * limb.data.acceleration_time
 
-    def timed(self, turn: Turn, spacing: float) -> Array:
+    def from_air(self, turn: Turn, stop: Array) -> Array | None:
+        """As :meth:`path`, of a hand in the air, which goes straight across or first up along its own axis.
+
+        Args:
+            turn: its source does not count. stop: joints as they come to rest ``[n, 7]`` [rad].
+        """
+        joints, target = stop[-1], self.postures.frame(turn.target)[:3, 3]
+        # z of frame 0 is along the arm, that of the hand towards its hold
+        ends = self.frames(turn, joints[None])[0]
+        hand = ends[0] * np.array([1.0, -1.0, -1.0, 1.0]) if turn.arm == 0 else ends[7]
+        # A hand that is still near to what the hold is on that it has left or was about to take goes up first
+        free, scale = self._clear(turn, stop, target), self.postures.kinematics.data.boom_length / BOOM
+        left = target if free else hand[:3, 3]
+        if not self._clear(turn, stop, left):
+            return None
+        heights = ((up * scale, lift * scale) for lift in LIFTS for up in ((0.0, lift) if free else (lift,)))
+        paths = (self._joined(turn, joints, hand, up, lift, left) for up, lift in heights)
+        return next((path for path in paths if path is not None), None)
+
+    def stop(self, joints: Array, rates: Array, spacing: float) -> Array:
+        """Joints that come to rest together, every ``spacing`` [s], with the accelerations of swings ``[n, 7]`` [rad];
+        from half of it before, so that the first step has their rates.
+
+        Args:
+            joints, rates: where they are ``[7]`` [rad] and how fast [rad/s].
+        """
+        data = self.postures.kinematics.data
+        hardest = self.postures.margins.swing_acceleration * data.joint_rate / data.acceleration_time
+        count = int(np.ceil(np.abs(rates).max() / hardest / spacing + 0.5))
+        times = (np.arange(count + 1.0)[:, None] - 0.5) * spacing
+        out: Array = joints + rates * (times - 0.5 * np.maximum(times, 0.0) ** 2 / times[-1])
+        return out
+
+    def timed(self, path: Array, spacing: float) -> Array:
         """Joints in the least time under the limits, every ``spacing`` [s], from rest to rest ``[n, 7]`` [rad]."""
-        path, limb, margins = self.path(turn), self.postures.kinematics, self.postures.margins
-        assert path is not None
+        limb, margins = self.postures.kinematics, self.postures.margins
         fastest = margins.swing_rate * limb.data.joint_rate
         hardest = margins.swing_acceleration * limb.data.joint_rate / limb.data.acceleration_time
         law = time_optimal(spline_path(path), velocity=fastest, acceleration=hardest, intervals=INTERVALS)
@@ -71,31 +103,40 @@ class TurnPaths:
         return np.asarray(law.at(np.linspace(0.0, law.duration, count + 1)).position)
 
     def _made(self, turn: Turn, lift: float) -> Array | None:
-        before, after = self._pair(turn, turn.source), self._pair(turn, turn.target)
-        first, last = self.postures.between(*before), self.postures.between(*after)
-        if first is None or last is None:
+        first, hand = self.postures.between(*self.pair(turn, turn.source)), self.postures.frame(turn.source)
+        return None if first is None else self._joined(turn, first, hand, lift, lift, hand[:3, 3])
+
+    def _joined(self, turn: Turn, first: Array, hand: Array, up: float, lift: float, left: Array) -> Array | None:
+        """A path from a posture whose hand has a frame, first ``up`` [m], with ``lift`` above the target [m].
+
+        Args:
+            left: where the hand may be near to what a hold is on [m].
+        """
+        last = self.postures.between(*self.pair(turn, turn.target))
+        if last is None:
             return None
         x = np.linspace(0.0, 1.0, POINTS)
         height = 1.0 - (1.0 - 2.0 * x) ** 2
-        leaving, coming = self._over(turn, turn.source, first, lift), self._over(turn, turn.target, last, lift)
+        leaving = self._over(turn, hand, first, up)
+        coming = self._over(turn, self.postures.frame(turn.target), last, lift)
         if leaving is None or coming is None:
             return None
         grid = np.linspace(0.0, 1.0, HEIGHTS)
         a, b = (np.stack([np.interp(height, grid, q[:, k]) for k in range(7)], axis=1) for q in (leaving, coming))
         y = step((x - UPRIGHT) / (1.0 - 2.0 * UPRIGHT))[:, None]
         path: Array = (1.0 - y) * a + y * b
-        if np.abs(path).max() > self.postures.limit:
+        if np.abs(path).max() > max(self.postures.limit, np.abs(first).max()):
             return None
-        return path if self._clear(turn, path) else None
+        return path if self._clear(turn, path, left) else None
 
-    def _pair(self, turn: Turn, grip: Grip) -> tuple[Grip, Grip]:
+    def pair(self, turn: Turn, grip: Grip) -> tuple[Grip, Grip]:
         """Grips of the near and of the far hand."""
         return (grip, turn.held) if turn.arm == 0 else (turn.held, grip)
 
-    def _over(self, turn: Turn, grip: Grip, q: Array, lift: float) -> Array | None:
-        """Postures with the swinging hand 0 to ``lift`` above a hold ``[HEIGHTS, 7]``, from ``q`` on."""
+    def _over(self, turn: Turn, hand: Array, q: Array, lift: float) -> Array | None:
+        """Postures with the swinging hand 0 to ``lift`` above where it has a frame ``[HEIGHTS, 7]``, from ``q`` on."""
         postures = self.postures
-        hand, held = postures.frame(grip), postures.frame(turn.held)
+        held = postures.frame(turn.held)
         raised = np.repeat(hand[None], HEIGHTS, axis=0)
         raised[:, :3, 3] -= np.linspace(0.0, lift, HEIGHTS)[:, None] * hand[:3, 2]
         pose = np.linalg.inv(raised) @ held if turn.arm == 0 else np.linalg.inv(held) @ raised
@@ -111,13 +152,10 @@ class TurnPaths:
             out[k] = last = near[best]
         return out
 
-    def _clear(self, turn: Turn, path: Array) -> bool:
-        postures = self.postures
-        near, far = (postures.frame(grip)[:3, 3] for grip in self._pair(turn, turn.source))
-        frames = self.frames(turn, path)
-        other = postures.frame(turn.target)[:3, 3]
-        ends = np.array([[near, other], [far, far]] if turn.arm == 0 else [[near, near], [far, other]])
-        return bool(postures.shapes.clear(frames, ends).all())
+    def _clear(self, turn: Turn, path: Array, left: Array) -> bool:
+        held, target = (self.postures.frame(grip)[:3, 3] for grip in (turn.held, turn.target))
+        ends = np.array([[left, target], [held, held]])
+        return bool(self.postures.shapes.clear(self.frames(turn, path), ends[:: 1 - 2 * turn.arm]).all())
 
     def frames(self, turn: Turn, q: Array) -> Array:
         """Frames 0 to 7 in the structure at postures ``[n, 7]`` while the other hand holds: ``[n, 8, 4, 4]`` [m]."""
@@ -148,16 +186,17 @@ class TurnLaw(SwingLaw):
         out: Array = self._joints[row] + (place - row) * (self._joints[row + 1] - self._joints[row])
         return out
 
-    def found(self, q: Array, v: Array) -> tuple[float, float]:
-        """The time at which the joints are nearest to a posture ``[joints]`` [rad], and the pace from 0 to 1 that their
-        rates are of its own there [rad/s].
+    def found(self, q: Array, v: Array) -> tuple[float, float, float]:
+        """The time at which the joints are nearest to a posture ``[joints]`` [rad], the pace from 0 to 1 that their
+        rates are of its own there [rad/s], and how far off the posture is [rad].
         """
         rows = self._joints
         spans, offs = np.diff(rows, axis=0), q - rows[:-1]
         squares = np.maximum((spans * spans).sum(axis=1), 1e-18)
         parts = np.clip((offs * spans).sum(axis=1) / squares, 0.0, 1.0)
-        row = int(np.linalg.norm(offs - parts[:, None] * spans, axis=1).argmin())
+        far = np.linalg.norm(offs - parts[:, None] * spans, axis=1)
+        row = int(far.argmin())
         spacing = self.duration / len(spans)
         rates = spans[row] / spacing
         pace = float(v @ rates / max(float(rates @ rates), 1e-12))
-        return (row + float(parts[row])) * spacing, min(max(pace, 0.0), 1.0)
+        return (row + float(parts[row])) * spacing, min(max(pace, 0.0), 1.0), float(far[row])

@@ -26,7 +26,8 @@ from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
-from wbc.walking.two_ended.planner import TwoEndedPlan, plan_two_ended
+from wbc.walking.two_ended.planner import TwoEndedPlan, plan_from_air, plan_two_ended
+from wbc.walking.two_ended.postures import Grip
 from wbc.walking.two_ended.search import GAITS
 from wbc.walking.two_ended.swing_path import TurnLaw
 
@@ -114,8 +115,8 @@ class TurnReplanner:
         to, gait: of :func:`wbc.walking.two_ended.planner.plan_two_ended`.
     """
 
-    def __init__(self, machine: Machine, to: str | Sequence[float], gait: str) -> None:
-        self._machine, self._to, self.gait = machine, to, gait
+    def __init__(self, machine: Machine, progress: PlanProgress, to: str | Sequence[float], gait: str) -> None:
+        self._machine, self._progress, self._to, self.gait = machine, progress, to, gait
         self.sight: Foresight | None = None
 
     def go(self, goal: Any) -> None:
@@ -136,13 +137,22 @@ class TurnReplanner:
         """Every plan of this arm begins with a stance."""
 
     def rest(self) -> PlanSlices:
-        """From the stance that the arm has now."""
-        machine = self._machine
-        walker, held = machine.walker, machine.held
-        if len(held) < len(walker.arms):
-            raise NoPlanError("hands", len(held), "one hand is in the air, and its hold is gone")
-        start = {walker.arms[arm].name: machine.structure.ids[hold] for arm, hold in held.items()}
-        return _at_once(plan_two_ended(walker, machine.structure, start, self._to, gait=self.gait))
+        """From the stance that the arm has now, or from where a hand is in the air."""
+        machine, progress, to = self._machine, self._progress, self._to
+        walker, structure, held = machine.walker, machine.structure, machine.held
+        if isinstance(to, str) and to not in structure.ids:
+            raise NoPlanError("to", to, "the hold that a hand was to come to is gone")
+        grips = [Grip(held.get(k, -1), int(progress.grips.roll[grip])) for k, grip in enumerate(progress.grip)]
+        if len(held) == len(walker.arms):
+            start = {arm.name: structure.ids[grip.hold] for arm, grip in zip(walker.arms, grips, strict=True)}
+            rolls = grips[0].roll, grips[1].roll
+            return _at_once(plan_two_ended(walker, structure, start, to, gait=self.gait, rolls=rolls))
+        ((arm, _),) = held.items()
+        near, far = (machine.q[one.q] for one in walker.arms)
+        steps, name = progress.steps, walker.arms[1 - arm].name
+        left = steps[-1].source if steps and steps[-1].arm == name else ""
+        joints = np.concatenate([near[::-1], far])
+        return _at_once(plan_from_air(walker, structure, (arm, grips[arm]), joints, to, gait=self.gait, left=left))
 
     def without(self, kept: int) -> PlanSlices | None:
         """The arm stops at its next stance."""
@@ -154,7 +164,7 @@ class TurnReplanner:
 
 class TwoEndedWalk(Walk):
     """A walk of the two-ended arm; one hand holds while the other one swings. Where a hand is in the air and its hold
-    vanishes, there is no plan.
+    vanishes, the arm comes to rest on its way, and the hand goes to another one.
 
     Args:
         walker, structure, plan: the two-ended arm, the holds, and a plan of :func:`plan_two_ended`.
@@ -181,8 +191,8 @@ class TwoEndedWalk(Walk):
             raise ShapeError("plan", plan, "expected a plan of plan_two_ended")
         stack = stack or TwoEndedStack(walker, structure, dt, collisions=False, backend=backend)
 
-        def replanner(machine: Machine, _: PlanProgress) -> TurnReplanner:
-            self._turns = TurnReplanner(machine, plan.to, plan.gait)
+        def replanner(machine: Machine, progress: PlanProgress) -> TurnReplanner:
+            self._turns = TurnReplanner(machine, progress, plan.to, plan.gait)
             return self._turns
 
         def leader(machine: Machine, progress: PlanProgress, _: WalkStack) -> TurnLeader:
@@ -205,7 +215,7 @@ class TwoEndedWalk(Walk):
         step, law, joints = self.plan.regrasps[0], self.plan.laws[0], self.walker.arms[arm]
         assert isinstance(law, TurnLaw)
         v = np.zeros(len(state.q) - 1) if state.v is None else state.v
-        clock, pace = law.found(state.q[joints.q], v[joints.v])
+        clock, pace, _ = law.found(state.q[joints.q], v[joints.v])
         opens, progress = state.opening is not None, self.progress
         more: dict[str, Any] = {"clock": 0.0 if opens else clock, "state": "opening" if opens else "open"}
         latch = self.hands.data.latch_time if opens else 0.0
@@ -216,6 +226,16 @@ class TwoEndedWalk(Walk):
         progress.lift(arm)
         self.hands.swinging = swinging
         self.body.pace, self.machine.v = (0.0, self.machine.v) if opens else (pace, v.copy())
+
+    def _bring(self, arm: int) -> None:
+        """A hand in the air goes to its hold by the first swing of the plan."""
+        step = self._may_lift()
+        if step is None or self.path_time < step.lift - 1e-9:
+            return
+        swinging = self._next_swing(step)
+        swinging.latch, swinging.state = 0.0, "open"
+        self.progress.lift(arm)
+        self.hands.swinging = swinging
 
     def go_to(self, to: str | Sequence[float], gait: str = "any") -> None:
         """Go somewhere else, from the stance that the arm comes to next: to a hold, or with the elbow to a point [m].

@@ -17,7 +17,7 @@ from wbc.walking.planner.slices import Allowance
 #: Searches along detours are so many times as wide, as another detour leads on more often than another stance
 NARROWER = 0.5
 #: Slices of work that are spent on all detours, on the search along one of them, and on one that goes on where it ended
-WORK, ROUTE, FURTHER = 3600.0, 600.0, 250.0
+WORK, ROUTE, FURTHER = 3300.0, 600.0, 250.0
 #: More arms than this, whose stances differ in more, may only have lost their way: the path itself is tried once more
 USUAL_ARMS = 3
 #: Where a plan ends behind this part of its path, a search that is so many times as wide goes on from so many re-grasps
