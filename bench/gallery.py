@@ -151,12 +151,11 @@ def undisturbed(page: Page) -> None:
     time.sleep(4.0)
 
 
-def save(frames: list[Image.Image], file: Path) -> Path:
-    """Pictures of one palette."""
+def save(frames: list[Image.Image], file: Path, between: float = SECONDS / FRAMES) -> Path:
+    """Pictures of one palette, shown one after the other [s]."""
     palette = frames[len(frames) // 2].quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
     reduced = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    between = round(1000 * SECONDS / FRAMES)
-    reduced[0].save(file, save_all=True, append_images=reduced[1:], duration=between, loop=0)
+    reduced[0].save(file, save_all=True, append_images=reduced[1:], duration=round(1000 * between), loop=0)
     return file
 
 

@@ -1,4 +1,6 @@
-"""Draws pictures of the pages from examples that draw none themselves: ``python -m bench.pictures [--only FILE]``."""
+"""Draws pictures of the pages, from examples that draw none themselves and of a walk among posts:
+``python -m bench.pictures [--only FILE]``.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +9,27 @@ import runpy
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import wbc
 from bench.gallery import save
 from bench.pool import ROOT
+from bench.walk.machine import walker_of
+from bench.walk.trials import posed
 from wbc.track import Scene
+from wbc.walking.report.animation import save_animation
+from wbc.walking.run.session import perform_walk
 
 SIZE, SMALL = (800, 540), (480, 330)
 #: Pictures of a film, and how far round the path of a hand there is something to see [m]
 FRAMES, ROUND = 24, 0.5
+#: Pictures of a walk, and how long each is shown [s]
+STEPS, SHOWN = 60, 0.2
 
 
 def dual_arm(run: dict[str, Any], file: Path) -> None:
@@ -70,11 +79,26 @@ def film(run: dict[str, Any], file: Path) -> None:
     save(frames, file)
 
 
-#: File -> the example that it is drawn from, and how
+def posts(_: dict[str, Any], file: Path) -> None:
+    """The walk of ``python -m bench.walk.trials structures "posts 2" FOLDER``, from its beginning to its end."""
+    walker = walker_of(3)
+    with TemporaryDirectory() as folder:
+        request = posed("posts", 2, walker, Path(folder))
+        run = perform_walk(request, walker)
+        assert run.log is not None
+        film = save_animation(run, run.log, Path(folder), SMALL, STEPS)
+        assert film is not None
+        with Image.open(film) as shown:
+            frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(shown)]
+    save(frames, file, SHOWN)
+
+
+#: File -> the example that it is drawn from, "" for none, and how
 PICTURES: dict[str, tuple[str, Callable[[dict[str, Any], Path], None]]] = {
     "dual_arm.png": ("dual_arm", dual_arm),
     "mobile_base.png": ("mobile_base", mobile_base),
     "mobile_base_film.gif": ("mobile_base", film),
+    "walk_posts.gif": ("", posts),
 }
 
 
@@ -87,7 +111,8 @@ def main() -> None:
     chosen.out.mkdir(parents=True, exist_ok=True)
     for name in chosen.only:
         example, draw = PICTURES[name]
-        draw(runpy.run_path(str(ROOT / "examples" / f"{example}.py"), run_name="__main__"), chosen.out / name)
+        run = runpy.run_path(str(ROOT / "examples" / f"{example}.py"), run_name="__main__") if example else {}
+        draw(run, chosen.out / name)
         print(chosen.out / name)
 
 

@@ -68,12 +68,7 @@ RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 def structures(name: str, walker: Walker, folder: Path) -> Record:
     """A walk on ``FAMILY SEED``."""
     family, seed = name.split()
-    trial = random_structure(family, int(seed), walker.arm_data.shoulder_radius + NECK)
-    file = trial.save(folder)
-    rng = np.random.default_rng(int(seed))
-    speed = float(rng.uniform(0.05, 0.15))
-    objective: Objective = "velocity" if rng.random() < 0.5 else "destination"
-    request = PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
+    request = posed(family, int(seed), walker, folder)
     spent = Spent()
     run = perform_walk(request, walker, progress=spent)
     times = spent.times(run.plan is not None)
@@ -83,6 +78,16 @@ def structures(name: str, walker: Walker, folder: Path) -> Record:
         found = passage(walker, request.site.build(), path.poses[0], path.poses[-1])
         out |= {"reference": found.kind, "around": found.around}
     return out
+
+
+def posed(family: str, seed: int, walker: Walker, folder: Path) -> PathRequest:
+    """What is asked for on a random structure, of which a file is left in the folder."""
+    trial = random_structure(family, seed, walker.arm_data.shoulder_radius + NECK)
+    file = trial.save(folder)
+    rng = np.random.default_rng(seed)
+    speed = float(rng.uniform(0.05, 0.15))
+    objective: Objective = "velocity" if rng.random() < 0.5 else "destination"
+    return PathRequest(Site(str(file)), trial.start, (trial.goal,), speed, 0.1, objective)
 
 
 class Spent:

@@ -38,13 +38,15 @@ def save_animation(
     log: WalkLog,
     folder: pathlib.Path,
     size: tuple[int, int] | None = None,
+    most: int = MOST,
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
     """Writes ``walk.mp4`` where an encoder is installed, else ``walk.gif``; None if ``stop`` ended it.
 
     Args:
-        size: width and height [pixels]; default: :data:`SIZE`. progress: is told what part is done.
+        size: width and height [pixels]; default: :data:`SIZE`. most: pictures at most.
+        progress: is told what part is done.
     """
     turn = surroundings.upright(log).rotation
     rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
@@ -60,7 +62,7 @@ def save_animation(
     ground = Ground(camera, still)
     parts = [part for part in parts_of(run.walker) if isinstance(part.shape, Capsule | Sphere)]
     frames: list[Image.Image] = []
-    chosen = _rows(log)
+    chosen = _rows(log, most)
     for number, row in enumerate(chosen):
         if stop is not None and stop():
             return None
@@ -70,9 +72,9 @@ def save_animation(
     return save_film(frames, folder / FILE, FRAMES_PER_SECOND, COLOURS)
 
 
-def _rows(log: WalkLog) -> Array:
+def _rows(log: WalkLog, most: int) -> Array:
     """Rows of the log that become pictures, evenly over its time; the last is always there."""
-    count = int(np.clip(log.t[-1] / FASTER * FRAMES_PER_SECOND, 2, MOST))
+    count = int(np.clip(log.t[-1] / FASTER * FRAMES_PER_SECOND, 2, most))
     return np.linspace(0, len(log) - 1, count).round().astype(int)
 
 
