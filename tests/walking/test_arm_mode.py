@@ -50,6 +50,9 @@ def test_a_hand_goes_through_poses_to_a_hold_and_the_body_stands(walk: Walk, mac
     assert mode.pose.translation - aside.translation == pytest.approx([0.0, 0.0, -0.025], abs=0.001)
     mode.to_hold(hold)
     assert structure.ids[walk.held[1]] == hold
+    # At once off again: the log has it closed meanwhile
+    mode.through([up])
+    mode.to_hold(hold)
     assert max(np.abs(tick.q[:3] - body[:3]).max() for tick in ticks) < 0.002
     assert all(tick.status == "solved" for tick in ticks)
     assert walk.run(on_tick) == "arrived"

@@ -159,6 +159,10 @@ class ArmMode:
         hold = self.walk.held[self.arm]
         if not self.walk.machine.may_open(self.arm):
             raise ArmRefused("arm", self.walk.walker.arms[self.arm].name, self.walk.machine.failing())
+        if self.walk.hands.just_landed(self.arm):
+            # A row of the log has what hands did in the tick before: one is to say that it was closed
+            for _ in range(2):
+                self._tick("closed", hold)
         self.walk.open_hand(self.arm)
         for _ in range(round(self.walk.hands.data.latch_time / self.walk.dt)):
             self._tick("opening", hold)

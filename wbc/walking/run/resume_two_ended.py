@@ -91,7 +91,9 @@ class TwoEndedResumeMode(TwoEndedMode):
         held, free = grips[1 - self._arm], self._old.arms[self._arm]
         assert held is not None
         joints, rates = (self._ordered(all_, part) for all_, part in ((self._state.q, "q"), (self._state.v, "v")))
-        more: dict[str, Any] = {"gait": request.gait, "left": start[free], "rates": rates}
+        # A hand that opens does not move before its latch is through
+        moving = rates if self._state.opening is None else None
+        more: dict[str, Any] = {"gait": request.gait, "left": start[free], "rates": moving}
         return plan_from_air(self.walker, self._there, (1 - self._arm, held), joints, request.goal, **more)
 
     def _grip(self, arm: int) -> Grip | None:

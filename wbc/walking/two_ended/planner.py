@@ -107,6 +107,9 @@ def plan_from_air(
         held: row of the arm whose hand holds, and its grip. joints: 1 to 7 ``[7]`` [rad].
         left: id of the hold that the hand in the air had.
         rates: of the joints ``[7]``, which first come to rest [rad/s]; None: they are at rest.
+
+    Raises:
+        NoPlanError: the hand reaches no other hold, or no swing leads on from there. Else as ``plan_two_ended``.
     """
     arm, grip = held
     free = 1 - arm
