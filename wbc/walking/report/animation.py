@@ -38,14 +38,14 @@ def save_animation(
     log: WalkLog,
     folder: pathlib.Path,
     size: tuple[int, int] | None = None,
-    most: int = MOST,
+    most: int | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
     """Writes ``walk.mp4`` where an encoder is installed, else ``walk.gif``; None if ``stop`` ended it.
 
     Args:
-        size: width and height [pixels]; default: :data:`SIZE`. most: pictures at most.
+        size: width and height [pixels]; default: :data:`SIZE`. most: pictures at most; default: :data:`MOST`.
         progress: is told what part is done.
     """
     turn = surroundings.upright(log).rotation
@@ -62,7 +62,7 @@ def save_animation(
     ground = Ground(camera, still)
     parts = [part for part in parts_of(run.walker) if isinstance(part.shape, Capsule | Sphere)]
     frames: list[Image.Image] = []
-    chosen = _rows(log, most)
+    chosen = _rows(log, most or MOST)
     for number, row in enumerate(chosen):
         if stop is not None and stop():
             return None
