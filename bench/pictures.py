@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from PIL import Image, ImageSequence
+from PIL import Image
 
 import wbc
 from bench.gallery import save
 from bench.pool import ROOT
 from bench.walk.machine import walker_of
-from bench.walk.trials import posed
+from bench.walk.trials import among
 from wbc.track import Scene
-from wbc.walking.report.animation import save_animation
+from wbc.walking.report.animation import pictures
 from wbc.walking.run.session import perform_walk
 
 SIZE, SMALL = (800, 540), (480, 330)
@@ -83,14 +83,9 @@ def posts(_: dict[str, Any], file: Path) -> None:
     """The walk of ``python -m bench.walk.trials structures "posts 2" FOLDER``, from its beginning to its end."""
     walker = walker_of(3)
     with TemporaryDirectory() as folder:
-        request = posed("posts", 2, walker, Path(folder))
-        run = perform_walk(request, walker)
-        assert run.log is not None
-        film = save_animation(run, run.log, Path(folder), SMALL, STEPS)
-        assert film is not None
-        with Image.open(film) as shown:
-            frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(shown)]
-    save(frames, file, SHOWN)
+        run = perform_walk(among("posts", 2, walker, Path(folder)), walker)
+    assert run.log is not None
+    save([image for _, image in pictures(run, run.log, SMALL, STEPS)], file, SHOWN)
 
 
 #: File -> the example that it is drawn from, "" for none, and how

@@ -68,7 +68,7 @@ RATES, LEGS, LEG = np.array([0.12, 0.12, 0.1]), 4, 3.0
 def structures(name: str, walker: Walker, folder: Path) -> Record:
     """A walk on ``FAMILY SEED``."""
     family, seed = name.split()
-    request = posed(family, int(seed), walker, folder)
+    request = among(family, int(seed), walker, folder)
     spent = Spent()
     run = perform_walk(request, walker, progress=spent)
     times = spent.times(run.plan is not None)
@@ -80,7 +80,7 @@ def structures(name: str, walker: Walker, folder: Path) -> Record:
     return out
 
 
-def posed(family: str, seed: int, walker: Walker, folder: Path) -> PathRequest:
+def among(family: str, seed: int, walker: Walker, folder: Path) -> PathRequest:
     """What is asked for on a random structure, of which a file is left in the folder."""
     trial = random_structure(family, seed, walker.arm_data.shoulder_radius + NECK)
     file = trial.save(folder)

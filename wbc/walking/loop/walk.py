@@ -472,11 +472,11 @@ class Walk:
         if found is not None:
             self._refuse(f"{step.arm} from {step.source} to {step.target}", found)
 
-    def _next_swing(self, step: Regrasp) -> Swinging:
-        """The swing of the next re-grasp."""
+    def _next_swing(self, step: Regrasp, **more: Any) -> Swinging:
+        """The swing of the next re-grasp, as its hand is to open; or with ``more`` of :class:`Swinging`."""
         arm, law = self.progress.arm_of(step), self.plan.laws[self.progress.next]
         grip = self._grip(self.progress.next_grip(arm))
-        swinging = self.hands.going(arm, grip, law, latch=self.hands.data.latch_time)
+        swinging = self.hands.going(arm, grip, law, **{"latch": self.hands.data.latch_time, **more})
         swinging.wrist = self.leader.wrist(arm)
         return swinging
 

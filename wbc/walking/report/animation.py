@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from PIL import Image
@@ -38,15 +38,31 @@ def save_animation(
     log: WalkLog,
     folder: pathlib.Path,
     size: tuple[int, int] | None = None,
-    most: int | None = None,
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
     """Writes ``walk.mp4`` where an encoder is installed, else ``walk.gif``; None if ``stop`` ended it.
 
     Args:
+        size: width and height [pixels]; default: :data:`SIZE`. progress: is told what part is done.
+    """
+    drawn: list[Image.Image] = []
+    for part, image in pictures(run, log, size):
+        if stop is not None and stop():
+            return None
+        drawn.append(image)
+        if progress is not None:
+            progress(part)
+    return save_film(drawn, folder / FILE, FRAMES_PER_SECOND, COLOURS)
+
+
+def pictures(
+    run: WalkRun, log: WalkLog, size: tuple[int, int] | None = None, most: int | None = None
+) -> Iterator[tuple[float, Image.Image]]:
+    """Pictures of a film, each with the part of it that is done by then.
+
+    Args:
         size: width and height [pixels]; default: :data:`SIZE`. most: pictures at most; default: :data:`MOST`.
-        progress: is told what part is done.
     """
     turn = surroundings.upright(log).rotation
     rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
@@ -61,15 +77,10 @@ def save_animation(
     )
     ground = Ground(camera, still)
     parts = [part for part in parts_of(run.walker) if isinstance(part.shape, Capsule | Sphere)]
-    frames: list[Image.Image] = []
-    chosen = _rows(log, most or MOST)
+    chosen = _rows(log, MOST if most is None else most)
     for number, row in enumerate(chosen):
-        if stop is not None and stop():
-            return None
-        frames.append(Image.fromarray(ground.over(_moving(run, log, int(row), parts, turn))))
-        if progress is not None:
-            progress((number + 1) / len(chosen))
-    return save_film(frames, folder / FILE, FRAMES_PER_SECOND, COLOURS)
+        image = Image.fromarray(ground.over(_moving(run, log, int(row), parts, turn)))
+        yield (number + 1) / len(chosen), image
 
 
 def _rows(log: WalkLog, most: int) -> Array:

@@ -13,7 +13,6 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
-from wbc.validation import Array
 from wbc.walking.holds.files import read_structure
 from wbc.walking.log.folder import STRUCTURE
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog
@@ -29,7 +28,7 @@ from wbc.walking.run.request import TwoEndedRequest, request_of, two_ended_reque
 from wbc.walking.run.resume_mode import RESUME, ResumeRequest, resumed_state, row_at
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
 from wbc.walking.two_ended.planner import plan_from_air
-from wbc.walking.two_ended.postures import Grip
+from wbc.walking.two_ended.postures import Grip, from_hand_to_hand
 from wbc.walking.two_ended.swing_path import TurnLaw
 
 #: Joints that are farther from a swing are not on it [rad]
@@ -81,19 +80,19 @@ class TwoEndedResumeMode(TwoEndedMode):
         if self._arm is None:
             return to(request.goal, request.gait)
         # The way to the goal may begin otherwise from here: then first to where the hand is on its way
-        for goal, gait in ((request.goal, request.gait), (target, "any")):
-            if not goal or not set(start.values()) <= set(self._there.ids):
-                break
+        ways = [(request.goal, request.gait), *([(target, "any")] if target else [])]
+        for goal, gait in ways if set(start.values()) <= set(self._there.ids) else []:
             with suppress(NoPlanError):
                 plan = to(goal, gait)
                 if self._goes_on(plan, target) and (goal == request.goal or len(plan.regrasps) == 1):
                     return plan
         held, free = grips[1 - self._arm], self._old.arms[self._arm]
         assert held is not None
-        joints, rates = (self._ordered(all_, part) for all_, part in ((self._state.q, "q"), (self._state.v, "v")))
+        arms, q, v = self.walker.arms, self._state.q, self._state.v
+        joints = from_hand_to_hand(*(q[one.q] for one in arms))
         # A hand that opens does not move before its latch is through
-        moving = rates if self._state.opening is None else None
-        more: dict[str, Any] = {"gait": request.gait, "left": start[free], "rates": moving}
+        rates = None if v is None or self._state.opening is not None else from_hand_to_hand(*(v[one.v] for one in arms))
+        more: dict[str, Any] = {"gait": request.gait, "left": start[free], "rates": rates}
         return plan_from_air(self.walker, self._there, (1 - self._arm, held), joints, request.goal, **more)
 
     def _grip(self, arm: int) -> Grip | None:
@@ -107,19 +106,13 @@ class TwoEndedResumeMode(TwoEndedMode):
         rolls = range(len(self._there.holds[hold].rolls))
         return Grip(hold, max(rolls, key=lambda roll: float(frame_on(self._there, hold, roll)[:3, 0] @ x)))
 
-    def _ordered(self, of_all: Array | None, part: str) -> Array:
-        """What joints 1 to 7 have of a configuration or a velocity."""
-        assert of_all is not None
-        near, far = (of_all[getattr(arm, part)] for arm in self.walker.arms)
-        return np.concatenate([near[::-1], far])
-
     def _goes_on(self, plan: TwoEndedPlan, target: str) -> bool:
         """Whether a plan begins with the swing that the arm is in, to a hold; "": to any."""
-        step, law = (plan.regrasps[0], plan.laws[0]) if plan.regrasps else (None, None)
-        if self._arm is None or step is None or not isinstance(law, TurnLaw):
+        if self._arm is None or not plan.regrasps:
             return False
-        q = self._state.q[self.walker.arms[self._arm].q]
-        return step.arm == self._old.arms[self._arm] and target in ("", step.target) and law.found(q, 0.0 * q)[2] < SAME
+        arm, step, law = self.walker.arms[self._arm], plan.regrasps[0], plan.laws[0]
+        assert isinstance(law, TurnLaw)
+        return step.arm == arm.name and target in ("", step.target) and law.off(self._state.q[arm.q]) < SAME
 
     def _swing(self) -> tuple[int | None, str]:
         """The arm whose hand is in the air or opens, None for none, and the hold that it goes to, "" where none is."""

@@ -18,7 +18,7 @@ from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.table import END, Grips
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.stances.nodes import Found
-from wbc.walking.two_ended.postures import Grip, PairPostures
+from wbc.walking.two_ended.postures import Grip, PairPostures, from_body_outwards
 from wbc.walking.two_ended.search import GAITS, TurnSearch
 from wbc.walking.two_ended.swing_path import Turn, TurnLaw, TurnPaths
 
@@ -233,8 +233,8 @@ def _plan(
         joints.append(q)
         frames = paths.frames(turn, q)
         poses.append(frames[:, 3])
-        hand, mine = (frames[:, 0], q[:, 2::-1]) if turn.arm == 0 else (frames[:, 7], q[:, 3:])
-        laws.append(TurnLaw(hand[:-STAND, :3, 3], mine[:-STAND], SPACING))
+        hands_at, mine = frames[:-STAND, 7 * turn.arm, :3, 3], from_body_outwards(q[:-STAND], turn.arm)
+        laws.append(TurnLaw(hands_at, mine, SPACING))
         lift, land = count, count + len(q) - STAND
         names = left or structure.ids[turn.source.hold], structure.ids[turn.target.hold]
         spent, roll = round((land - lift) * SPACING, 6), structure.holds[turn.target.hold].rolls[turn.target.roll]
@@ -254,7 +254,7 @@ def _grips(
     """Grips of the plan over its path, and those that each arm uses."""
     rows, parts, chain, offset = list[list[int]](), list[Array](), list[tuple[int, ...]](), 0
     for arm, mine in enumerate(spans):
-        columns = joints[:, 2::-1] if arm == 0 else joints[:, 3:]
+        columns = from_body_outwards(joints, arm)
         lifts = [round(step.lift / SPACING) for step in steps if step.arm == walker.arms[arm].name]
         ends = [lift + STAND // 2 for lift in lifts] + [len(joints) - 1]
         chain.append(tuple(range(len(rows), len(rows) + len(mine))))

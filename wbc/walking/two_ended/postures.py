@@ -79,6 +79,16 @@ class ArmShapes:
         return out
 
 
+def from_hand_to_hand(near: Array, far: Array) -> Array:
+    """Joints 1 to 7, or their rates, from those of both arms, which are from the body outwards ``[3]``, ``[4]``."""
+    return np.concatenate([near[::-1], far])
+
+
+def from_body_outwards(joints: Array, arm: int) -> Array:
+    """Those of one arm (0 or 1) of joints 1 to 7 ``[..., 7]``: ``[..., 3]`` or ``[..., 4]``."""
+    return joints[..., 2::-1] if arm == 0 else joints[..., 3:]
+
+
 class Grip(NamedTuple):
     """A hand on a hold (its row), at one of its rolls (its number)."""
 

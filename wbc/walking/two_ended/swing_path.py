@@ -43,6 +43,9 @@ class TurnPaths:
     def __init__(self, postures: PairPostures) -> None:
         self.postures = postures
         self._known: dict[Turn, Array | None] = {}
+        data, margins = postures.kinematics.data, postures.margins
+        self._fastest = margins.swing_rate * data.joint_rate
+        self._hardest = margins.swing_acceleration * data.joint_rate / data.acceleration_time
 
     def path(self, turn: Turn) -> Array | None:
         """Joints 1 to 7 along the first path that is possible and clear ``[POINTS, 7]`` [rad]; None if none is."""
@@ -54,11 +57,11 @@ class TurnPaths:
 
     def seconds(self, turn: Turn) -> float:
         """A time that a swing takes about [s]: what its joints turn at full rate."""
-        path, limb = self.path(turn), self.postures.kinematics
+        path = self.path(turn)
         if path is None:
             return np.inf
         turned = float(np.abs(np.diff(path, axis=0)).max(axis=1).sum())
-        return turned / (self.postures.margins.swing_rate * limb.data.joint_rate) + 2.0 * limb.data.acceleration_time
+        return turned / self._fastest + 2.0 * self.postures.kinematics.data.acceleration_time
 
     def from_air(self, turn: Turn, stop: Array) -> Array | None:
         """As :meth:`path`, of a hand in the air, which goes straight across or first up along its own axis.
@@ -67,13 +70,12 @@ class TurnPaths:
             turn: its source does not count. stop: joints as they come to rest ``[n, 7]`` [rad].
         """
         joints, target = stop[-1], self.postures.frame(turn.target)[:3, 3]
-        # z of frame 0 is along the arm, that of the hand towards its hold
-        ends = self.frames(turn, joints[None])[0]
-        hand = ends[0] * np.array([1.0, -1.0, -1.0, 1.0]) if turn.arm == 0 else ends[7]
+        held, pose = self.postures.frame(turn.held), self.postures.kinematics.forward(joints)
+        hand = held @ (np.linalg.inv(pose) if turn.arm == 0 else pose)
         # A hand that is still near to what the hold is on that it has left or was about to take goes up first
         free, scale = self._clear(turn, stop, target), self.postures.kinematics.data.boom_length / BOOM
         left = target if free else hand[:3, 3]
-        if not self._clear(turn, stop, left):
+        if not free and not self._clear(turn, stop, left):
             return None
         heights = ((up * scale, lift * scale) for lift in LIFTS for up in ((0.0, lift) if free else (lift,)))
         paths = (self._joined(turn, joints, hand, up, lift, left) for up, lift in heights)
@@ -86,19 +88,14 @@ class TurnPaths:
         Args:
             joints, rates: where they are ``[7]`` [rad] and how fast [rad/s].
         """
-        data = self.postures.kinematics.data
-        hardest = self.postures.margins.swing_acceleration * data.joint_rate / data.acceleration_time
-        count = int(np.ceil(np.abs(rates).max() / hardest / spacing + 0.5))
+        count = int(np.ceil(np.abs(rates).max() / self._hardest / spacing + 0.5))
         times = (np.arange(count + 1.0)[:, None] - 0.5) * spacing
         out: Array = joints + rates * (times - 0.5 * np.maximum(times, 0.0) ** 2 / times[-1])
         return out
 
     def timed(self, path: Array, spacing: float) -> Array:
         """Joints in the least time under the limits, every ``spacing`` [s], from rest to rest ``[n, 7]`` [rad]."""
-        limb, margins = self.postures.kinematics, self.postures.margins
-        fastest = margins.swing_rate * limb.data.joint_rate
-        hardest = margins.swing_acceleration * limb.data.joint_rate / limb.data.acceleration_time
-        law = time_optimal(spline_path(path), velocity=fastest, acceleration=hardest, intervals=INTERVALS)
+        law = time_optimal(spline_path(path), velocity=self._fastest, acceleration=self._hardest, intervals=INTERVALS)
         count = int(np.ceil(law.duration / spacing))
         return np.asarray(law.at(np.linspace(0.0, law.duration, count + 1)).position)
 
@@ -186,17 +183,25 @@ class TurnLaw(SwingLaw):
         out: Array = self._joints[row] + (place - row) * (self._joints[row + 1] - self._joints[row])
         return out
 
-    def found(self, q: Array, v: Array) -> tuple[float, float, float]:
-        """The time at which the joints are nearest to a posture ``[joints]`` [rad], the pace from 0 to 1 that their
-        rates are of its own there [rad/s], and how far off the posture is [rad].
+    def found(self, q: Array, v: Array) -> tuple[float, float]:
+        """The time at which the joints are nearest to a posture ``[joints]`` [rad], and the pace from 0 to 1 that their
+        rates are of its own there [rad/s].
         """
+        row, part, _ = self._nearest(q)
+        rates = (self._joints[row + 1] - self._joints[row]) / self.spacing
+        pace = float(v @ rates / max(float(rates @ rates), 1e-12))
+        return (row + part) * self.spacing, min(max(pace, 0.0), 1.0)
+
+    def off(self, q: Array) -> float:
+        """How far a posture ``[joints]`` is from the nearest one of the swing [rad]."""
+        return self._nearest(q)[2]
+
+    def _nearest(self, q: Array) -> tuple[int, float, float]:
+        """Row, part of the way to the next one, and distance [rad] of the posture that is nearest to another one."""
         rows = self._joints
         spans, offs = np.diff(rows, axis=0), q - rows[:-1]
         squares = np.maximum((spans * spans).sum(axis=1), 1e-18)
         parts = np.clip((offs * spans).sum(axis=1) / squares, 0.0, 1.0)
         far = np.linalg.norm(offs - parts[:, None] * spans, axis=1)
         row = int(far.argmin())
-        spacing = self.duration / len(spans)
-        rates = spans[row] / spacing
-        pace = float(v @ rates / max(float(rates @ rates), 1e-12))
-        return (row + float(parts[row])) * spacing, min(max(pace, 0.0), 1.0), float(far[row])
+        return row, float(parts[row]), float(far[row])

@@ -27,7 +27,7 @@ from wbc.walking.loop.walk import Walk
 from wbc.walking.planner.plan import NoPlanError
 from wbc.walking.planner.replanning import PlanSlices
 from wbc.walking.two_ended.planner import TwoEndedPlan, plan_from_air, plan_two_ended
-from wbc.walking.two_ended.postures import Grip
+from wbc.walking.two_ended.postures import Grip, from_hand_to_hand
 from wbc.walking.two_ended.search import GAITS
 from wbc.walking.two_ended.swing_path import TurnLaw
 
@@ -148,10 +148,9 @@ class TurnReplanner:
             rolls = grips[0].roll, grips[1].roll
             return _at_once(plan_two_ended(walker, structure, start, to, gait=self.gait, rolls=rolls))
         ((arm, _),) = held.items()
-        near, far = (machine.q[one.q] for one in walker.arms)
         steps, name = progress.steps, walker.arms[1 - arm].name
         left = steps[-1].source if steps and steps[-1].arm == name else ""
-        joints = np.concatenate([near[::-1], far])
+        joints = from_hand_to_hand(*(machine.q[one.q] for one in walker.arms))
         return _at_once(plan_from_air(walker, structure, (arm, grips[arm]), joints, to, gait=self.gait, left=left))
 
     def without(self, kept: int) -> PlanSlices | None:
@@ -215,13 +214,11 @@ class TwoEndedWalk(Walk):
         step, law, joints = self.plan.regrasps[0], self.plan.laws[0], self.walker.arms[arm]
         assert isinstance(law, TurnLaw)
         v = np.zeros(len(state.q) - 1) if state.v is None else state.v
-        clock, pace, _ = law.found(state.q[joints.q], v[joints.v])
+        clock, pace = law.found(state.q[joints.q], v[joints.v])
         opens, progress = state.opening is not None, self.progress
-        more: dict[str, Any] = {"clock": 0.0 if opens else clock, "state": "opening" if opens else "open"}
-        latch = self.hands.data.latch_time if opens else 0.0
-        swinging = self.hands.going(arm, self._grip(progress.next_grip(arm)), law, latch=latch, **more)
+        more: dict[str, Any] = {} if opens else {"clock": clock, "state": "open", "latch": 0.0}
+        swinging = self._next_swing(step, **more)
         swinging.place, swinging.axis, swinging.x_axis = self.machine.hand(arm)
-        swinging.wrist = self.leader.wrist(arm)
         progress.path_time = step.lift + swinging.clock
         progress.lift(arm)
         self.hands.swinging = swinging
@@ -232,8 +229,7 @@ class TwoEndedWalk(Walk):
         step = self._may_lift()
         if step is None or self.path_time < step.lift - 1e-9:
             return
-        swinging = self._next_swing(step)
-        swinging.latch, swinging.state = 0.0, "open"
+        swinging = self._next_swing(step, state="open", latch=0.0)
         self.progress.lift(arm)
         self.hands.swinging = swinging
 
