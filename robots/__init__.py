@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from wbc.robots.walker_masses import HoldRating, hold_rating, with_masses
     from wbc.robots.walker_robot import Walker, walker
 else:
-    __getattr__ = lazy.attach(__name__, __file__, {"Arm": "WalkerArm"})
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "BodyLimb",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-from typing import Any
-
 from wbc.tasks._stereographic import PlaneReference
 from wbc.tasks.axis_align import AxisAlign
 from wbc.tasks.axis_cone import AxisCone
@@ -110,10 +107,3 @@ __all__ = [
     "support_planes",
     "support_polygon",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name != "Order":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warnings.warn("Order is called SacrificeOrder now", DeprecationWarning, stacklevel=2)
-    return SacrificeOrder

@@ -11,26 +11,20 @@ import importlib
 import importlib.util
 import pathlib
 import sys
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 
-def attach(package: str, file: str, renamed: Mapping[str, str] | None = None) -> Callable[[str], Any]:
+def attach(package: str, file: str) -> Callable[[str], Any]:
     """The ``__getattr__`` of a package: its public names, then its modules.
 
     Args:
         package: its ``__name__``.
         file: its ``__file__``.
-        renamed: names of the version before this one -> what they are now; whoever uses one is warned.
     """
-    now = renamed or {}
     found_at = _imports(ast.parse(pathlib.Path(file).read_text(encoding="utf-8")))
 
     def find(name: str) -> Any:
-        if name in now:
-            warnings.warn(f"{package}.{name} is {package}.{now[name]} now", DeprecationWarning, stacklevel=2)
-            return find(now[name])
         if name in found_at:
             module, original = found_at[name]
             whole = module == package

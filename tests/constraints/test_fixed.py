@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import wbc
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
@@ -78,8 +77,3 @@ def test_bad_declarations() -> None:
         Fixed("panda_joint1", acceleration=2)
     with pytest.raises(UnknownNameError, match="did you mean 'panda_joint1'"):
         Fixed("panda_joint_1").validate(bot)
-
-
-def test_the_old_name_of_the_order_of_sacrifice_warns() -> None:
-    with pytest.warns(DeprecationWarning, match="SacrificeOrder now"):
-        assert wbc.tasks.Order is SacrificeOrder

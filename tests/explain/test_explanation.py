@@ -15,7 +15,6 @@ import pytest
 from tests.controller.stacks import DT, FRAMES, robot
 from tests.torque.problems import controller
 from wbc.controller import Controller, Stack, Status, core_of
-from wbc.controller.outcome import Binding
 from wbc.errors import SolverError
 from wbc.explain.explanation import Bound, Contradiction, Give, Price, by_item, by_task
 from wbc.explain.naming import Naming
@@ -199,14 +198,6 @@ def test_a_step_from_a_pickle_tells_everything_else(tick: Controller) -> None:
         assert repr(other) == repr(step)
         with pytest.raises(SolverError, match="pickle"):
             other.explain()
-
-
-def test_old_names_warn() -> None:
-    bound = Bound("limits", "joint", "upper", 1.0, "rad/s")
-    give, binding = Give(bound, 0.5), Binding("limits", "joint", "upper", 2.0)
-    for owner, old, value in ((bound, "side", "upper"), (give, "side", bound), (binding, "side", "upper")):
-        with pytest.warns(DeprecationWarning, match="is called (which|bound) now"):
-            assert getattr(owner, old) == value
 
 
 def test_a_large_contradiction_names_its_largest_members_and_counts_the_rest() -> None:

@@ -18,7 +18,6 @@ FLOORS = {
     "wbc.interrupts": 0,
     "wbc.lazy": 0,
     "wbc.pickling": 0,
-    "wbc.renamed": 0,
     "wbc.rotations": 0,
     "wbc.validation": 0,
     "wbc.shapes": 0,
@@ -77,8 +76,6 @@ WALKING = {
     "run": 6,
     "report": 7,
 }
-#: Names what it leads to in strings, and must: what it stands for lies above it
-OLD_NAMES = "wbc.walking.old_names"
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
@@ -237,7 +234,7 @@ def test_no_two_packages_import_each_other() -> None:
 @pytest.mark.parametrize("package", sorted({part_of(module_name(path)) for path in PACKAGE_FILES} - {ROOF}))
 def test_no_files_of_a_package_import_each_other_in_a_circle(package: str) -> None:
     """Imports for types counted."""
-    files = [path for path in PACKAGE_FILES if part_of(module_name(path)) == package and module_name(path) != OLD_NAMES]
+    files = [path for path in PACKAGE_FILES if part_of(module_name(path)) == package]
     assert list(circles(files, types=True)) == []
 
 
@@ -272,7 +269,7 @@ def test_rooms_of_walking_import_only_rooms_below() -> None:
     used, up = set(), []
     for path in PACKAGE_FILES:
         module = module_name(path)
-        if not module.startswith("wbc.walking.") or module == OLD_NAMES:
+        if not module.startswith("wbc.walking."):
             continue
         here = module.split(".")[2]
         used.add(here)
@@ -289,8 +286,6 @@ def test_no_modules_or_packages_side_by_side_import_each_other_in_a_circle() -> 
     arrows, packages = set(), set()
     for path in PACKAGE_FILES:
         module = module_name(path)
-        if module == OLD_NAMES:
-            continue
         if path.name == "__init__.py":
             # A package's own names come from what it holds
             packages.add(module)
@@ -311,7 +306,6 @@ def test_reproductions_are_imported_by_the_command_line_alone() -> None:
     parts = {
         part_of(module_name(path))
         for path in PACKAGE_FILES
-        if module_name(path) != OLD_NAMES
         for _, target in mentioned(path)
         if part_of(target) == "wbc.published"
     }

@@ -70,10 +70,3 @@ def test_import_leaves_heavy_packages_alone(module: str) -> None:
 def test_version_is_that_of_the_distribution() -> None:
     code = "import wbc, importlib.metadata as m; print(wbc.__version__ == m.version('wbc'))"
     assert run(code).strip() == "True"
-
-
-def test_names_that_left_the_controller_are_still_found_there() -> None:
-    code = (
-        "from wbc.controller import Branches, Ending, Explanation, Recorder, Solver, replayed; print(Solver.__module__)"
-    )
-    assert run(code).strip() == "wbc.ik.inverse_kinematics"

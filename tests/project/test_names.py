@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import importlib
 import types
-import warnings
-from dataclasses import dataclass
 
 import pytest
 
 import wbc
 from wbc import lazy
-from wbc.renamed import renamed
 
 #: Everything that ``dir(wbc)`` shows
 NAMES = {
@@ -50,49 +47,3 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = wbc.Stak
     with pytest.raises(AttributeError):
         lazy.attach("wbc", wbc.__file__)("__wrapped__")
-
-
-@pytest.mark.parametrize(
-    ("package", "old", "new"),
-    [
-        ("trajectory", "Limits", "MotionLimits"),
-        ("trajectory", "Certificate", "LawCertificate"),
-        ("analysis", "Certificate", "RankCertificate"),
-        ("analysis", "Witness", "RankWitness"),
-        ("analysis", "Branch", "LocusBranch"),
-        ("robots", "Arm", "WalkerArm"),
-        ("track", "Moving", "MovingObstacle"),
-        ("track", "Path", "TimedPath"),
-        ("track", "Plan", "PathRun"),
-    ],
-)
-def test_old_names_are_found_and_said_to_be_old(package: str, old: str, new: str) -> None:
-    room = importlib.import_module(f"wbc.{package}")
-    with pytest.warns(DeprecationWarning, match=f"wbc.{package}.{old} is wbc.{package}.{new} now"):
-        found = getattr(room, old)
-    assert found is getattr(room, new)
-    assert old not in dir(room)
-
-
-def test_old_arguments_and_fields_work_and_are_said_to_be_old() -> None:
-    @renamed(told="progress")
-    def work(one: int, *, progress: int = 0) -> tuple[int, int]:
-        return one, progress
-
-    @renamed(pull="fastest")
-    @dataclass(frozen=True)
-    class Kept:
-        fastest: float = 1.0
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert work(1, progress=2) == (1, 2)
-        assert Kept(2.0).fastest == Kept(fastest=2.0).fastest == 2.0
-    with pytest.warns(DeprecationWarning, match="work: told is progress now"):
-        assert work(1, told=2) == (1, 2)  # type: ignore[call-arg]
-    with pytest.warns(DeprecationWarning, match="Kept: pull is fastest now"):
-        old = Kept(pull=3.0)  # type: ignore[call-arg]
-    with pytest.warns(DeprecationWarning, match="Kept.pull is Kept.fastest now"):
-        assert old.pull == old.fastest == 3.0  # type: ignore[attr-defined]
-    with pytest.raises(TypeError, match="both were given"):
-        work(1, progress=2, told=3)  # type: ignore[call-arg]

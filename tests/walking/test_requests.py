@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from wbc.errors import RangeError, ShapeError, StructureFileError, UnknownNameError, WbcError
-from wbc.walking import run
 from wbc.walking.log.log import WalkLogError
 from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site, TwoEndedRequest
 from wbc.walking.run.request import PublishedRequest, Request, read_request, record_of, request_of
@@ -134,11 +133,3 @@ def test_modes_refuse_what_they_do_not_do(machine: Any) -> None:
         mode_of(TwoEndedRequest(), machine)
     with pytest.raises(UnknownNameError, match="13,99"):
         mode_of(ArmRequest(tasks=("hold 13,99",)), machine)  # type: ignore[arg-type]
-
-
-def test_the_old_name_still_makes_requests() -> None:
-    with pytest.warns(DeprecationWarning, match="PathRequest"):
-        old = run.WalkRequest
-    assert old("cylinder", points=("13,14",)) == PathRequest(points=("13,14",))
-    with pytest.raises(AttributeError, match="perform_dance"):
-        _ = run.perform_dance

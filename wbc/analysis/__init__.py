@@ -31,9 +31,7 @@ if TYPE_CHECKING:
     from wbc.analysis.published import PublishedSets, candidate_rows, published_sets
     from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
 else:
-    __getattr__ = lazy.attach(
-        __name__, __file__, {"Certificate": "RankCertificate", "Witness": "RankWitness", "Branch": "LocusBranch"}
-    )
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "ALGORITHMS",

@@ -22,7 +22,6 @@ from wbc.analysis.loci.budget import Budget, processor_seconds
 from wbc.analysis.loci.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import CompileError, RangeError, UnsupportedJointError
-from wbc.renamed import renamed
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -77,7 +76,6 @@ class Analysis:
     processor: float
 
 
-@renamed(told="progress")
 def analyse(
     model: ExactModel,
     task: Sequence[Rows],

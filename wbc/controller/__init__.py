@@ -1,8 +1,5 @@
 """The tick (floor 6): buffers in, one call, a step out."""
 
-from typing import TYPE_CHECKING
-
-from wbc.controller import hooks
 from wbc.controller.controller import Controller, core_of
 from wbc.controller.outcome import Status
 from wbc.controller.policy import Policy
@@ -11,6 +8,3 @@ from wbc.controller.step import Step
 from wbc.qp.certificate import Certificate
 
 __all__ = ["Certificate", "Controller", "Policy", "Stack", "Status", "Step", "core_of"]
-
-if not TYPE_CHECKING:
-    __getattr__ = hooks.moved

@@ -31,17 +31,3 @@ inverse_kinematics = _above("wbc.ik", "InverseKinematics")
 batch = _above("wbc.batch", "Batch")
 #: For :meth:`wbc.Controller.export`: (controller, and its arguments) -> folder
 export = _above("wbc.export", "export")
-
-#: Names that stood in ``wbc.controller`` before they had packages of their own, found there for one version more
-MOVED = {
-    **dict.fromkeys(("Explanation",), "wbc.explain"),
-    **dict.fromkeys(("Branch", "Branches", "Ending", "InverseKinematics", "Solution", "Solver"), "wbc.ik"),
-    **dict.fromkeys(("Recorder", "Recording", "Replay", "replay", "replayed"), "wbc.record"),
-}
-
-
-def moved(name: str) -> Any:
-    """The ``__getattr__`` of ``wbc.controller``."""
-    if name not in MOVED:
-        raise AttributeError(f"module 'wbc.controller' has no attribute {name!r}")
-    return getattr(importlib.import_module(MOVED[name]), name)

@@ -9,7 +9,6 @@ from enum import StrEnum
 import numpy as np
 
 from wbc.controller.tick.buffers import CHAIN, INFINITE
-from wbc.renamed import old_attribute
 from wbc.stack.layout import Block, Layout, rate_unit
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction
@@ -52,8 +51,6 @@ class Binding:
     bound: str
     multiplier: float
     level: int | None = 0
-
-    side = old_attribute("bound")
 
     def __str__(self) -> str:
         return f"{self.item}/{self.row} {self.bound}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import logging
-import warnings
 import weakref
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -123,11 +122,6 @@ class Stack(Declaration):
         """
         kinematics: InverseKinematics = hooks.inverse_kinematics(self, goals, backend)
         return kinematics
-
-    def solver(self, goals: Iterable[str] | None = None, backend: str = "auto") -> InverseKinematics:
-        """The old name of :meth:`inverse_kinematics`, for one version."""
-        warnings.warn("Stack.solver is called Stack.inverse_kinematics now", DeprecationWarning, stacklevel=2)
-        return self.inverse_kinematics(goals, backend)
 
     def solve(
         self,

@@ -14,7 +14,6 @@ from wbc.coordinates import expressions
 from wbc.coordinates.expressions import DRIFT, REFERENCE
 from wbc.coordinates.rows import KINDS, Coordinate
 from wbc.errors import RangeError
-from wbc.renamed import renamed
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Values
@@ -97,7 +96,6 @@ class FollowRows(Task):
         return ca.SX(ca.vertcat(*whole)[:, order])
 
 
-@renamed(pull="fastest_return")
 @dataclass(frozen=True)
 class KeepRows(Constraint):
     """Coordinates have a prescribed rate, exactly: A(q) v = speed - gain e                       [m/s, rad/s]

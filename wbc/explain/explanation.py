@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.explain.reason import Reason, amount
-from wbc.renamed import old_attribute
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
@@ -94,8 +93,6 @@ class Bound:
     margin: float | None = None
     actuator: bool = False
 
-    side = old_attribute("which")
-
     @property
     def name(self) -> str:
         """``item/row``."""
@@ -121,8 +118,6 @@ class Give:
     bound: Bound
     amount: float
 
-    side = old_attribute("bound")
-
     def __str__(self) -> str:
         return f"{self.bound.name} by {amount(self.amount, self.bound.unit)}"
 
@@ -147,8 +142,6 @@ class Contradiction:
     enough: bool
     cheapest: Give
     shares: tuple[float, ...]
-
-    sides = old_attribute("bounds")
 
     def __str__(self) -> str:
         long = len(self.bounds) > _LONG
@@ -194,8 +187,6 @@ class Loss:
     alone: float
     to: tuple[Share, ...]
 
-    asked = old_attribute("requested")
-
     def __str__(self) -> str:
         text = f"{self.task} misses {amount(self.lost, self.unit)} of {amount(self.requested, self.unit)}"
         if self.requested == 0.0:
@@ -218,8 +209,6 @@ class Price:
     task: str
     amount: float
     unit: str
-
-    side = old_attribute("bound")
 
     def __str__(self) -> str:
         bound, cost = self.bound, amount(self.amount, self.unit)

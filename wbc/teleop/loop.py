@@ -14,7 +14,6 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
-from wbc.renamed import renamed
 from wbc.simulation import Connection, Plant
 from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.session import Seen, Teleoperation
@@ -104,7 +103,6 @@ def _padded(rates: Array) -> list[str]:
     return given + [""] * (AT_ONCE - len(given))
 
 
-@renamed(tell="progress")
 def run_session(
     session: Teleoperation,
     source: Source,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from wbc.track.scene import Scene
     from wbc.track.setup import MovingObstacle, PathRun
 else:
-    __getattr__ = lazy.attach(__name__, __file__, {"Moving": "MovingObstacle", "Path": "TimedPath", "Plan": "PathRun"})
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "PRESETS",

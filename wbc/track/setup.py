@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -162,11 +161,3 @@ def plane_task(robot: Robot) -> tasks.PitchPlane:
         raise WbcError("plane", robot.name, "the table knows no shoulder, elbow and wrist of this robot", ("off",))
     shoulder, elbow, wrist = (str(role) for role in roles)
     return tasks.PitchPlane(shoulder, elbow, wrist, reference=REFERENCE, gain=5.0)
-
-
-def __getattr__(name: str) -> Any:
-    """The name of the version before."""
-    if name == "Swing":
-        warnings.warn("wbc.track.setup.Swing is wbc.track.setup.ElbowSwing now", DeprecationWarning, stacklevel=2)
-        return ElbowSwing
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

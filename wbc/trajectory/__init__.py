@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from wbc.trajectory.together import Laws, many
 else:
     # toppra, ruckig and matplotlib cost nothing until they are used
-    __getattr__ = lazy.attach(__name__, __file__, {"Limits": "MotionLimits", "Certificate": "LawCertificate"})
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "Followed",

@@ -17,7 +17,6 @@ from wbc.walking.holds.hold import Hold
 from wbc.walking.holds.obstacle import Obstacle
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
-from wbc.walking.old_names import keep_old_names
 
 __all__ = [
     "ArmKinematics",
@@ -39,5 +38,3 @@ __all__ = [
     "save_structure",
     "truss",
 ]
-
-keep_old_names()

@@ -13,7 +13,6 @@ from wbc.analysis.algebra.minors import determinant, eliminated, maximal_minors,
 from wbc.analysis.algebra.ring import Matrix, Poly
 from wbc.analysis.algebra.transforms import dot
 from wbc.analysis.loci.budget import Budget
-from wbc.renamed import renamed
 
 #: Blocks of full rank that are compared before the cheapest is taken
 BLOCKS = 8
@@ -30,7 +29,6 @@ class _Block:
     det: Poly
 
 
-@renamed(told="progress")
 def singular_vector_locus(
     exact: Exact, matrix: Matrix, budget: Budget | None = None, progress: Callable[[Locus], None] | None = None
 ) -> Locus:

@@ -9,10 +9,8 @@ from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.ring import Matrix
 from wbc.analysis.loci.budget import Budget
-from wbc.renamed import renamed
 
 
-@renamed(told="progress")
 def sub_determinant_locus(
     exact: Exact, matrix: Matrix, budget: Budget | None = None, progress: Callable[[Locus], None] | None = None
 ) -> Locus:

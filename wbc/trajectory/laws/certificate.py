@@ -16,7 +16,6 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.renamed import renamed
 from wbc.trajectory.laws.between import Highest, highest
 from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
@@ -92,7 +91,6 @@ class Worst:
     spacing: float = 0.0
 
 
-@renamed(kept="satisfied")
 @dataclass(frozen=True)
 class LawCertificate:
     """Worst ratios by quantity: ``position``, ``velocity``, ``acceleration``, ``jerk``, and what else was requested.

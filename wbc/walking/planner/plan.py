@@ -11,7 +11,6 @@ from math import isfinite
 from typing import Any
 
 from wbc.errors import StructureFileError, WbcError
-from wbc.renamed import renamed
 from wbc.walking.body_path import BodyPath
 from wbc.walking.log.body_paths import path_of, way_of
 from wbc.walking.planner.grips.table import Grips
@@ -36,7 +35,6 @@ class HoldLost(WbcError):
     """Fewer hands hold than the robot needs."""
 
 
-@renamed(way="curve")
 @dataclass(frozen=True)
 class Regrasp:
     """One swing of a plan.
