@@ -15,6 +15,7 @@ import pytest
 from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
+from wbc.robots import operator_arm
 from wbc.teleop import Keyboard, Order, RateFile, RateFileError, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELD
 from wbc.teleop.session import STALE
@@ -230,6 +231,8 @@ def test_bad_sessions_and_files(tmp_path: Path) -> None:
 
 #: Beside joint 2 at 90 degrees, where the lock of the yaw joint loses its rank
 BESIDE = np.array([0.3, np.pi / 2 - 0.012, -0.5, 1.2, 0.7, -0.6, 0.9])
+#: Away from all loci
+ELBOWED = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
 
 
 @pytest.fixture(scope="module")
@@ -268,6 +271,38 @@ def test_what_is_lost_is_told_with_the_reason_and_a_better_pair(station: Teleope
     assert better.lost < 1e-2
 
 
+@pytest.mark.parametrize(
+    ("kind", "limits"),
+    [
+        ("acceleration", {}),
+        ("rate", {"velocity": 0.004}),
+        ("position", {"position_lower": ELBOWED - 0.005, "position_upper": ELBOWED + 0.005}),
+    ],
+)
+def test_what_is_late_is_told_apart_from_what_limits_take(kind: str, limits: dict[str, Any]) -> None:
+    robot = operator_arm("ssrms").robot.with_limits(**limits)
+    session, log, q = Teleoperation(robot, ["M1"], acceleration=0.1, backend="vm"), SessionLog(), ELBOWED
+    session.reset(q)
+    for k in range(100):
+        log.add(0.02 * k, q, session.step(q, Order((0.05, 0.0, 0.02))))
+        q = q + session.control.dt * log.v[-1]
+    assert log.seen[0].ramping
+    assert log.seen[0].why[0] == "rates rise or fall to what is asked"
+    assert log.seen[0].why[1].startswith("acceleration limits of joint")
+    if kind == "acceleration":
+        assert log.lost_in(1e-3) == []
+        assert log.lost[-1] < 1e-3
+    else:
+        worst = log.seen[log.lost_in(0.1)[0]]
+        assert any(text.startswith(f"{kind} limits of joint") for text in worst.why)
+        assert not worst.ramping
+        assert log.seen[-1].lost > 0.1
+
+
+def test_the_nearest_locus_is_named(station: Teleoperation) -> None:
+    assert station.nearest_locus(BESIDE, "xi | joint2") == "0.012 rad from joint2 = 1.571, where the pair loses rank"
+
+
 def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Of the tip, by Pinocchio."""
     model = robot.model
@@ -276,10 +311,9 @@ def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def test_over_determined_motion_has_its_cue(station: Teleoperation) -> None:
-    start = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
     station.control.switch("elbow | xi", 0.0)
-    station.reset(start)
-    q = start
+    station.reset(ELBOWED)
+    q = ELBOWED
     for _ in range(20):
         seen = station.step(q, Order((0.0, 0.0, 0.005)))
         q = q + station.control.dt * seen.step.v

@@ -209,7 +209,7 @@ def _warn(session: Teleoperation, q: object) -> None:
 
 
 def _report(found: SessionLog, session: Teleoperation, log: Path | None) -> None:
-    status, active, lost = found.status, found.active, found.lost
+    status, active = found.status, found.active
     statuses = ", ".join(f"{status.count(s)} {s}" for s in dict.fromkeys(status))
     fastest = max((float(np.abs(v).max()) for v in found.v), default=0.0)
     changes = sum(a != b for a, b in pairwise(active))
@@ -219,14 +219,17 @@ def _report(found: SessionLog, session: Teleoperation, log: Path | None) -> None
         f"{changes} changes of pairs, {found.late} late{ended}",
         soft_wrap=True,
     )
-    worst = int(np.argmax(lost)) if lost else 0
-    if lost and lost[worst] > NOTHING:
-        seen = found.seen[worst]
-        count = sum(x > STEPS[1] for x in lost)
+    ramps = sum(seen.ramping for seen in found.seen)
+    late = f"late, and not lost, in {ramps} ticks while rates rise or fall" if ramps else ""
+    if ticks := found.lost_in(STEPS[1]):
+        worst = found.seen[ticks[0]]
         text = (
-            f"lost: more than 1 % of the command in {count} ticks, at most {100 * lost[worst]:.2g} % "
-            f"at {found.time[worst]:.2f} s with {seen.active}: {', '.join(seen.why)}"
+            f"lost: more than 1 % of the command in {len(ticks)} ticks, at most {100 * worst.lost:.2g} % "
+            f"at {found.time[ticks[0]]:.2f} s with {worst.active}: {', '.join(worst.why)}; "
+            f"{session.nearest_locus(found.q[ticks[0]], worst.active)}"
         )
-        out().print(escape(text), soft_wrap=True)
+        out().print(escape(f"{text}; {late}" if late else text), soft_wrap=True)
+    elif late:
+        out().print(f"nothing of the command was lost; it was {late}", soft_wrap=True)
     if log is not None:
         out().print(escape(str(found.write(log, session.robot.dof_names))), soft_wrap=True)

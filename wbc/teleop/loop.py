@@ -56,6 +56,11 @@ class SessionLog:
         """Parts of the command that were lost, see :class:`Seen`."""
         return [one.lost for one in self.seen]
 
+    def lost_in(self, part: float) -> list[int]:
+        """Ticks in which more than a part of the command was lost, the worst first; ramps do not count."""
+        ticks = [k for k, one in enumerate(self.seen) if one.lost > part and not one.ramping]
+        return sorted(ticks, key=lambda k: -self.seen[k].lost)
+
     def add(self, time: float, q: Array, seen: Seen, cost: float = 0.0) -> None:
         """One tick."""
         self.time.append(time)

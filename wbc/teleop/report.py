@@ -23,13 +23,13 @@ def session_figures(session: Teleoperation, log: SessionLog) -> list[Figure]:
     statuses = log.status
     counts = {status: statuses.count(status) for status in dict.fromkeys(statuses)}
     fastest = max((float(np.abs(v).max(initial=0.0)) for v in log.v), default=0.0)
-    worst = max(log.lost, default=0.0)
+    worst = max((log.lost[k] for k in log.lost_in(0.0)), default=0.0)
     names = list(dict.fromkeys(log.active))
     return [
         Figure("status", "ticks", counts, ", ".join(f"{n} {name}" for name, n in counts.items()) or "none"),
         Figure("pairs", "pairs in use", names, ", ".join(names)),
         Figure("fastest", "fastest joint", fastest, f"{fastest:.4g} rad/s"),
-        Figure("lost", "largest part of the command that was lost", worst, f"{100.0 * worst:.3g} %"),
+        Figure("lost", "largest part of the command that was lost, ramps aside", worst, f"{100.0 * worst:.3g} %"),
         Figure("late", "ticks that began late", log.late, str(log.late)),
         Figure("start", "start", log.q[0].tolist() if log.q else [], _numbers(log.q[0]) if log.q else "none"),
     ]
@@ -44,9 +44,12 @@ def save_report(session: Teleoperation, log: SessionLog, folder: pathlib.Path) -
     ticks, robot = len(log.time), session.robot
     page = RunPage(f"{robot.name} driven by rates", f"{ticks} ticks of {1e3 * session.control.dt:g} ms")
     page.section("Asked for, and whether it was kept")
-    lost = np.array(log.lost)
-    followed = int((lost <= LOST).sum())
-    page.verdict(followed == ticks, f"rates as they were ordered, to {100 * LOST:g} %: in {followed} of {ticks} ticks")
+    lost = np.array([0.0 if seen.ramping else seen.lost for seen in log.seen])
+    followed = ticks - len(log.lost_in(LOST))
+    page.verdict(
+        followed == ticks,
+        f"rates as they were ordered, to {100 * LOST:g} %, or rising to them: in {followed} of {ticks} ticks",
+    )
     if ticks:
         rates, limit = np.abs(np.array(log.v)), robot.limits.velocity
         page.verdict(bool((rates <= limit * (1.0 + 1e-9) + 1e-12).all()), "velocity limits of all joints")

@@ -12,6 +12,7 @@ from wbc import validation
 from wbc.controller import Status, Step
 from wbc.coordinates import (
     Adviser,
+    Condition,
     CoordinatePair,
     Mode,
     PairController,
@@ -21,6 +22,7 @@ from wbc.coordinates import (
     parts,
     regular_start,
 )
+from wbc.coordinates.advice.determinant_places import closed_form
 from wbc.coordinates.advice.modes import mode
 from wbc.coordinates.control.pair_stack import row_count
 from wbc.coordinates.pair import pairs_of
@@ -42,6 +44,10 @@ USUAL = (Mode.M1, Mode.M2)
 SLOW, PLAIN = 0.02, 10.0
 #: A part of the command below this is not lost but rounding and the lag of one tick
 NOTHING = 1e-3
+#: A locus that is known exactly is the nearest one where it is within this factor of the first-order estimate
+ALIKE = 2.0
+#: Share of a limit from which on a joint counts as at it
+REACHED = 1.0 - 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +62,8 @@ class Seen:
         asked, met: rates of the task rows that were ordered, and those that the command gives [m/s, rad/s].
         lost: |D (asked - met)| / |D asked|, D: metres over the arm's length; 0 where nothing is asked.
         why: what took it, in words.
+        ramping: rates are on their way to what is asked: nothing but accelerations of joints holds them back, and no
+            further than in the tick before. Such a part of the command is late and not lost.
     """
 
     step: Step
@@ -69,6 +77,7 @@ class Seen:
     met: Array
     lost: float
     why: tuple[str, ...]
+    ramping: bool
 
 
 class Teleoperation:
@@ -136,6 +145,8 @@ class Teleoperation:
                 motion_cue(self.robot, pair, self.robot.neutral, np.zeros(row_count(self.robot, pair.task)))
         self._scale = {pair.name: scales(self.robot, pair.task)[0] for pair in given}
         self._order, self._age = Order(), 0.0
+        #: Rates asked for in the last tick, and how far they were missed
+        self._asked, self._missed = np.zeros(0), np.inf
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -159,6 +170,7 @@ class Teleoperation:
         """
         self.control.reset(q)
         self._order, self._age = Order(), 0.0
+        self._asked = np.zeros(0)
 
     def step(self, q: Any, order: Order | None = None) -> Seen:
         """One tick.
@@ -182,17 +194,58 @@ class Teleoperation:
             sigma, task, _ = self.adviser.look(q, advised)
         blending = self.control.blending
         self.control.command(self._rates(self.control.pair, Order() if stale else self._order))
+        before = self.control.controller.last_command
         step = self.control.step(q)
         asked, met = self.control.asked, self.control.met(step.v)
         scale = self._scale[self.control.active]
         size = float(np.linalg.norm(scale * asked))
-        lost = float(np.linalg.norm(scale * (asked - met))) / size if size > 0.0 else 0.0
+        missed = float(np.linalg.norm(scale * (asked - met)))
+        lost = missed / size if size > 0.0 else 0.0
         kept = min(1.0, sigma / task) if task > 0.0 else float(sigma > 0.0)
-        why = self._why(q, step, sigma, kept, blending) if lost > NOTHING or step.status is not Status.SOLVED else ()
+        at, solved = self._at_limits(step, before), step.status is Status.SOLVED
+        why = self._why(q, step, sigma, kept, blending, at) if lost > NOTHING or not solved else ()
+        held_back = at.keys() - {"acceleration"} or self.control.eased or not solved
+        nearer = missed <= self._missed or not np.array_equal(asked, self._asked)
+        ramping = lost > NOTHING and not held_back and nearer and (blending or bool(at))
+        if ramping:
+            why = ("rates rise or fall to what is asked", *why)
+        self._asked, self._missed = asked, missed
         active = self.control.active
-        return Seen(step, active, self.control.blending, stale, sigma, kept, advised, asked, met, max(0.0, lost), why)
+        return Seen(step, active, self.control.blending, stale, sigma, kept, advised, asked, met, lost, why, ramping)
 
-    def _why(self, q: Array, step: Step, sigma: float, kept: float, blending: bool) -> tuple[str, ...]:
+    def nearest_locus(self, q: Any, name: str) -> str:
+        """Where the rank of a pair, or of its task, is lost next, and how far away that is, in words.
+
+        Determinants are factored for it, which takes seconds where that was not done before.
+
+        Raises:
+            UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        pair = self.control.pairs[validation.one_of("pair", name, self.control.pairs)]
+        (here,) = Adviser(self.robot, [pair]).advise(q)
+        lost = f"where {'its task' if here.condition is Condition.TASK else 'the pair'} loses rank"
+        known = closed_form(self.robot, pair)
+        found = known.nearest(q) if known is not None else None
+        if found is not None and abs(found[1]) <= ALIKE * here.distance:
+            return f"{abs(found[1]):.2g} {self.robot.dof_units[found[0].dof]} from {found[0]}, {lost}"
+        return f"about {here.distance:.2g} rad from {lost}"
+
+    def _at_limits(self, step: Step, before: Array) -> dict[str, list[str]]:
+        """Joints whose rates end at a limit, by what it limits: their acceleration, their rate or their position."""
+        out: dict[str, list[str]] = {}
+        limits, names = self.robot.limits, self.robot.dof_names
+        for joint in dict.fromkeys(b.row for b in step.binding if b.row in names and b.bound != "equal"):
+            k = names.index(joint)
+            if abs(step.v[k] - before[k]) >= REACHED * limits.acceleration[k] * self.control.dt:
+                kind = "acceleration"
+            else:
+                kind = "rate" if abs(step.v[k]) >= REACHED * limits.velocity[k] else "position"
+            out.setdefault(kind, []).append(joint)
+        return out
+
+    def _why(
+        self, q: Array, step: Step, sigma: float, kept: float, blending: bool, at: dict[str, list[str]]
+    ) -> tuple[str, ...]:
         """What took a part of the command."""
         out = []
         if blending:
@@ -203,9 +256,7 @@ class Teleoperation:
         if self.control.active in self._tall:
             cue = motion_cue(self.robot, self.control.pair, q, self.control.asked)
             out.append(f"more rows than joints: {cue}")
-        joints = dict.fromkeys(b.row for b in step.binding if b.row in self.robot.dof_names and b.bound != "equal")
-        if joints:
-            out.append(f"at limits of {', '.join(joints)}")
+        out += [f"{kind} limits of {', '.join(joints)}" for kind, joints in at.items()]
         if step.relaxed:
             out.append(f"relaxed: {', '.join(dict.fromkeys(slack.item for slack in step.relaxed))}")
         if step.status is not Status.SOLVED:
