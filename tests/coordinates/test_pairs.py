@@ -13,12 +13,15 @@ import pytest
 from wbc import WbcError
 from wbc.analysis.jacobians.numeric import NumericRows
 from wbc.coordinates import (
+    Adviser,
     BodyRows,
     CoordinatePair,
     JointRows,
     MissingPartError,
     Mode,
+    PairController,
     PitchPlaneRows,
+    carry,
     mode_pairs,
     mode_table,
     parts,
@@ -30,7 +33,7 @@ from wbc.robots.operator_arms import OPERATOR_ARMS
 
 ROBOT = operator_arm("ssrms").robot
 XI, ALPHA, ROLL = BodyRows("tip", name="xi"), PitchPlaneRows("F3", "F5"), JointRows("joint1")
-ELBOW = BodyRows("end3", rotation=(), name="elbow")
+ELBOW, POINT = BodyRows("end3", rotation=(), name="elbow"), BodyRows("tip", rotation=(), name="point")
 
 
 def test_a_pair_and_its_swap() -> None:
@@ -70,7 +73,6 @@ def test_one_stack_serves_several_pairs() -> None:
         (lambda: CoordinatePair(XI, [ALPHA, XI]), DuplicateNameError),
         (lambda: CoordinatePair(XI, ALPHA, metric=-1.0), RangeError),
         (lambda: CoordinatePair(ELBOW, ALPHA, metric=1.0), RangeError),
-        (lambda: CoordinatePair(ELBOW, ALPHA).counts(ROBOT), RangeError),
         (lambda: CoordinatePair(ROLL, [XI, ALPHA]).counts(ROBOT), RangeError),
         (lambda: CoordinatePair(XI, JointRows("joint8")).counts(ROBOT), UnknownNameError),
         (lambda: pair_stack(ROBOT, []), ShapeError),
@@ -85,6 +87,31 @@ def test_one_stack_serves_several_pairs() -> None:
 def test_bad_pairs(make: Any, error: type[WbcError]) -> None:
     with pytest.raises(error):
         make()
+
+
+def test_what_a_robot_has_is_named_where_something_is_missing() -> None:
+    with pytest.raises(MissingPartError, match=r"no carrier .* valid: M1 end effector, M2 self-motion, .* M8 over"):
+        mode_pairs("ssrms", "M7")
+
+
+@pytest.mark.parametrize("pair", [CoordinatePair(XI, ()), CoordinatePair(POINT, ALPHA), CoordinatePair(ELBOW, ())])
+def test_with_fewer_rows_than_joints_rates_have_the_least_norm(pair: CoordinatePair) -> None:
+    """Against the pseudo-inverse of all rows, whose rates are those of task and constraint."""
+    assert pair.under_determined(ROBOT)
+    numeric, rng = NumericRows(ROBOT), np.random.default_rng(4)
+    control = PairController(ROBOT, pair, limits=False, backend="vm")
+    adviser = Adviser(ROBOT, [pair], backend="vm")
+    for _ in range(5):
+        q = rng.uniform(-1.0, 1.0, ROBOT.nv)
+        task = 1e-3 * rng.normal(size=pair.counts(ROBOT)[0])
+        control.reset(q)
+        control.command(task)
+        rows = numeric.value(pair.rows, q)
+        rates = np.linalg.pinv(rows) @ np.append(task, np.zeros(len(rows) - len(task)))
+        assert adviser.sigmas(q)[0] > control.eased_below(pair.name)
+        np.testing.assert_allclose(control.step(q).v, rates, atol=1e-7)
+    with pytest.raises(RangeError, match="undetermined"):
+        carry(ROBOT, q, q + 0.1, [pair])
 
 
 def test_every_mode_is_there_or_says_what_is_missing() -> None:

@@ -19,10 +19,11 @@ from wbc.robot import Robot
 class CoordinatePair:
     """Task coordinates are commanded, constraint coordinates are held or have prescribed rates:
 
-        minimise |v_T - J_T v|   subject to   J_C v = v_C - gain e                [m/s, rad/s]
+        minimise |D (v_T - J_T v)|   subject to   J_C v = v_C - gain e            [m/s, rad/s]
 
-    With as many rows as joints in all the answer is unique where [J_T; J_C] is regular; with more, constraints stay
-    exact and the task follows in the least-squares sense.
+    D divides rows in metres by the stack's length, by default the robot's characteristic length. With as many rows as
+    joints in all the answer is unique where [J_T; J_C] is regular; with more, constraints stay exact and the task
+    follows in the least-squares sense; with fewer, of all rates that do it the joints have those of the least norm.
 
     Attributes:
         task, constraint: one declaration or several: :class:`wbc.analysis.BodyRows`, ``JointRows``, ``PitchPlaneRows``,
@@ -75,16 +76,13 @@ class CoordinatePair:
         """Rows of task and constraint on a robot, checked.
 
         Raises:
-            UnknownNameError, RangeError: a name that the robot does not have; rows that no joint moves; fewer rows
-                than joints, or constraints that leave the task nothing.
+            UnknownNameError, RangeError: a name that the robot does not have; rows that no joint moves; constraints
+                that leave the task nothing.
         """
         for field_name, side in (("task", self.task), ("constraint", self.constraint)):
             for one in side:
                 expressions.check(robot, f"CoordinatePair.{field_name}", one)
         n, p = (sum(len(expressions.labels(robot, one)) for one in side) for side in (self.task, self.constraint))
-        if n + p < robot.nv:
-            reason = f"{n} task and {p} constraint rows leave some of {robot.nv} joints undetermined"
-            raise RangeError("CoordinatePair", self.name, reason)
         if p >= robot.nv:
             reason = f"{p} constraint rows leave the task none of {robot.nv} joints"
             raise RangeError("CoordinatePair.constraint", self.name, reason)
@@ -93,6 +91,10 @@ class CoordinatePair:
     def over_determined(self, robot: Robot) -> bool:
         """Whether there are more rows than joints, so that the task follows in the least-squares sense."""
         return sum(self.counts(robot)) > robot.nv
+
+    def under_determined(self, robot: Robot) -> bool:
+        """Whether there are fewer rows than joints, so that rates of the least norm are chosen."""
+        return sum(self.counts(robot)) < robot.nv
 
     def __str__(self) -> str:
         return self.name

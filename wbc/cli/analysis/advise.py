@@ -53,8 +53,10 @@ def advise(
         turn = found.direction * found.distance
         shown = np.abs(turn) >= min(0.05, np.abs(turn).max())
         turns = ", ".join(f"{n} {x:+.2g}" for n, x, is_ in zip(machine.dof_names, turn, shown, strict=True) if is_)
-        where = found.locus or f"{found.basis}: {turns}"
-        numbers = f"{found.sigma:.4f}", f"{found.ratio:.3f}", str(found.condition), f"{found.distance:.3f}"
+        far = found.distance > np.pi
+        where = "none within half a turn" if far else found.locus or f"{found.basis}: {turns}"
+        distance = "none" if far else f"{found.distance:.3f}"
+        numbers = f"{found.sigma:.4f}", f"{found.ratio:.3f}", str(found.condition), distance
         rows.add_row(escape(found.pair), *numbers, escape(where))
     out().print(rows)
     out().print(f"use: [bold]{escape(adviser.recommend(q, current))}[/bold]")

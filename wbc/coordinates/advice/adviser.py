@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.analysis.rows import JointRows
 from wbc.coordinates.advice.determinant_places import ClosedForm, closed_form
 from wbc.coordinates.chains import Braked, braked
 from wbc.coordinates.control.conditioning import Conditioning, checked_configuration
@@ -101,6 +102,9 @@ class Adviser:
     that the constraint locks on other arms than the task's, see :func:`braked`: the rank that is lost is the same. For
     over-determined pairs the matrix is tall.
 
+    A pair that locks joints of the arm which it commands means less to an operator than one that holds a pitch plane,
+    an elbow or another body: in comparisons its singular value counts by 1 / factor.
+
     Args:
         length: characteristic length [m]; default: the robot's. near: see :data:`NEAR`.
         factor: how much better another pair must be for a change, > 1: the hysteresis.
@@ -142,6 +146,13 @@ class Adviser:
             robot, [g[0] for g in groups], brakes=[g[1] for g in groups], length=length, backend=backend
         )
         self._names = list(self.pairs)
+        #: Of each pair: what its singular value counts by where pairs are compared
+        self._worth = np.array(
+            [
+                1.0 / self.factor if any(isinstance(one, JointRows) for one in some.held) else 1.0
+                for some in self._braked
+            ]
+        )
         self._wholes = self.conditioning.chosen(self._group_numbers[:, 0].tolist())
         self._wholes_and_tasks = self.conditioning.chosen(self._group_numbers[:, :2].ravel().tolist())
         alike = [[k for k, other in enumerate(given) if other.task == pair.task] for pair in given]
@@ -197,15 +208,16 @@ class Adviser:
         return tuple(out)
 
     def recommend(self, q: Any, current: str | None = None) -> str:
-        """The name of the pair to use: the best conditioned one, or the current one where none is better by the factor.
+        """The name of the pair to use: the best one, or the current one where none is better by the factor.
 
-        Only pairs that command the same can be compared: with ``current`` those with its task.
+        The best conditioned one is the best, but for locks of joints, see the class. Only pairs that command the same
+        can be compared: with ``current`` those with its task.
 
         Raises:
             UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
         """
         if current is None:
-            return self._names[int(np.argmax(self.sigmas(q)))]
+            return self._names[int(np.argmax(self._worth * self.sigmas(q)))]
         return self.look(q, current)[2]
 
     def look(self, q: Any, current: str) -> tuple[float, float, str]:
@@ -218,8 +230,9 @@ class Adviser:
         alike, asked = self._siblings[current]
         found = asked(checked_configuration(self.robot, q))
         sigmas, task = found[:-1], float(found[-1])
-        best, own = int(np.argmax(sigmas)), alike.index(self._names.index(current))
-        stay = sigmas[best] < self.factor * sigmas[own] or best == own
+        worth = self._worth[alike] * sigmas
+        best, own = int(np.argmax(worth)), alike.index(self._names.index(current))
+        stay = worth[best] < self.factor * worth[own] or best == own
         return float(sigmas[own]), task, current if stay else self._names[alike[best]]
 
     def _condition(self, pair: float, task: float, constraint: float) -> Condition:

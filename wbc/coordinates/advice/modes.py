@@ -81,7 +81,8 @@ def mode_pairs(robot: str | Robot, wanted: str | Mode) -> tuple[CoordinatePair, 
     pairs = _MAKERS[chosen](found)
     if isinstance(pairs, str):
         name = robot if isinstance(robot, str) else robot.name
-        raise MissingPartError.of("mode", f"{chosen.name} on {name}", pairs)
+        has = [f"{one.name} {one.value}" for one, made in _made(found).items() if not isinstance(made, str)]
+        raise MissingPartError.of("mode", f"{chosen.name} on {name}", pairs, has)
     return tuple(pairs)
 
 
@@ -91,7 +92,10 @@ def mode_row(robot: str | Robot) -> dict[Mode, tuple[CoordinatePair, ...] | str]
     Raises:
         UnknownNameError, MissingPartError: no such robot; one that has no arm at all.
     """
-    found = parts(robot)
+    return _made(parts(robot))
+
+
+def _made(found: Parts) -> dict[Mode, tuple[CoordinatePair, ...] | str]:
     made = {one: _MAKERS[one](found) for one in Mode}
     return {one: pairs if isinstance(pairs, str) else tuple(pairs) for one, pairs in made.items()}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -22,9 +23,9 @@ class MissingPartError(WbcError):
     part = ""
 
     @classmethod
-    def of(cls, field: str, value: str, part: str) -> MissingPartError:
-        """The error about a part."""
-        error = cls(field, value, f"the robot has no {part}")
+    def of(cls, field: str, value: str, part: str, has: Iterable[str] = ()) -> MissingPartError:
+        """The error about a part; ``has``: what the robot has of the kind."""
+        error = cls(field, value, f"the robot has no {part}", has)
         error.part = part
         return error
 

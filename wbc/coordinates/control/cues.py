@@ -69,7 +69,8 @@ def motion_cue(robot: Robot, pair: CoordinatePair, q: Any, rates: Any) -> Motion
         met = J_T N (S J_T N)^+ S asked,    J_C N = 0,    minimising |S (asked - met)|              [m/s, rad/s]
 
     N is an orthonormal basis of the null space of J_C, its rank decided at 1e-9 of the largest singular value. S
-    divides rows in metres by the arm's length, or takes the velocities of three points where the pair has a ``metric``.
+    divides rows in metres by the robot's characteristic length, as the controller does, or takes the velocities of
+    three points where the pair has a ``metric``.
     For a pair that is not over-determined all is met where it is regular.
 
     Args:
@@ -95,8 +96,9 @@ def _function(robot: Robot, pair: CoordinatePair) -> ca.Function:
     """q -> (J_T, S, J_C): rows of the task, how they count, and rows of the constraint."""
     kin = Tracer(Kinematics(robot.model))
     task, held = ([expressions.matrix(robot, kin, one) for one in side] for side in (pair.task, pair.constraint))
-    rows, columns = scales(robot, pair.task)
-    scale, _ = scales(robot, pair.constraint)
+    length = robot.characteristic_length
+    rows, columns = scales(robot, pair.task, length)
+    scale, _ = scales(robot, pair.constraint, length)
     parts, start = [], 0
     for one, matrix in zip(pair.task, task, strict=True):
         count = matrix.shape[0]

@@ -143,7 +143,10 @@ def carry(
     start, end = robot.configuration("q0", q0), robot.configuration("q1", q1)
     given = pairs_of(pairs, some=False)
     for pair in given:
-        pair.counts(robot)
+        if pair.under_determined(robot):
+            n, p = pair.counts(robot)
+            reason = f"{n} task and {p} constraint rows leave some of {robot.nv} joints undetermined on the way"
+            raise RangeError("pairs", pair.name, reason)
     total = validation.scalar("seconds", seconds, low=0.0, open_low=True, unit="s")
     part = validation.scalar("share", share, low=0.0, high=1.0)
     step = np.asarray(pin.difference(robot.model, start, end))
