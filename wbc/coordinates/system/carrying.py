@@ -27,6 +27,8 @@ from wbc.validation import Array
 
 #: Intervals of the first look, and rounds of setting samples closer at most
 FIRST, ROUNDS = 64, 40
+#: Samples closer than this part of the path are not set closer for a given pair that is lost between them [1]
+FINEST = 1.0 / 1024.0
 #: A joint goes this far at most [rad, m]: the path is sampled closely all along
 FARTHEST = 1e3
 #: Functions of rows that are cached
@@ -179,12 +181,15 @@ class _Search:
         grid = np.linspace(0.0, 1.0, FIRST + 1).tolist() if np.abs(self.step).max(initial=0.0) > 0.0 else [0.0, 1.0]
         for _ in range(ROUNDS):
             good, high, sigma = self._table(grid)
-            bare = np.flatnonzero(~good.any(axis=0)).tolist()
-            if not bare:
+            served = high[: self._given].any(axis=0)
+            # Given pairs whose rows change too much from one sample to the next, or that are nearly lost at one of them
+            coarse = (served[:-1] & served[1:]) | ((served[:-1] | served[1:]) & (np.diff(grid) > FINEST))
+            bare = ~good.any(axis=0) | (coarse & ~good[: self._given].any(axis=0))
+            if not bare.any():
                 return self._joined(grid, good, sigma)
-            middles = {k: 0.5 * (grid[k] + grid[k + 1]) for k in bare}
-            # Where all pairs are nearly lost one is made, elsewhere their rows change too much: samples are set closer
-            low = [k for k in bare if not high[:, k].any()]
+            middles = {k: 0.5 * (grid[k] + grid[k + 1]) for k in np.flatnonzero(bare).tolist()}
+            # Where all pairs are nearly lost one is made, elsewhere samples are set closer
+            low = [k for k in middles if not coarse[k] and not (high[:, k] & high[:, k + 1]).any()]
             if low:
                 self._make(middles[low[len(low) // 2]])
             grid = sorted({*grid, *middles.values()})
@@ -199,8 +204,8 @@ class _Search:
         return found
 
     def _table(self, grid: list[float]) -> tuple[Flags, Flags, Array]:
-        """(pair is regular between samples, its least singular value is high enough there [pairs, intervals], that
-        value at the samples [pairs, samples]).
+        """(pair is regular between samples [pairs, intervals], its least singular value is high enough at the samples,
+        that value [pairs, samples]).
         """
         whole = np.array([self._matrix(s) for s in grid])
         count = len(self._rows_of_pairs)
@@ -211,9 +216,9 @@ class _Search:
             change[k] = np.linalg.norm(np.diff(J, axis=0), axis=(1, 2))
         least = np.minimum(sigma[:, :-1], sigma[:, 1:])
         system = np.linalg.svd(whole[:, [row for _, row, _ in self._system]], compute_uv=False)[:, -1]
-        high = least >= FLOOR * np.minimum(system[:-1], system[1:])
-        high[: self._given] &= least[: self._given] >= self._share * least[: self._given].max(axis=0, initial=0.0)
-        return np.asarray(high & (change < SAFE * least)), np.asarray(high), sigma
+        high = sigma >= FLOOR * system
+        high[: self._given] &= sigma[: self._given] >= self._share * sigma[: self._given].max(axis=0, initial=0.0)
+        return np.asarray(high[:, :-1] & high[:, 1:] & (change < SAFE * least)), np.asarray(high), sigma
 
     def _joined(
         self, grid: list[float], good: Flags, sigma: Array
