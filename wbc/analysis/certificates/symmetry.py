@@ -33,20 +33,18 @@ def symmetries(forms: Sequence[TrigForm], joints: Sequence[int]) -> tuple[Symmet
     Compared are the coefficients, not values at some configurations.
     """
     size = forms[0].waves.shape[1]
-    fewest = sorted(forms, key=lambda f: f.terms)
     found = []
     for choice in product((1, -1), repeat=len(joints)):
         signs = np.ones(size, int)
         signs[list(joints)] = choice
-        images = [_image(form, signs) for form in fewest]
+        images = [_image(form, signs) for form in forms]
         known = [image for image in images if image is not None]
         if len(known) < len(images):
             continue
-        for halves in product((0, 1), repeat=len(joints)):
+        for halves in _half_turns(forms, known, joints):
             turns = np.zeros(size, int)
             turns[list(joints)] = halves
-            if all(_unchanged(form, image, turns) for form, image in zip(fewest, known, strict=True)):
-                found.append(Symmetry(tuple(signs.tolist()), tuple(turns.tolist())))
+            found.append(Symmetry(tuple(signs.tolist()), tuple(turns.tolist())))
     return tuple(found)
 
 
@@ -108,40 +106,37 @@ def _image(form: TrigForm, signs: Array) -> tuple[Array, Array] | None:
     return to, turned
 
 
-def _unchanged(form: TrigForm, image: tuple[Array, Array], turns: Array) -> bool:
-    """Whether M(moved q) = R M(q) C with diagonal R, C of signs."""
-    to, turned = image
-    flip = np.where((form.waves.astype(int) @ turns) % 2, -1, 1)
-    cosine, sine = np.zeros_like(form.cosine), np.zeros_like(form.sine)
-    cosine[:, to], sine[:, to] = flip * form.cosine, flip * turned * form.sine
-    before = np.hstack((form.cosine, form.sine))
-    after = np.hstack((cosine, sine))
-    size = SAME * np.abs(before).max(initial=0.0)
-    same = np.abs(after - before).max(1, initial=0.0) <= size
-    opposite = np.abs(after + before).max(1, initial=0.0) <= size
-    empty = same & opposite
-    if not (same | opposite).all():
-        return False
-    signs = np.where(empty, 0, np.where(same, 1, -1)).reshape(form.shape)
-    return _product_of_signs(signs)
+def _half_turns(
+    forms: Sequence[TrigForm], images: Sequence[tuple[Array, Array]], joints: Sequence[int]
+) -> list[tuple[int, ...]]:
+    """All turns with M(moved q) = R M(q) C for each matrix, R and C diagonal matrices of signs.
 
-
-def _product_of_signs(signs: Array) -> bool:
-    """Whether signs_ij = r_i c_j wherever it is not zero, for some signs r and c."""
-    rows, columns = np.zeros(signs.shape[0], int), np.zeros(signs.shape[1], int)
-    for start in range(len(rows)):
-        if rows[start]:
-            continue
-        rows[start] = 1
-        waiting = [(True, start)]
-        while waiting:
-            is_row, i = waiting.pop()
-            line, mine, others = (signs[i], rows, columns) if is_row else (signs[:, i], columns, rows)
-            for j in np.flatnonzero(line):
-                expected = line[j] * mine[i]
-                if others[j] == 0:
-                    others[j] = expected
-                    waiting.append((not is_row, int(j)))
-                elif others[j] != expected:
-                    return False
-    return True
+    A coefficient of wave w in entry ij that becomes itself by a sign (-1)^b needs w . turns + r_i + c_j = b modulo 2:
+    equations over the field of two elements, as bits of whole numbers, turns in the lowest ones.
+    """
+    count = len(joints)
+    equations, first = set[int](), count
+    for form, (to, turned) in zip(forms, images, strict=True):
+        rows, columns = form.shape
+        least = SAME * max(np.abs(form.cosine).max(initial=0.0), np.abs(form.sine).max(initial=0.0))
+        odd = (form.waves[:, list(joints)].astype(np.int64) % 2) @ (1 << np.arange(count))
+        for part, signs in ((form.cosine, np.ones_like(turned)), (form.sine, turned)):
+            entry, wave = np.nonzero(np.abs(part) > least)
+            changed = signs[wave] * part[entry, wave] * part[entry, to[wave]] < 0.0
+            own = (np.int64(1) << (first + entry // columns)) + (np.int64(1) << (first + rows + entry % columns))
+            equations |= set((2 * (odd[wave] + own) + changed).tolist())
+        first += rows + columns
+    solved: dict[int, int] = {}
+    for equation in equations:
+        while equation > 1 and (known := solved.get(equation.bit_length())) is not None:
+            equation ^= known
+        if equation == 1:
+            return []
+        if equation:
+            solved[equation.bit_length()] = equation
+    of_turns = [e for e in solved.values() if e.bit_length() <= count + 1]
+    return [
+        halves
+        for halves in product((0, 1), repeat=count)
+        if not any((e & (1 + sum(2 << k for k in range(count) if halves[k]))).bit_count() % 2 for e in of_turns)
+    ]
