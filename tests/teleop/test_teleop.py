@@ -344,6 +344,32 @@ def test_a_log_has_what_there_was_at_ctrl_c(session: Teleoperation, tmp_path: Pa
     assert float(rows[3][head.index("sigma")]) == pytest.approx(found.seen[3].sigma, rel=1e-5)
 
 
+def test_what_was_taught_is_done_again(station: Teleoperation, tmp_path: Path) -> None:
+    """Orders at odd times, one that becomes stale, changes of pairs by the operator and by the adviser."""
+    names, rng = [name for name in station.names if name.startswith("xi |")], np.random.default_rng(3)
+
+    class Operator:
+        def order(self, time: float, *given: Any) -> Order | None:
+            if rng.uniform() > 0.03:
+                return None
+            pair = names[int(rng.integers(len(names)))] if rng.uniform() < 0.3 else None
+            return Order(tuple(rng.uniform(-0.04, 0.04, 6)), pair=pair)
+
+    station.control.switch(names[0], 0.0)
+    station._automatic = True
+    try:
+        taught = run_session(station, Operator(), BESIDE, seconds=12.0)
+    finally:
+        station._automatic = False
+    assert len(set(taught.active)) > 2
+    station.control.switch(names[0], 0.0)
+    again = run_session(station, RateFile(taught.save_orders(tmp_path / "taught.csv")), BESIDE)
+    assert again.active == taught.active
+    np.testing.assert_array_equal(again.q, taught.q)
+    with pytest.raises(RangeError, match="no ticks"):
+        SessionLog().save_orders(tmp_path / "nothing.csv")
+
+
 def test_an_error_leaves_the_log(session: Teleoperation) -> None:
     log = SessionLog()
 

@@ -53,6 +53,9 @@ def drive(
     automatic: Annotated[bool, typer.Option("--automatic", help="Change pairs as the adviser says.")] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wait for the clock with a file, too.")] = False,
     log: Annotated[Path | None, typer.Option(help="Write what happened to this CSV file, after Ctrl-C, too.")] = None,
+    teach: Annotated[
+        Path | None, typer.Option(help="Write the orders to this CSV file, which --rates carries out again.")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--out", "--output", help="A folder for log.csv, report.html and replay.html, after Ctrl-C, too."),
@@ -86,6 +89,10 @@ def drive(
                 run_session(session, keyboard, q, realtime=True, progress=line, log=found)
     finally:
         _report(found, session, log)
+        if teach is not None and found.time:
+            start = ",".join(repr(x) for x in found.q[0].tolist())
+            text = f"again: wbc drive {robot} --rates {found.save_orders(teach)} --at={start}"
+            out().print(text + "".join(f" --mode {one}" for one in mode or ()), soft_wrap=True, markup=False)
         if folder is not None:
             out().print(escape(f"{folder}: {', '.join(_pages(found, session, folder))}"), soft_wrap=True)
     if found.interrupted:

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import RobotFileError, ShapeError
+from wbc.errors import RangeError, RobotFileError, ShapeError
 from wbc.simulation import Connection, Plant
 from wbc.teleop.order import AT_ONCE, Source
-from wbc.teleop.session import Seen, Teleoperation
+from wbc.teleop.rate_file import COLUMNS
+from wbc.teleop.session import RATE, Seen, Teleoperation
 from wbc.validation import Array
 
 
@@ -97,6 +98,31 @@ class SessionLog:
                     numbers = map(repr, [*q.tolist(), *seen.step.v.tolist()])
                     what = [f"{time:.6g}", seen.active, str(seen.step.status), *own, "; ".join(seen.why)]
                     table.writerow([*what, *rates[0], *rates[1], *numbers])
+        except OSError as error:
+            raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
+        return file
+
+    def save_orders(self, path: str | os.PathLike[str]) -> pathlib.Path:
+        """As a :class:`RateFile`: what was commanded from tick to tick, on the pairs that were used.
+
+        From the same configuration a session with the same pairs does the same again, changes of pairs by an adviser
+        included.
+
+        Raises:
+            RangeError: nothing was done. RobotFileError: it cannot be written.
+        """
+        file = validation.file_path("path", path)
+        if not self.time:
+            raise RangeError("log", self, "there are no ticks to save")
+        lines: list[list[str]] = []
+        for at, seen in zip(self.time, self.seen, strict=True):
+            said = [seen.active, *map(repr, seen.asked.tolist())]
+            if not lines or said != lines[-1][1:]:
+                lines.append([repr(at), *said])
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with file.open("w", newline="", encoding="utf-8") as out:
+                csv.writer(out).writerows([COLUMNS, *lines, [repr(self.time[-1] + 1.0 / RATE)]])
         except OSError as error:
             raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
         return file

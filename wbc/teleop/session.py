@@ -62,8 +62,8 @@ class Seen:
         asked, met: rates of the task rows that were ordered, and those that the command gives [m/s, rad/s].
         lost: |D (asked - met)| / |D asked|, D: metres over the arm's length; 0 where nothing is asked.
         why: what took it, in words.
-        ramping: rates are on their way to what is asked: nothing but accelerations of joints holds them back, and no
-            further than in the tick before. Such a part of the command is late and not lost.
+        ramping: rates are on their way to what is asked: nothing holds them back but a change of pairs, or accelerations
+            of joints, and those no further than in the tick before. Such a part of the command is late and not lost.
     """
 
     step: Step
@@ -206,7 +206,7 @@ class Teleoperation:
         why = self._why(q, step, sigma, kept, blending, at) if lost > NOTHING or not solved else ()
         held_back = at.keys() - {"acceleration"} or self.control.eased or not solved
         nearer = missed <= self._missed or not np.array_equal(asked, self._asked)
-        ramping = lost > NOTHING and not held_back and nearer and (blending or bool(at))
+        ramping = lost > NOTHING and not held_back and (blending or (nearer and bool(at)))
         if ramping:
             why = ("rates rise or fall to what is asked", *why)
         self._asked, self._missed = asked, missed
