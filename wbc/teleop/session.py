@@ -62,8 +62,9 @@ class Seen:
         asked, met: rates of the task rows that were ordered, and those that the command gives [m/s, rad/s].
         lost: |D (asked - met)| / |D asked|, D: metres over the arm's length; 0 where nothing is asked.
         why: what took it, in words.
-        ramping: rates are on their way to what is asked: nothing holds them back but a change of pairs, or accelerations
-            of joints, and those no further than in the tick before. Such a part of the command is late and not lost.
+        ramping: rates are on their way to what is asked: nothing holds them back but a change of pairs, or
+            accelerations of joints, and those no further than in the tick before. Such a part of the command is late
+            and not lost.
     """
 
     step: Step
