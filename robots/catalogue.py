@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pinocchio as pin
 
 from wbc import validation
+from wbc.errors import WbcError
 from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
@@ -66,7 +67,7 @@ def load(
             ``mujoco.MjModel``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
-            ``Robot.locked_dofs``). Default: the table's, or the one that the model or MJCF file brings, or fixed.
+            ``Robot.locked_dofs``). Default: the table's, or the one that the model or file brings, or fixed.
         lock: joints to lock: a name, names, patterns (``"finger_*"``), or a mapping from those to a value
             [rad or m] (None: where the neutral configuration has it). Replaces the table's list; ``()`` locks none.
             Locking one end of a mimic pair locks both.
@@ -110,7 +111,12 @@ def load(
         "acceleration": acceleration,
         "effort": effort,
     }
-    built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+    try:
+        built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+    except WbcError as error:
+        if recipe.file or not isinstance(source, (str, os.PathLike)) or str(source) in str(error):
+            raise
+        raise error.about(str(source)) from error
     return built if made is None else as_made(built, made, lock is None and shapes == "auto", limits, neutral)
 
 

@@ -19,7 +19,7 @@ class Mechanism(Constraint):
     """Equality rows of the robot's couplings and of its undriven degrees of freedom; every stack has them by itself.
 
         mimic joint   v_follower - ratio v_leader = -gain (q_follower - ratio q_leader - offset)      [rad/s or m/s]
-        undriven      v_i = 0          (sideways motion of a differential-drive base)                 [m/s]
+        undriven      v_i = 0          (a differential-drive base sideways; what no motor moves)      [m/s or rad/s]
 
     The right side of a mimic row brings back a configuration that does not fit. It is added under the name
     ``mechanism`` where ``robot.couplings`` or ``robot.locked_dofs`` is not empty.

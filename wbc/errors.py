@@ -36,6 +36,10 @@ class WbcError(Exception):
         """The same error about ``name.field``."""
         return _rebuilt(type(self), (f"{name}.{self}",), {**self.__dict__, "field": f"{name}.{self.field}"})
 
+    def about(self, what: str) -> WbcError:
+        """The same error with a text that begins with what it is about."""
+        return _rebuilt(type(self), (f"{what}: {self}",), self.__dict__)
+
     def __reduce__(self) -> tuple[Any, ...]:
         # Exceptions are rebuilt from their text alone, which no constructor here takes: they must cross processes
         return _rebuilt, (type(self), self.args, self.__dict__)

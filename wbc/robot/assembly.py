@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,14 +11,23 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError, UnsupportedJointError
-from wbc.robot.frames import make_frames_unique, restore_joint_names
+from wbc.errors import BoundsError, RangeError, ShapeError, UnsupportedJointError
+from wbc.robot.frames import make_frames_unique
 from wbc.robot.limits import Limits
+from wbc.robot.rebuilt import without_joints
 from wbc.robot.recipe import Recipe, expand
 from wbc.robot.robot import Coupling, Robot
 from wbc.robot.sources.description import Description, Mimic, finite_or_unlimited
 from wbc.symbolic.joints import symbolic_joint
 from wbc.validation import Array
+
+#: Two values of a joint this close are one [rad or m]
+SAME_VALUE = 1e-9
+
+#: What Pinocchio has as position limits of the numbers of a quaternion or (cos, sin), which limit nothing
+PIN_UNIT = 1.01
+
+log = logging.getLogger("wbc")
 
 _NO_ACCELERATION = "none known: unlimited"
 
@@ -34,12 +44,21 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     notes = dict(description.notes)
     model = description.model
     _check_order(model)
-    mimics = resolve_mimics(description.mimics, model)
+    mimics, standing = resolve_mimics(description.mimics, model)
     q, remarks = neutral_configuration(model, mimics, recipe, states)
     if remarks:
         notes["neutral"] = remarks
     driven = _moving(model)[0 if description.base == "fixed" else 1 :]
-    locked = _locked(model, mimics, expand("lock", recipe.lock, driven), q)
+    lock = expand("lock", recipe.lock, driven)
+    for name, value in standing.items():
+        given = lock.get(name)
+        if given is not None and abs(given - value) > SAME_VALUE:
+            raise RangeError(f"lock[{name!r}]", given, f"it follows a fixed joint, which puts it at {value:.9g}")
+    for pair in zip(model.mimicked_joints, model.mimicking_joints, strict=True):
+        leader, follower = (str(model.names[j]) for j in pair)
+        if {leader, follower} & set(lock):  # Pinocchio's own mimic joints, which have no coordinates
+            lock = {leader: None, follower: None, **lock}
+    locked = _locked(model, mimics, {**lock, **standing}, q)
     model, q, renamed = _reduced(model, with_values(model, q, locked), list(locked))
     if locked:
         shown = (f"{name} at {' '.join(f'{x:.6g}' for x in value)}" for name, value in locked.items())
@@ -62,8 +81,13 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
         if m.follower not in locked
     )
     limits = read_limits(model, description.base, notes)
-    locked_dofs = (1,) if description.base == "differential" else ()
-    if locked_dofs:
+    undriven = {name: model.getJointId(name) for name in description.undriven if model.existJointName(name)}
+    locked_dofs = tuple(int(model.idx_vs[j]) + k for j in undriven.values() for k in range(int(model.nvs[j])))
+    if undriven:
+        notes["undriven"] = f"nothing drives {', '.join(undriven)}, which is no base: its velocity must stay 0"
+        log.warning("%s: %s", description.source, notes["undriven"])
+    if description.base == "differential":
+        locked_dofs = (1, *locked_dofs)
         notes["base"] = "differential drive: the sideways velocity of the base (index 1 of v) must stay 0"
     robot = Robot(
         recipe.name,
@@ -114,14 +138,14 @@ def _with_accelerations(robot: Robot, values: Mapping[str, float], source: str) 
     return replace(robot, notes={**robot.notes, "acceleration": note})
 
 
-def resolve_mimics(mimics: tuple[Mimic, ...], model: pin.Model) -> tuple[Mimic, ...]:
-    """Mimics between joints that move, chains replaced by their first leader.
+def resolve_mimics(mimics: tuple[Mimic, ...], model: pin.Model) -> tuple[tuple[Mimic, ...], dict[str, float]]:
+    """(mimics between joints that move, chains replaced by their first leader; where followers of fixed joints stand).
 
     Raises:
         RangeError: joints that follow each other in a circle, or a mimic of a joint with several numbers.
     """
     by_follower = {m.follower: m for m in mimics if model.existJointName(m.follower)}
-    out = []
+    out, standing = [], {}
     for mimic in by_follower.values():
         leader, ratio, offset = mimic.leader, mimic.ratio, mimic.offset
         for _ in by_follower:
@@ -130,14 +154,15 @@ def resolve_mimics(mimics: tuple[Mimic, ...], model: pin.Model) -> tuple[Mimic, 
                 break
             leader, ratio, offset = above.leader, ratio * above.ratio, ratio * above.offset + offset
         if leader in by_follower:
-            raise RangeError("mimic", mimic.follower, "these joints follow each other in a circle")
-        if not model.existJointName(leader):
-            continue
+            raise RangeError("mimic", leader, "these joints follow each other in a circle")
         for name in (mimic.follower, leader):
-            if model.nqs[model.getJointId(name)] != 1:
+            if model.existJointName(name) and model.nqs[model.getJointId(name)] != 1:
                 raise RangeError("mimic", name, "only joints with one coordinate can be coupled")
-        out.append(Mimic(mimic.follower, leader, ratio, offset))
-    return tuple(out)
+        if model.existJointName(leader):
+            out.append(Mimic(mimic.follower, leader, ratio, offset))
+        else:
+            standing[mimic.follower] = offset
+    return tuple(out), standing
 
 
 def neutral_configuration(
@@ -251,7 +276,7 @@ def _locked(
             continue
         coupled = mimic.ratio * values[mimic.leader] + mimic.offset
         given = lock.get(mimic.follower)
-        if given is not None and abs(given - coupled[0]) > 1e-9:
+        if given is not None and abs(given - coupled[0]) > SAME_VALUE:
             reason = f"it follows {mimic.leader}, which puts it at {coupled[0]:.9g}"
             raise RangeError(f"lock[{mimic.follower!r}]", given, reason)
         values[mimic.follower] = coupled
@@ -267,10 +292,8 @@ def _reduced(model: pin.Model, q: Array, locked: list[str]) -> tuple[pin.Model, 
     """(model without the locked joints, its part of q, frames renamed to make their names unique)."""
     start = {str(model.names[j]): int(model.idx_qs[j]) for j in range(1, model.njoints)}
     indices = [model.getJointId(name) for name in locked]
-    whole = pin.Model(model)
-    renamed = make_frames_unique(whole)
-    reduced = pin.buildReducedModel(whole, indices, q) if locked else whole
-    restore_joint_names(reduced, renamed)
+    reduced = without_joints(model, indices, q) if locked else pin.Model(model)
+    renamed = make_frames_unique(reduced)
     parts = []
     for j in range(1, reduced.njoints):
         first = start[str(reduced.names[j])]
@@ -279,30 +302,71 @@ def _reduced(model: pin.Model, q: Array, locked: list[str]) -> tuple[pin.Model, 
 
 
 def read_limits(model: pin.Model, base: str, notes: dict[str, str]) -> Limits:
-    """Limits of a model; none for the base, and what is 0 in velocity or effort is taken as not given.
+    """Limits of a model; what is 0 in velocity or effort is taken as not given. No motor drives a floating base.
 
     Raises:
         BoundsError, RangeError, NotFiniteError: the description has a lower limit above the upper one, a
-            negative limit or NaN.
+            negative limit, one in one direction only, or NaN.
     """
     nv = int(model.nv)
     lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
     for j in range(1, model.njoints):
-        n = int(model.nvs[j])
+        n, start = int(model.nvs[j]), int(model.idx_qs[j])
+        ends = (finite_or_unlimited(bound)[start:] for bound in (model.lowerPositionLimit, model.upperPositionLimit))
+        low, high = (bound[: model.nqs[j]] for bound in ends)
         if model.nqs[j] == n:
-            to, start = int(model.idx_vs[j]), int(model.idx_qs[j])
-            lower[to : to + n] = model.lowerPositionLimit[start : start + n]
-            upper[to : to + n] = model.upperPositionLimit[start : start + n]
-    velocity, effort = finite_or_unlimited(model.upperVelocityLimit), finite_or_unlimited(model.upperEffortLimit)
-    base_nv = {"fixed": 0, "floating": 6}.get(base, 3)
-    velocity[:base_nv] = effort[:base_nv] = np.inf
+            to = int(model.idx_vs[j])
+            lower[to : to + n], upper[to : to + n] = low, high
+            if (low > high).any():
+                raise BoundsError("limits.position_lower", (low, high), f"above position_upper at {model.names[j]}")
+            continue
+        # Pinocchio writes 1.01 for the numbers of a turn, some of its readers for those of a shift, too
+        turns = {7: 4, 4: 2 if n == 3 and "Planar" in model.joints[j].shortname() else 4}.get(len(low), len(low))
+        none = np.where(np.arange(len(low)) < len(low) - turns, np.inf, 1.0)
+        tight = ((low > -none) & (low != -PIN_UNIT)) | ((high < none) & (high != PIN_UNIT))
+        if tight.any():
+            shown = "; ".join(f"{low[k]:g} to {high[k]:g}" for k in np.flatnonzero(tight))
+            log.warning(
+                "%s: position limits of a joint without single coordinates are not kept: %s", model.names[j], shown
+            )
     names = [str(model.names[j]) for j in range(1, model.njoints) for _ in range(int(model.nvs[j]))]
-    for key, array in (("velocity", velocity), ("effort", effort)):
-        absent = [name for name, value in zip(names, array, strict=True) if value == 0.0]
+    rates = {}
+    for key, bounds in (
+        ("velocity", (model.lowerVelocityLimit, model.upperVelocityLimit)),
+        ("effort", (model.lowerEffortLimit, model.upperEffortLimit)),
+    ):
+        rates[key] = array = _both_ways(key, names, *(finite_or_unlimited(bound) for bound in bounds))
+        if base == "floating" and key == "effort":
+            if (array[:6] > 0.0).any() and np.isfinite(array[:6]).any():
+                log.warning("%s floats: its efforts of at most %s N, N m are those of no motor", names[0], array[:6])
+            array[:6] = np.inf
+        absent = dict.fromkeys(name for name, value in zip(names, array, strict=True) if value == 0.0)
         array[array == 0.0] = np.inf
         if absent:
-            notes[key] = f"not given for {', '.join(dict.fromkeys(absent))}: unlimited"
-    return Limits(finite_or_unlimited(lower), finite_or_unlimited(upper), velocity, np.full(nv, np.inf), effort)
+            text = f"not given for {', '.join(absent)}: unlimited"
+            notes[key] = f"{notes[key]}; {text}" if key in notes else text
+    return Limits(lower, upper, rates["velocity"], np.full(nv, np.inf), rates["effort"])
+
+
+def _both_ways(key: str, names: list[str], lower: Array, upper: Array) -> Array:
+    """The largest size that a velocity or effort may have in both directions; a lower one that says more is said.
+
+    Raises:
+        RangeError: a negative size, or one direction only.
+    """
+    out, uneven = np.array(upper), []
+    for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
+        if (key == "velocity" and low > 0.0) or (high == 0.0 and np.isinf(low)):
+            # Pinocchio 4.1 has the largest velocity as the lower one, with a positive sign; 0 is not given
+            low = -high
+        if high < 0.0 or ((high > 0.0) != (low < 0.0) and not np.isnan(low + high)):
+            raise RangeError(f"limits.{key}", (low, high), f"{names[k]}: expected one below and one above 0")
+        out[k] = np.minimum(-low, high)
+        if low != -high and np.isfinite([low, high]).all():
+            uneven.append(f"{low:g} to {high:g} of {names[k]}")
+    if uneven:
+        log.warning("the lesser of both directions limits %s: %s", key, "; ".join(uneven))
+    return out
 
 
 def override_limits(robot: Robot, changes: Mapping[str, Any]) -> Robot:

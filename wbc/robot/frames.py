@@ -10,9 +10,6 @@ import pinocchio as pin
 def make_frames_unique(model: pin.Model) -> dict[str, str]:
     """Renames frames that share a name, in place: the link keeps it, a joint's frame gets ``_joint`` appended.
 
-    A joint follows its frame's new name, as Pinocchio's reduction of models looks it up by that; give the joints
-    of the result their names back with :func:`restore_joint_names`.
-
     Returns:
         Old name -> new name.
     """
@@ -32,14 +29,4 @@ def make_frames_unique(model: pin.Model) -> dict[str, str]:
         taken.add(new)
         renamed[name] = new
         model.frames[index].name = new
-        if frame.type == pin.FrameType.JOINT:
-            model.names[frame.parentJoint] = new
     return renamed
-
-
-def restore_joint_names(model: pin.Model, renamed: dict[str, str]) -> None:
-    """Gives the joints that :func:`make_frames_unique` renamed their names back; frames keep the new ones."""
-    original = {new: old for old, new in renamed.items()}
-    for j in range(1, model.njoints):
-        name = str(model.names[j])
-        model.names[j] = original.get(name, name)

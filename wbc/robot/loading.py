@@ -48,7 +48,7 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
         path = pathlib.Path(source)
         _, tree = read_xml(path)
         if tree.tag == "robot":
-            return read_urdf(path, base, recipe.mimic_leaders)
+            return read_urdf(path, tree, base, recipe.mimic_leaders)
         if tree.tag == "mujoco":
             return read_mjcf(path, base)
         raise RobotFileError("robot", str(path), f"neither URDF nor MJCF: the root element is <{tree.tag}>")

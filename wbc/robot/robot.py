@@ -53,7 +53,7 @@ class Robot:
         frames: role -> frame name ("tip", "shoulder", "elbow", "wrist", ...), where the table knows them.
         notes: where limits come from, one sentence a key ("acceleration", "shapes", ...).
         locked_dofs: degrees of freedom that the robot cannot drive, whose velocity must stay 0 (the sideways
-            velocity of a differential-drive base). Indices into v.
+            velocity of a differential-drive base, a URDF's floating joint that is no base). Indices into v.
         source: the file that the model was read from; "" for a model made in memory.
         self_pairs: pairs of links with shapes that must not touch each other; None: not chosen yet.
     """
@@ -329,7 +329,7 @@ class Robot:
         return replace(self, model=model)
 
     def seen_from(self, pose: pin.SE3) -> Robot:
-        """A copy whose world is the frame at ``pose``: every link is there as seen from that frame.
+        """A copy whose world is the frame at ``pose``: links and gravity are there as seen from that frame.
 
         Raises:
             ShapeError, NotFiniteError, RotationError: no pose.
@@ -341,6 +341,8 @@ class Robot:
         for frame in model.frames:
             if int(frame.parentJoint) == 0:
                 frame.placement = away * frame.placement
+        turned = (away.rotation @ part for part in (model.gravity.linear, model.gravity.angular))
+        model.gravity, model.inertias[0] = pin.Motion(*turned), away.act(model.inertias[0])
         return replace(self, model=model)
 
     def with_limits(self, **changes: Any) -> Robot:

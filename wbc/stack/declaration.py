@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Self, get_args
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import pickling, validation
@@ -41,6 +42,12 @@ LEAST_DAMPING = 1e-12
 
 #: Highest price of a soft constraint; beyond it a row is as good as hard
 HIGHEST_PRICE = 1e9
+
+#: Part of its weight that a planar base may bear in its plane, as rounding
+PLUMB = 1e-6
+
+#: Negative part of the mass matrix's largest eigenvalue that is rounding
+SEMIDEFINITE = 1e-9
 
 #: The time step may vary from tick to tick within these factors of the declared one.
 DT_FACTORS = (0.25, 2.0)
@@ -158,7 +165,7 @@ class Declaration:
         Raises:
             UnknownNameError: another command.
             CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot
-                has no mass.
+                has no mass, an inertia that no body has, or a joint that nothing drives.
         """
         validation.one_of("command", command, COMMANDS)
         if command == self._command and command != "velocity":
@@ -166,8 +173,8 @@ class Declaration:
         if self._command != "velocity":
             reason = f"this stack is compiled for {self._command}; compile the one that it was made from"
             raise CommandError("command", command, reason)
-        if command == "torque" and pin.computeTotalMass(self._robot.model) <= 0.0:
-            raise CommandError("command", command, f"the moving links of {self._robot.name!r} have no mass")
+        if command == "torque" and (reason := _no_torques(self._robot)):
+            raise CommandError("command", command, reason)
         out = self if command == "velocity" else copy.copy(self)
         out._command = next(known for known in COMMANDS if known == command)
         for entry in self.entries:
@@ -367,6 +374,28 @@ class Declaration:
                 [e.name, e.level, e.item.declaration(self._robot), *_softness(e), *_frame(e)] for e in self.entries
             ],
         }
+
+
+def _no_torques(robot: Robot) -> str:
+    """Why motors cannot move a robot as a stack asks, "" where they can."""
+    model, data = robot.model, robot.model.createData()
+    weight = pin.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
+    if pin.computeTotalMass(model) <= 0.0:
+        return f"the moving links of {robot.name!r} have no mass"
+    # A floating or planar joint has several degrees of freedom; others that are locked have motors to hold them
+    names = [robot.dof_names[k] for k in robot.locked_dofs if k >= robot.base_nv]
+    if undriven := [name for name in names if name not in robot.joint_names]:
+        return f"nothing drives {', '.join(undriven)} of {robot.name!r}: lock the joint"
+    borne = np.abs(pin.computeGeneralizedGravity(model, data, robot.neutral)[: robot.base_nv])
+    if robot.base == "planar" and borne.max() > PLUMB * weight:
+        return f"nothing holds the planar base of {robot.name!r} against {borne.max():.6g} N of its weight"
+    moments = np.linalg.eigvalsh(pin.crba(model, data, robot.neutral))
+    if moments[0] < -SEMIDEFINITE * moments[-1]:
+        bodies = [np.linalg.eigvalsh(body.inertia)[0] for body in model.inertias]
+        worst = 1 + int(np.argmin(bodies[1:]))
+        reason = f"the body on joint {str(model.names[worst])!r} has a moment of {bodies[worst]:.6g} kg m^2"
+        return f"the mass matrix of {robot.name!r} has a negative eigenvalue, {moments[0]:.6g}: {reason}"
+    return ""
 
 
 def _check_values(item: Item, robot: Robot) -> None:

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError
+from wbc.robot.rebuilt import on_joint, without_joints
 from wbc.robot.robot import BASES
 from wbc.validation import Array
 
@@ -38,6 +39,7 @@ class Description:
         acceleration: joint name -> limit, where the description knows it.
         notes: see :class:`~wbc.robot.Robot`.
         source: path of the file, "" for none.
+        undriven: joints with several degrees of freedom that no motor moves, the base left out.
     """
 
     model: pin.Model
@@ -47,6 +49,7 @@ class Description:
     acceleration: Mapping[str, float] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
+    undriven: tuple[str, ...] = ()
 
 
 def root_joint(base: str) -> pin.JointModel | None:
@@ -60,9 +63,12 @@ def root_joint(base: str) -> pin.JointModel | None:
 def own_base(model: pin.Model) -> str:
     """The base that a model has by itself: its only root joint is a free flyer or a planar joint."""
     roots = [j for j in range(1, model.njoints) if model.parents[j] == 0]
-    if len(roots) != 1:
-        return "fixed"
-    kind = model.joints[1].shortname()
+    return moving_freely(model, 1) if len(roots) == 1 else "fixed"
+
+
+def moving_freely(model: pin.Model, j: int) -> str:
+    """The base that a joint would be: ``floating``, ``planar``, or ``fixed`` for one that is none."""
+    kind = model.joints[j].shortname()
     return {"JointModelFreeFlyer": "floating", "JointModelPlanar": "planar"}.get(kind, "fixed")
 
 
@@ -73,27 +79,25 @@ def with_base(model: pin.Model, base: str | None, q: Array | None = None) -> tup
 
     Raises:
         UnknownNameError: no such base.
-        RobotFileError: the model brings a base of another kind.
+        RobotFileError: the model brings a base of another kind, or has several parts that move freely.
     """
     has = own_base(model)
     if base is None:
         return model, has
-    validation.one_of("base", base, BASES)
+    joint = root_joint(base)
     if has != "fixed":
         if base == "fixed":
-            return pin.buildReducedModel(model, [1], pin.neutral(model) if q is None else q), base
+            return without_joints(model, [1], pin.neutral(model) if q is None else q), base
         if base == has or (has == "planar" and base == "differential"):
             return model, base
         raise RobotFileError("base", base, f"the description has a {has} base of its own")
-    joint = root_joint(base)
     if joint is None:
         return model, base
-    root = pin.Model()
-    root.name = model.name
-    index = root.addJoint(0, joint, pin.SE3.Identity(), ROOT)
-    root.addJointFrame(index)
-    merged = pin.appendModel(root, model, root.getFrameId(ROOT), pin.SE3.Identity())
-    return merged, base
+    for j in range(1, model.njoints):
+        if model.parents[j] == 0 and moving_freely(model, j) != "fixed":
+            reason = f"the joint {str(model.names[j])!r} at the root of the description moves freely already"
+            raise RobotFileError("base", base, reason)
+    return on_joint(model, joint, ROOT), base
 
 
 def finite_or_unlimited(array: Array) -> Array:

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import pinocchio as pin
 
 from wbc.errors import RobotFileError
+from wbc.robot.sources.xml_text import parse
 
 #: What the C++ parsers' exceptions become in Python.
 PARSER_ERRORS = (ValueError, RuntimeError, IndexError, OverflowError)
@@ -58,19 +59,24 @@ def read_xml(path: pathlib.Path) -> tuple[str, ElementTree.Element]:
     """(text, root element) of a robot description.
 
     Raises:
-        RobotFileError: missing, a directory, unreadable, or not well-formed XML.
+        RobotFileError: missing, a directory, unreadable, or not XML, see :mod:`wbc.robot.sources.xml_text`.
     """
     if not path.exists():
         raise RobotFileError("robot", str(path), "there is no such file")
     if path.is_dir():
         raise RobotFileError("robot", str(path), "this is a directory, expected a URDF or MJCF file")
     try:
-        text = path.read_text(encoding="utf-8")
-        return text, ElementTree.fromstring(text.encode())
-    except (OSError, UnicodeDecodeError) as error:
+        data = path.read_bytes()
+    except OSError as error:
         raise RobotFileError("robot", str(path), f"cannot be read: {error}") from error
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    try:
+        return text, parse(text)
     except ElementTree.ParseError as error:
-        raise RobotFileError("robot", str(path), f"not well-formed XML: {error}") from error
+        raise RobotFileError("robot", str(path), f"cannot be read, not well-formed XML: {error}") from error
 
 
 class Noise:

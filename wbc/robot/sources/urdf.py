@@ -1,4 +1,4 @@
-"""Reading URDF files: Pinocchio's parser for the model, the XML for what the parser drops."""
+"""Reading URDF files: Pinocchio's parser for the model, the XML for what the parser drops or takes wrongly."""
 
 from __future__ import annotations
 
@@ -9,76 +9,194 @@ from collections.abc import Mapping
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import RobotFileError
-from wbc.robot.sources.description import Description, Mimic, root_joint
-from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr, read_xml
+from wbc.errors import RangeError, RobotFileError
+from wbc.robot.sources.description import Description, Mimic, moving_freely, root_joint, with_base
+from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
+from wbc.robot.sources.urdf_checks import SINGLE, Remarks, axis_of, check_links, check_tree, number
+from wbc.validation import Array
+
+Joints = Mapping[str, ElementTree.Element]
 
 
 def read_urdf(
-    path: pathlib.Path, base: str | None = None, mimic_leaders: Mapping[str, str] | None = None
+    path: pathlib.Path,
+    tree: ElementTree.Element,
+    base: str | None = None,
+    mimic_leaders: Mapping[str, str] | None = None,
 ) -> Description:
-    """The description in a URDF file, on the given base (default: fixed).
+    """The description in a URDF file, on the given base (default: its own, else fixed).
+
+    A floating or planar joint that alone carries all else is the base; another one is ``undriven``. What the file says
+    and the description does not hold is said in the log and in the notes.
 
     Args:
-        path: the file.
+        path: the file. tree: what is in it.
         base: ``fixed``, ``floating``, ``planar`` or ``differential``.
         mimic_leaders: follower -> leader, for files that misspell the leader of a mimic joint.
 
     Raises:
-        RobotFileError: the file cannot be read or is no URDF; the parser's reason is in the message.
+        RobotFileError: what is no URDF, with the parser's reason; no tree, a joint without an axis, a negative mass,
+            by names and numbers; a ``base`` that contradicts the file's own.
+        RangeError: a mimic of a joint with several numbers.
     """
-    _, tree = read_xml(path)
-    if tree.tag != "robot":
-        raise RobotFileError("robot", str(path), f"no URDF: the root element is <{tree.tag}>, expected <robot>")
-    base = base or "fixed"
-    joint = root_joint(base)
+    remarks, joints = Remarks(path), {str(joint.get("name")): joint for joint in tree.findall("joint")}
+    leaders = _leaders(joints, dict(mimic_leaders or {}))
+    coupled = {name for pair in leaders.items() if pair[1] in joints for name in pair}
+    unlimited = _read_limits(joints, coupled, remarks)
+    check_tree(path, tree)
+    text = _motion(tree)
+    plain, noise = _parsed(path, text)
+    if noise:
+        dropped = ": these links weigh nothing" if "inertial element for Link" in noise else ""
+        remarks.add("parser", noise + dropped)
+    loose = any(joint.get("type") in ("floating", "planar") for joint in joints.values())
+    model = plain if loose or base in (None, "fixed") else _rooted(path, text, plain, root_joint(str(base)))
+    check_links(path, tree, remarks)
+    mimics = _mimics(joints, leaders, model, remarks)
+    for name in unlimited:
+        index = int(model.idx_qs[model.getJointId(name)])
+        for bound, none in (("lowerPositionLimit", -np.inf), ("upperPositionLimit", np.inf)):
+            values = np.array(getattr(model, bound))
+            values[index] = none
+            setattr(model, bound, values)
+    for name, joint in joints.items():
+        if joint.get("type") == "planar":
+            if joint.find("axis") is None:
+                remarks.add("plane", f"{name} has no axis: its plane is normal to x, as the format says")
+            _turn_plane(model, model.getJointId(name), axis_of(joint))
+    whole, kind = with_base(model, base)
+    beyond = range(1 if kind == "fixed" else 2, whole.njoints)
+    undriven = tuple(str(whole.names[j]) for j in beyond if moving_freely(whole, j) != "fixed")
+    return Description(whole, kind, mimics, notes=remarks.said(), source=str(path), undriven=undriven)
+
+
+def _motion(tree: ElementTree.Element) -> str:
+    """What a file says of motion and weight, without shapes and looks."""
+    out = ElementTree.Element("robot", tree.attrib)
+    for link in tree.findall("link"):
+        _copy(link.findall("inertial"), ElementTree.SubElement(out, "link", link.attrib))
+    _copy(tree.findall("joint"), out)
+    return ElementTree.tostring(out, encoding="unicode")
+
+
+def _copy(elements: list[ElementTree.Element], under: ElementTree.Element) -> None:
+    """Copies of elements with their children, but not with what is in those."""
+    for element in elements:
+        copied = ElementTree.SubElement(under, element.tag, element.attrib)
+        for child in element:
+            ElementTree.SubElement(copied, child.tag, child.attrib)
+
+
+def _parsed(path: pathlib.Path, text: str, *root: pin.JointModel) -> tuple[pin.Model, str]:
+    """(the parser's model, what it said)."""
     try:
         with captured_stderr() as noise:
-            model = pin.buildModelFromUrdf(str(path), *(() if joint is None else (joint,)))
+            model = pin.buildModelFromXML(text, *root)
     except PARSER_ERRORS as error:
         reason = noise.reason or " ".join(str(error).split())
         raise RobotFileError("robot", str(path), f"the URDF parser refused it: {reason}") from error
-    notes = {"parser": noise.reason} if noise.reason else {}
-    unlimited = _lift_absent_limits(model, tree)
-    if unlimited:
-        notes["position"] = f"the file gives neither lower nor upper for {', '.join(unlimited)}: unlimited"
-    mimics, problems = _mimics(tree, dict(mimic_leaders or {}))
-    if problems:
-        notes["mimic"] = problems
-    return Description(model, base, mimics, notes=notes, source=str(path))
+    return model, noise.reason
 
 
-def _lift_absent_limits(model: pin.Model, tree: ElementTree.Element) -> list[str]:
-    """Sets joints whose <limit> has neither ``lower`` nor ``upper`` to unlimited (the parser reads 0 and 0)."""
-    names = []
-    for joint in tree.findall("joint"):
-        name, limit = str(joint.get("name")), joint.find("limit")
-        if joint.get("type") not in ("revolute", "prismatic") or not model.existJointName(name):
-            continue
-        if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
-            index = int(model.idx_qs[model.getJointId(name)])
-            lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
-            lower[index], upper[index] = -np.inf, np.inf
-            model.lowerPositionLimit, model.upperPositionLimit = lower, upper
-            names.append(name)
-    return names
+def _rooted(path: pathlib.Path, text: str, plain: pin.Model, root: pin.JointModel) -> pin.Model:
+    """The model on a root joint, with frames in the parser's order; it leaves the root link's frame without inertia."""
+    model, _ = _parsed(path, text, root)
+    for frame in plain.frames:
+        if model.existFrame(frame.name, frame.type):
+            model.frames[model.getFrameId(frame.name, frame.type)].inertia = frame.inertia
+    return model
 
 
-def _mimics(tree: ElementTree.Element, leaders: dict[str, str]) -> tuple[tuple[Mimic, ...], str]:
-    """The mimic joints, and a sentence about those whose leader the file does not have."""
-    joints = {str(j.get("name")) for j in tree.findall("joint")}
-    found: list[Mimic] = []
-    lost: list[str] = []
-    for joint in tree.findall("joint"):
-        mimic = joint.find("mimic")
-        if mimic is None:
-            continue
-        follower = str(joint.get("name"))
-        leader = leaders.get(follower, str(mimic.get("joint")))
+def _leaders(joints: Joints, corrections: dict[str, str]) -> dict[str, str]:
+    """Follower -> leader, of the joints that move."""
+    return {
+        name: corrections.get(name, str(mimic.get("joint")))
+        for name, joint in joints.items()
+        if (mimic := joint.find("mimic")) is not None and joint.get("type") != "fixed"
+    }
+
+
+def _mimics(joints: Joints, leaders: dict[str, str], model: pin.Model, remarks: Remarks) -> tuple[Mimic, ...]:
+    """The mimic joints; one whose leader the file does not have stays free, one whose leader is fixed stands still.
+
+    Raises:
+        RangeError: a mimic of a joint with several numbers.
+    """
+    found, lost = [], []
+    for follower, leader in leaders.items():
         if leader not in joints:
             lost.append(f"{follower} (of {leader})")
             continue
-        ratio, offset = float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
-        found.append(Mimic(follower, leader, ratio, offset))
-    text = f"the file has no such leader, so these stay free: {', '.join(lost)}" if lost else ""
-    return tuple(found), text
+        for name in (follower, leader):
+            if joints[name].get("type") not in (*SINGLE, "fixed"):
+                raise RangeError("mimic", name, "only joints with one coordinate can be coupled")
+        mimic = joints[follower].find("mimic")
+        assert mimic is not None
+        found.append(Mimic(follower, leader, number(mimic, "multiplier", 1.0), number(mimic, "offset")))
+        if not model.existJointName(leader):
+            remarks.add("mimic", f"{follower} follows {leader}, which is fixed: it stands at {found[-1].offset:g}")
+    if lost:
+        remarks.add("mimic", f"the file has no such leader, so these stay free: {', '.join(lost)}")
+    return tuple(found)
+
+
+def _read_limits(joints: Joints, coupled: set[str], remarks: Remarks) -> list[str]:
+    """Puts limits into a form that the parser takes; names of the revolute and prismatic joints without a range.
+
+    A continuous joint that others follow, or that follows, becomes a revolute one without a range: it turns by an angle
+    that has a ratio to others, which a point on a circle has not.
+    """
+    unlimited, absent = [], []
+    for name, joint in joints.items():
+        kind, limit = joint.get("type"), joint.find("limit")
+        if kind == "continuous" and name in coupled:
+            joint.set("type", "revolute")
+            if limit is None:
+                limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
+        if kind not in SINGLE or limit is None:
+            continue
+        for key, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
+            if number(limit, key) < 0.0:
+                remarks.add(key, f"{key} of {name} is {limit.get(key)} {unit}, below 0: unlimited")
+                limit.set(key, "0")
+        lower, upper = number(limit, "lower"), number(limit, "upper")
+        if kind == "continuous":
+            if lower < upper:
+                remarks.add("position", f"{name} is continuous: its lower {lower:g} and upper {upper:g} limit nothing")
+        elif lower > upper:
+            remarks.add("position", f"lower {lower:g} of {name} is above its upper {upper:g}: unlimited")
+        elif limit.get("lower") is None and limit.get("upper") is None:
+            absent.append(name)
+        else:
+            continue
+        if joint.get("type") != "continuous":
+            limit.attrib.pop("lower", None), limit.attrib.pop("upper", None)
+            unlimited.append(name)
+    if absent:
+        remarks.add(
+            "position", f"the file gives neither lower nor upper for {', '.join(absent)}: unlimited", loud=False
+        )
+    return unlimited
+
+
+def _turn_plane(model: pin.Model, j: int, axis: Array) -> None:
+    """Turns the plane of a planar joint, which Pinocchio has normal to z, so that it is normal to an axis.
+
+    The joint's pose is  origin R M(x, y, angle) R'  with R the least turn that takes z to the axis.
+    """
+    axis = axis / np.linalg.norm(axis)
+    half = np.array([0.0, 0.0, 1.0]) + axis
+    # 2 h h' / h'h - 1 turns by pi about h, which lies halfway; before it half a turn about z
+    turn = np.diag([1.0, -1.0, -1.0])
+    if half @ half > 1e-12:
+        turn = (2.0 * np.outer(half, half) / (half @ half) - np.eye(3)) @ np.diag([-1.0, -1.0, 1.0])
+    there = pin.SE3(turn, np.zeros(3))
+    back = there.inverse()
+    model.jointPlacements[j] = model.jointPlacements[j] * there
+    model.inertias[j] = back.act(model.inertias[j])
+    for k in range(1, model.njoints):
+        if model.parents[k] == j:
+            model.jointPlacements[k] = back * model.jointPlacements[k]
+    for frame in model.frames:
+        if frame.parentJoint == j:
+            frame.placement = back * frame.placement

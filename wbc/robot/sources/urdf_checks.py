@@ -1,0 +1,121 @@
+"""What a URDF file says that no robot can be: refused where it moves or weighs otherwise, else said in the log."""
+
+from __future__ import annotations
+
+import logging
+import pathlib
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+
+from wbc.errors import RobotFileError
+from wbc.validation import Array
+
+log = logging.getLogger("wbc")
+
+#: Joint types of one degree of freedom
+SINGLE = ("revolute", "continuous", "prismatic")
+_ENDS = ("parent", "child")
+#: A shorter axis is what is left of one that was meant to be 0
+SHORTEST_AXIS = 1e-6
+#: Principal moments that break a rule by less than so much of the largest are rounded numbers of a body
+MOMENT_DIGITS = 1e-2
+#: What is less than so much of the largest moment in the file moves nothing otherwise: 1e-6 kg m^2 of empty links
+FELT = 1e-4
+
+
+class Remarks:
+    """What is said about a file: sentences by the key that they have in ``Robot.notes``."""
+
+    def __init__(self, path: pathlib.Path) -> None:
+        self._path = path
+        self._sentences: dict[str, list[str]] = {}
+        self._loud: dict[str, list[str]] = {}
+
+    def add(self, key: str, sentence: str, *, loud: bool = True) -> None:
+        """One more sentence; ``loud``: for the log, too."""
+        self._sentences.setdefault(key, []).append(sentence)
+        if loud:
+            self._loud.setdefault(key, []).append(sentence)
+
+    def said(self) -> dict[str, str]:
+        """The notes; writes a line a key to the log."""
+        for sentences in self._loud.values():
+            log.warning("%s: %s", self._path, "; ".join(sentences))
+        return {key: "; ".join(sentences) for key, sentences in self._sentences.items()}
+
+
+def number(element: ElementTree.Element, key: str, default: float = 0.0) -> float:
+    """A number of the file; the default where there is none, or none that the parser takes."""
+    try:
+        return float(element.get(key, default))
+    except ValueError:
+        return default
+
+
+def axis_of(joint: ElementTree.Element) -> Array:
+    """The axis of a joint as the file has it; x where there is no element, 0 where that has no numbers."""
+    axis = joint.find("axis")
+    text = "1 0 0" if axis is None else axis.get("xyz", "0 0 0")
+    try:
+        return np.array([float(x) for x in text.split()])
+    except ValueError:
+        return np.ones(3)  # for the parser to refuse
+
+
+def check_tree(path: pathlib.Path, tree: ElementTree.Element) -> None:
+    """Every link hangs on one joint and in the end on the root; joints that move have an axis.
+
+    Raises:
+        RobotFileError: they do not.
+    """
+    above: dict[str, tuple[str, str]] = {}  # child -> joint, parent
+    for joint in tree.findall("joint"):
+        name = str(joint.get("name"))
+        parent, child = (str(end.get("link")) if (end := joint.find(key)) is not None else "" for key in _ENDS)
+        if above.setdefault(child, (name, parent))[0] != name:
+            reason = f"link {child!r} hangs on two joints, {above[child][0]!r} and {name!r}: a closed chain is no tree"
+            raise RobotFileError("robot", str(path), reason)
+        moves = joint.get("type") in (*SINGLE, "planar")
+        if moves and not np.linalg.norm(axis := axis_of(joint)) > SHORTEST_AXIS:
+            reason = f"joint {name!r} has no direction: its axis is {_shown(axis)}"
+            raise RobotFileError("robot", str(path), reason)
+    hangs: dict[str, bool] = {}  # whether a link's way up ends
+    for link in above:
+        way = [link]
+        while way[-1] in above and way[-1] not in hangs and len(way) <= len(above):
+            way.append(above[way[-1]][1])
+        hangs |= dict.fromkeys(way, hangs.get(way[-1], way[-1] not in above))
+    if circle := [link for link in above if not hangs[link]]:
+        reason = f"these links hang on each other, not on the root: {', '.join(circle)}"
+        raise RobotFileError("robot", str(path), reason)
+
+
+def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks) -> None:
+    """Masses are refused below 0; principal moments that no body has, a < 0 or c > a + b, are said.
+
+    Raises:
+        RobotFileError: a negative mass.
+    """
+    moments: dict[str, Array] = {}
+    for link in tree.findall("link"):
+        name, mass, inertia = str(link.get("name")), link.find("inertial/mass"), link.find("inertial/inertia")
+        if mass is None or inertia is None:
+            continue
+        if number(mass, "value") < 0.0:
+            raise RobotFileError("robot", str(path), f"link {name!r} has a mass of {mass.get('value')} kg")
+        xx, xy, xz, yy, yz, zz = (number(inertia, key) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        moments[name] = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    largest = max((float(np.abs(m).max()) for m in moments.values()), default=0.0)
+    wrong, slightly = list[str](), list[str]()
+    for name, m in moments.items():
+        excess = max(-m[0], m[2] - m[0] - m[1])
+        if excess > MOMENT_DIGITS * np.abs(m).max():
+            (wrong if excess > FELT * largest else slightly).append(f"link {name!r} {_shown(m)}")
+    for links, loud in ((wrong, True), (slightly, False)):
+        if links:
+            remarks.add("inertia", f"principal moments that no body has [kg m^2]: {'; '.join(links)}", loud=loud)
+
+
+def _shown(values: Array) -> str:
+    return ", ".join(f"{x:.6g}" for x in values)
