@@ -30,8 +30,8 @@ setup: $(READY)  ## create .venv with the pinned packages and this one
 demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into runs/walk (the Panda: wbc demo)
 	$(BIN)/wbc walk --out runs/walk --force
 
-test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases
-	WBC_REPEATS=$(REPEATS) $(BIN)/python -m pytest -n $(PYTEST_JOBS) $(PYTEST_ARGS)
+test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases; build/failed.txt names those that failed
+	WBC_REPEATS=$(REPEATS) $(BIN)/python -m pytest -n $(PYTEST_JOBS) --failed-list build/failed.txt $(PYTEST_ARGS)
 
 check: $(READY) lint types  ## between edits: lint, types and the tests that are quick
 	$(BIN)/python -m pytest -n $(PYTEST_JOBS) -q -m "not slow" $(PYTEST_ARGS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -61,6 +61,8 @@ class Contact(Constraint):
     equality: ClassVar[bool] = True
     #: Components of the wrench that the contact can bear, in the axes of its frame: 0, 1, 2 force, 3, 4, 5 moment
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
+    #: What counts of the target, as of :class:`wbc.tasks.Input`
+    part: ClassVar[Literal["", "position"]] = ""
 
     frame: str
 
@@ -82,7 +84,7 @@ class Contact(Constraint):
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``gain`` of the motion, then :meth:`limits`."""
         return (
-            Input("target", "pose", unit="m, rad"),
+            Input("target", "pose", unit="m, rad", part=self.part),
             Input("gain", unit="1/s", default=10.0, low=0.0),
             *self.limits(),
         )

@@ -71,6 +71,8 @@ class Input:
         direction: a vector that is kept at unit length; its rate is the derivative of the unit vector.
         sensed: a :class:`Sensor` writes it before every tick; users only read it.
         joints: of a configuration or a velocity, the joints of which it is read: their numbers alone are a value, too.
+        part: of a pose, what is read of it: a ``position`` (3 numbers) or an ``orientation`` (a 3x3 matrix or a
+            quaternion x, y, z, w) alone is a value, too; "" for all of it.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Input:
     direction: bool = False
     sensed: bool = False
     joints: tuple[str, ...] | None = None
+    part: Literal["", "position", "orientation"] = ""
 
 
 @dataclass(frozen=True)

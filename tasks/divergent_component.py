@@ -38,7 +38,7 @@ class DivergentComponent(Task):
     Inputs:
         target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
         feedforward: velocity of the target [m/s]. Default 0.
-        gain: how fast xi reaches its target [1/s]. Default 3.
+        gain: how fast xi reaches its target [1/s].
         omega: of the pendulum [1/s].
 
     Example:
@@ -56,6 +56,7 @@ class DivergentComponent(Task):
     """
 
     initial_only: ClassVar[tuple[str, ...]] = ("omega",)
+    default_gain: ClassVar[float] = 3.0
 
     omega: float
     weights: tuple[float, ...] | None = (1.0, 1.0, 0.0)
@@ -80,7 +81,7 @@ class DivergentComponent(Task):
         return (
             Input("target", unit="m", size=3),
             Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
-            Input("gain", unit="1/s", default=3.0 if self.gain is None else self.gain, low=0.0),
+            Input("gain", unit="1/s", default=self.default_gain if self.gain is None else self.gain, low=0.0),
             Input("omega", unit="1/s", default=self.omega, low=1e-6),
         )
 

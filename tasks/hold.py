@@ -48,7 +48,8 @@ class Hold(Constraint):
         gain: initial value of the input [1/s].
 
     Inputs:
-        target: pose in the world [m, rad]. Default: the pose at the first step.
+        target: pose in the world [m, rad]; of kind ``position`` 3 numbers [m], or ``orientation`` a 3x3 matrix or a
+            quaternion x, y, z, w, will do. Default: the pose at the first step.
         gain: how fast drift decays [1/s], to stay below 1/dt; 0 leaves it as it is.
 
     It cannot hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose, are
@@ -81,7 +82,9 @@ class Hold(Constraint):
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``gain``."""
-        return (Input("target", "pose", unit="m, rad"), Input("gain", unit="1/s", default=self.gain, low=0.0))
+        part = self.kind if self.kind in ("position", "orientation") else ""
+        target = Input("target", "pose", unit="m, rad", part=part)
+        return (target, Input("gain", unit="1/s", default=self.gain, low=0.0))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The frame's pose at ``q``."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
@@ -80,7 +81,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         ShapeError, NotFiniteError, RotationError, RangeError: it is no value of this input.
     """
     if declared.kind == "pose":
-        return validation.pose_numbers(field, value)
+        return validation.pose_numbers(field, _whole_pose(field, declared, value))
     if declared.kind == "rotation":
         return np.ravel(validation.rotation(field, value), order="F")
     if declared.joints is not None:
@@ -108,6 +109,24 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         for number in numbers[np.isfinite(numbers)]:
             validation.scalar(field, number, low=declared.low, high=declared.high, unit=declared.unit)
     return numbers
+
+
+def _whole_pose(field: str, declared: Input, value: Any) -> Any:
+    """A pose, where the part of it that counts is given; else what is given.
+
+    Raises:
+        ShapeError: numbers that are neither. NotFiniteError, RotationError: a part that is none.
+    """
+    if not declared.part or isinstance(value, pin.SE3) or (isinstance(value, (tuple, list)) and len(value) == 2):
+        return value
+    shape = validation.dimensions(field, value)
+    if shape in ((7,), (4, 4)):
+        return value
+    if declared.part == "position":
+        if shape != (3,):
+            raise ShapeError(field, value, f"expected a position, 3 numbers, or a pose; is of shape {shape}")
+        return pin.SE3(np.eye(3), validation.real_array(field, value, (3,)))
+    return pin.SE3(validation.rotation(field, value), np.zeros(3))
 
 
 def _spread(robot: Robot, field: str, declared: Input, value: Any) -> Any:

@@ -34,7 +34,7 @@ class LineContact(Pressing, Contact):
     Inputs:
         target: pose in the world [m, rad]. Default: the pose at the first step.
         gain: how fast drift decays [1/s]. Default 10.
-        friction: coefficient of friction [1].
+        friction: Coulomb's coefficient [1]; in the pyramids that are the rows, mu = friction / sqrt(2).
         least: least normal force [N].
         most: largest normal force [N].
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import casadi as ca
 
@@ -26,9 +26,9 @@ class PointContact(Pressing, Contact):
     1 - cos(pi / edges) of a tangential force, 29 % for 4 and 8 % for 8 edges.
 
     Inputs:
-        target: pose in the world, of which the position counts [m]. Default: the pose at the first step.
+        target: position in the world, 3 numbers [m], or a pose. Default: where it is at the first step.
         gain: how fast drift decays [1/s]. Default 10.
-        friction: coefficient of friction [1].
+        friction: Coulomb's coefficient [1].
         least: least normal force [N].
         most: largest normal force [N].
 
@@ -50,6 +50,7 @@ class PointContact(Pressing, Contact):
     """
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    part: ClassVar[Literal["", "position"]] = "position"
 
     friction: float = 0.5
     least: float = 0.0

@@ -45,7 +45,7 @@ class RollingContact(Pressing, Contact):
         target: pose of the ground in the world, of which the plane counts: its origin, and z out of the ground [m,
             rad]. Default: level ground under the wheel at the first step.
         gain: how fast a distance from the ground decays [1/s]. Default 10.
-        friction: coefficient of friction [1].
+        friction: Coulomb's coefficient [1]; in the pyramids that are the rows, mu = friction / sqrt(2).
         least: least normal force [N].
         most: largest normal force [N].
 

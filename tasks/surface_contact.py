@@ -24,16 +24,15 @@ class SurfaceContact(Pressing, Contact):
         m_min <= m_z <= m_max                           the yaw torque that friction bears       [N m]
 
         m_min = -mu (X + Y) f_z + |Y f_x - mu m_x| + |X f_y - mu m_y|
-        m_max = +mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|
+        m_max = +mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|,      mu = friction / sqrt(2)
 
     These are exactly the wrenches of forces at the four corners within friction pyramids (Caron, Pham and Nakamura,
-    ICRA 2015, equations 10 to 13); mu = friction / sqrt(2), so that the pyramids are within Coulomb's cones: at most
-    29 % of a tangential force is left out.
+    ICRA 2015, equations 10 to 13), which are within Coulomb's cones: at most 29 % of a tangential force is left out.
 
     Inputs:
         target: pose in the world [m, rad]. Default: the pose at the first step.
         gain: how fast drift decays [1/s]. Default 10.
-        friction: coefficient of friction [1].
+        friction: Coulomb's coefficient [1]; in the pyramids that are the rows, mu = friction / sqrt(2).
         least: least normal force [N].
         most: largest normal force [N].
 

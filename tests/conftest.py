@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 pytest_plugins = [
-    f"tests.{name}" for name in ("processes", "slow", "pictures", "browsers", "seeds", "backends", "loading")
+    f"tests.{name}"
+    for name in ("processes", "slow", "pictures", "browsers", "seeds", "backends", "loading", "failures")
 ]
 
 os.environ.setdefault("MPLBACKEND", "Agg")

@@ -6,6 +6,7 @@ the field; nothing is changed when it raises.
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 import pathlib
@@ -225,6 +226,16 @@ def exists(field: str, value: Any) -> bool:
         return file_path(field, value).exists()
     except OSError:
         return False
+
+
+def no_such(path: str | os.PathLike[str], reason: str = "there is no such file") -> str:
+    """The reason why a file or folder that is not there is refused, with the nearest name in its folder."""
+    place = pathlib.Path(path)
+    try:
+        near = [] if place.exists() else difflib.get_close_matches(place.name, os.listdir(place.parent), 1)
+    except OSError:
+        near = []
+    return f"{reason}, did you mean {str(place.with_name(near[0]))!r}?" if near else reason
 
 
 def rotation(field: str, value: Any) -> Array:

@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,24 @@ def test_an_unknown_command_names_the_nearest() -> None:
 
 def test_version() -> None:
     assert run("--version") == (0, f"wbc {wbc.__version__}\n", "")
+
+
+def test_the_module_is_the_command() -> None:
+    command = [sys.executable, "-m", "wbc"]
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (f"wbc {wbc.__version__}\n", "")
+    assert subprocess.run([*command, "replay", "none"], capture_output=True, check=False).returncode == 2
+
+
+@pytest.mark.parametrize(("given", "taken"), [((), 10.0), (("--silence", "3"), 3.0)])
+def test_play_says_how_long_a_page_may_be_silent(
+    given: tuple[str, ...], taken: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: dict[str, Any] = {}
+    monkeypatch.setattr("wbc.cli.play.run", lambda *_, **options: seen.update(options))
+    monkeypatch.setattr("wbc.cli.viewing.compiled", lambda stack, backend: None)
+    assert run("play", "panda", *given)[0] == 0
+    assert seen["silence"] == taken
 
 
 def test_robots_lists_the_table() -> None:
@@ -157,6 +176,25 @@ def test_track_with_holds_and_start(tmp_path: Path) -> None:
         (["track", "pandda"], "robot: unknown name, did you mean 'panda'?"),
         (["track", "--path", "circel"], "path: unknown name, did you mean 'circle'?"),
         (["track", "--path", "none.csv"], "path: there is no such file"),
+        (
+            ["view", "pandda"],
+            "what: no robot has this name, and there is no such file or folder; did you mean 'panda'?",
+        ),
+        (
+            ["view", "first"],
+            "what: no robot has this name, and there is no such file or folder; did you mean 'first_'?",
+        ),
+        (["view", "none.urdf", "--export", "page.html"], "what: there is no such file or folder (got"),
+        (["view", "ticks.npz"], "what: there is no such file or folder (got"),
+        (["view", "first_/run"], "what: there is no such file or folder, did you mean 'first_/runs'?"),
+        (["replay", "first_/run"], "recording: cannot be read: No such file or directory, did you mean 'first_/runs'?"),
+        (["check", "first"], "run: there is no such folder, did you mean 'first_'?"),
+        (["plans", "none.json", "none.json"], "plan: there is no such file"),
+        (["study", "none.yaml"], "study: there is no such file"),
+        (["study", "--resume", "first"], "resume: there is no such folder, did you mean 'first_'?"),
+        (["drive", "ur5", "--rates", "none.csv"], "path: cannot be read"),
+        (["ik", "ur5", "--targets", "none.csv"], "targets: there is no such file"),
+        (["walk", "--commands", "none.csv"], "file: cannot be read"),
         (["track", "--frame", "panda_hand_tpc"], "did you mean 'panda_hand_tcp'?"),
         (["track", "--solver", "dapq"], "solver: unknown name, did you mean 'daqp'?"),
         (["track", "--backend", "nativ"], "backend: unknown name, did you mean 'native'?"),
@@ -181,6 +219,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
     arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "first_" / "runs").mkdir(parents=True)
     options: list[str] = []
     if arguments[0] == "track":
         defaults = {"--output": "run", "--backend": "vm", "--duration": "0.2"}

@@ -9,7 +9,8 @@ import pytest
 from tests.constraints.items import tip
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
-from wbc.errors import RangeError, UnknownNameError
+from wbc.controller import Stack
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.hold import Hold
 
@@ -97,6 +98,36 @@ def test_rows_and_order() -> None:
     assert [r.unit for r in Hold("panda_hand", "orientation").rows(bot)] == ["rad/s"] * 3
     assert [r.label for r in Hold("panda_hand", "roll").rows(bot)] == ["x", "y", "z", "roll"]
     assert Hold.order == SacrificeOrder.HOLD
+
+
+@pytest.mark.parametrize("kind", ["position", "orientation"])
+def test_the_part_of_a_pose_that_counts_is_a_target(kind: str) -> None:
+    """It gives the command of the whole pose, alone and for many robots; what is neither is refused and changes
+    nothing."""
+    bot, rng = robot("panda"), np.random.default_rng(25)
+    stack = Stack(bot, 0.01).add(Hold("panda_hand", kind), name="hold")  # type: ignore[arg-type]
+    controller, q = stack.compile(backend="vm"), random_configuration(bot, rng)
+    pose = pin.SE3(pin.exp3(rng.uniform(-1.5, 1.5, 3)), rng.uniform(-1, 1, 3))
+    whole = [pose, pose.homogeneous, pin.SE3ToXYZQUAT(pose), (pose.translation, pose.rotation)]
+    place = pose.translation
+    parts = [place, place.tolist(), tuple(place)]
+    if kind == "orientation":
+        parts = [pose.rotation, pin.Quaternion(pose.rotation).coeffs(), pose.rotation.tolist()]
+    found = set()
+    for target in (*whole, *parts):
+        controller["hold"].target = target
+        found.add(tuple(np.round(controller.step(q).v, 9)))
+        controller.set(hold=target)
+        found.add(tuple(np.round(controller.step(q).v, 9)))
+    assert len(found) == 1
+    for wrong in (np.zeros(2), np.zeros((2, 3)), place * np.nan, "here", None, [[1.0], [2.0, 3.0]], [pose, pose, pose]):
+        with pytest.raises((ShapeError, NotFiniteError), match=r"hold\.target"):
+            controller["hold"].target = wrong
+    assert tuple(np.round(controller.step(q).v, 9)) in found
+    batch = controller.batch(3)
+    for targets in (parts[0], [parts[0]] * 3, [pose] * 3, pose, [whole[2], parts[0], whole[1]]):
+        batch.set(hold=targets)
+        assert np.round(batch.step(np.tile(q, (3, 1))).v, 9).tolist() == [list(v) for v in found] * 3
 
 
 def test_bad_declarations() -> None:

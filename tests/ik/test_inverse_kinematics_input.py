@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from functools import cache
 from time import perf_counter
 from typing import Any
@@ -137,6 +138,22 @@ def test_one_call_is_enough() -> None:
     assert resting.solved
     assert resting.descents == 1
     np.testing.assert_allclose(resting.q, robot.neutral, atol=1e-12)
+
+
+def test_a_compiled_one_takes_the_same_arguments_for_one_search() -> None:
+    """Targets of a search are forgotten after it, also those of one that is refused."""
+    robot, kinematics = arm("panda"), stack().inverse_kinematics()
+    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    ours, theirs = (inspect.signature(owner.solve).parameters for owner in (Stack, InverseKinematics))
+    assert [name for name in ours if name not in ("goals", "backend")] == list(theirs)
+    assert all((ours[name].kind, ours[name].default) == (theirs[name].kind, theirs[name].default) for name in theirs)
+    found = kinematics.solve(robot.neutral, {"hand": goal}, budget=None)
+    assert found.q.tobytes() == stack().solve(robot.neutral, {"hand": goal}, budget=None).q.tobytes()
+    with pytest.raises(UnknownNameError):
+        kinematics.solve(robot.neutral, {"hand": goal, "hnad": goal})
+    np.testing.assert_allclose(kinematics.solve(robot.neutral, budget=None).q, robot.neutral, atol=1e-12)
+    kinematics["hand"].target = goal
+    assert kinematics.solve(robot.neutral, budget=None).q.tobytes() == found.q.tobytes()
 
 
 def test_limits_of_speed_do_not_count() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import multiprocessing
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +20,8 @@ from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
+from wbc.record import recorder, replayed
 from wbc.record import recording as files
-from wbc.record import replayed
 from wbc.record.recorder import INPUTS
 from wbc.record.recording import RecordingError, Writer
 from wbc.shapes import Box
@@ -27,7 +29,7 @@ from wbc.tasks import Obstacle
 
 TOP = Path(__file__).parents[2]
 #: Ticks of the small stack in a chunk
-CHUNK = 963
+CHUNK = 840
 
 
 def history(one: Controller, rng: np.random.Generator, ticks: int) -> list[bytes]:
@@ -159,6 +161,69 @@ def test_one_that_does_not_record_is_as_before(tmp_path: Path) -> None:
         assert core_of(one.clone()).recording is None
     assert core_of(one).call is call
     assert core_of(one).recording is None
+
+
+# What a reader asks for
+
+
+@pytest.mark.parametrize(
+    ("builder", "backend"), [("arm", "native"), ("arm", "vm"), ("sensed", "python"), ("humanoid", "vm")]
+)
+def test_times_residuals_margins_and_inputs_are_those_of_the_run(builder: str, backend: str, tmp_path: Path) -> None:
+    one = sensed().compile(backend=backend) if builder == "sensed" else controller(builder, backend=backend)
+    rng, bot = np.random.default_rng(4), one.stack.robot
+    steps, given, dts = [], list[dict[str, Any]](), list[float]()
+    with one.record(tmp_path / "run.npz") as recorder:
+        for _ in range(12):
+            randomise(one, rng)
+            dts.append(one.stack.dt * rng.uniform(0.5, 1.5))
+            steps.append(one.step(near_limits(bot, rng), dt=dts[-1]))
+            slots = {(n, i): s for n, b in core_of(one).layout.blocks.items() for i, s in b.slots.items()}
+            given.append({f"{name}.{i}": core_of(one).tick.p[s.span].copy() for (name, i), s in slots.items()})
+    made = Recording(recorder.path)
+    assert made.time.tolist() == [0.0, *np.cumsum(dts[:-1]).tolist()]
+    assert made.status == tuple(step.status for step in steps)
+    for found, part in ((made.residuals, "residuals"), (made.margins, "margins")):
+        wanted = [getattr(step, part) for step in steps]
+        assert list(found) == [name for name in wanted[0] if len(found.get(name, ()))]
+        for name, rows in found.items():
+            values = [getattr(each[name], "values", each[name]) for each in wanted]
+            assert rows.tobytes() == np.array(values).tobytes(), name
+    assert set(made.inputs) == set(given[0])
+    for name, rows in made.inputs.items():
+        assert rows.tobytes() == np.array([each[name] for each in given]).tobytes(), name
+    table = made.table()
+    assert {len(column) for column in table.values()} == {12}
+    assert set(made.units) < set(table)
+    first = next(name for name, residual in steps[5].residuals.items() if len(residual.values))
+    residual = steps[5].residuals[first]
+    for label, unit, value in zip(residual.labels, residual.units, residual.values, strict=True):
+        assert table[f"residual.{first}.{label}"][5] == value
+        assert made.units[f"residual.{first}.{label}"] == unit
+    assert [table[f"v.{name}"][7] for name in bot.dof_names] == steps[7].v.tolist()
+    wide = len(one.stack.entries) + bot.nq + bot.nv + sum(rows.shape[1] for rows in made.residuals.values())
+    assert len(table) > wide
+
+
+def test_a_recording_of_an_older_format_is_read_and_says_what_it_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(recorder, "TOLD", ())
+        patch.setattr(recorder, "about", functools.partial(as_format_2, recorder.about))
+        run = recorded(tmp_path / "run.npz")
+    made = Recording(run)
+    assert replay(made).identical
+    assert len(made.time) == 30
+    for asked in ("residuals", "margins", "inputs", "units"):
+        with pytest.raises(RecordingError, match="older versions kept none"):
+            getattr(made, asked)
+    with pytest.raises(RecordingError, match="older versions kept none"):
+        made.table()
+
+
+def as_format_2(about: Callable[[Controller], dict[str, Any]], one: Controller) -> dict[str, Any]:
+    return {name: value for name, value in about(one).items() if name not in ("names", "command")} | {"format": 2}
 
 
 # What differs

@@ -8,6 +8,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -611,3 +612,39 @@ def test_answers_do_not_depend_on_the_cache() -> None:
     assert two.cached
     assert not np.allclose(small.command(one), small.command(two), atol=1e-2)
     assert (one["posture"].gain, two["posture"].gain) == (Posture.default_gain, 1.0)
+
+
+# Waiting
+
+
+def test_who_waits_long_is_told_and_who_does_not_is_not(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def slow(place: Folder) -> None:
+        time.sleep(0.3)
+        (place / "file").touch()
+
+    def interrupted(place: Folder) -> None:
+        time.sleep(0.3)
+        raise KeyboardInterrupt
+
+    with caplog.at_level(logging.INFO, "wbc"):
+        cache.fetch("not so slow", slow)
+        assert caplog.messages == []
+        monkeypatch.setattr(cache, "SLOW", 0.05)
+        cache.fetch("slow", slow, what="a stack", advice="do this")
+        *told, last = caplog.messages
+        assert set(told) == {"compiling a stack: 0 s so far; it is kept for the next time; do this"}
+        assert last.startswith("compiling a stack ended after ")
+        caplog.clear()
+        cache.fetch("slow", slow)
+        assert caplog.messages == []
+        with pytest.raises(KeyboardInterrupt):
+            cache.fetch("interrupted", interrupted)
+        *told, last = caplog.messages
+        assert told
+        assert "ended after" in last
+    for thread in threading.enumerate():
+        if thread.name == "compiling":
+            thread.join(5.0)
+            assert not thread.is_alive()

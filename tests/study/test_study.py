@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +19,12 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
+from tests.repeats import repeats
 from wbc import robots
 from wbc.cli.app import app
-from wbc.errors import BusyError, RangeError, RobotFileError, UnknownNameError, WbcError
-from wbc.study import Kept, Study, StudyError, carry_out
+from wbc.errors import BusyError, RangeError, RobotFileError, SolverError, UnknownNameError, WbcError
+from wbc.study import Kept, Progress, Study, StudyError, carry_out
+from wbc.study.carrying_out import connected
 from wbc.study.summary import conclude
 
 HERE = Path(__file__).with_name("scenario_file.py")
@@ -107,8 +113,53 @@ def test_a_lost_worker_loses_no_trial(tmp_path: Path) -> None:
         assert kept.table()["square"] == [4.0 + seed for seed in range(8)]
 
 
-def test_a_cluster_by_its_address(tmp_path: Path) -> None:
-    """A scheduler that was there before, as that of another machine is, goes on after the study."""
+def test_workers_that_die_with_results_lose_no_trial(tmp_path: Path) -> None:
+    """First both, when they have the results of all trials and one was fetched; then one, at random instants, also
+    while it starts.
+    """
+    rng, killed = np.random.default_rng(1), list[int]()
+    with connected(2, None) as client:
+        cluster = client.cluster
+
+        def kill(most: int) -> None:
+            there = [worker.pid for worker in list(cluster.workers.values()) if worker.pid]
+            for pid in rng.permutation(there)[:most].tolist():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                    killed.append(pid)
+
+        def wait(state: str, there: bool) -> None:
+            end = time.monotonic() + 30.0
+            while any(task.state == state for task in list(cluster.scheduler.tasks.values())) is not there:
+                assert time.monotonic() < end, state
+                time.sleep(0.01)
+
+        def tick(progress: Progress) -> None:
+            if progress.done == 1 and not case:
+                wait("processing", False)
+                wait("memory", True)
+                kill(2)
+                wait("memory", False)
+
+        for case in range(1 + repeats(2)):
+            seeds = 40 if case else 8
+            accident = threading.Timer(0.4 * rng.random(), kill, [min(case, 1)])
+            (tmp_path / str(case)).mkdir()
+            study = Study(scenario=SQUARES, parameters={"base": 2}, seeds=seeds, metrics=["square"])
+            with Kept(tmp_path / str(case), study) as kept:
+                accident.start()
+                progress = carry_out(kept, address=cluster.scheduler_address, tick=tick)
+                accident.join()
+                assert (progress.done, progress.failed) == (seeds, 0), case
+                assert kept.table()["square"] == [4.0 + seed for seed in range(seeds)], case
+        assert len(killed) > repeats(2) // 2
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_cluster_by_its_address(tmp_path: Path, lost: bool) -> None:
+    """A scheduler that was there before, as that of another machine is, goes on after the study; where it is lost, the
+    study ends and keeps what it has.
+    """
     study = Study(scenario=SQUARES, parameters={"base": 2}, seeds=8, metrics=["square"])
     with (
         distributed.LocalCluster(
@@ -116,6 +167,16 @@ def test_a_cluster_by_its_address(tmp_path: Path) -> None:
         ) as cluster,
         Kept(tmp_path, study) as kept,
     ):
+
+        def tick(progress: Progress) -> None:
+            if lost and progress.done == 2:
+                cluster.close()
+
+        if lost:
+            with pytest.raises(SolverError, match="the scheduler was lost"):
+                carry_out(kept, address=cluster.scheduler_address, tick=tick)
+            assert len(kept.table()["square"]) == 2
+            return
         progress = carry_out(kept, address=cluster.scheduler_address)
         assert (progress.done, progress.failed) == (8, 0)
         assert kept.table()["square"] == [4.0 + seed for seed in range(8)]

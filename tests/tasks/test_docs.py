@@ -6,11 +6,15 @@ import re
 import shutil
 from pathlib import Path
 
+import casadi as ca
+import numpy as np
 import pytest
 
 from wbc import pages
-from wbc.pages import docstring, folder
-from wbc.tasks import EndEffector, Hold, Task
+from wbc.pages import docstring, example, folder
+from wbc.pages.docstring import PageError
+from wbc.stack.layout import Layout
+from wbc.tasks import EndEffector, Hold, LineContact, RollingContact, SurfaceContact, Task
 
 pytestmark = pytest.mark.usefixtures("loaded_once")
 
@@ -42,6 +46,32 @@ def test_every_page_is_about_an_item() -> None:
 
 def test_every_item_has_a_page_with_an_example_and_nothing_is_stale() -> None:
     assert pages.stale(PAGES) == [], "run make docs"
+
+
+def test_the_gain_that_a_page_states_is_the_first_value() -> None:
+    seen = 0
+    for cls in pages.shipped().values():
+        if issubclass(cls, Task):
+            stack, entry = example.find(cls, pages.page_name(cls), (PAGES / pages.page_name(cls)).read_text())
+            slot = Layout(stack).blocks[entry.name].slots.get("gain")
+            if slot is not None and entry.item.gain is None:
+                seen += 1
+                assert slot.input.default == cls.default_gain, cls.__name__
+    assert seen > 8
+
+
+@pytest.mark.parametrize("cls", [SurfaceContact, LineContact, RollingContact])
+def test_the_friction_of_a_page_is_that_of_the_rows(cls: type[SurfaceContact]) -> None:
+    """The largest f_x that the rows allow beside f_z = 1 and nothing else."""
+    page = (PAGES / pages.page_name(cls)).read_text()
+    item = example.find(cls, pages.page_name(cls), page)[1].item
+    cone = item.cone({"friction": ca.SX(0.6), "least": ca.SX(0.0), "most": ca.SX(1e3)})
+    matrix, lower = (np.array(ca.DM(part)) for part in (cone.matrix, cone.lower))
+    along, pressing = matrix[1:, 0], matrix[1:, 2]
+    most = min(-pressing[k] / along[k] for k in np.flatnonzero(along < 0.0))
+    assert not lower.any()
+    assert most == pytest.approx(0.6 / np.sqrt(2.0))
+    assert "mu = friction / sqrt(2)" in page
 
 
 @pytest.fixture
@@ -78,6 +108,12 @@ def test_text_outside_the_marks_is_left_alone(copy: Path) -> None:
     page.write_text(marked.replace("# Hold", "# Hold fast"))
     assert "hold.md" in pages.update(copy)
     assert page.read_text() == before.replace("# Hold", "# Hold fast")
+
+
+def test_a_docstring_that_states_another_default_is_refused(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(EndEffector, "__doc__", str(EndEffector.__doc__).replace("Default 0.", "Default 1."))
+    with pytest.raises(PageError, match="its default is 1, and it is 0"):
+        pages.stale(copy)
 
 
 @pytest.mark.parametrize(

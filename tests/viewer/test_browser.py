@@ -101,6 +101,10 @@ def test_the_hand_is_dragged_stopped_and_looked_back_at(loop: Loop) -> None:
     with Chromium(SIZE) as browser:
         page = browser.open(loop.viewer.url)
         page.wait("wbc.state && wbc.operator === wbc.me", 60.0)
+        # It draws by software, so pictures may take long however short the silence
+        patience = "(() => { const was = wbc.hello.silence; wbc.hello.silence = 1.0; const found = wbc.patience();"
+        patience += " wbc.hello.silence = was; return [wbc.software, found]; })()"
+        assert page.evaluate(patience) == [True, 20000]
         page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')", 60.0)
         # The robot is seen where it is: its links are not of the colour of what is behind them, as at the view's edge
         until, seen = time.monotonic() + 60.0, 0.0

@@ -68,7 +68,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any, count: int, sing
     """
     value, size = taken(value), inputs.size(robot, declared)
     if declared.kind == "pose":
-        return _poses(field, value, count)
+        return _poses(robot, field, declared, value, count)
     if inputs.is_plain(declared):
         return rows(field, value, count, size)
     given = validation.real_array(field, value, finite=False)
@@ -84,15 +84,17 @@ def flat(robot: Robot, field: str, declared: Input, value: Any, count: int, sing
     return out
 
 
-def _poses(field: str, value: Any, count: int) -> Array:
+def _poses(robot: Robot, field: str, declared: Input, value: Any, count: int) -> Array:
     """Poses as 12 numbers: a rotation by columns, then a position."""
     if not (isinstance(value, np.ndarray) and value.shape == (count, 4, 4)):
         pairs = isinstance(value, tuple) and len(value) == 2
-        if isinstance(value, pin.SE3) or pairs or not hasattr(value, "__len__") or np.shape(value) == (4, 4):
-            return np.broadcast_to(validation.pose_numbers(field, value), (count, 12))
+        one = {"position": (3,), "orientation": (3, 3)}.get(declared.part, (4, 4))
+        single = isinstance(value, pin.SE3) or pairs or not hasattr(value, "__len__")
+        if single or _shape(value) in ((4, 4), one):
+            return np.broadcast_to(inputs.flat(robot, field, declared, value), (count, 12))
         if len(value) != count:
             raise ShapeError(field, value, f"expected one pose, or {count}; there are {len(value)}")
-        return np.stack([validation.pose_numbers(f"{field}[{k}]", pose) for k, pose in enumerate(value)])
+        return np.stack([inputs.flat(robot, f"{field}[{k}]", declared, pose) for k, pose in enumerate(value)])
     matrices = validation.real_array(field, value, finite=False)
     with np.errstate(invalid="ignore", over="ignore"):
         R = matrices[:, :3, :3]
@@ -102,6 +104,15 @@ def _poses(field: str, value: Any, count: int) -> Array:
     _refuse_first(~fine, lambda k: validation.pose_numbers(f"{field}[{k}]", matrices[k]))
     # Columns of the rotation, then the position
     return np.ascontiguousarray(matrices[:, :3].transpose(0, 2, 1)).reshape(count, 12)
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    """Shape of an array of numbers; () of poses that are no arrays, or are not written alike."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return ()
+    return () if array.dtype == object else array.shape
 
 
 def _refuse_first(wrong: np.ndarray, single: Callable[[int], object]) -> None:

@@ -19,6 +19,8 @@ from wbc.viewer.presets import PRESETS, playground
 
 #: Of the walker on its structure, which is more than a stack
 CLIMB = "climb"
+#: Nothing real moves, so slow machines may be silent for long [s]
+SILENCE = 10.0
 
 
 def play(
@@ -32,6 +34,10 @@ def play(
     zeromq: Annotated[
         str, typer.Option(help="Take messages over ZeroMQ as well, at an address such as tcp://127.0.0.1:5555.")
     ] = "",
+    silence: Annotated[
+        float,
+        typer.Option(help="The robot stops where the page, or the viewer, gives no sign of life for so long [s]."),
+    ] = SILENCE,
     seconds: viewing.Seconds = None,
     backend: Backend = "auto",
 ) -> None:
@@ -61,6 +67,7 @@ def play(
             port=port,
             open_browser=browser,
             zeromq=zeromq,
+            silence=silence,
             announce=viewing.announce,
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from wbc import record, validation
-from wbc.cli.console import err, out
+from wbc.cli.console import OutputError, err, out
 from wbc.cli.session import RECORDING, STRIDE
 
 #: Exit code of a replay whose commands are not those of the recording
@@ -26,6 +27,9 @@ def replay(
     trust: Annotated[
         bool, typer.Option("--trust", help="Run code from the recording: items and functions that are not wbc's.")
     ] = False,
+    table: Annotated[
+        Path | None, typer.Option(help="Write the recording as CSV: times, joints, residuals, margins and inputs.")
+    ] = None,
 ) -> None:
     """Do the ticks of a recording again and compare every bit of their commands.
 
@@ -34,6 +38,8 @@ def replay(
     """
     validation.one_of("backend", backend, BACKENDS)
     recording = record.Recording(run / RECORDING if run.is_dir() else run)
+    if table is not None:
+        save_table(recording, table)
     console = err()
     bar = Progress(
         TextColumn("replaying"),
@@ -60,6 +66,22 @@ def replay(
         console.print("[yellow]note[/yellow]: the recording was not closed; its last ticks may be missing")
     if not found.identical:
         raise typer.Exit(DIFFERS)
+
+
+def save_table(recording: record.Recording, file: Path) -> None:
+    """A row a tick; the head has the units.
+
+    Raises:
+        OutputError: there is such a file, or it cannot be written. RecordingError: of an older version.
+    """
+    columns, units = recording.table(), recording.units
+    try:
+        with file.open("x", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(f"{name} [{units[name]}]" if name in units else name for name in columns)
+            writer.writerows(zip(*columns.values(), strict=True))
+    except OSError as error:
+        raise OutputError("table", str(file), f"cannot be written: {error.strerror}") from error
 
 
 def report(recording: record.Recording, found: record.Replay) -> None:

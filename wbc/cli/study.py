@@ -63,7 +63,12 @@ def study(
             if value is not None:
                 raise RangeError(option, value, "--resume goes on with the study of its folder as it was asked for")
         if not (resume / STUDY).is_file():
-            raise RobotFileError("resume", str(resume), "holds no study")
+            there = validation.exists("resume", resume)
+            raise RobotFileError(
+                "resume",
+                str(resume),
+                "holds no study" if there else validation.no_such(resume, "there is no such folder"),
+            )
         asked, folder = Study.read(resume / STUDY), resume
     else:
         assert what is not None

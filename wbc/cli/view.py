@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pathlib
 import threading
 import webbrowser
@@ -10,10 +11,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from wbc import robots
+from wbc import robots, validation
 from wbc.cli import viewing
 from wbc.cli.console import err, out
+from wbc.errors import UnknownNameError, nearest
 from wbc.record.recording import Recording
+from wbc.robot import Robot
 from wbc.viewer import run
 from wbc.viewer.beside import require_viser, token_for
 from wbc.viewer.errors import ViewerError
@@ -40,6 +43,8 @@ def view(
     """Show a robot with its joints on sliders, or a run with its time on one."""
     require_viser()
     path = pathlib.Path(what)
+    if not validation.exists("what", what) and (path.name != what or path.suffix):
+        raise ViewerError("what", what, validation.no_such(what, "there is no such file or folder"))
     recording = recording_in(path) if path.is_dir() or path.suffix == ".npz" else None
     if path.is_dir() and recording is None:
         page = path / REPLAY
@@ -50,9 +55,10 @@ def view(
             webbrowser.open(page.resolve().as_uri())
         return
     if recording is None:
+        robot = _robot(what)
         if export is not None:
             raise ViewerError("export", what, "only runs are exported; this is a robot")
-        chosen = of_robot(robots.load(what))
+        chosen = of_robot(robot)
         err().print(escape(chosen.about), soft_wrap=True)
         with viewing.until_interrupted():
             controller = chosen.stack.compile(backend="vm")
@@ -73,3 +79,15 @@ def view(
         threading.Timer(seconds, session.ended.set).start()
     with viewing.until_interrupted():
         session.run()
+
+
+def _robot(what: str) -> Robot:
+    """The robot of a name or a file; a name that is none may be that of something here."""
+    try:
+        return robots.load(what)
+    except UnknownNameError as error:
+        if error.field != "robot":
+            raise
+        near = nearest(what, [*error.choices, *os.listdir()])
+        reason = f"no robot has this name, and there is no such file or folder; did you mean {near[0]!r}?"
+        raise ViewerError("what", what, reason, near) from None

@@ -28,10 +28,6 @@ log = logging.getLogger("wbc")
 _COMPILED: weakref.WeakKeyDictionary[Controller, weakref.ref[Stack]] = weakref.WeakKeyDictionary()
 
 
-#: What :meth:`Stack.solve` hands on to :meth:`wbc.InverseKinematics.solve`
-OPTIONS = ("seed", "budget", "restarts", "tolerance")
-
-
 def base_is_free(stack: Declaration) -> bool:
     """A base that moves, and no item says how fast: no limit of its velocity, and nothing that holds the robot."""
     robot = stack.robot
@@ -128,25 +124,21 @@ class Stack(Declaration):
         q0: Any,
         targets: Mapping[str, Any] | None = None,
         *,
+        seed: int = 0,
+        budget: float | None = 0.005,
+        restarts: int = 100,
+        tolerance: float = 1e-5,
         goals: Iterable[str] | None = None,
         backend: str = "auto",
-        **options: Any,
     ) -> Solution:
         """One configuration that meets the tasks: :meth:`inverse_kinematics` and its ``solve`` in one.
 
         Args:
-            q0: where the search begins [nq].
-            targets: name of a task -> its ``target``; others stay where q0 has them.
+            q0, targets, seed, budget, restarts, tolerance: as for :meth:`wbc.InverseKinematics.solve`.
             goals, backend: as for :meth:`inverse_kinematics`.
-            options: ``seed``, ``budget``, ``restarts`` and ``tolerance`` of :meth:`wbc.InverseKinematics.solve`.
 
         Raises:
             WbcError: as these two.
         """
-        chosen = {} if targets is None else validation.mapping("targets", targets, "tasks to targets")
-        for option in options:
-            validation.one_of("option", option, OPTIONS)
         kinematics = self.inverse_kinematics(goals, backend)
-        for name, target in chosen.items():
-            kinematics[name].target = target
-        return kinematics.solve(q0, **options)
+        return kinematics.solve(q0, targets, seed=seed, budget=budget, restarts=restarts, tolerance=tolerance)

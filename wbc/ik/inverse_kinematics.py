@@ -24,6 +24,7 @@ from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
 from wbc.ik.solution import Batch, Ending, Solution
 from wbc.ik.timeless import TICK
 from wbc.stack.declaration import Declaration
+from wbc.validation import Array
 
 #: Share of the time that is kept for the question which goals contradict each other
 ASKING = 0.2
@@ -38,6 +39,7 @@ class InverseKinematics(Handles):
         kinematics = stack.inverse_kinematics()
         kinematics["hand"].target = pose             # targets that nobody sets are taken from q0
         solution = kinematics.solve(q0)
+        solution = kinematics.solve(q0, {"hand": pose})     # of this search alone
 
     A search makes Newton steps on the rows of the controller, with gains of one step, no limits of speed, and a damping
     that falls with the error, from q0 and then from random configurations, until the goals are met and the constraints
@@ -61,6 +63,7 @@ class InverseKinematics(Handles):
     def solve(
         self,
         q0: Any,
+        targets: Mapping[str, Any] | None = None,
         *,
         seed: int = 0,
         budget: float | None = 0.005,
@@ -71,6 +74,7 @@ class InverseKinematics(Handles):
 
         Args:
             q0: where the search begins [nq]; what lies outside the position limits is moved to them.
+            targets: name of a task -> its ``target`` in this search; others are what is set, or taken from q0.
             seed: of the random configurations. The answer is a function of q0, the run-time values, the seed and the
                 number of restarts, unless the time ends the search.
             budget: time for the search [s], overrun by one iteration and the report of the answer at most; None: no
@@ -79,11 +83,29 @@ class InverseKinematics(Handles):
             tolerance: of every row of a goal, in metres and radians.
 
         Raises:
-            ShapeError, NotFiniteError, RotationError, RangeError: bad input.
+            UnknownNameError, ShapeError, NotFiniteError, RotationError, RangeError: bad input.
         """
-        engine, goals = self._engine, self.goals
+        engine = self._engine
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
+        given = {} if targets is None else validation.mapping("targets", targets, "tasks to targets")
+        wanted = [self._target(name, (target,)) for name, target in given.items()]
         first = engine.begin(q0)
+        before = engine.tick.p.copy()
+        try:
+            for span, (numbers,) in wanted:
+                engine.tick.p[span] = numbers
+            return self._solved(first, seconds, near, starts, number)
+        finally:
+            engine.tick.p[:] = before
+
+    def _target(self, name: str, values: Sequence[Any]) -> tuple[slice, list[Array]]:
+        """Where the target of a task is among the run-time values, and its numbers for each of several values."""
+        handle = self._engine.controller[name]
+        return handle.slot("target").span, [handle.checked("target", value) for value in values]
+
+    def _solved(self, first: Array, seconds: float, near: float, starts: int, number: int) -> Solution:
+        """The search of :meth:`solve` with the run-time values as they are."""
+        engine, goals = self._engine, self.goals
         query = engine.query(goals, near, starts, number)
         found = engine.run(first, query, seconds * (1.0 - ASKING if len(goals) > 1 else 1.0))
         # Rounding of the last tick may pass a limit by its last digit
@@ -137,10 +159,7 @@ class InverseKinematics(Handles):
         total = next(iter(lengths.values()))
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
         proofs = not validation.flag("nearest", nearest)
-        checked = []
-        for name, values in wanted.items():
-            handle = controller[name]
-            checked.append((handle.slot("target").span, [handle.checked("target", value) for value in values]))
+        checked = [self._target(name, values) for name, values in wanted.items()]
         # Nothing else is refused: from here on targets that wait are taken from q0
         first = engine.begin(q0)
         parameters = np.tile(engine.tick.p, (total, 1))

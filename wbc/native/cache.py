@@ -20,6 +20,8 @@ import pathlib
 import shutil
 import stat
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator
 
 import platformdirs
@@ -27,6 +29,8 @@ import platformdirs
 log = logging.getLogger("wbc")
 
 MANIFEST = "manifest.json"
+#: Who waits longer for compiled code is told so [s]
+SLOW = 5.0
 
 
 def root() -> pathlib.Path:
@@ -35,11 +39,14 @@ def root() -> pathlib.Path:
     return pathlib.Path(chosen) if chosen else pathlib.Path(platformdirs.user_cache_dir("wbc"))
 
 
-def fetch(name: str, build: Callable[[pathlib.Path], None], *, library: bool = False) -> tuple[pathlib.Path, bool]:
+def fetch(
+    name: str, build: Callable[[pathlib.Path], None], *, library: bool = False, what: str = "C code", advice: str = ""
+) -> tuple[pathlib.Path, bool]:
     """Folder of entry ``name``, and whether it was there; ``build(folder)`` fills a new one.
 
     Args:
         library: files of the entry will be loaded as code, so its file system must allow that.
+        what, advice: what is built, and what spares the wait, for the log where it takes long.
     """
     base = root()
     problem = _problem(base, name, library)
@@ -48,7 +55,7 @@ def fetch(name: str, build: Callable[[pathlib.Path], None], *, library: bool = F
     final = base / name
     if _valid(final):
         return final, True
-    with _locked(base / f".{name}.lock"):
+    with _told_when_slow(what, advice), _locked(base / f".{name}.lock"):
         if _valid(final):  # another process has built it in the meantime
             return final, True
         if os.path.lexists(final):
@@ -61,6 +68,29 @@ def fetch(name: str, build: Callable[[pathlib.Path], None], *, library: bool = F
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
     return final, False
+
+
+@contextlib.contextmanager
+def _told_when_slow(what: str, advice: str) -> Iterator[None]:
+    """A line in the log after :data:`SLOW`, twice that and so on, and one at the end where there was one before."""
+    began, ended, told = time.monotonic(), threading.Event(), threading.Event()
+
+    def tell() -> None:
+        due = SLOW
+        while not ended.wait(due - (time.monotonic() - began)):
+            told.set()
+            log.warning(
+                "compiling %s: %.0f s so far; it is kept for the next time%s", what, due, advice and f"; {advice}"
+            )
+            due *= 2.0
+
+    threading.Thread(target=tell, name="compiling", daemon=True).start()
+    try:
+        yield
+    finally:
+        ended.set()
+        if told.is_set():
+            log.warning("compiling %s ended after %.0f s", what, time.monotonic() - began)
 
 
 def clear() -> int:

@@ -44,6 +44,7 @@ TYPES = {
 }
 #: Where a text on an input says its first value; the column of defaults has it then
 DEFAULT = re.compile(r"[.;]? Default:? ((?:[^.]|\.(?=\S))*)\.?")
+STATED = re.compile(r"-?\d+(?:\.\d+)?")
 #: Inputs that every item has, or every one of a form
 COMMON = {
     "gain": "the error decays like exp(-gain t) where nothing hinders it",
@@ -156,11 +157,14 @@ def _first_value(cls: type[Item], declared: Input, meaning: str) -> tuple[str, s
     """(meaning without its words on the default, default)."""
     said = DEFAULT.search(meaning)
     rest = _without_stop(DEFAULT.sub("", meaning))
+    number = _number(declared)
+    if said and STATED.fullmatch(said.group(1)) and float(said.group(1)) != float(number or "nan"):
+        reason = f"the docstring says that its default is {said.group(1)}, and it is {number or declared.default}"
+        raise PageError(f"{cls.__name__}.__doc__", declared.name, reason)
     if declared.name in inspect.signature(cls).parameters:
         return _without_stop(meaning), f"field `{declared.name}`"
     if declared.default is None:
         return rest, said.group(1) if said else "at the first step"
-    number = _number(declared)
     return rest, number if number or said is None else said.group(1)
 
 

@@ -32,6 +32,8 @@ def recorded_inputs(layout: Layout) -> tuple[str, ...]:
     return INPUTS if layout.command == "velocity" else (*INPUTS, "kept")
 
 
+#: Of the report, besides the command and how the tick ended: what is told of it, but not compared by a replay
+TOLD = ("error", "margin")
 #: In place of a number of resets: what the solver remembers is not what was recorded
 UNKNOWN = -1
 #: The part ``reset`` of a tick
@@ -67,6 +69,9 @@ class Recorder:
         if layout.variables > layout.nv:
             sizes["others"] = layout.variables - layout.nv
         sizes["flag"] = 1
+        told = [self._tick.report[core.context.memory[name]] for name in TOLD]
+        sizes |= {name: part.size for name, part in zip(TOLD, told, strict=True)}
+        self._told = [part.data.cast("B") for part in told if part.size]
         self._given = [view.data.cast("B") for view in views.values() if view.size]
         # the report begins with the command and the flag
         self._command = self._tick.report.data.cast("B")[: 8 * (layout.variables + 1)]
@@ -156,7 +161,7 @@ def _recorded(recorder: Recorder) -> int:
     if flag < 0:
         recorder._seen = seen
         return flag
-    recorder._rows.append(b"".join((given, WARM if resets == seen else COLD, recorder._command)))
+    recorder._rows.append(b"".join((given, WARM if resets == seen else COLD, recorder._command, *recorder._told)))
     recorder._seen = resets
     recorder.count += 1
     if len(recorder._rows) >= recorder._chunk:
@@ -187,6 +192,33 @@ def about(controller: Controller) -> dict[str, Any]:
         "policy": [controller.policy.conflict, list(controller.policy.chain)],
         "versions": {name: metadata.version(name) for name in PACKAGES},
         "machine": f"{platform.system()} {platform.machine()}",
+        "command": controller.stack.command,
+        "names": names(controller),
+    }
+
+
+def names(controller: Controller) -> dict[str, Any]:
+    """What the numbers of a tick are: [name, unit] of each coordinate, command and other variable; [item, row, unit] of
+    each residual and margin; [item, input, first, end, unit] of each input, which are places in ``p``.
+    """
+    layout, robot = core_of(controller).layout, controller.stack.robot
+    model, units = robot.model, robot.dof_units
+    coordinates = list[list[str]]()
+    for name, size, first in zip(model.names[1:], model.nqs[1:], model.idx_vs[1:], strict=True):
+        single = [[name, units[first]]]
+        coordinates += single if size == 1 else [[f"{name}.{k}", ""] for k in range(size)]
+    each = "/s" if layout.command == "velocity" else "/s^2"
+    return {
+        "q": coordinates,
+        "v": [[name, unit + each] for name, unit in zip(robot.dof_names, units, strict=True)],
+        "others": [layout.variable(k) for k in range(layout.nv, layout.variables)],
+        "error": [[b.entry.name, row.label, row.unit] for b in layout.of_form("task") for row in b.rows],
+        "margin": [[b.entry.name, row.label, row.unit] for b in layout.of_form("margins") for row in b.rows],
+        "inputs": [
+            [name, slot.input.name, slot.span.start, slot.span.stop, slot.input.unit]
+            for name, block in layout.blocks.items()
+            for slot in block.slots.values()
+        ],
     }
 
 

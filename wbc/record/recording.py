@@ -28,10 +28,12 @@ from typing import IO, Any
 import numpy as np
 
 from wbc import validation
+from wbc.controller.outcome import STATUSES
 from wbc.errors import WbcError
 from wbc.validation import Array
 
-FORMAT = 2
+#: Of what is written, and of what is read: 2 has no names, residuals and margins
+FORMAT, READ = 3, (2, 3)
 #: Bytes of a chunk, and the ticks that it has at least and at most
 CHUNK, FEWEST, MOST = 1 << 18, 16, 1024
 #: Head of a member, and the length of the end of the directory
@@ -113,7 +115,9 @@ class Recording:
     """A recording that was read.
 
         recording = wbc.Recording("run.npz")
-        recording["q"], recording["v"], recording["p"]         ticks x numbers
+        recording.time, recording["q"], recording["v"]         ticks x numbers
+        recording.residuals["hand"], recording.margins["ball"], recording.inputs["hand.target"]
+        recording.table()                                      a column a number, as for pandas.DataFrame
 
     Attributes:
         about: what ``about.json`` says.
@@ -135,10 +139,9 @@ class Recording:
                 break
         if "format" not in self.about:
             raise RecordingError("recording", str(self.path), "this file is no recording of ticks")
-        if self.about["format"] != FORMAT:
-            raise RecordingError(
-                "recording", self.about["format"], f"is of another format, this version reads {FORMAT}"
-            )
+        if self.about["format"] not in READ:
+            known = " and ".join(map(str, READ))
+            raise RecordingError("recording", self.about["format"], f"is of another format, this version reads {known}")
         self.parts = Columns.of(self.about["sizes"])
 
     @property
@@ -168,9 +171,105 @@ class Recording:
             rows[:, columns] = values.reshape(count, varying)
             yield rows
 
+    @property
+    def time(self) -> Array:
+        """When each tick began, from the first one on, as the sum of what their commands were for [s]."""
+        dt = self["dt"][:, 0]
+        return np.concatenate([np.zeros(min(1, dt.size)), np.cumsum(dt[:-1])])
+
+    @property
+    def status(self) -> tuple[str, ...]:
+        """How each tick ended."""
+        return tuple(str(STATUSES[int(flag)]) for flag in self["flag"][:, 0])
+
+    @property
+    def residuals(self) -> dict[str, Array]:
+        """Name of a task -> its error before each tick, ticks x rows, in the units of :attr:`units`.
+
+        Raises:
+            RecordingError: as of :meth:`names`.
+        """
+        return self._by_item("error")
+
+    @property
+    def margins(self) -> dict[str, Array]:
+        """Name of a constraint with margins -> these before each tick, ticks x rows; at least 0 where they are kept.
+
+        Raises:
+            RecordingError: as of :meth:`names`.
+        """
+        return self._by_item("margin")
+
+    @property
+    def inputs(self) -> dict[str, Array]:
+        """``"hand.target"`` and all other run-time inputs -> what they were in each tick, ticks x numbers; a pose is
+        its rotation by columns, then its position.
+
+        Raises:
+            RecordingError: as of :meth:`names`.
+        """
+        places, p = self.names("inputs"), self["p"]
+        return {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column of :meth:`table` that has one.
+
+        Raises:
+            RecordingError: as of :meth:`names`.
+        """
+        return {"time": "s"} | {name: unit for name, unit, _, _ in self._columns() if unit}
+
+    def table(self) -> dict[str, Array | tuple[str, ...]]:
+        """All that a reader asks for, name of a column -> one entry a tick: ``time``, ``status``, ``dt``, ``q.JOINT``,
+        the command (``v.JOINT``, or ``a.JOINT``), ``residual.TASK.ROW``, ``margin.CONSTRAINT.ROW``, and
+        ``TASK.INPUT``, with ``.0``, ``.1``, ... where it has several numbers.
+
+        Raises:
+            RecordingError: as of :meth:`names`.
+        """
+        parts: dict[str, Array] = {}
+        out: dict[str, Array | tuple[str, ...]] = {"time": self.time, "status": self.status}
+        for name, _, part, place in self._columns():
+            if part not in parts:
+                parts[part] = self[part]
+            out[name] = parts[part][:, place]
+        return out
+
+    def names(self, part: str) -> list[list[Any]]:
+        """What ``about.json`` says of the numbers of a part.
+
+        Raises:
+            RecordingError: the recording is of an older version, which kept no names, residuals and margins.
+        """
+        if "names" not in self.about:
+            reason = "has no names, residuals and margins, as older versions kept none; wbc.record.replayed gives them"
+            raise RecordingError("recording", self.about["format"], reason)
+        found: list[list[Any]] = self.about["names"][part]
+        return found
+
+    def _columns(self) -> Iterator[tuple[str, str, str, int]]:
+        """(column, unit, part, place in it) of the numbers of :meth:`table`."""
+        yield "dt", "s", "dt", 0
+        own = {"q": "q.", "v": "v." if self.about.get("command") == "velocity" else "a.", "others": ""}
+        for part, prefix in own.items():
+            for place, (name, unit) in enumerate(self.names(part)):
+                yield f"{prefix}{name}", unit, part, place
+        for part, prefix in (("error", "residual"), ("margin", "margin")):
+            for place, (item, row, unit) in enumerate(self.names(part)):
+                yield f"{prefix}.{item}.{row}", unit, part, place
+        for item, name, start, stop, unit in self.names("inputs"):
+            for place in range(start, stop):
+                yield f"{item}.{name}" + (f".{place - start}" if stop - start > 1 else ""), unit, "p", place
+
+    def _by_item(self, part: str) -> dict[str, Array]:
+        rows, numbers = self.names(part), self[part]
+        return {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows}
+
     def __getitem__(self, name: str) -> Array:
         """A part of every tick: ``q``, ``v_last``, ``v_in``, ``use_v``, ``dt``, ``p``, ``weight``, ``enabled``,
-        ``bound_enabled``, ``reset`` (1: the solver had forgotten its active set), ``v`` (the command), ``flag``.
+        ``bound_enabled``, ``reset`` (1: the solver had forgotten its active set), ``v`` (the command), ``flag``,
+        ``error`` and ``margin`` (of all rows).
 
         Raises:
             UnknownNameError: no such part.
@@ -184,7 +283,8 @@ class Recording:
         try:
             file = self.path.open("rb")
         except OSError as error:
-            raise RecordingError("recording", str(self.path), f"cannot be read: {error.strerror}") from error
+            reason = validation.no_such(self.path, f"cannot be read: {error.strerror}")
+            raise RecordingError("recording", str(self.path), reason) from error
         with file:
             while len(head := file.read(_LOCAL.size)) == _LOCAL.size:
                 mark, _, _, method, _, _, check, size, plain, name_size, extra = _LOCAL.unpack(head)

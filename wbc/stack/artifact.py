@@ -83,7 +83,9 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
         toolchain.compile_tick(codegen.sources(stack, layout, program), folder / "tick.so", search)
 
     built_by = toolchain.identity() + ("\nsearch" if search else "")
-    folder, cached = cache.fetch(key(stack, version, built_by), fill, library=True)
+    folder, cached = cache.fetch(
+        key(stack, version, built_by), fill, library=True, what=_said(stack), advice="backend='vm' is ready sooner"
+    )
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
@@ -96,7 +98,11 @@ def _virtual(stack: Declaration, layout: Layout, version: str, compiled: bool) -
         for name, function in made.items():
             function.save(str(folder / f"{name}.casadi"))
 
-    folder, cached = cache.fetch(key(stack, version, "vm"), fill)
+    folder, cached = cache.fetch(key(stack, version, "vm"), fill, what=_said(stack))
     saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
     return Artifact(layout, None, functions, cached, compiled)
+
+
+def _said(stack: Declaration) -> str:
+    return f"a stack of {len(stack.entries)} items on {stack.robot.name}"

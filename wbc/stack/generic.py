@@ -129,7 +129,11 @@ def library(variant: Variant) -> pathlib.Path:
         raise CompileError("compiler", toolchain.compiler(), f"cannot compile: {', '.join(toolchain.missing())}")
     said = "\n".join((*files.values(), toolchain.identity(), "generic"))
     name = hashlib.sha256(said.encode()).hexdigest()
-    folder, _ = cache.fetch(name, lambda place: toolchain.compile_generic(files, place / "generic.so"), library=True)
+
+    def fill(place: pathlib.Path) -> None:
+        toolchain.compile_generic(files, place / "generic.so")
+
+    folder, _ = cache.fetch(name, fill, library=True, what="the tick, once for all stacks")
     return folder / "generic.so"
 
 

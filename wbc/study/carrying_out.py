@@ -92,8 +92,9 @@ def _on_cluster(
 ) -> Iterator[tuple[Trial, Done]]:
     """In the order in which they end. A trial whose worker is lost is done by another one."""
     waiting = iter(trials)
-    with _client(workers, address) as client:
-        from distributed import as_completed
+    with connected(workers, address) as client:
+        from distributed import CancelledError, as_completed
+        from distributed.client import ClosedClientError
 
         running: dict[Any, Trial] = {}
         ended = as_completed()
@@ -104,21 +105,34 @@ def _on_cluster(
                 running[future] = trial
                 ended.add(future)
 
-        for _ in range(AHEAD * max(1, sum(client.nthreads().values()))):
-            submit()
-        for future in ended:
-            trial = running.pop(future)
-            submit()
-            if future.status == "finished":
-                yield trial, future.result()
-            elif future.status == "error":
-                yield trial, Done({}, f"{type(future.exception()).__name__}: {future.exception()}")
-            else:
-                raise SolverError("address", address, f"the cluster was lost; a trial is {future.status}")
+        try:
+            for _ in range(AHEAD * max(1, sum(client.nthreads().values()))):
+                submit()
+            for future in ended:
+                # A worker that dies takes results with it, which another one computes again
+                if future.status in ("lost", "pending"):
+                    ended.add(future)
+                    continue
+                trial, done = running.pop(future), _done(future)
+                submit()
+                yield trial, done
+        except (CancelledError, ClosedClientError, OSError) as error:
+            raise SolverError("address", address, f"the scheduler was lost: {error}") from error
+
+
+def _done(future: Any) -> Done:
+    """What came of a trial on a cluster, or why no worker could bring it to its end."""
+    try:
+        done: Done = future.result()
+    except Exception as error:
+        if future.status != "error":
+            raise
+        done = Done({}, f"{type(error).__name__}: {error}")
+    return done
 
 
 @contextmanager
-def _client(workers: int | None, address: str | None) -> Iterator[Any]:
+def connected(workers: int | None, address: str | None) -> Iterator[Any]:
     """A client of a cluster, which is made and ended where no address is given."""
     try:
         import dask
@@ -143,4 +157,6 @@ def _client(workers: int | None, address: str | None) -> Iterator[Any]:
         count = validation.integer("workers", workers, 1, 1024)
         made = distributed.LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None)
         with made as cluster, distributed.Client(cluster) as client:
+            # A worker that is killed while it starts, or that is not back in 15 s, would be given up for good
+            cluster.adapt(minimum=count, maximum=count)
             yield client

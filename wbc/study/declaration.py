@@ -140,6 +140,8 @@ class Study:
         path = validation.file_path("study", path)
         try:
             content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except FileNotFoundError as error:
+            raise RobotFileError("study", str(path), validation.no_such(path)) from error
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
             raise RobotFileError("study", str(path), " ".join(str(error).split())) from error
         if not isinstance(content, dict):

@@ -36,7 +36,8 @@ class RateFile:
         try:
             lines = list(csv.reader(validation.file_path("path", path).read_text(encoding="utf-8").splitlines()))
         except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise RateFileError("path", str(path), f"cannot be read: {error}") from error
+            reason = validation.no_such(path, f"cannot be read: {error}")
+            raise RateFileError("path", str(path), reason) from error
         if not lines or tuple(cell.strip() for cell in lines[0]) != COLUMNS:
             raise RateFileError("line 1", lines[0] if lines else "", f"expected the columns {','.join(COLUMNS)}")
         for number, cells in enumerate(lines[1:], start=2):

@@ -108,7 +108,7 @@ def load(run: str | os.PathLike[str]) -> Log:
     """
     path = validation.file_path("run", run)
     if not validation.exists("run", path):
-        raise LogFileError("run", str(path), "there is no such file or folder")
+        raise LogFileError("run", str(path), validation.no_such(path, "there is no such file or folder"))
     if path.is_dir():
         found = [path / f"log.{kind}" for kind in FORMATS if (path / f"log.{kind}").is_file()]
         if not found:

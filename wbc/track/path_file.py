@@ -46,7 +46,8 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = "there is no such file" if isinstance(error, FileNotFoundError) else f"cannot be read: {error}"
+        missing = isinstance(error, FileNotFoundError)
+        reason = validation.no_such(path) if missing else f"cannot be read: {error}"
         raise PathFileError("path", str(path), reason) from error
     table = _from_csv(path, text) if path.suffix.lower() == ".csv" else _from_tables(path, text)
     if len(table) < 2:

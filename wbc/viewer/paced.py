@@ -8,7 +8,7 @@ from typing import Any
 
 from wbc.controller import Controller
 from wbc.simulation import Connection, Plant
-from wbc.viewer.beside import Viewer, show
+from wbc.viewer.beside import SILENT, Viewer, show
 
 
 def run(
@@ -21,6 +21,7 @@ def run(
     port: int = 0,
     open_browser: bool = True,
     token: str | None = None,
+    silence: float = SILENT,
     zeromq: str = "",
     announce: Any = None,
 ) -> None:
@@ -31,7 +32,7 @@ def run(
         q: configuration to begin at. seconds: None: without end.
         plant: what moves; default: a :class:`wbc.simulation.KinematicPlant`.
         announce: called with the :class:`wbc.viewer.Viewer` before the first tick.
-        host, port, open_browser, token, zeromq: as of :func:`wbc.viewer.show`.
+        host, port, open_browser, token, silence, zeromq: as of :func:`wbc.viewer.show`.
 
     Raises:
         ViewerError: as of :func:`wbc.viewer.show`. PlantError: as of :class:`wbc.simulation.Connection`.
@@ -40,7 +41,9 @@ def run(
     connection = Connection(plant, controller.stack.robot, dt)
     controller.reset(q)
     with (
-        show(controller, host=host, port=port, open_browser=open_browser, token=token, zeromq=zeromq) as viewer,
+        show(
+            controller, host=host, port=port, open_browser=open_browser, token=token, silence=silence, zeromq=zeromq
+        ) as viewer,
         connection,
     ):
         if announce is not None:

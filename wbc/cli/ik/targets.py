@@ -73,7 +73,7 @@ def read_targets(file: Path) -> list[Target]:
     try:
         rows = _from_csv(file) if file.suffix.lower() == ".csv" else _from_npz(file)
     except FileNotFoundError as error:
-        raise PathFileError("targets", str(file), "there is no such file") from error
+        raise PathFileError("targets", str(file), validation.no_such(file)) from error
     except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
         raise PathFileError("targets", str(file), f"cannot be read: {error}") from error
     if not rows:

@@ -124,7 +124,7 @@ def check_folder(folder: Path) -> None:
         WalkLogError, StructureFileError, RobotFileError: no run, or one that was ended before it walked.
     """
     if not validation.exists("run", folder) or not folder.is_dir():
-        raise WalkLogError("run", str(folder), "there is no such folder")
+        raise WalkLogError("run", str(folder), validation.no_such(folder, "there is no such folder"))
     log = WalkLog.load(folder)
     machine = log.meta.get("machine")
     report = check_run(folder, None if machine is None else rules_of(machine_made(machine)))

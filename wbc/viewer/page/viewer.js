@@ -6,7 +6,7 @@ const bare = query.has("bare"); // the scene alone, for pictures
 let me = Math.random().toString(36).slice(2, 12), hello = null, state = null, operator = "";
 let dragging = new Set(), told = 0, firstControl = true, rows = {};
 const seen = { states: 0, since: performance.now(), rate: 0 };
-window.wbc = { get state() { return state; }, get hello() { return hello; }, get operator() { return operator; }, get me() { return me; }, get open() { return open; }, seen, send, drop() { link.postMessage({ close: true }); } };
+window.wbc = { get state() { return state; }, get hello() { return hello; }, get operator() { return operator; }, get me() { return me; }, get open() { return open; }, get software() { return software; }, patience, seen, send, drop() { link.postMessage({ close: true }); } };
 
 function send(message) { link.postMessage({ text: JSON.stringify({ wbc: 1, ...message }) }); }
 function set(item, values) { send({ type: "set", item, values }); }
@@ -26,14 +26,25 @@ link.onmessage = (event) => {
   if (!open) { pill("no connection", "gone"); operator = ""; who(); }
 };
 link.postMessage({ address: `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/wbc/${me}` });
-setInterval(() => link.postMessage({}), 100);
+setInterval(() => link.postMessage({ patience: patience() }), 100);
 // One state a picture: what came in between is old
 let newest = null;
-function draw() { requestAnimationFrame(draw); if (newest) { const message = newest; newest = null; take(message); } }
+function draw() { requestAnimationFrame(draw); paced(); if (newest) { const message = newest; newest = null; take(message); } }
 requestAnimationFrame(draw);
 
+// Without a graphics card a picture takes up to seconds, in which nothing else runs here: that is slow, not silent
+const LONGEST = 20000, software = drawsBySoftware();
+let slowest = 0, drawn = performance.now();
+function drawsBySoftware() {
+  const gl = make("canvas").getContext("webgl");
+  const told = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  return !gl || /swiftshader|llvmpipe|softpipe|software|basic render/i.test(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
+function paced() { const now = performance.now(); slowest = Math.max(now - drawn, 0.98 * slowest); drawn = now; }
+function patience() { return Math.max(hello ? 2500 * hello.silence : LONGEST, software ? LONGEST : Math.min(4 * slowest, LONGEST)); }
+
 function take(message) {
-  if (message.type === "hello") { hello = message; link.postMessage({ patience: 2500 * hello.silence }); operator = message.operator; me = message.you; build(); }
+  if (message.type === "hello") { hello = message; operator = message.operator; me = message.you; build(); }
   else if (message.type === "state") { state = message; show(); }
   else if (message.type === "operator") { operator = message.name; who(); }
   else if (message.type === "refused") notice(message.reason);
@@ -85,6 +96,7 @@ function build() {
     $("arm").replaceChildren(make("option", { value: "" }, "the body"), ...hello.arms.map((name) => make("option", { value: name }, name)));
   }
   who();
+  if (software) notice(`This browser draws by software: pictures are few, and the robot is stopped only after ${patience() / 1000} s without one.`);
   const auto = hello.live && firstControl && operator === "" && !query.has("watch");
   if (auto) { firstControl = false; send({ type: "operate" }); }
   $("control").hidden = $("stop").hidden = !hello.live;

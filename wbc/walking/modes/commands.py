@@ -38,7 +38,8 @@ def read_numbers(path: str | os.PathLike[str], columns: Sequence[str]) -> Array:
     try:
         rows = _from_npz(file, columns) if file.suffix == ".npz" else _from_csv(file, columns)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, csv.Error) as error:
-        raise NumberTableError("file", str(path), f"cannot be read: {error}") from error
+        reason = validation.no_such(path, f"cannot be read: {error}")
+        raise NumberTableError("file", str(path), reason) from error
     if not len(rows):
         raise NumberTableError("file", str(path), "there are no rows")
     bad = np.argwhere(~np.isfinite(rows))

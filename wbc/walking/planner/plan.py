@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from typing import Any
 
+from wbc import validation
 from wbc.errors import StructureFileError, WbcError
 from wbc.walking.body_path import BodyPath
 from wbc.walking.log.body_paths import path_of, way_of
@@ -148,6 +149,8 @@ def read_plan(path: str | os.PathLike[str]) -> Plan:
         start, separating = tuple(map(str, kept["start"])), tuple(kept["separating"])
         whole, reached, reason = bool(kept["complete"]), float(kept["reached"]), str(kept["reason"])
         along = path_of(kept["way"])
+    except FileNotFoundError as error:
+        raise StructureFileError("plan", str(path), validation.no_such(path)) from error
     except (OSError, ValueError, KeyError, TypeError, WbcError) as error:
         raise StructureFileError("plan", str(path), f"not a plan: {error}") from error
     return Plan(along, start, steps, whole, reached, reason, separating=separating)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -61,6 +61,7 @@ class PointGrasp(AxisGrasp):
     """A hand that may turn about its origin: three rows as of ``Hold(kind="position")``, and a force within the box."""
 
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    part: ClassVar[Literal["", "position"]] = "position"
 
     @property
     def _hold(self) -> Hold:
