@@ -6,6 +6,7 @@ the field; nothing is changed when it raises.
 
 from __future__ import annotations
 
+import decimal
 import difflib
 import math
 import os
@@ -59,6 +60,15 @@ def dimensions(field: str, value: Any) -> tuple[int, ...]:
         return np.shape(value)
     except ValueError as error:
         raise ShapeError(field, value, "expected rows of one length") from error
+
+
+def bound_text(value: float, towards: int, digits: int = 6) -> str:
+    """Digits of a bound that, read back, lie on its allowed side: below it (towards = -1) or above it (1)."""
+    text = f"{value:.{digits}g}"
+    if towards * float(text) >= towards * value:
+        return text
+    context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR if towards < 0 else decimal.ROUND_CEILING)
+    return f"{float(context.create_decimal_from_float(float(value))):.{digits}g}"
 
 
 def scalar(

@@ -185,8 +185,8 @@ def test_bad_input(changes, error, field):
     assert caught.value.field == field
 
 
-def test_unreachable_speeds_are_refused_with_the_largest_that_works():
-    with pytest.raises(errors.InfeasibleError, match=r"largest that works: 0\.5"):
+def test_unreachable_speeds_are_refused_with_those_that_work():
+    with pytest.raises(errors.InfeasibleError, match=r"what works: -1 to 0\.5 "):
         jerk_limited([0.0], [1.0], start_velocity=[0.9], start_acceleration=[1.0], velocity=1, acceleration=1, jerk=1)
     law = jerk_limited([0.0], [1.0], start_velocity=[0.5], start_acceleration=[1.0], velocity=1, acceleration=1, jerk=1)
     assert law.certificate.satisfied

@@ -51,7 +51,8 @@ def test_splines_take_little_longer_than_without_a_limit_of_the_jerk():
         assert max(used(law, sizes)) <= 1.0 + 1e-3
         assert on_path(law, path) < 1e-12
         assert law.certificate.ratio > 1.0 - 1e-3
-        assert 0.0 < law.duration / free - 1.0 < longer
+        # time_optimal is slower than the least time by up to so much itself
+        assert -5e-3 < law.duration / free - 1.0 < longer
 
 
 @pytest.mark.parametrize("size", [1e-2, 1e-8, 1e3])

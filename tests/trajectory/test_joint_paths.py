@@ -90,8 +90,13 @@ def test_repeated_waypoints_are_dropped() -> None:
         np.testing.assert_allclose(path.evaluate(grid), plain.evaluate(grid), atol=1e-9)
 
 
-def test_waypoints_that_are_small_against_the_whole_are_kept_until_a_billionth() -> None:
-    near, nearer = ([[0.0, 0.0], [step, 0.0], [step, 1.0], [1.0, 1.0]] for step in (1e-8, 1e-10))
+@pytest.mark.parametrize(("whole", "least"), [(1e-8, 1e-14), (1.0, 1e-6), (1e3, 1e-6)])
+def test_waypoints_are_apart_from_a_millionth_on(whole: float, least: float) -> None:
+    """Of the whole, of long paths of a unit."""
+    near, nearer = (
+        whole * np.array([[0.0, 0.0], [step / whole, 0.0], [0.5, 0.0], [0.5, 0.5]])
+        for step in (1.1 * least, 0.9 * least)
+    )
     assert len(spline_path(near).knots) == 4
     assert len(spline_path(nearer).knots) == 3
 

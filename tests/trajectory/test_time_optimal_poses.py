@@ -43,3 +43,11 @@ def test_parts_of_a_pose_are_linear_and_angular():
         time_optimal(geodesic_path(pose(0), pose(1)), 1.0, 1.0, cartesian_speed={"tip": 1.0})
     assert caught.value.field == "cartesian_speed"
     assert caught.value.choices[0] in ("linear", "angular")
+
+
+def test_a_turn_of_nearly_nothing_between_two_others() -> None:
+    """Its law is slowed until the samples of the slower one find nothing beyond its limits."""
+    turns = (0.0, 0.5, 0.5 + 1e-5, 0.9)
+    places = ([0.0, 0.0, 0.0], [0.5, 0.2, 0.0], [0.5, 0.2, 0.0], [0.8, 0.0, 0.1])
+    poses = [(p, [0.0, 0.0, np.sin(a / 2), np.cos(a / 2)]) for p, a in zip(places, turns, strict=True)]
+    assert time_optimal(pose_spline(poses), 1.0, 2.0).certificate.satisfied

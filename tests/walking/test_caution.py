@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.repeats import repeats
+from wbc.clearance import sweep
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
 from wbc.shapes import Sphere
@@ -19,7 +21,7 @@ from wbc.walking.loop.body_command import BENDING, BodyMotion, Corners
 from wbc.walking.loop.caution import RATE, SETTLED, Caution, Course
 from wbc.walking.loop.closed_chain import ClosedChain
 from wbc.walking.loop.coasting import Coasting
-from wbc.walking.loop.foresight import Foresight
+from wbc.walking.loop.foresight import LAGS, Foresight
 from wbc.walking.loop.hand_pace import LEAST_PACE, RAMP_AGAIN, hand_pace
 from wbc.walking.loop.rest import quickest
 from wbc.walking.loop.stack import DT, WalkStack
@@ -333,17 +335,17 @@ def test_a_swing_is_slower_where_its_arm_has_no_room_to_lag(
     course = walk._course(swinging)
     monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (0.9, 1.2))
     times, rows = np.array([0.0, 1.0]), np.repeat(walk.q[None], 2, axis=0)
-    room = caution.sight.spare(times, rows, swinging.arm, 10.0)
+    close = caution.sight.close(times, rows, swinging.arm)
     pairs = caution.sight._bringing[swinging.arm]
     here = caution.sight._sweeper.at(caution.sight.motion(times, rows), 0.0, pairs)
-    assert room == pytest.approx(min(near.distance - near.required for near in here), abs=2e-3)
-    for least, slower in ((0.1, False), (0.0, True)):
-        monkeypatch.setattr(Foresight, "spare", lambda *_given, least=least: least)
+    assert close is (min(near.distance - near.required for near in here) < LAGS)
+    for near_by in (False, True):
+        monkeypatch.setattr(Foresight, "close", lambda *_given, near_by=near_by: near_by)
         assert caution.swing(swinging, course) is None
-        assert (swinging.part < 1.0) is slower
+        assert (swinging.part < 1.0) is near_by
     swinging.part = 1.0
     monkeypatch.setattr(Caution, "_needs", lambda _self, _swinging, _times: (1.2, 0.0))
-    monkeypatch.setattr(Foresight, "spare", lambda *_given: 0.1)
+    monkeypatch.setattr(Foresight, "close", lambda *_given: False)
     assert caution.swing(swinging, course) is None
     assert swinging.part == pytest.approx(RATE / 1.2)
 
@@ -478,3 +480,27 @@ def at_once(walk: Walk, place: np.ndarray):  # type: ignore[no-untyped-def]
         return 0.0
 
     return put
+
+
+def test_what_a_lagging_arm_may_touch_is_the_same_without_a_compiler(
+    machine: Walker, structure: Structure, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of motions on which an arm comes about as near as a lagging one may."""
+    compiled = Foresight(machine, structure)
+    monkeypatch.setattr(sweep, "library", lambda: None)
+    plain = Foresight(machine, structure)
+    rng, times, grips = np.random.default_rng(4), np.linspace(0.0, 0.5, 11), plan.grips
+    assert grips is not None
+    seen = list[bool]()
+    for _ in range(repeats(60)):
+        sample = int(rng.integers(0, 60))
+        q = np.zeros((11, machine.robot.nq))
+        q[:, :7] = pin.SE3ToXYZQUAT(pin.SE3(plan.path.poses[sample]))
+        for k, arm in enumerate(machine.arms):
+            q[:, arm.q] = grips.posture_at(plan.chain[k][0], sample)
+        moving = int(rng.integers(0, len(machine.arms)))
+        turns = rng.uniform(-0.6, 0.6, (2, 6))
+        q[:, machine.arms[moving].q] += turns[0] + times[:, None] * turns[1]
+        seen.append(compiled.close(times, q, moving))
+        assert plain.close(times, q, moving) == seen[-1]
+    assert 0.1 < np.mean(seen) < 0.9

@@ -12,6 +12,7 @@ import pinocchio as pin
 from wbc.controller.tick.buffers import Assembly
 from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
+from wbc.qp.factor import load
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
@@ -35,6 +36,8 @@ class Search:
         self._dofs = layout.dof_scales(stack)
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
+        # What the first tick would import takes longer than many ticks, which budgets are for
+        load()
 
     @np.errstate(over="ignore", invalid="ignore")
     def run(self, query: Query, seconds: float) -> SearchResult:

@@ -66,7 +66,7 @@ class InverseKinematics(Handles):
         targets: Mapping[str, Any] | None = None,
         *,
         seed: int = 0,
-        budget: float | None = 0.005,
+        budget: float | None = None,
         restarts: int = 100,
         tolerance: float = 1e-5,
     ) -> Solution:
@@ -76,9 +76,9 @@ class InverseKinematics(Handles):
             q0: where the search begins [nq]; what lies outside the position limits is moved to them.
             targets: name of a task -> its ``target`` in this search; others are what is set, or taken from q0.
             seed: of the random configurations. The answer is a function of q0, the run-time values, the seed and the
-                number of restarts, unless the time ends the search.
+                number of restarts, unless a budget ends the search.
             budget: time for the search [s], overrun by one iteration and the report of the answer at most; None: no
-                limit.
+                limit, the search ends with its restarts.
             restarts: random configurations to start from after q0 at most, 10^6 or fewer.
             tolerance: of every row of a goal, in metres and radians.
 
@@ -129,7 +129,7 @@ class InverseKinematics(Handles):
         targets: Mapping[str, Sequence[Any]],
         *,
         seed: int = 0,
-        budget: float | None = 0.005,
+        budget: float | None = None,
         restarts: int = 100,
         tolerance: float = 1e-5,
         workers: int | None = None,
@@ -140,7 +140,7 @@ class InverseKinematics(Handles):
         Args:
             q0: where every search begins [nq].
             targets: name of a task -> its ``target`` in each search; all of one length.
-            budget: time for each search [s].
+            budget: time for each search [s]; None: no limit.
             workers: threads; default: as many as cores. Without a compiler, or where rows are measured, there is one.
             nearest: also look for the nearest configuration where a target is proven out of reach, see
                 :func:`wbc.ik.reach.beyond_reach`; False: such a search is left out, its q is q0 and its descents are 0.
@@ -249,7 +249,7 @@ class InverseKinematics(Handles):
         *,
         most: int | None = None,
         seed: int = 0,
-        budget: float | None = 1.0,
+        budget: float | None = None,
         restarts: int = 500,
         tolerance: float = 1e-5,
     ) -> Branches:
@@ -267,7 +267,7 @@ class InverseKinematics(Handles):
             q0: where the first descent begins [nq], and what distances are counted from.
             most: branches that are enough; None: go on until the restarts or the time are used up.
             seed: of the random configurations. The answer is a function of q0, the run-time values, the seed and the
-                number of restarts, unless the time ends the search.
+                number of restarts, unless a budget ends the search.
             budget: time for the search [s], overrun by one iteration and the report of the answers at most; None: no
                 limit.
             restarts: random configurations to start from after q0.

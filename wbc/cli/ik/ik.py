@@ -45,7 +45,10 @@ Every = Annotated[
     bool, typer.Option("--branches", help="All configurations, not only the first one.", rich_help_panel=_WHAT)
 ]
 Seed = Annotated[int, typer.Option(help="Of the random configurations to start from.", rich_help_panel=_SEARCH)]
-Budget = Annotated[float, typer.Option(help="Time for each target, in s.", rich_help_panel=_SEARCH)]
+Budget = Annotated[
+    float | None,
+    typer.Option(help="Time for each target, in s. Default: until the restarts are used up.", rich_help_panel=_SEARCH),
+]
 Restarts = Annotated[
     int | None,
     typer.Option(help="Random configurations. Default: 100, with --branches 500.", rich_help_panel=_SEARCH),
@@ -67,7 +70,7 @@ def ik(
     branches: Every = False,
     margin: options.Margin = 0.02,
     seed: Seed = 0,
-    budget: Budget = 1.0,
+    budget: Budget = None,
     restarts: Restarts = None,
     tolerance: Tolerance = 1e-5,
     backend: options.Backend = "auto",

@@ -21,6 +21,9 @@ from wbc.validation import Array
 #: Steps of the first or second derivative at a knot, as a share of its size, that are rounding
 STEP = 1e-9
 
+#: Coordinates of knots are off by this share of them
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+
 #: Parts into which a path may be cut at most
 MOST_CELLS = 20_000.0
 #: Laws are slowed down by this share more than the certificate asks for
@@ -125,9 +128,12 @@ def _breaks(path: Path) -> list[tuple[float, str]]:
     # A second derivative that turns the direction by less than rounding over the whole path is none
     sizes[1] = max(sizes[1], sizes[0] / path.length)
     steps = []
+    # A knot is known to its rounding, by which a derivative changes as fast as the next one says
+    rounding = ROUNDING * np.abs(knots)[:, None]
     for order, size in enumerate(sizes, 1):
         left, right = path.evaluate(knots, order, before), path.evaluate(knots, order, before + 1)
-        steps.append(np.abs(right - left).max(axis=1) / size)
+        change = np.maximum(*(np.abs(path.evaluate(knots, order + 1, before + k)) for k in (0, 1)))
+        steps.append((np.abs(right - left) - rounding * change).max(axis=1) / size)
     return [
         (float(s), "the direction" if first > STEP else "the curvature")
         for s, first, second in zip(knots, *steps, strict=True)

@@ -13,7 +13,7 @@ from wbc.trajectory.jerk.joined_courses import along_line, law_of, standing
 from wbc.trajectory.jerk.state_to_state import StateTask, by_ruckig, by_stops, others, plan
 from wbc.trajectory.laws.law import Law
 from wbc.trajectory.laws.limits import MotionLimits
-from wbc.validation import Array
+from wbc.validation import Array, bound_text
 
 Synchronisation = Literal["time", "phase", "none"]
 
@@ -128,23 +128,34 @@ def _check_inside(name: str, state: Array, limits: MotionLimits, towards: float)
         out = np.flatnonzero((state[0] < limits.lower) | (state[0] > limits.upper))
         if out.size:
             i = int(out[0])
-            bounds = f"{limits.lower[i]:g} to {limits.upper[i]:g}"
+            bounds = f"{bound_text(limits.lower[i], 1)} to {bound_text(limits.upper[i], -1)}"
             raise BoundsError(name, float(state[0, i]), f"joint {i} is outside its limits, {bounds}")
     for part, row, limit in (("velocity", state[1], v), ("acceleration", state[2], a)):
         out = np.flatnonzero(np.abs(row) > limit)
         if out.size:
             i = int(out[0])
-            raise RangeError(f"{name}_{part}", float(row[i]), f"joint {i}: expected at most {limit[i]:g} in size")
-    peak = np.abs(state[1] + towards * state[2] * np.abs(state[2]) / (2.0 * j))
-    out = np.flatnonzero(peak > v * (1.0 + 1e-9))
+            raise RangeError(
+                f"{name}_{part}", float(row[i]), f"joint {i}: expected at most {bound_text(limit[i], -1)} in size"
+            )
+    change = towards * state[2] * np.abs(state[2]) / (2.0 * j)
+    out = np.flatnonzero(np.abs(state[1] + change) > v * (1.0 + 1e-9))
     if out.size:
         i = int(out[0])
-        largest = max(float(v[i] - 0.5 * state[2, i] ** 2 / j[i]), 0.0)
+        least, most = max(-v[i], -v[i] - change[i]), min(v[i], v[i] - change[i])
+        if least > most:
+            slow = float(bound_text(v[i], -1))
+            push = bound_text(np.sqrt(2.0 * j[i] * (v[i] + slow)), -1)
+            allowed = f"{push}, with a velocity of {-np.copysign(slow, change[i]):g}"
+            raise InfeasibleError(
+                f"{name}_acceleration",
+                float(state[2, i]),
+                f"joint {i}: with any velocity at this end the velocity passes {v[i]:g}; largest that works: {allowed}",
+            )
         raise InfeasibleError(
             f"{name}_velocity",
             float(state[1, i]),
-            f"joint {i}: with its acceleration of {state[2, i]:g} the velocity passes {v[i]:g}; largest that works: "
-            f"{largest:g}",
+            f"joint {i}: with its acceleration of {state[2, i]:g} the velocity passes {v[i]:g}; what works: "
+            f"{bound_text(least, 1)} to {bound_text(most, -1)}",
         )
 
 

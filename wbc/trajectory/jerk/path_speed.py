@@ -13,12 +13,12 @@ and constant jerk makes y go with u. So dx/du = 2 y L g'(u) is integrated exactl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from wbc.errors import InfeasibleError
-from wbc.trajectory.jerk.course import moved, rest_to_rest
 from wbc.trajectory.laws.certificate import chain
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import Path
@@ -27,11 +27,21 @@ from wbc.validation import Array
 #: Programs are solved until so many in a row gain less than this share of the duration, and no more than so many
 PATIENCE, GAIN, ROUNDS = 3, 5e-4, 20
 
-#: x of a program is no lower than this share of the last one's, so that the next one has a tangent
-LOWEST = 1e-4
+#: but while what limits are passed by falls to this share of what it was, programs go on
+SETTLED = 0.98
+
+#: x of a program is no lower than this share of the last one's, below which a tangent says too little of the time; or
+#: than the second one, where that is too much
+LOWEST = (0.3, 1e-4)
 
 #: Places of a cell at which derivatives are looked at
 PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+
+#: Cells between two knots at least, where a path has not too many
+LEAST_CELLS = 8
+
+#: Cells are not made shorter than this, of a length of 1
+SHORTEST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +59,30 @@ class Stretch:
 
     @classmethod
     def of(cls, path: Path, start: float, end: float, limits: tuple[Array, Array, Array], cells: int) -> Stretch:
-        """Even in u, but that grid points beside knots are left out."""
-        u = np.linspace(0.0, 1.0, cells + 1)
+        """Even in u between knots, several cells from knot to knot, and none more than twice as long as the next: they
+        become shorter towards knots that are near to each other.
+        """
+        knots = np.concatenate([[start], path.knots[(path.knots > start) & (path.knots < end)], [end]])
+        share = (knots - start) / (end - start)
+        fine = np.linspace(0.0, 1.0, 20 * cells + 1)
+        at = np.interp(share, _grade(fine), fine)
+        for _ in range(3):
+            at[1:-1] = np.clip(at[1:-1] - (_grade(at[1:-1]) - share[1:-1]) / _slope(at[1:-1]), 0.0, 1.0)
+        parts = len(at) - 1
+        least = min(max(1, cells // parts), LEAST_CELLS)
+        wide = np.diff(at)
+        counts = np.maximum(np.round(wide * cells).astype(int), np.where(wide > least * SHORTEST, least, 1))
+        rows = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(pairwise(at), counts, strict=True)]
+        u = np.append(np.concatenate(rows), 1.0)
+        while True:
+            sizes = np.diff(u)
+            beside = np.minimum(np.append(np.inf, sizes[:-1]), np.append(sizes[1:], np.inf))
+            long = np.flatnonzero(sizes > 2.001 * np.maximum(beside, SHORTEST))
+            if not long.size:
+                break
+            u = np.insert(u, long + 1, u[long] + 0.5 * sizes[long])
         s = start + (end - start) * _grade(u)
-        knots = path.knots[(path.knots > start) & (path.knots < end)]
-        if knots.size:
-            fine = np.linspace(0.0, 1.0, 20 * cells + 1)
-            at = np.interp((knots - start) / (end - start), _grade(fine), fine)
-            for _ in range(3):
-                at = np.clip(at - (_grade(at) - (knots - start) / (end - start)) / _slope(at), 0.0, 1.0)
-            near = np.searchsorted(at, u)
-            away = np.minimum(np.abs(u - at[np.maximum(near - 1, 0)]), np.abs(at[np.minimum(near, len(at) - 1)] - u))
-            keep = away > 0.4 / cells
-            keep[[0, -1]] = True
-            order = np.argsort(np.concatenate([u[keep], at]))
-            u, s = (np.concatenate(pair)[order] for pair in ((u[keep], at), (s[keep], knots)))
-        s[[0, -1]] = start, end
+        s[np.searchsorted(u, at)] = knots
         return cls(path, u, s, limits)
 
     def coordinates(self, place: float) -> Array:
@@ -88,24 +106,27 @@ class Stretch:
         part = (self.s[-1] - self.s[0]) * _slope(self.u[:-1, None] + span * share) * span * place * weights
         return np.stack([part @ (1.0 - share), part @ share], axis=1)
 
-    def constant(self) -> tuple[float, float, float]:
-        """Speed, acceleration and jerk of s that no joint minds anywhere: half of each limit for the curvature."""
+    def room(self) -> tuple[Array, Array, Array]:
+        """(squared speed, acceleration, jerk) of s that no joint minds in each cell: half of each limit is left for the
+        curvature.
+
+        Raises:
+            InfeasibleError: nothing moves in any cell.
+        """
         v, a, j = self.limits
         first, second, third = (
-            np.max([np.abs(part).max(axis=0) for part in parts], axis=0)
+            np.max([np.abs(part) for part in parts], axis=0)
             for parts in zip(*(self.derivatives(u) for u in PLACES), strict=True)
         )
-        with np.errstate(divide="ignore"):
-            speed = min(
-                float(np.min(v / first)),
-                float(np.min(np.sqrt(0.5 * a / second))),
-                float(np.min(np.cbrt(j / (4.0 * third)))),
-            )
-            push = min(float(np.min(0.5 * a / first)), float(np.min(j / (12.0 * second * speed))))
-            jerk = float(np.min(0.5 * j / first))
-        if not 0.0 < speed < np.inf or not np.isfinite([push, jerk]).all():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            speed = np.minimum(v / first, np.minimum(np.sqrt(0.5 * a / second), np.cbrt(0.25 * j / third))).min(axis=1)
+            push = np.minimum(0.5 * a / first, j / (12.0 * second * speed[:, None])).min(axis=1)
+            jerk = (0.5 * j / first).min(axis=1)
+        if not (np.isfinite(jerk) & (speed > 0.0)).any():
             raise InfeasibleError("path", float(self.s[0]), "nothing moves between this coordinate and the next stop")
-        return speed, push, jerk
+        # Where nothing moves, anything goes: as much as anywhere else
+        speed, push, jerk = (np.where(np.isfinite(x), x, x[np.isfinite(x)].max()) for x in (speed, push, jerk))
+        return speed**2, push, jerk
 
 
 def _grade(u: Array) -> Array:
@@ -122,53 +143,56 @@ def fastest(stretch: Stretch) -> Timing:
     Raises:
         InfeasibleError: the solver of the linear programs gave up.
     """
-    x, y = _first(stretch)
+    room = stretch.room()
+    x, y = _first(stretch, *room)
     shares = np.ones((3, len(x) - 1))
-    best, least, idle = None, np.inf, 0
+    best, least, idle, before = None, np.inf, 0, np.inf
     for _ in range(ROUNDS):
-        x, y = _program(stretch, x, y, shares)
+        x, y = _program(stretch, x, y, shares, room)
         timing = _timing(stretch, x, y)
         ratios = _ratios(stretch, timing)
         loss = max(1.0, *(float(r.max()) ** (1.0 / order) for order, r in enumerate(ratios, 1)))
         # Cells in which more is used between the points that the program looks at are given less
-        shares = np.minimum(shares * np.clip(0.9999 / ratios, 0.8, 1.01), 1.0)
-        gained = 1.0 - timing.duration * loss / least
+        shares = np.minimum(shares * np.clip(0.9999 / ratios, 0.5, 1.01), 1.0)
+        gained, settled = 1.0 - timing.duration * loss / least, loss > SETTLED * before
+        before = loss
         if gained > 0.0:
             best, least = timing, timing.duration * loss
-        idle = idle + 1 if gained < GAIN else 0
+        idle = idle + 1 if gained < GAIN and settled else 0
         if idle == PATIENCE:
             break
     assert best is not None
     return best
 
 
-def _first(stretch: Stretch) -> tuple[Array, Array]:
-    """x and y of the course from rest to rest under constant limits."""
-    s = stretch.s - stretch.s[0]
-    course = rest_to_rest(float(s[-1]), *stretch.constant())
-    rows = []
-    for point, jerk, span in zip(course.points(), course.jerks, course.spans, strict=False):
-        rows += [moved(point, jerk, t) for t in np.linspace(0.0, span, 200)]
-    at, speeds, pushes = np.array(rows).T
-    # Beside rest an interpolated speed is far too low
-    near = np.minimum(s, s[-1] - s)
-    x = np.interp(s, at, speeds) ** 2
-    least = 0.5 * x.max() * (near / s[-1]) ** (4.0 / 3.0)
-    low = x < least
-    return np.where(low, least, x), np.where(low, 0.0, np.interp(s, at, pushes))
+def _first(stretch: Stretch, most: Array, push: Array, jerk: Array) -> tuple[Array, Array]:
+    """x and y to begin with, from what the cells have room for: no more than is reached from slower parts on both
+    sides, where from rest x^(3/4) = 3 sqrt(jerk / 2) s with a constant jerk, x = 2 y s with a constant acceleration.
+    """
+    h = np.diff(stretch.s)
+    rise, steep = 2.0 * push * h, 3.0 * np.sqrt(0.5 * jerk) * h
+    x = np.concatenate([[0.0], np.minimum(most[1:], most[:-1]), [0.0]])
+    for cells in (range(len(h)), range(len(h) - 1, -1, -1)):
+        for k in cells:
+            here, there = (k, k + 1) if cells.step > 0 else (k + 1, k)
+            x[there] = min(x[there], x[here] + rise[k], (x[here] ** 0.75 + steep[k]) ** (4.0 / 3.0))
+    return x, 0.5 * np.gradient(x, stretch.s)
 
 
-def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Array, Array]:
+def _program(
+    stretch: Stretch, x0: Array, y0: Array, shares: Array, room: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
     """x and y that maximise sum h x / x0^(3/2), the gain of time, under the limits linearised at x0.
 
-    Unknowns are x / x0 and y over what it is where the jerk is constant, at inner grid points.
+    Unknowns are x / x0 and y over what it is from rest with a constant jerk, at inner grid points.
     """
     import scipy.optimize
     import scipy.sparse as sparse
 
     h, count = np.diff(stretch.s), len(stretch.s) - 2
     size_x = x0[1:-1]
-    size_y = size_x / np.minimum(stretch.s[1:-1] - stretch.s[0], stretch.s[-1] - stretch.s[1:-1])
+    push, jerk = (np.minimum(part[1:], part[:-1]) for part in room[1:])
+    size_y = np.minimum(push, np.sqrt(2.0 * jerk) * size_x**0.25)
 
     def matrix(of_x: Array, of_y: Array, first: Any) -> Any:
         """A row for each of ``first``: coefficients of the x and of the y of that grid point and those behind it."""
@@ -193,19 +217,21 @@ def _program(stretch: Stretch, x0: Array, y0: Array, shares: Array) -> tuple[Arr
     within = matrix(np.array([[-1.0, 1.0]]) * unit, -w[1:-1] * unit, every[:-1])
     unit = 1.0 / size_x[ends, None]
     at_ends = matrix(unit, np.array([[-w[0, 1]], [w[-1, 0]]]) * unit, ends)
-    top = np.maximum(_speeds(stretch, shares) / size_x, 2.0 * LOWEST)
-    free = np.full(count, np.inf)
-    gain = 0.5 * (h[1:] + h[:-1]) / np.sqrt(size_x)
-    answer = scipy.optimize.linprog(
-        np.concatenate([-gain / gain.max(), np.zeros(count)]),
-        A_ub=upper,
-        b_ub=np.concatenate(tops),
-        A_eq=sparse.vstack([within, at_ends]),
-        b_eq=np.zeros(count + 1),
-        bounds=np.stack([np.append(np.full(count, LOWEST), -free), np.append(top, free)], axis=1),
-        method="highs-ipm",
-    )
-    if answer.x is None:
+    free, gain = np.full(count, np.inf), 0.5 * (h[1:] + h[:-1]) / np.sqrt(size_x)
+    for lowest in LOWEST:
+        top = np.maximum(_speeds(stretch, shares) / size_x, 2.0 * lowest)
+        answer = scipy.optimize.linprog(
+            np.concatenate([-gain / gain.max(), np.zeros(count)]),
+            A_ub=upper,
+            b_ub=np.concatenate(tops),
+            A_eq=sparse.vstack([within, at_ends]),
+            b_eq=np.zeros(count + 1),
+            bounds=np.stack([np.append(np.full(count, lowest), -free), np.append(top, free)], axis=1),
+            method="highs-ipm",
+        )
+        if answer.x is not None:
+            break
+    else:
         raise InfeasibleError("path", float(stretch.s[0]), f"no speed was found from here on: {answer.message}")
     zero = np.zeros(1)
     x, y = np.split(answer.x, 2)

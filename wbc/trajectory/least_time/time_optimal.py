@@ -20,7 +20,7 @@ from wbc.trajectory.least_time.fastest import FastestTask
 from wbc.trajectory.least_time.repair import repaired
 from wbc.trajectory.paths.joint_paths import spline_path, standing_path
 from wbc.trajectory.paths.path import JoinedPath, Path
-from wbc.validation import Array
+from wbc.validation import Array, bound_text
 
 #: Parts into which a path may be cut at most
 MOST_INTERVALS = 100_000.0
@@ -64,7 +64,8 @@ def time_optimal(
         robot: whose torques and frames are meant.
         inequality: (function, F, g), or name -> (function, F, g), with F w <= g for w = function(q, dq/dt, d2q/dt2)
             that is affine in d2q/dt2 and quadratic in dq/dt: contact wrenches.
-        start_speed, end_speed: of the path coordinate, ds/dt >= 0, so that dq/dt = q' ds/dt.
+        start_speed, end_speed: of the path coordinate, ds/dt >= 0 [rad/s or m/s], so that dq/dt = q' ds/dt; of splines
+            and functions q' is only near 1 in size.
         duration: a longer time than the least, from rest to rest [s].
         intervals: of the grid; by default 125 for each piece of the path and at least 500.
 
@@ -95,7 +96,9 @@ def time_optimal(
     if longer is None:
         return law
     if longer < law.duration * (1.0 - 1e-12):
-        raise InfeasibleError("duration", duration, f"the shortest that satisfies the limits is {law.duration:.9g} s")
+        raise InfeasibleError(
+            "duration", duration, f"the shortest that satisfies the limits is {bound_text(law.duration, 1, 9)} s"
+        )
     return law.scaled(longer / law.duration)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from wbc.errors import RangeError
 from wbc.trajectory.paths.path import Index
 from wbc.trajectory.paths.waypoints import summed
-from wbc.validation import Array
+from wbc.validation import Array, bound_text
 
 #: b in the middle of a corner of reach 1
 DEEPEST = 3.0 / 16.0
@@ -64,7 +64,7 @@ def rounded(field: str, value: float, lengths: Array, reach: Array) -> RoundedCo
     half = 0.5 * np.minimum(lengths[:-1], lengths[1:])
     if (reach < SHORTEST * s[-1]).any():
         needed = value * float((SHORTEST * s[-1] / reach).max())
-        raise RangeError(field, value, f"corners of this size vanish in rounding; at least {needed:.3g}")
+        raise RangeError(field, value, f"corners of this size vanish in rounding; at least {bound_text(needed, 1, 3)}")
     d = np.minimum(reach, half)
     rounding = 8.0 * float(np.finfo(float).eps) * s[-1]
     knots, corner, before, behind = [0.0], [], [], []

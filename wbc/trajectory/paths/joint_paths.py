@@ -1,9 +1,9 @@
 """Paths of joints through waypoints: standing, straight, splines, and straight pieces with rounded corners.
 
 The coordinate s is the distance sqrt(sum of squares) [rad or m] from waypoint to waypoint, so that |q'| is near 1
-whatever the size of the move. Waypoints that repeat the one before are dropped (nearer than 1e-9 of the whole, than
-1e-14, or than the rounding of the coordinates); the last one is always reached. Where all are equal, the path stands:
-see :func:`standing_path`.
+whatever the size of the move. Waypoints that repeat the one before are dropped (nearer than 1e-6 of the whole and than
+1e-6, or than the rounding of the coordinates), and passed within that distance; the last one is always reached. Where
+all are equal, the path stands: see :func:`standing_path`.
 """
 
 from __future__ import annotations

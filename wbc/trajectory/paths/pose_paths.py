@@ -3,8 +3,9 @@
 The coordinate s is metres of travel plus ``radius`` times the turn [rad], so that turns on the spot have a length, and
 (p'; w) is bounded by 1 and by 1 / ``radius``. ``radius`` is 0.5 m unless given: one radian counts as half a metre.
 
-Poses that repeat the one before are dropped (nearer than 1e-9 of the whole, than 1e-14 m, or than the rounding of the
-coordinates); the last one is always reached. Where all are equal, the path stands: it is of degree 0 over s in [0, 1].
+Poses that repeat the one before are dropped (nearer than 1e-6 of the whole and than 1e-6 m, or than the rounding of the
+coordinates), and passed within that distance; the last one is always reached. Where all are equal, the path stands: it
+is of degree 0 over s in [0, 1].
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
 from wbc.trajectory.paths.turning import QuaternionSpline, TwoTurns, turn_between
 from wbc.trajectory.paths.waypoints import ENDS, Ends, cubic_spline, distance, kept, summed
-from wbc.validation import Array
+from wbc.validation import Array, bound_text
 
 #: A radian of turn counts as so many metres
 RADIUS = 0.5
@@ -79,8 +80,9 @@ class Poses:
             if angle > largest:
                 raise RangeError(
                     f"path.poses[{number}]",
-                    f"{degrees(angle):.6g} deg",
-                    f"too far from the orientation before it, at most {degrees(largest):.6g} deg; add a pose between",
+                    f"{degrees(angle):.9g} deg",
+                    f"too far from the orientation before it, at most {bound_text(degrees(largest), -1)} deg; add a "
+                    "pose between",
                 )
         return cls(points[numbers], quaternions[numbers], turns, np.array([between(i, j) for i, j in pairs]))
 
@@ -143,10 +145,10 @@ def pose_polyline(
     with np.errstate(divide="ignore", over="ignore"):
         by_turn = turn_deviation / (DEEPEST * twists)
         by_place = deviation / (DEEPEST * deflections)
-    if (by_turn < by_place).any():
-        corners = rounded("path.turn_deviation", turn_deviation, known.lengths, np.minimum(by_turn, by_place))
-    else:
-        corners = rounded("path.deviation", deviation, known.lengths, by_place)
+    # Where corners are too small, the deviation is named that makes the smallest one
+    turns_first = by_turn.min(initial=np.inf) < by_place.min(initial=np.inf)
+    field, value = ("path.turn_deviation", turn_deviation) if turns_first else ("path.deviation", deviation)
+    corners = rounded(field, value, known.lengths, np.minimum(by_turn, by_place))
     position = PolynomialPath(corners.knots, corners.combined(known.points, directions))
     return PosePath(position, _turns(corners, rates, matrices(known.quaternions)))
 

@@ -15,8 +15,12 @@ from wbc.validation import Array
 Ends = Literal["not-a-knot", "clamped", "natural"]
 ENDS = ("not-a-knot", "clamped", "natural")
 
-#: Waypoints nearer to the one before than this share of the whole are dropped
-NEAREST = 1e-9
+#: Waypoints nearer to the one before than this share of the whole are dropped: a way through both, one beside the
+#: other, is nearly a stop, for what no robot can show
+NEAREST = 1e-6
+
+#: but of long paths none that are farther apart than this [rad or m]
+FARTHEST = 1e-6
 
 #: and those nearer than this [rad or m], or than the rounding of the coordinates: no robot can tell them apart
 SMALLEST = 1e-14
@@ -43,7 +47,7 @@ def joint_waypoints(field: str, value: Any) -> tuple[Array, Array]:
 def kept(field: str, count: int, between: Callable[[int, int], float], size: float) -> list[int]:
     """Numbers of the waypoints that a path goes through: not those nearer to the last one kept than
 
-        max(1e-9 of the sum of all distances, 1e-14, rounding of coordinates of this size)
+        max(1e-6 of the sum of all distances or 1e-6, whichever is less, 1e-14, rounding of coordinates of this size)
 
     The first always stays, and so does the last, unless none is apart from the first.
 
@@ -54,7 +58,7 @@ def kept(field: str, count: int, between: Callable[[int, int], float], size: flo
         whole = sum(between(k - 1, k) for k in range(1, count))
     if not np.isfinite(whole):
         raise RangeError(field, whole, "waypoints too far apart: the sum of their distances is no finite number")
-    tolerance = max(NEAREST * whole, SMALLEST, 8.0 * float(np.finfo(float).eps) * size)
+    tolerance = max(min(NEAREST * whole, FARTHEST), SMALLEST, 8.0 * float(np.finfo(float).eps) * size)
     out = [0]
     for k in range(1, count):
         if between(out[-1], k) > tolerance:

@@ -28,8 +28,6 @@ AHEAD, LEFT = 1.0, 0.4
 #: Part of their rates that joints get of a hand that has to go slower, and the least part of its pace; what an arm is
 #: off its way does not count any more after [s]
 RATE, SLOWEST, SETTLED = 0.96, 0.3, 0.3
-#: An arm may lag by so much, its hand less, whose joints cannot follow for their accelerations [m]
-LAGS = 0.005
 
 
 class Course(NamedTuple):
@@ -144,7 +142,7 @@ class Caution:
 
     def _near_by(self, swinging: Swinging, when: Timing) -> bool:
         """Whether an arm that lags in what was foreseen last may touch something."""
-        return self.sight.spare(when.times, self._rows, swinging.arm, LAGS) < LAGS
+        return self.sight.close(when.times, self._rows, swinging.arm)
 
     def _needs(self, swinging: Swinging, times: Array) -> tuple[float, float]:
         """How many times too fast the swinging arm is in what was foreseen last, once it is back on its way: the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
 
@@ -42,6 +42,8 @@ STEP = 0.025
 HELD_DEPTH = 0.03
 #: A swinging arm that is off its way comes back to it within some of these [s]
 FADES = 0.15
+#: An arm may lag by so much, its hand less, whose joints cannot follow for their accelerations [m]
+LAGS = 0.005
 #: What clearances may lack, and what the proof may miss, together less than the checker leaves [m]
 SLACK, TOLERANCE = 8e-5, 1.5e-5
 
@@ -75,6 +77,10 @@ class Foresight:
         pairs = self_pairs(walker.robot, clearance) if walker.robot.self_pairs is not None else []
         pairs += [Pair(body.name, thing.name, clearance) for body, thing in product(bodies, things)]
         self._sweeper = Sweeper(SweptScene(tree, [*bodies, *things], pairs))
+        # Whether something comes nearer than a distance is found the same in C and in numpy; how near it comes, within
+        # a tolerance, is not
+        wider = [replace(pair, required=pair.required + LAGS) for pair in pairs]
+        self._wider = Sweeper(SweptScene(tree, [*bodies, *things], wider))
         # Of each arm the pairs with the links that bring its hand along, but the first, which turns about itself
         bringing = [
             {body.name for body in bodies if body.link in arm.links[1:] and body not in mine}
@@ -115,15 +121,12 @@ class Foresight:
             exempt += self._exemptions(arm, place, DEPTH, since=since)
         return self._sweeper.sweep(motion, exemptions=exempt, tolerance=TOLERANCE).violation
 
-    def spare(self, times: Array, q: Array, arm: int, most: float) -> float:
-        """By how much more than its clearance the arm that brings a hand along keeps from all else in a motion
-        ``[k, nq]``, as far as that is at most ``most`` [m].
+    def close(self, times: Array, q: Array, arm: int) -> bool:
+        """Whether the arm that brings a hand along comes within its clearance and :data:`LAGS` of anything in a motion
+        ``[k, nq]``.
         """
         pairs = self._bringing[arm]
-        if not len(pairs):
-            return most
-        swept = self._sweeper.sweep(self.motion(times, q), pairs, aim="least", tolerance=1e-3, far=most)
-        return float(swept.bound.min())
+        return self._wider.sweep(self.motion(times, q), pairs, tolerance=TOLERANCE).violation is not None
 
     def motion(self, times: Array, q: Array) -> Motion:
         """Of configurations ``[k, nq]`` at times [s]; joints go straight between them."""
