@@ -10,6 +10,8 @@ from wbc.validation import Array
 
 #: Time constant in which an error is made up for, of positions, velocities and torques: so many delays,
 PER_DELAY = {CommandKind.POSITION: 2.5, CommandKind.VELOCITY: 2.5, CommandKind.TORQUE: 1.0}
+#: and what the delay may be longer so many times,
+PER_DOUBT = {CommandKind.POSITION: 1.0, CommandKind.VELOCITY: 1.0, CommandKind.TORQUE: 2.0}
 #: at least so many periods,
 PER_PERIOD = 10.0
 #: and where the response is still to be found, at least so much [s]
@@ -53,9 +55,13 @@ class Feedback:
         self._reach, self._slows, self._moves = late * dt, dt * wide, dt * dt * (left - 0.5) * wide
         self._predicts = late > 0 and kind is CommandKind.TORQUE
 
+    def within(self, error: Array, low: Array, high: Array, most: float) -> Array:
+        """e, as far as making up for it by w e asks for a speed from ``low`` to ``high``, and up to ``most``."""
+        return np.asarray(np.clip(error, np.maximum(low / self._w, -most), np.minimum(high / self._w, most)))
+
     def correction(self, error: Array, rate: Array, total: Array, sent: Array, most: float) -> tuple[Array, Array]:
-        """d and b, from e up to ``most``, de/dt up to w most, z, and the d of the last D, the oldest first."""
-        error, rate = np.clip(error, -most, most), np.clip(rate, -most * self._w, most * self._w)
+        """d and b, from e, de/dt up to w most, z, and the d of the last D, the oldest first."""
+        rate = np.clip(rate, -most * self._w, most * self._w)
         if self._predicts:
             error = error + self._reach * rate - (self._moves * sent).sum(axis=0)
             rate = rate - (self._slows * sent).sum(axis=0)
@@ -67,7 +73,8 @@ class Feedback:
 def quickness(kind: CommandKind, dt: float, response: Response, told: bool) -> float:
     """w [1/s]: 1 over the largest of the times that the period, the delay and ignorance ask for.
 
-    A delay that is told too long costs accuracy; what is missing of it, times w, must stay below 1.
+    A delay that is told too long costs accuracy; what is missing of it, times w, must stay below 1, and of torques
+    below 0.66, where the loop of triple poles begins to swing.
     """
-    late = PER_DELAY[kind] * response.delay + response.doubt
+    late = PER_DELAY[kind] * response.delay + PER_DOUBT[kind] * response.doubt
     return 1.0 / max(PER_PERIOD * dt, late, 0.0 if told else UNTOLD[kind])

@@ -29,6 +29,10 @@ SHOWN = {
 LITTLE = (1e-4, 1.0, 1.0, 0.1, 0.01, 1e-9)
 #: A delay is doubted as long as its squared residual is at most so many times the least one
 AS_GOOD = 1.5
+#: So much motion tells something, see :attr:`Identification.motion` [rad^2/s]
+ENOUGH = 0.05
+#: Part of the torques that move the joints, below which errors of predictions are not compared
+FINE = 0.05
 #: A joint that moves less than this between its extremes says nothing of its lag [rad or m, rad/s or m/s]
 LEAST_MOTION = 1e-3
 
@@ -71,15 +75,14 @@ class Response:
         for name in ("delay", "doubt"):
             validation.scalar(f"response.{name}", getattr(self, name), low=0.0, unit="s")
 
+    def __str__(self) -> str:
+        lag = float(np.mean(self.lag))
+        return f"lag {1e3 * lag:.0f} ms and delay {1e3 * self.delay:.0f} to {1e3 * (self.delay + self.doubt):.0f} ms"
+
     @property
     def of_joints(self) -> bool:
         """Whether it says anything but a delay."""
         return any(row.any() for row in self.rows())
-
-    def towards(self, other: Response, part: float) -> Response:
-        """With the delay of another one, and a part of the way to its numbers of joints."""
-        lag, *others = (a + min(1.0, part) * (b - a) for a, b in zip(self.rows(), other.rows(), strict=True))
-        return Response(lag, other.delay, other.doubt, *others)
 
     def rows(self, joints: int | None = None) -> list[Array]:
         """T, C, S, F and B, each for so many joints."""
@@ -110,9 +113,10 @@ class Identification:
         #: Smoothed: u, x; dx/dt, the loads, and 1
         self._u, self._x, self._terms = np.zeros(joints), np.zeros(joints), np.zeros((TERMS, joints))
         self._terms[-1] = 1.0
-        self._squares = np.zeros((TERMS, TERMS, joints))
-        self._products = np.zeros((TERMS, self._rows, joints))
-        self._errors = np.zeros((self._rows, joints))
+        # Of products of terms, of terms and errors, and of squared errors, for each delay
+        self._sums = np.zeros((TERMS * TERMS + TERMS * self._rows + self._rows, joints))
+        self._squares, self._products, self._errors = self._parts(self._sums)
+        self._marked, self._faded = self._sums.copy(), 1.0
         #: Of :meth:`slope`
         self._v, self._a = np.zeros((2, joints))
         self._next = -1
@@ -146,8 +150,8 @@ class Identification:
         terms[1] += pushes
         if 0 not in self._shown:
             terms[0] = self._a
-        for sums in (self._squares, self._products, self._errors):
-            sums *= self._keep
+        self._sums *= self._keep
+        self._faded *= self._keep
         self._squares += terms[:, None] * terms
         self._products += terms[:, None] * error
         self._errors += error * error
@@ -155,11 +159,35 @@ class Identification:
     @property
     def motion(self) -> float:
         """How much there was to learn from: the sum of int (dx/dt)^2 dt about its mean [rad^2/s]."""
-        return float(self._dt * self._variance().sum())
+        return float(self._dt * _variance(self._squares, 0).sum())
 
-    def _variance(self) -> Array:
-        squares = self._squares
-        return np.asarray(np.maximum(squares[0, 0] - squares[0, -1] ** 2 / np.maximum(squares[-1, -1], 1.0), 0.0))
+    def _parts(self, sums: Array) -> tuple[Array, Array, Array]:
+        squares, products, errors = np.split(sums, [TERMS * TERMS, TERMS * (TERMS + self._rows)])
+        return squares.reshape(TERMS, TERMS, -1), products.reshape(TERMS, self._rows, -1), errors
+
+    def mark(self) -> None:
+        """What follows is kept apart, for :meth:`misfits`."""
+        self._marked[:], self._faded = self._sums, 1.0
+
+    def misfits(self, responses: Sequence[Response], motion: float) -> list[float]:
+        """How badly each response predicts what followed :meth:`mark`: the geometric mean over the joints of its
+        squared errors, each with an offset of its own; nothing while there was less :attr:`motion` than that.
+
+        No error counts as less than half a period of the motion, or of torques than :data:`FINE` of those that move
+        the joints.
+        """
+        squares, products, errors = self._parts(self._sums - self._faded * self._marked)
+        if self._dt * _variance(squares, 0).sum() < motion:
+            return []
+        part, term = (0.5 * self._dt, 0) if 0 in self._shown else (FINE, 1)
+        least, misfits = part**2 * _variance(squares, term) + LITTLE[-1] / self._dt, []
+        for response in responses:
+            row = self._rows - 1 - min(round(response.delay / self._dt), self._rows - 1)
+            numbers = np.array([*response.rows(squares.shape[-1]), np.zeros(squares.shape[-1])])
+            numbers[-1] = (products[-1, row] - (squares[-1] * numbers).sum(axis=0)) / np.maximum(squares[-1, -1], 1.0)
+            explained = (numbers * (2.0 * products[:, row] - (squares * numbers).sum(axis=1))).sum(axis=0)
+            misfits.append(float(_geometric_mean(np.maximum(errors[row] - explained, 0.0) + least)))
+        return misfits
 
     def response(self, delay: float | None = None) -> Response:
         """What fits best, with a delay that is known where one is given."""
@@ -172,7 +200,9 @@ class Identification:
         rest = products[:, -1] - np.einsum("jt,jtd->jd", squares[:, -1, :-1], found[:, :-1])
         found[:, -1] = rest / np.maximum(squares[:, -1, -1], 1.0)[:, None]
         explained = np.einsum("jtd,jtd->jd", found, 2.0 * products - squares @ found)
-        left = ((self._errors.T - explained) / (self._variance() + LITTLE[0] / self._dt)[:, None]).sum(axis=0)
+        # Each joint with noise of its own: the likelihood of a delay is the product over the joints
+        least = LITTLE[-1] * np.maximum(squares[:, -1, -1], 1.0)[:, None]
+        left = _geometric_mean(np.maximum(self._errors.T - explained, least))
         row = int(left.argmin()) if delay is None else self._rows - 1 - round(delay / self._dt)
         # Row 0 is the longest delay
         doubtful = row - int(np.argmax(left <= AS_GOOD * left[row])) if delay is None else 0
@@ -180,6 +210,17 @@ class Identification:
         numbers[shown] = found[:, :, row].T
         lag, *others, _ = numbers
         return Response(lag, (self._rows - 1 - row) * self._dt, doubtful * self._dt, *others)
+
+
+def _variance(squares: Array, term: int) -> Array:
+    """Of a term about its mean, times the number of samples."""
+    about = squares[term, term] - squares[term, -1] ** 2 / np.maximum(squares[-1, -1], 1.0)
+    return np.asarray(np.maximum(about, 0.0))
+
+
+def _geometric_mean(errors: Array) -> Array:
+    """Over the joints, the first axis."""
+    return np.asarray(np.exp(np.log(errors).mean(axis=0)))
 
 
 def identify(commands: Any, measured: Any, dt: float, longest_delay: float = 0.05) -> Response:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.controller import Controller, Step
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
 from wbc.servo.laws import Feedback, quickness
-from wbc.servo.response import PER_JOINT, SHOWN, Identification, Response
+from wbc.servo.response import ENOUGH, PER_JOINT, SHOWN, Identification, Response
 from wbc.simulation import Command, CommandKind
 from wbc.validation import Array
 
@@ -22,20 +22,41 @@ log = logging.getLogger("wbc")
 
 #: No delay is longer than this [s]
 LONGEST_DELAY = 0.05
-#: A response that nobody told is looked for after so much motion, see :attr:`Identification.motion` [rad^2/s],
-ENOUGH = 0.05
-#: as it was over the last [s],
+#: A response that nobody told is looked for as it was over the last [s],
 MEMORY = 5.0
-#: again after so many periods,
-EVERY = 20
-#: and taken on with this time constant [s]
+#: again after [s],
+EVERY = 0.02
+#: and taken on with this time constant [s],
 TAKEN_ON = 0.1
+#: its delay by at most so many seconds a second: a reference that is asked for earlier runs faster meanwhile
+CATCHES_UP = 0.2
+#: A response is checked by what follows after so much motion, see :attr:`Identification.motion` [rad^2/s, rad^2/s^3]
+CHECKED = {CommandKind.POSITION: 0.02, CommandKind.VELOCITY: 0.5, CommandKind.TORQUE: 1.0}
+#: It is doubted where another one predicts what follows with this part of its squared error,
+BETTER = 1.0 / 16.0
+#: so many times one after another
+TIMES = 3
+#: Part of their limits up to which joints make up for an error
+ROOM = 1.1
 #: Friction is all there at several times this speed [rad/s, m/s]
 CREEP = 0.01
+#: A joint of a stopped robot runs away that moves away at so many times its limit,
+RUNS = 0.5
+#: farther off than so many times where it was stopped
+AWAY = 3.0
+#: for so long [s]
+LASTS = 0.05
 #: Part of its speed that a reference keeps until it is stopped: it does not wait for ever for a robot that is stuck
 SLOWEST = 0.2
 #: Acceleration of braking where a joint has no limit [rad/s^2, m/s^2]
 PLAIN = 10.0
+
+
+#: What is counted on where nothing was told
+UNKNOWN = Response(doubt=LONGEST_DELAY)
+#: A response whose delay is doubted by so much is not counted on [s]
+DOUBTFUL = 0.5 * LONGEST_DELAY
+UNCONFIRMED = "what was found is not confirmed yet by what followed"
 
 
 class Following(StrEnum):
@@ -82,16 +103,20 @@ class Servo:
 
     Where the robot is farther behind than ``divergence[0]`` the reference slows down, z stands and no correction is
     larger than for that distance; at ``divergence[1]`` the reference brakes, and stays where it is until :meth:`reset`.
+    A joint that runs away even then, such as one of the wrong sign, ends all feedback.
 
     Attributes:
         response: that is counted on, as told or as found so far: to be told next time.
+        doubt: what speaks or spoke last against what was told or found, a sentence; else empty.
 
     Args:
         controller: compiled; it belongs to the servo from now on, apart from its run-time values.
         kind: what the servos take: "position", "velocity" or "torque".
         response: see :func:`wbc.servo.identify`. Default: it is found while the robot moves. A delay that is told
-            stays; of torques it should be told, because it shows in accelerations alone.
-        learn: whether the numbers of joints are found while the robot moves. Default: where none is told.
+            stays; of torques it should be told, because it shows in accelerations alone. What is told is let go where
+            what follows contradicts it, and the log says so.
+        learn: whether the numbers of joints are found while the robot moves. Default: where none is told, or where
+            what was told is let go, or its delay is in doubt by 25 ms or more. False: they are never found.
         divergence: distance behind the reference at which it begins to wait, and at which it stops [rad or m].
         armature: of motors, where the model has none, nv numbers or one [kg m^2]. damping: of joints [N m s]. Both for
             torques only.
@@ -130,17 +155,24 @@ class Servo:
         self._data = self._model.createData()
         known = self._robot.limits.acceleration
         self._brake = np.where(np.isfinite(known), known, PLAIN)
-        told = validation.instance("response", response or Response(), Response, "a wbc.servo.Response")
-        self._delay = None if response is None else told.delay
-        self._learns = not told.of_joints if learn is None else learn
+        told = validation.instance("response", response or UNKNOWN, Response, "a wbc.servo.Response")
+        self._trusted = told.doubt < DOUBTFUL
+        self._delay: float | None = told.delay if self._trusted else None
+        self.doubt = "" if self._trusted else UNCONFIRMED
+        self._learns = not (self._trusted and told.of_joints) if learn is None else learn
+        self._may_learn = learn is not False
         for name in PER_JOINT:
             _each(f"response.{name}", getattr(told, name), nv)
         validation.scalar("response.delay", told.delay, high=LONGEST_DELAY, unit="s")
+        if response is not None and not self._trusted:
+            log.warning("the response told, %s, is not counted on: its delay is in doubt, and is found anew", told)
+            told = UNKNOWN
         if not np.isfinite(known).all():
             joint = self._robot.dof_names[int(np.argmin(np.isfinite(known)))]
             log.warning("%s has no acceleration limit: its reference may jump, which no servo follows", joint)
-        self._most = round(LONGEST_DELAY / self._dt) + 1
-        self._respond(told)
+        self._most, self._every = round(LONGEST_DELAY / self._dt) + 1, max(1, round(EVERY / self._dt))
+        self._room = ROOM * self._robot.limits.velocity
+        self.response = self._counted = told
         self.reset(self._robot.neutral)
 
     @property
@@ -157,13 +189,16 @@ class Servo:
         """
         q, nv = self._robot.configuration("q", validation.ordinary_array("q", q)), self._robot.nv
         self.controller.reset(q)
-        shown = SHOWN[self.kind]
-        self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY, shown) if self._learns else None
+        self._identification = Identification(nv, self._dt, LONGEST_DELAY, MEMORY, SHOWN[self.kind])
+        self._rivals, self._verdicts = [self._counted, UNKNOWN], 0
         self._q: Array = q
         self._v, self._a, self._wanted, self._sum = np.zeros((4, nv))
         self._measured, self._command, self._moved, self._asked = q, q, *np.zeros((2, nv))
-        self._stopped, self._ticks = False, 0
-        #: The last references and corrections, the oldest first
+        self._stopped, self._lost, self._ticks, self._away = False, False, 0, 0
+        self._set_feedback()
+        #: How far ahead the reference is asked for now [s], and T, C, S, F and B as they are taken on
+        self._lead, self._rows = self._late * self._dt, self._found.copy()
+        #: The last references as they were asked for, and the last corrections, the oldest first
         self._references = [(q, self._v, self._a)] * self._most
         self._sent = np.zeros((self._most, nv))
 
@@ -181,24 +216,44 @@ class Servo:
         moved = pin.difference(self._model, self._measured, q)
         speed = moved / self._dt if given is None else given
         self._measured, self._moved = q, self._moved + moved
-        where, rate, _ = self._ahead(*self._references[-1 - self._late])
+        where, rate, _ = self._references[-1 - self._late]
         error = np.asarray(pin.difference(self._model, q, where))
         behind = float(np.abs(error).max(initial=0.0))
-        self._stopped |= behind >= self._far
+        if behind >= self._far and not self._stopped:
+            self._stopped = True
+            self._set_feedback()
         farther = max(0.0, (behind - self._near) / (self._far - self._near))
         pace = 0.0 if self._stopped else 1.0 - (1.0 - SLOWEST) * farther
         step = self._tick(pace)
+        part = self._feedback.within(error, -self._room - rate, self._room - rate, self._near)
         if behind < self._near:
-            self._sum += error * self._dt
+            self._sum += part * self._dt
         sent = self._sent[self._most - self._late :]
-        d, b = self._feedback.correction(error, rate - speed, self._sum, sent, self._near)
+        d, b = self._feedback.correction(part, rate - speed, self._sum, sent, self._near)
+        if self._lost or self._runs_away(error, speed):
+            d, b = np.zeros_like(d), np.zeros_like(b)
         self._sent[:-1] = self._sent[1:]
         self._sent[-1] = d
         values = self._values(d, b)
-        if self._identification is not None and not self._stopped:
-            self._learn(self._identification, values, q, speed)
+        if not self._stopped:
+            self._learn(values, q, speed)
         following = Following.STOPPED if self._stopped else Following.CLOSE if pace == 1.0 else Following.SLOWED
         return ServoStep(Command(self.kind, values), step, following, error)
+
+    def _runs_away(self, error: Array, speed: Array) -> bool:
+        """Whether a joint of a stopped robot is driven farther and farther off by what should bring it back."""
+        if not self._stopped:
+            return False
+        fast = np.abs(speed) > RUNS * self._robot.limits.velocity
+        away = fast & (error * speed < 0.0) & (np.abs(error) > AWAY * self._far)
+        self._away = self._away + 1 if away.any() else 0
+        if self._away * self._dt > LASTS and not self._lost:
+            self._lost = True
+            joint = self._robot.dof_names[int(np.argmax(away))]
+            log.warning(
+                "%s runs away from its reference: feedback is off until a reset; are its sign and order right?", joint
+            )
+        return self._lost
 
     def _tick(self, pace: float) -> Step:
         """The reference one period on, at a part of the tick's velocity."""
@@ -211,13 +266,14 @@ class Servo:
         # Smoothed over the time that it is extrapolated by
         self._a = self._a + (self._change - self._a) / (self._late + 1.0)
         self._q = np.asarray(pin.integrate(self._model, self._q, self._v * self._dt))
-        self._references.append((self._q, self._v, self._a))
+        late = self._late * self._dt
+        self._lead = min(max(late, self._lead - CATCHES_UP * self._dt), self._lead + CATCHES_UP * self._dt)
+        self._references.append(self._ahead(self._q, self._v, self._a, self._lead))
         del self._references[0]
         return step
 
-    def _ahead(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Where a reference is D later, how fast, and its acceleration."""
-        late = self._late * self._dt
+    def _ahead(self, q: Array, v: Array, a: Array, late: float) -> tuple[Array, Array, Array]:
+        """Where a reference is so much later, how fast, and its acceleration."""
         return np.asarray(pin.integrate(self._model, q, late * (v + 0.5 * late * a))), v + late * a, a
 
     def _loads(self, q: Array, v: Array, a: Array) -> Array:
@@ -228,29 +284,44 @@ class Servo:
 
     def _values(self, d: Array, b: Array) -> Array:
         """What the servos get."""
-        q, v, a = self._ahead(*self._references[-1])
+        q, v, a = self._references[-1]
+        if self._learns:
+            self._rows += min(1.0, self._dt / TAKEN_ON) * (self._found - self._rows)
+        lag, yields = self._rows[0], self._rows[1:]
         if self.kind is CommandKind.TORQUE:
             a = self._change + d
             moved, gravity, *_ = loads = self._loads(q, v, a)
             own = self._armature * a + self._damping * v
-            return np.asarray(moved + gravity + own + (self._yields * loads).sum(axis=0))
+            return np.asarray(moved + gravity + own + (yields * loads).sum(axis=0))
         a = a + b
-        if self._yields.any():
-            d = d + (self._yields * self._loads(q, v, a)).sum(axis=0)
+        if yields.any():
+            d = d + (yields * self._loads(q, v, a)).sum(axis=0)
         if self.kind is CommandKind.VELOCITY:
-            return np.asarray(v + self._lag * a + d)
-        return np.asarray(pin.integrate(self._model, q, self._lag * v + d))
+            return np.asarray(v + lag * a + d)
+        return np.asarray(pin.integrate(self._model, q, lag * v + d))
 
     def _respond(self, response: Response) -> None:
-        """Count on a response."""
-        self.response, self._late = response, round(response.delay / self._dt)
-        self._lag, *yields = response.rows(self._robot.nv)
-        self._yields = np.array(yields)
-        w = quickness(self.kind, self._dt, response, self._delay is not None)
-        self._feedback = Feedback(self.kind, self._dt, self._lag, self._late, w)
+        """Count on a response; what nothing confirmed is to be told with all the doubt that there is."""
+        self._counted, self.response = response, response if self._trusted else _doubted(response)
+        self._set_feedback()
 
-    def _learn(self, found: Identification, values: Array, q: Array, v: Array) -> None:
-        """Find lag and delay while the robot moves, and take them on slowly."""
+    def _set_feedback(self) -> None:
+        """By what is counted on; after a stop with all doubt, and where what follows speaks against it with as much as
+        what was found says.
+        """
+        careful = response = self._counted
+        if self._stopped:
+            careful = _doubted(response)
+        elif self._verdicts < 0:
+            found = self._rivals[1]
+            careful = replace(response, doubt=max(response.doubt, found.delay + found.doubt - response.delay))
+        self._late, self._found = round(response.delay / self._dt), np.array(response.rows(self._robot.nv))
+        w = quickness(self.kind, self._dt, careful, self._delay is not None)
+        self._feedback = Feedback(self.kind, self._dt, self._found[0], self._late, w)
+
+    def _learn(self, values: Array, q: Array, v: Array) -> None:
+        """Find the response while the robot moves, and check what is counted on."""
+        found = self._identification
         a = found.slope(v)
         loads = self._loads(q, v, np.zeros_like(v))
         resting = pin.rnea(self._model, self._data, q, np.zeros_like(v), a) - loads[1]
@@ -263,8 +334,47 @@ class Servo:
         else:
             found.add(values, loads[0] + loads[1] + self._damping * v, loads, resting, resting + self._armature * a)
         self._ticks += 1
-        if self._ticks % EVERY == 0 and found.motion > ENOUGH:
-            self._respond(self.response.towards(found.response(self._delay), EVERY * self._dt / TAKEN_ON))
+        if self._ticks % self._every == 0:
+            self._check(found)
+            if self._learns and found.motion > ENOUGH:
+                self._respond(found.response(self._delay))
+
+    def _check(self, found: Identification) -> None:
+        """Whether what was counted on before predicts what followed as well as what was found before, or as nothing."""
+        misfits = found.misfits(self._rivals, CHECKED[self.kind])
+        if not misfits:
+            return
+        own, other = misfits[0], min(misfits[1:])
+        # So many verdicts of a kind one after another, those against it below 0
+        self._verdicts = min(self._verdicts, 0) - 1 if other < BETTER * own else max(self._verdicts, 0) + 1
+        if self._verdicts >= TIMES and not self._trusted:
+            self._trusted, self.doubt = True, "" if self.doubt == UNCONFIRMED else self.doubt
+            self._respond(self._counted)
+        elif self._verdicts <= -TIMES and (self._trusted or self._delay is not None):
+            self._let_go(float(np.sqrt(own / other)), None if misfits[2] == other else found.response())
+        self._rivals = [self._counted, found.response(), UNKNOWN]
+        self._set_feedback()
+        found.mark()
+
+    def _let_go(self, times: float, better: Response | None) -> None:
+        """Doubt what is counted on, say so, and count on what predicts better where there is such a one."""
+        which, what = "found", "feedback is careful"
+        if self._delay is not None:
+            self._delay, self._learns, which, what = None, self._may_learn, "told", "it is let go"
+        than = "none" if better is None else f"what was found, {better}"
+        if not self._learns:
+            better, what = None, "feedback is careful"
+        self._trusted, self._verdicts = better is not None, 0 if better is not None else -TIMES
+        said = f"the response {which}, {self._counted}, errs {times:.2g} times as much about what follows as {than}"
+        if self.doubt in ("", UNCONFIRMED):
+            log.warning("%s: %s", said, what)
+        self.doubt = said
+        self._respond(better or self._counted)
+
+
+def _doubted(response: Response) -> Response:
+    """With all the doubt that a delay can be in."""
+    return replace(response, doubt=max(response.doubt, LONGEST_DELAY - response.delay))
 
 
 def _each(field: str, value: Any, nv: int) -> Array:
