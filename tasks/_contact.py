@@ -105,6 +105,10 @@ class Contact(Constraint):
         """Those of ``Hold``: J v = -gain e."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """That of the motion."""
+        return self._hold.residual(robot, kin, inputs)
+
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX | None:
         """What of a twist (linear; angular) in the axes of :meth:`velocity_rows` its rows are, linear in the twist.
 

@@ -377,6 +377,12 @@ class Constraint(Item):
         """lower <= A v <= upper, or None."""
         return None
 
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """e(q, inputs) of equality rows that keep it at 0 by de/dt = -gain e, one entry a row, 0 in rows that keep
+        nothing: how far e bends within a tick is made up for, see docs/reach.md. None: rows count as they are at q.
+        """
+        return None
+
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds | None:
         """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""
         return None

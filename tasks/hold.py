@@ -102,23 +102,32 @@ class Hold(Constraint):
         """See the class."""
         pose, target = kin.pose(self.frame), inputs["target"]
         jacobian = kin.frame_jacobian(self.frame)
-        drift, matrix = [], []
+        matrix = []
         if self.kind != "orientation":
-            drift.append(pose.position - target.position)
             matrix.append(jacobian[:3, :])
         if self.kind == "axis":
-            # As seen from the frame, its z axis turns away from where the target's is
-            drift.append(shortest_turn(pose.rotation.T @ target.rotation[:, 2]))
             matrix.append((pose.rotation.T @ jacobian[3:, :])[:2, :])
         elif self.kind == "roll":
             x, frame = pose.rotation[:, 0], target.rotation
             along, across = ca.dot(x, frame[:, 0]), ca.dot(x, frame[:, 1])
-            drift.append(ca.atan2(across, along))
             # d atan2(b, a) = (a db - b da) / (a^2 + b^2), with dx = w x x; x along the target's z axis has no roll
             turn = along * ca.cross(x, frame[:, 1]) - across * ca.cross(x, frame[:, 0])
             matrix.append((turn.T @ jacobian[3:, :]) / ca.fmax(along * along + across * across, UPRIGHT))
         elif self.kind != "position":
-            drift.append(rot.log3(pose.rotation @ target.rotation.T))
             matrix.append(jacobian[3:, :])
-        wanted = -inputs["gain"] * ca.vertcat(*drift)
+        wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
         return Rows(ca.vertcat(*matrix), wanted, wanted)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """e of the class."""
+        pose, target = kin.pose(self.frame), inputs["target"]
+        drift = [] if self.kind == "orientation" else [pose.position - target.position]
+        if self.kind == "axis":
+            # As seen from the frame, its z axis turns away from where the target's is
+            drift.append(shortest_turn(pose.rotation.T @ target.rotation[:, 2]))
+        elif self.kind == "roll":
+            x, frame = pose.rotation[:, 0], target.rotation
+            drift.append(ca.atan2(ca.dot(x, frame[:, 1]), ca.dot(x, frame[:, 0])))
+        elif self.kind != "position":
+            drift.append(rot.log3(pose.rotation @ target.rotation.T))
+        return ca.SX(ca.vertcat(*drift))

@@ -72,12 +72,17 @@ class LineContact(Pressing, Contact):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        pose, target, jacobian = kin.pose(self.frame), inputs["target"], kin.frame_jacobian(self.frame)
-        # y, z, x in place of x, y, z: the turn is that of the third axis
-        seen = (pose.rotation.T @ target.rotation[:, 0])[[1, 2, 0]]
-        wanted = -inputs["gain"] * ca.vertcat(pose.position - target.position, shortest_turn(seen))
+        pose, jacobian = kin.pose(self.frame), kin.frame_jacobian(self.frame)
+        wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
         matrix = ca.vertcat(jacobian[:3, :], (pose.rotation.T @ jacobian[3:, :])[1:, :])
         return Rows(matrix, wanted, wanted)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """Drift of the position, then the shortest turn of the frame's x axis to the target's."""
+        pose, target = kin.pose(self.frame), inputs["target"]
+        # y, z, x in place of x, y, z: the turn is that of the third axis
+        seen = (pose.rotation.T @ target.rotation[:, 0])[[1, 2, 0]]
+        return ca.vertcat(pose.position - target.position, shortest_turn(seen))
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
         """The rate of R'w is R' dw/dt, so both are taken alike."""

@@ -183,6 +183,18 @@ class Rolling(Constraint):
             right += wanted
         return Rows(ca.sparsify(ca.vertcat(*matrix)), ca.vertcat(*right), ca.vertcat(*right))
 
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """Heights of the points of contact over the ground, in rows of contact; slip has none."""
+        if not self._touches(robot):
+            return None
+        ground: Pose = inputs["ground"]
+        out = []
+        for wheel in self.wheels:
+            point = _contact(kin, wheel, ground.rotation[:, 2])[0]
+            out += [ca.SX(1 if wheel.roller is not None else 2, 1)]
+            out += [ca.dot(ground.rotation[:, 2], point - ground.position)]
+        return ca.vertcat(*out)
+
     def _touches(self, robot: Robot) -> bool:
         return robot.base == "floating" if self.contact is None else self.contact
 

@@ -112,12 +112,17 @@ class RollingContact(Pressing, Contact):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        pose, target, jacobian = kin.pose(self.frame), inputs["target"], kin.frame_jacobian(self.frame)
+        pose, jacobian = kin.pose(self.frame), kin.frame_jacobian(self.frame)
         arm, directions = self._contact(inputs, pose.rotation)
-        off = ca.dot(target.rotation[:, 2], pose.position + arm - target.position)
-        wanted = ca.vertcat(0, 0, -inputs["gain"] * off)
+        wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
         point = jacobian[:3, :] - ca.skew(arm) @ jacobian[3:, :]
         return Rows(directions.T @ point, wanted, wanted)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """Height of the point of contact over the ground; slip has none."""
+        pose, target = kin.pose(self.frame), inputs["target"]
+        point = pose.position + self._contact(inputs, pose.rotation)[0]
+        return ca.SX(ca.vertcat(0, 0, ca.dot(target.rotation[:, 2], point - target.position)))
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX | None:
         """None: the point of contact wanders over the wheel."""

@@ -69,9 +69,13 @@ class SlidingContact(Pressing, Contact):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        target, normal = inputs["target"], inputs["target"].rotation[:, 2]
-        wanted = -inputs["gain"] * ca.dot(normal, kin.position(self.frame) - target.position)
+        normal, wanted = inputs["target"].rotation[:, 2], -inputs["gain"] * self.residual(robot, kin, inputs)
         return Rows(normal.T @ kin.frame_jacobian(self.frame)[:3, :], wanted, wanted)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+        """Height over the surface."""
+        target = inputs["target"]
+        return ca.SX(ca.dot(target.rotation[:, 2], kin.position(self.frame) - target.position))
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
         """Along the normal."""

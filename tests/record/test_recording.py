@@ -423,7 +423,7 @@ def test_a_fork_leaves_the_file_to_its_parent(tmp_path: Path, monkeypatch: pytes
 
 def test_parts_are_all_that_a_tick_reads() -> None:
     """A buffer that is added to the tick must be added to the recording."""
-    from wbc.controller.tick.buffers import Buffers
+    from wbc.controller.tick.buffers import OWN, Buffers
 
     # the wrenches that are kept are those of stacks that command accelerations
-    assert {*INPUTS, "kept"} == set(Buffers.__annotations__) - {"report", "state"}
+    assert {*INPUTS, "kept"} == set(Buffers.__annotations__) - {"report", "state", *OWN}

@@ -6,7 +6,7 @@ import pytest
 
 import wbc.robots
 from wbc.controller import Stack
-from wbc.controller.stack import warn_free_base
+from wbc.controller.stack import warn_free_base, warn_no_accelerations
 from wbc.tasks import Damping, FrameVelocityLimit, Hold, JointLimits, Posture
 
 
@@ -34,6 +34,22 @@ def test_a_base_that_nothing_limits_is_said_once_with_a_line_that_works(caplog: 
     warn_free_base.cache_clear()
     caplog.clear()
     Stack(limited, 0.01).add(Posture()).add(JointLimits()).compile(backend="vm")
-    for item in (Hold(foot), FrameVelocityLimit(foot, linear=1.0)):
-        Stack(robot, 0.01).add(Posture()).add(item).compile(backend="vm")
+    Stack(robot, 0.01).add(Posture()).add(FrameVelocityLimit(foot, linear=1.0)).compile(backend="vm")
     assert not caplog.messages
+
+
+def test_held_frames_without_limits_of_accelerations_are_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    warn_no_accelerations.cache_clear()
+    robot = wbc.robots.load("quadruped")
+    hold = Hold(robot.frames["front_left_foot"])
+    for _ in range(2):
+        Stack(robot, 0.01).add(Posture()).add(hold, name="foot").add(JointLimits()).compile(backend="vm")
+    (said,) = caplog.messages
+    assert "quadruped: nothing limits accelerations, so beside 'foot'" in said
+    warn_no_accelerations.cache_clear()
+    caplog.clear()
+    limited = eval(said.split("robot = ")[1].split(" in rad")[0], {"robot": robot})
+    Stack(limited, 0.01).add(Posture()).add(hold).add(JointLimits()).compile(backend="vm")
+    Stack(robot, 0.01).add(Posture()).add(hold, soft=1.0).compile(backend="vm")
+    Stack(wbc.robots.load("double_pendulum"), 0.01).add(Posture()).compile(backend="vm")
+    assert [m for m in caplog.messages if "accelerations" in m] == []

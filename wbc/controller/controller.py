@@ -202,6 +202,7 @@ class Controller(Handles):
         """
         if self._core.waiting:
             raise SolverError("qp", None, "needs the first configuration; call step(q) or reset(q) first")
+        self._core.assembly.unbend()
         return self._core.tick.qp()
 
     @property

@@ -15,8 +15,8 @@ from wbc.controller import hooks
 from wbc.controller.controller import Controller, core_of
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
-from wbc.stack.declaration import Declaration
-from wbc.tasks import Fixed, FrameVelocityLimit, JointLimits
+from wbc.stack.declaration import Declaration, bends
+from wbc.tasks import Constraint, Fixed, FrameVelocityLimit, JointLimits
 from wbc.tasks.mechanism import Mechanism
 
 if TYPE_CHECKING:
@@ -52,6 +52,27 @@ def warn_free_base(robot: str, joint: str, numbers: str) -> None:
         robot,
         joint,
         numbers,
+    )
+
+
+def held_without_accelerations(stack: Declaration) -> str:
+    """Name of the first item that holds a robot with a moving base while nothing limits accelerations; else empty."""
+    items = [entry.item for entry in stack.constraints if isinstance(entry.item, Constraint)]
+    if stack.command != "velocity" or stack.robot.base_nv == 0:
+        return ""
+    if any(np.isfinite(item.acceleration_limits(stack.robot)).any() for item in items):
+        return ""
+    return next((entry.name for entry in stack.constraints if bends(entry)), "")
+
+
+@functools.cache
+def warn_no_accelerations(robot: str, item: str) -> None:
+    """Say once for each robot and item what makes joints change their rates from tick to tick as they like."""
+    log.warning(
+        "%s: nothing limits accelerations, so beside %r joints may reach any rate, and turn round, in one tick; "
+        "with robot = robot.with_limits(acceleration=100.0) in rad/s^2, stack.add(wbc.tasks.JointLimits()) does",
+        robot,
+        item,
     )
 
 
@@ -103,6 +124,8 @@ class Stack(Declaration):
         if base_is_free(self):
             joint = self.robot.joint_names[0]
             warn_free_base(self.robot.name, joint, ", ".join(["0.5"] * self.robot.base_nv))
+        if item := held_without_accelerations(declared):
+            warn_no_accelerations(self.robot.name, item)
         return controller
 
     def inverse_kinematics(self, goals: Iterable[str] | None = None, backend: str = "auto") -> InverseKinematics:

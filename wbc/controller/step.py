@@ -24,7 +24,7 @@ from wbc.controller.outcome import (
 from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.errors import CommandError
 from wbc.qp.certificate import Certificate
-from wbc.stack.declaration import Declaration
+from wbc.stack.declaration import Declaration, bends
 from wbc.stack.layout import CLOSED, Block, Layout, rate_unit
 from wbc.stack.memory import Memory
 from wbc.validation import Array
@@ -192,6 +192,15 @@ class Step:
     def margins_ahead(self) -> Mapping[str, Array]:
         """Margins h(q (+) v dt) after the step, with moving obstacles moved on: part of the certificate."""
         return self._by_margin("ahead")
+
+    @property
+    def lost(self) -> Mapping[str, Array]:
+        """What equality rows lose at q (+) v dt, by item: how much further from its target than J v = -gain e says the
+        item is then [m, rad]. Beyond 1e-3 of ``stack.length`` per second, or rad/s, rows are in ``relaxed`` with it.
+        docs/reach.md
+        """
+        values = self._part("lost")
+        return {b.entry.name: values[b.span] for b in self._context.layout.of_form("rows") if bends(b.entry)}
 
     def _by_margin(self, part: str) -> Mapping[str, Array]:
         values = self._part(part)

@@ -165,3 +165,7 @@ class KeepRows(Constraint):
             off = off + inputs[DRIFT]
         wanted = inputs["speed"] - ca.fmax(-self.fastest_return, ca.fmin(self.fastest_return, inputs["gain"] * off))
         return Rows(expressions.matrix(robot, kin, self.coordinate), wanted, wanted)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """e of the class, where it is no sum of rates."""
+        return expressions.drift(robot, kin, self.coordinate, inputs.get(REFERENCE))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.controller.outcome import certificates, scales
+from wbc.controller.tick.buffers import BENDS
 from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Residue
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
@@ -66,7 +67,14 @@ class Explainer:
                 if share < 1.0 - 1e-6
             ),
             reasons(past, v, tuple(binding.values()), missed),
+            self._lost(v),
         )
+
+    def _lost(self, v: Array) -> tuple[Give, ...]:
+        """What equality rows lose per second, as far as it is more than a thousandth of what counts as giving way."""
+        rates, n = self.past.part("lost") / float(self.past.tick.dt[0]), self.past.layout.variables
+        told = np.flatnonzero(np.abs(rates) > 1e-3 * BENDS * self.naming.units[n:])
+        return tuple(Give(self._violated(n + int(k), v), float(abs(rates[k]))) for k in told)
 
     def _infeasibility(self) -> Infeasibility:
         """Conflicts of the QP in v / dof_scale and rows per unit."""

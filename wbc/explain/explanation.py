@@ -243,6 +243,7 @@ class Explanation:
             alone would better the objective. complementarity: largest distance of an active row from its bound.
         scales: lambda of each scaled task that is slowed down; the rows that keep its direction are not in ``binding``.
         reasons: why each task does or does not converge, see :class:`Reason`.
+        lost: of equality rows, what they lose until the next tick per second of it, see :attr:`wbc.Step.lost`.
     """
 
     status: str
@@ -259,6 +260,7 @@ class Explanation:
     complementarity: Residue
     scales: tuple[tuple[str, float], ...] = ()
     reasons: tuple[Reason, ...] = ()
+    lost: tuple[Give, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{self.status} (by {self.answered_by})." if self.answered_by else f"{self.status}."]
@@ -269,6 +271,10 @@ class Explanation:
             lines.append("The least that ends all conflicts: " + ", ".join(str(g) for g in self.least) + ".")
         if self.gave_way:
             lines.append("What gave way here: " + ", ".join(str(g) for g in self.gave_way) + ".")
+        if self.lost:
+            lines.append(
+                "Lost within the tick, which is long for how rows bend: " + ", ".join(map(str, self.lost)) + "."
+            )
         if self.binding:
             many = len(self.binding) > _LONG
             lines.append(f"Binding: {by_item(self.binding) if many else listed(self.binding)}.")

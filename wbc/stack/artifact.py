@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
@@ -101,6 +101,7 @@ def _virtual(stack: Declaration, layout: Layout, version: str, compiled: bool) -
     folder, cached = cache.fetch(key(stack, version, "vm"), fill, what=_said(stack))
     saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
+    functions = replace(functions, lost=saved.get("lost"))
     return Artifact(layout, None, functions, cached, compiled)
 
 

@@ -17,6 +17,7 @@ from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram, sparsity_rows
 from wbc.stack.tables import (
+    bent_rows,
     brakes,
     force_scales,
     gain_table,
@@ -99,6 +100,7 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
                 "NNZK": upper.nnz(),
                 "HANDED": next((f.numel_out("handed") for f in functions if "handed" in f.name_out()), 0),
                 "CALM": int(stack.calm),
+                "BENDING": sum(bent_rows(layout, program)),
                 "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
@@ -119,6 +121,7 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
         _table("int", "unit_size", [u[1] for u in units]),
         _table("int", "k_row", upper.get_triplet()[0]),
         _table("int", "k_col", upper.get_triplet()[1]),
+        _table("int", "bent", bent_rows(layout, program)),
         _table("int", "margin_at", margin_table(layout)),
         _table("int", "rate_at", rate_table(layout)),
         _table("int", "gain_at", gain_table(layout)),

@@ -417,6 +417,14 @@ def soft_rows(entry: Entry, robot: Robot) -> int:
     return count - 1 if isinstance(entry.item, Direction) else count
 
 
+def bends(entry: Entry) -> bool:
+    """Whether equality rows of an item hold exactly and may bend within a tick, see :meth:`Constraint.residual`."""
+    item = entry.item
+    if not isinstance(item, Constraint) or type(item).residual is Constraint.residual:
+        return False
+    return item.equality and entry.price is None and entry.level == 0
+
+
 def _softness(entry: Entry) -> list[str]:
     """What the compiled code knows of how soft an item is."""
     return ["priced"] if entry.price is not None else [] if entry.hard else ["soft"]

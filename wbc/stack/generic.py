@@ -29,14 +29,15 @@ PREBUILT = pathlib.Path(__file__).parent / "prebuilt_libraries"
 
 #: Whole sizes of ``stack.h``, and real ones
 SIZES = (
-    "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "UNITS", "LAST_ORDER", "ACTIVE_MAX",
-    "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST", "SOFT_MAX", "BLOCKED",
+    "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "UNITS", "LAST_ORDER",
+    "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST", "SOFT_MAX",
+    "BLOCKED",
 )  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
 INT_TABLES = (
     "j_start", "j_col", "a_start", "a_end", "a_col", "row_order", "bound_sequence", "unit_start", "unit_size",
-    "k_row", "k_col", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
+    "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
     "slewed_at", "slewed_dof", "level_start", "row_level", "block_row", "block_rows", "block_first", "block_columns",
 )  # fmt: skip
 REAL_TABLES = (
@@ -44,13 +45,13 @@ REAL_TABLES = (
     "task_scale",
 )  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
-FUNCTIONS = ("rows", "ahead", "curvature", "torque")
-COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "MT")]}
+FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost")
+COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)")], "lost": [(1, "moved", "DOFS")]}
 #: Arrays that only C knows and the functions write
 WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries")
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "NNZK", "SLEWED")
-_ALWAYS = ("MH", "KEPT")
+_ALWAYS = ("MH", "KEPT", "BENDING")
 
 _MEMBERS = re.compile(r"^    (double|int|long long|wide) (.*?);", re.MULTILINE)
 _ARRAY = re.compile(r"(\w+)\[(.*)\]")

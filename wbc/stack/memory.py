@@ -76,6 +76,7 @@ REPORT = (
     Field("ahead", ("MH",), "margins after v has been held for dt", True),
     Field("multipliers", ("NV + MC",), "of the bounds, then of the rows; > 0 at the upper bound", True, "lambda"),
     Field("slack", ("MC",), "by how much a row is missed, in its unit / s", True),
+    Field("lost", ("MC",), "what equality rows lose until v has been held for dt: their residual bends", True),
     Field("owner_low", ("NV",), "number of the bound that sets each lower bound of v, -1: none"),
     Field("owner_high", ("NV",), "the same for the upper bound"),
 )
@@ -100,6 +101,10 @@ INPUTS = (
     Field("weight", ("MT",), "of each task row, scale included", True),
     Field("enabled", ("MC",), "1 or 0 for each general row", True),
     Field("bound_enabled", ("NB * NV",), "the same for each entry of each bound block", True),
+    Field("bend", ("MC",), "added to both sides of equality rows, for what they lose; a tick begins with 0", True),
+    Field("curving", (), "not 0: H has the curvature of equality rows, whatever CALM says; a tick begins with 0"),
+    Field("shortened", (), "on the diagonal of H besides, in units of dof_scale; a tick begins with 0"),
+    Field("stopped", ("NV",), "1 for joints that bounds stop and that others do not count on; a tick begins with 0"),
     Field("plain", (), "not 0: the linear model as it is, whatever CALM says"),
 )
 #: Of accelerations

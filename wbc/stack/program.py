@@ -17,8 +17,9 @@ nv counts the variables of the QP here, which may be more than the velocities, s
 The tick forms H = sum w (factor J)'J + damping and g from these, so that the compiled expression stays
 small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
 inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
-curvature of the errors of the first level's tasks for a weight ``force`` on each row, as far as it comes from the
-robot's links; see :mod:`wbc.symbolic.curvature`.
+curvature of the errors of the first level's tasks, then of those that equality rows keep, for a weight ``force`` on
+each row, as far as it comes from the robot's links; see :mod:`wbc.symbolic.curvature`. ``lost(q, v, p, dt)`` is how far
+the errors that equality rows A v = b keep bend until q (+) v dt: e(q (+) v dt) - e - (A v) dt, one entry a general row.
 
 Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
 :mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x, enabled)`` are the torques of the joints, and ``ahead`` takes the
@@ -42,7 +43,7 @@ import numpy as np
 
 from wbc.errors import ShapeError
 from wbc.robot import Robot
-from wbc.stack.declaration import Declaration
+from wbc.stack.declaration import Declaration, bends
 from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
 from wbc.stack.second import SecondOrder
@@ -51,7 +52,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.operators import quick_operators
-from wbc.symbolic.tracer import Carrier, Tracer
+from wbc.symbolic.tracer import Carrier, Tracer, along
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
@@ -74,8 +75,8 @@ ROWS_OUTPUTS = (
 @dataclass(frozen=True, eq=False)
 class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
-    task has any or the stack does not want it; ``torque`` where none is commanded; ``balls`` and ``sensed`` are rows
-    that are left to loops.
+    task has any or the stack does not want it; ``torque`` where none is commanded; ``lost`` where no equality row
+    bends; ``balls`` and ``sensed`` are rows that are left to loops.
     """
 
     rows: ca.Function
@@ -84,11 +85,13 @@ class TickProgram:
     torque: ca.Function | None = None
     balls: Balls = field(default_factory=Balls)
     sensed: Sensed = field(default_factory=Sensed)
+    lost: ca.Function | None = None
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
         every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
+        every["lost"] = self.lost
         return {name: function for name, function in every.items() if function is not None}
 
 
@@ -113,7 +116,7 @@ class _Builder:
         self.kinematics = _kinematics_of(stack.robot)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
-        self.force = ca.SX.sym("force", layout.task_rows)
+        self.force = ca.SX.sym("force", layout.task_rows + layout.general_rows)
         self.forces: list[AppliedForce] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
         self.second = SecondOrder(self) if stack.command != "velocity" else None
@@ -245,6 +248,9 @@ class _Builder:
         robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         count = len(block.rows)
         if block.form == "rows":
+            if (kept := self.residual(block, tracer)) is not None and self.layout.leading:
+                start = self.layout.task_rows + block.start
+                self.forces += tracer.forces(ca.dot(self.force[start : start + count], kept))
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
@@ -272,6 +278,32 @@ class _Builder:
             matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
         rows = Rows(matrix, low, ca.SX.inf(count))
         return rows, margin, factor
+
+    def residual(self, block: Block, tracer: Tracer) -> ca.SX | None:
+        """What equality rows keep at 0; None for others and for those that may give way at a price."""
+        item = block.entry.item
+        assert isinstance(item, Constraint)
+        if self.stack.command != "velocity" or not bends(block.entry):
+            return None
+        kept = item.residual(self.stack.robot, tracer, self.values(block))
+        return None if kept is None else self.column(block, "residual", kept)
+
+    def lost(self, block: Block) -> ca.SX:
+        """How far e of equality rows bends until q (+) v dt: e(q (+) v dt) - e - (A v) dt, with what moves beside."""
+        tracer, item = self.tracer(block), block.entry.item
+        kept = self.residual(block, tracer)
+        if kept is None or not isinstance(item, Constraint):
+            return ca.SX(len(block.rows), 1)
+        rows = item.velocity_rows(self.stack.robot, tracer, self.values(block), self.dt)
+        assert rows is not None
+        rate = along(ca.SX(rows.matrix), self.kinematics.v)
+        for owner, slot in self.moving(block):
+            if owner is block:
+                rate += ca.jacobian(kept, self.p[slot.span]) @ self.rate(owner, slot)
+        keeps = ca.DM([float(not kept[k].is_zero()) for k in range(kept.numel())])
+        kept, rate = tracer.expanded(kept, rate)
+        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block))
+        return ca.sparsify(keeps * (later - kept - rate * self.dt))
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
         """Rows of sensed pairs, see :meth:`Constraint.sensed_rows`."""
@@ -356,7 +388,9 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
         enabled = ca.SX.sym("enabled", layout.general_rows)
         found = [ca.densify(b.second.torque(enabled))]
         torque = checked_function("torque", [*inputs, b.second.x, enabled], found, ["torque"])
-    return TickProgram(rows, ahead, second, torque, balls, sensed)
+    bent = ca.vertcat(ca.SX(0, 1), *[b.lost(block) for block in layout.of_form("margins", "rows")])
+    lost = checked_function("lost", inputs, [ca.densify(bent)], ["lost"]) if bent.nnz() else None
+    return TickProgram(rows, ahead, second, torque, balls, sensed, lost)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:

@@ -64,15 +64,25 @@ def _lever(stack: Declaration, row: Row) -> float:
 
 
 def force_scales(stack: Declaration, layout: Layout, program: TickProgram) -> list[float]:
-    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows
-    without any.
+    """How much curvature a task row of unit weighted error may have: its lever for metres, else 1; 0 for rows without
+    any: they have none of their own, and move a single joint or meet no equality row that bends.
     """
     scales = np.zeros(layout.task_rows)
     if program.curvature is not None:
         for block in layout.of_form("task"):
             scales[block.span] = [_lever(stack, row) for row in block.rows]
-        scales *= np.diff(program.curvature.jac_sparsity(0, 4).colind()) > 0
+        curved = np.diff(program.curvature.jac_sparsity(0, 4).colind())[: layout.task_rows] > 0
+        moves = np.diff(program.rows.sparsity_out("jt").colind()) > 1
+        scales *= curved | moves if any(bent_rows(layout, program)) else curved
     return scales.tolist()
+
+
+def bent_rows(layout: Layout, program: TickProgram) -> list[int]:
+    """1 for general rows whose residual bends within a tick, see :meth:`Constraint.residual`; else 0."""
+    out = np.zeros(layout.general_rows, dtype=np.int_)
+    if program.lost is not None:
+        out[program.lost.jac_sparsity(0, 1).row()] = 1
+    return [int(x) for x in out]
 
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:

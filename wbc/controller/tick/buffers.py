@@ -35,8 +35,17 @@ TOLERANCE, UNIT_TOLERANCE = 1e-9, 2.00001e-6
 #: third, or a row that never gives way is violated by more than the last; as in ``native/settings.h``
 SOUND, KNOWN, OPTIMAL, FIRMLY = 1e-6, 1e-3, 1e-9, 1e-8
 
+#: What equality rows may lose [rad, or characteristic lengths, per second], from where on joints that bounds stop are
+#: not counted on, how often rows are corrected, how often the step gets shorter and by how much, and from which rate on
+#: a joint turns round; as in ``native/bend.h``
+BENDS, STRETCHED, BENDINGS, SHORTER, STEEPER, TURNING = 1e-3, 2e-2, 8, 3, 100.0, 1.0
+
 #: Paths to another answer, in the order in which they are tried by default; braking is always the last
 CHAIN = ("cold", "daqp", "osqp", "elastic")
+
+
+#: Buffers that are 0 when a tick begins, and that the tick itself writes
+OWN = ("bend", "curving", "stopped", "shortened")
 
 
 class Buffers:
@@ -49,6 +58,9 @@ class Buffers:
         p: run-time inputs, see :class:`wbc.stack.layout.Layout`. dt: one number.
         weight: of each task row, scale included. enabled: 1 or 0 for each general row.
         bound_enabled: the same for each entry of each bound block.
+        bend: added to both sides of equality rows that bend, see ``native/bend.h``; curving: not 0 where H has their
+            curvature without calm motion, too; stopped: 1 for joints that bounds stop; shortened: on
+            the diagonal of H besides. All 0 when a tick begins.
         report: see :class:`wbc.stack.memory.Memory`.
         state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
             velocity that the tick counted accelerations from.
@@ -64,6 +76,10 @@ class Buffers:
     weight: Array
     enabled: Array
     bound_enabled: Array
+    bend: Array
+    curving: Array
+    stopped: Array
+    shortened: Array
     report: Array
     state: Array
     #: of accelerations, the torques of the last command and the wrenches that a tick without an answer keeps
@@ -139,6 +155,14 @@ class Assembly(Buffers, ABC):
     def look_ahead(self) -> None:
         """Margins after the step, into the report."""
 
+    @abstractmethod
+    def find_lost(self, everything: bool) -> float:
+        """What equality rows lose at the reported command, into the report; the largest as a rate, in row units.
+
+        Args:
+            everything: what they miss of moved sides, too, which is not what the order of sacrifice has taken.
+        """
+
     #: whether :meth:`taker` is there
     takes = False
 
@@ -179,11 +203,17 @@ class Assembly(Buffers, ABC):
     def rewind(self) -> None:
         """Before the tick is done again: accelerations and torques count from where they did."""
         self.v_last[:] = self.v_in
+        self.unbend()
         self.kept[self._slewed[1]] = self.p[self._slewed[0]]
 
-    def rest(self, lower: Array, upper: Array) -> Array:
-        """The command within simple bounds that is nearest to rest."""
-        nearest = np.zeros(lower.size)
+    def unbend(self) -> None:
+        """The rows as they are at q."""
+        for name in OWN:
+            getattr(self, name)[:] = 0.0
+
+    def rest(self, lower: Array, upper: Array, coasting: Array) -> Array:
+        """The command within simple bounds that is nearest to rest, or of velocities to ``coasting``."""
+        nearest = coasting.copy()
         if self._command != "velocity":
             nv = self._dofs
             nearest[:nv], nearest[nv:] = -self.v_last[:nv] / float(self.dt[0]), self.kept[nv:]

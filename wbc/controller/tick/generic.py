@@ -104,7 +104,12 @@ class GenericTick(CompiledTick):
             return self._memory[place.start : max(place.stop, place.start + 1, place.start + least)]
 
         q, p, dt, v = field("q"), field("p"), field("dt"), field("v_last")
-        copies = {name: np.zeros(max(1, count)) for name, count in (("mean", layout.nv), ("force", layout.task_rows))}
+        sizes_of_copies = (
+            ("mean", layout.nv),
+            ("moved", layout.nv),
+            ("force", layout.task_rows + layout.general_rows),
+        )
+        copies = {name: np.zeros(max(1, count)) for name, count in sizes_of_copies}
         for name, array in copies.items():
             self._context.set(name, array.ctypes.data)
         state = [q, v[: layout.nv], p, dt]
@@ -117,6 +122,7 @@ class GenericTick(CompiledTick):
         calls: dict[str, tuple[Any, list[Array], list[Array]]] = {
             "rows": (program.rows, state, written),
             "ahead": (program.ahead, [q, copies["mean"], p, dt], [field("ahead")]),
+            "lost": (program.lost, [q, copies["moved"], p, dt], [field("lost")]),
         }
         if program.curvature is not None:
             entries = self._written("curvature_entries", program.curvature.nnz_out(0))

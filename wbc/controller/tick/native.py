@@ -48,7 +48,9 @@ class CompiledTick(Assembly):
         self._unusable, self.plain = view("unusable"), view("plain")
         self._desired, self._factor = view("desired"), view("factor")
         self._sides = view("free_low"), view("free_high")
-        self._give = view("give")
+        self._give, self.bend = view("give"), view("bend")
+        self.curving, self.stopped, self.shortened = view("curving"), view("stopped"), view("shortened")
+        self._library.wbc_tick_find_lost.restype = ctypes.c_double
         self.step_function = self._library.wbc_tick_step
         #: one tick; returns its flag
         self.call = builtin(self._library.wbc_python_step, self.pointer.value or 0)
@@ -84,6 +86,9 @@ class CompiledTick(Assembly):
     def look_ahead(self) -> None:
         """Margins after the step only."""
         self._library.wbc_tick_look_ahead(self.pointer)
+
+    def find_lost(self, everything: bool) -> float:
+        return float(self._library.wbc_tick_find_lost(self.pointer, int(everything)))
 
     def check(self) -> int:
         """Only refuse bad inputs, and take over a measured velocity."""

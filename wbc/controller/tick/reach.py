@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram
-from wbc.stack.tables import brakes, force_scales, gain_table, kept_rows, margin_table, rate_table, stops
+from wbc.stack.tables import bent_rows, brakes, force_scales, gain_table, kept_rows, margin_table, rate_table, stops
 from wbc.validation import Array
 
 #: As in ``native/reach.h``
@@ -25,11 +25,15 @@ BRAKING_MARGIN = 0.25
 DEAD = 1e-20
 
 
+#: Rows of unit length; the places of their forces behind those of the task rows; what of a force goes there
+Firm = tuple[Array, NDArray[np.intp], Array]
+
+
 class Reach:
     """Curvature of the errors that no step removes, and gains that leave margin to brake.
 
     Args:
-        curve: weights of the task rows -> curvature (nv x nv, symmetric); None: no task has any.
+        curve: weights of the task rows and of general rows -> curvature (nv x nv, symmetric); None: no task has any.
     """
 
     def __init__(
@@ -51,6 +55,8 @@ class Reach:
         self._dof_count = layout.nv
         margins = np.array(margin_table(layout), dtype=np.intp)
         self._kept = np.array(kept_rows(layout), dtype=np.intp)
+        self._bent = np.array(bent_rows(layout, program), dtype=np.bool_)
+        self._tasks, self._calm, self._amended = layout.task_rows, stack.calm, False
         self._margin_rows = np.flatnonzero(margins >= 0)
         self._margin_at = margins[self._margin_rows]
         self._rate_at = np.array(rate_table(layout), dtype=np.intp)[self._margin_rows]
@@ -65,14 +71,16 @@ class Reach:
         q: Array,
         p: Array,
         equal: Array,
-        keepers: tuple[Array, NDArray[np.intp], Array],
+        firm: Firm,
         bound_enabled: Array,
+        stopped: Array,
     ) -> tuple[Array, Array]:
         """(H, g) of the QP that is solved.
 
         Args:
             H: of the linear model. J: task rows of the first level. weight: of each, fading included.
-            equal: rows of the equalities, of unit length in v / dof scales. keepers: see :meth:`keepers`.
+            equal: rows of the equalities, of unit length in v / dof scales. firm: see :meth:`firm`.
+            stopped: 1 for joints that bounds stop.
         """
         counts = weight != 0.0
         error = np.where(counts, error, 0.0)
@@ -83,16 +91,26 @@ class Reach:
         slope = J.T @ (weight * error)
         if not (np.abs(error) < TOO_FAR).all():
             return H, plain
-        free = self._free(q, slope, bound_enabled)
+        free = np.minimum(self._free(q, slope, bound_enabled), 1.0 - stopped)
         metric = _cut_off(self._strengthened(H, equal), free)
         if not _is_definite(metric):
             return H, plain
-        curved = self._curved(H, metric, J, weight, error, slope, free, keepers, equal)
+        curved = self._curved(H, metric, J, weight, error, slope, free, firm, equal)
         if curved is not None:
             H, metric = curved, self._strengthened(curved, equal)
             if not _is_definite(metric):
                 return H, plain
-        allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, free, bound_enabled)
+            # what is definite by little only makes a step that is too long for what is held
+            if (
+                self._amended
+                and (firm[1] >= self._tasks).any()
+                and (more := self._held_short(np.asarray(np.linalg.solve(metric, free * slope)), free * slope))
+            ):
+                H = H + np.diag(more / self._dofs**2)
+                metric = self._strengthened(H, equal)
+        allowed = largest
+        if self._calm:
+            allowed = self._stoppable(metric, J, weight * gain**2 * error, largest, free, bound_enabled)
         if curved is None and allowed >= largest:
             return H, plain
         drift = -desired - gain * error
@@ -104,16 +122,17 @@ class Reach:
             g -= H @ self._following(metric, J, weight, -(J.T @ (weight * drift)))
         return H, g
 
-    def keepers(self, A: Array, equal: NDArray[np.bool_], factor: Array) -> tuple[Array, NDArray[np.intp], Array]:
-        """Rows that keep directions, of unit length in v / dof scales; the task rows; how these are in them.
+    def firm(self, A: Array, equal: NDArray[np.bool_], factor: Array) -> Firm:
+        """Rows that keep directions, or bend, of unit length in v / dof scales; where their forces go, and how much.
 
         Args:
             A: general rows. equal: which are equalities. factor: fading of the task rows.
         """
         length = np.sqrt(np.einsum("ij,ij->i", A * self._dofs, A * self._dofs))
-        on = np.flatnonzero((self._kept >= 0) & equal & (length**2 > DEAD))
+        on = np.flatnonzero(((self._kept >= 0) | self._bent) & equal & (length**2 > DEAD))
         kept = self._kept[on]
-        return A[on] / length[on, None], kept, factor[kept] / length[on]
+        place = np.where(kept >= 0, kept, self._tasks + on)
+        return A[on] / length[on, None], place, np.where(kept >= 0, factor[kept], 1.0) / length[on]
 
     def _free(self, q: Array, slope: Array, bound_enabled: Array) -> Array:
         """1 for joints that may move, 0 for those that their tasks push against a position limit."""
@@ -136,35 +155,21 @@ class Reach:
         error: Array,
         slope: Array,
         free: Array,
-        keepers: tuple[Array, NDArray[np.intp], Array],
+        firm: Firm,
         equal: Array,
     ) -> Array | None:
         """H with the curvature of the errors that one step leaves, None where there is none to count."""
         if self._curve is None:
             return None
-        # what blocked joints are asked for is not asked of the others
-        slope = free * slope
-        rows, kept, parts = keepers
-        stiffness = FIRM * float((H.diagonal() * self._dofs**2).max(initial=0.0))
-        firm = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
-        squares = [
-            (J, weight),
-            (equal, np.full(len(equal), stiffness / FIRM)),
-            (rows, np.full(len(rows), stiffness - stiffness / FIRM)),
-        ]
-        step = self._sharp(firm, squares, free, 0.0, slope)
-        length = float(np.abs(step / self._dofs)[: self._dof_count].max())
-        if length > TRUSTED:
-            more = float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length)
-            step = self._sharp(firm + np.diag(more / self._dofs**2), squares, free, more, slope)
-        step = free * step
-        force = weight * (error - J @ step)
-        force[kept] -= parts * stiffness * (rows @ step)
-        size, whole = (float((np.abs(x) * self._force_scale).sum()) for x in (force, weight * error))
         pivots = np.linalg.cholesky(metric).diagonal() * self._dofs
         least = float((pivots**2).min())
-        share = float(np.clip(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0))
-        share *= float(np.clip(size / (REMOVED * whole + np.finfo(float).tiny) - 1.0, 0.0, 1.0))
+        kept = bool((self._kept >= 0).any())
+        none = firm[0][:0], firm[1][:0], firm[2][:0]
+        force = self._left_over(H, metric, J, weight, error, slope, free, firm if kept else none, equal)
+        # Errors that are left push against rows that bend: with how much is seen where these are firm
+        if not kept and len(firm[0]) and self._counted(weight * error, force, least) > 0.0:
+            force = self._left_over(H, metric, J, weight, error, slope, free, firm, equal)
+        share = self._counted(weight * error, force, least)
         if not share > 0.0:
             return None
         curvature = share * (free[:, None] * free) * self._curve(force)
@@ -175,7 +180,52 @@ class Reach:
         scale = self._dofs[:, None] * self._dofs
         least = max(LEAST_PIVOT * float(np.abs(curvature * scale).max()), least)
         more_pivot = definite(mixed * scale, least)
+        self._amended = bool((more_pivot > 0.0).any())
         return np.asarray(mixed + np.diag(more_pivot / self._dofs**2))
+
+    def _counted(self, whole: Array, force: Array, least: float) -> float:
+        """Share in [0, 1] of the curvature that counts, by the errors that are left and the least pivot of H."""
+        left = len(self._force_scale)
+        size, all_of_it = (float((np.abs(x[:left]) * self._force_scale).sum()) for x in (force, whole))
+        share = float(np.clip(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0))
+        return share * float(np.clip(size / (REMOVED * all_of_it + np.finfo(float).tiny) - 1.0, 0.0, 1.0))
+
+    def _left_over(
+        self,
+        H: Array,
+        metric: Array,
+        J: Array,
+        weight: Array,
+        error: Array,
+        slope: Array,
+        free: Array,
+        firm: Firm,
+        equal: Array,
+    ) -> Array:
+        """Weighted errors that one step leaves, then what each general row that bends holds against them."""
+        # what blocked joints are asked for is not asked of the others
+        slope = free * slope
+        rows, place, parts = firm
+        stiffness = FIRM * float((H.diagonal() * self._dofs**2).max(initial=0.0))
+        stiff = metric + _cut_off((stiffness - stiffness / FIRM) * rows.T @ rows, free)
+        squares = [
+            (J, weight),
+            (equal, np.full(len(equal), stiffness / FIRM)),
+            (rows, np.full(len(rows), stiffness - stiffness / FIRM)),
+        ]
+        step = self._sharp(stiff, squares, free, 0.0, slope)
+        if more := self._held_short(step, slope):
+            step = self._sharp(stiff + np.diag(more / self._dofs**2), squares, free, more, slope)
+        step = free * step
+        force = np.zeros(self._tasks + len(self._bent))
+        force[: len(error)] = weight * (error - J @ step)
+        force[place] -= parts * stiffness * (rows @ step)
+        return force
+
+    def _held_short(self, step: Array, slope: Array) -> float:
+        """What on the diagonal, in units of the dof scales, keeps a step down a slope to about TRUSTED; or 0."""
+        length = float(np.abs(step / self._dofs)[: self._dof_count].max())
+        return float(np.abs(slope * self._dofs).max()) / TRUSTED * (1.0 - TRUSTED / length) if length > TRUSTED else 0.0
 
     def _sharp(self, metric: Array, squares: list[tuple[Array, Array]], free: Array, more: float, b: Array) -> Array:
         """metric^-1 b at rounding level, see ``sharpen`` in ``native/reach.h``.

@@ -8,15 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.controller.tick.buffers import (
+    BENDINGS,
+    BENDS,
     BRAKED,
     FIRMLY,
     INFINITE,
     KNOWN,
     OPTIMAL,
     RELAXED,
+    SHORTER,
     SOLVED,
     SOUND,
+    STEEPER,
+    STRETCHED,
     TOLERANCE,
+    TURNING,
     UNSOUND,
     Assembly,
     Buffers,
@@ -32,7 +38,7 @@ from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.stack.tables import reported_slacks
+from wbc.stack.tables import brakes, reported_slacks
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
@@ -53,14 +59,16 @@ class SolvedTick(Buffers):
         self._memory = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
         self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
-        self._torques = layout.command == "torque"
+        self._torques, self._commands_velocity = layout.command == "torque", layout.command == "velocity"
+        slots, limits = brakes(stack, layout)
+        self._brakes = np.array(slots, dtype=np.intp), limits
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
-        scales = layout.dof_scales(stack)
+        scales = self._own_scales = layout.dof_scales(stack)
         self._longest = max(1.0, float(scales.max(initial=1.0)), float(self._units.max(initial=1.0)))
         wide = np.concatenate((scales, np.ones(layout.with_slacks - layout.variables)))
         self._dof_scales = None if (scales == 1.0).all() else wide
-        self._soft = SoftRows(stack, layout)
+        self._soft, self._calm = SoftRows(stack, layout), stack.calm
         self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
         #: strict levels, None where there is one
         self.levels = Levels(assembly, stack, layout) if layout.cascade else None
@@ -85,7 +93,76 @@ class SolvedTick(Buffers):
         return self.finish(self.assembly.qp())
 
     def finish(self, qp: QP) -> int:
-        """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails."""
+        """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails.
+        Equality rows make up for what they lose within the tick; where that does not help, the step gets shorter.
+        """
+        flag = self._answered(qp)
+        everything = flag == SOLVED
+        worst = self.assembly.find_lost(everything)
+        bends = worst > BENDS
+        if worst > (STRETCHED if self._calm else BENDS) and flag in (SOLVED, RELAXED):
+            # again, with the curvature of equality rows, and without counting on joints that bounds stop
+            pushes = self.report[self._memory["multipliers"]][: self._nv] != 0.0
+            self.stopped[:] = pushes & (qp.lower[: self._nv] != qp.upper[: self._nv])
+            self.curving[0] = 1.0
+            if not self._calm or self.stopped.any():
+                qp = self.assembly.qp()
+                flag = self._answered(qp)
+        flag, worst = self._corrected(qp, flag, everything)
+        for n in range(SHORTER):
+            if flag not in (SOLVED, RELAXED) or not (worst > BENDS or (bends and n == 0 and self._turns_round())):
+                break
+            self.bend[:] = 0.0
+            self.shortened[0] = STEEPER * self.shortened[0] or float((qp.H.diagonal() * self._own_scales**2).max())
+            qp = self.assembly.qp()
+            flag, worst = self._corrected(qp, self._answered(qp), everything)
+        lost, dt = self.report[self._memory["lost"]], float(self.dt[0])
+        if worst > BENDS and flag in (SOLVED, RELAXED):
+            rates = np.abs(lost) / dt
+            slack = self.report[self._memory["slack"]]
+            slack[:] = np.maximum(slack, np.where(rates > BENDS * self._units, rates, 0.0))
+            flag = RELAXED
+            self.report[self._memory["flag"]] = flag
+        self.assembly.look_ahead()
+        self.assembly.commanded(self.report[self._memory["v"]], flag in (SOLVED, RELAXED))
+        return flag
+
+    def _corrected(self, qp: QP, flag: int, everything: bool) -> tuple[int, float]:
+        """Sides are moved until equality rows make up for what they lose, as far as that gets less: the flag, and what
+        they lose then as a rate.
+        """
+        lost, dt = self.report[self._memory["lost"]], float(self.dt[0])
+        worst = self.assembly.find_lost(everything)
+        for _ in range(BENDINGS):
+            if not worst > BENDS or flag not in (SOLVED, RELAXED):
+                break
+            before, last = worst, self.bend.copy()
+            qp = self._bent(qp, last - lost / dt)
+            flag = self._answered(qp)
+            worst = self.assembly.find_lost(everything)
+            if not worst < before or flag not in (SOLVED, RELAXED):
+                flag = self._answered(self._bent(qp, last))
+                return flag, self.assembly.find_lost(everything)
+        return flag, worst
+
+    def _turns_round(self) -> bool:
+        """Whether a joint moves fast the other way than in the last tick."""
+        now = self.report[self._memory["v"]][: self._velocities] / self._own_scales[: self._velocities]
+        before = self.v_last[: self._velocities] / self._own_scales[: self._velocities]
+        return bool(((now * before < 0.0) & (np.minimum(np.abs(now), np.abs(before)) > TURNING)).any())
+
+    def _bent(self, qp: QP, bend: Array) -> QP:
+        """The problem with both sides of its equality rows moved to where ``bend`` wants them."""
+        out, n = qp.copy(), qp.n
+        equal = qp.lower[n:] == qp.upper[n:]
+        change = np.where(equal, bend - self.bend, 0.0)
+        out.lower[n:] += change
+        out.upper[n:] += change
+        self.bend[equal] = bend[equal]
+        return out
+
+    def _answered(self, qp: QP) -> int:
+        """Solve a QP and write the report as far as it is about that."""
         wide = qp.with_slacks().definite()
         flag, x, answer = self.answer(wide)
         v, levels = self.below(qp, x[: self._nv], answer)
@@ -126,8 +203,6 @@ class SolvedTick(Buffers):
         report[memory["iterations"]] = iterations + (answer.iterations if answer is not None else 0)
         report[memory["multipliers"]] = multipliers
         report[memory["slack"]] = slack
-        self.assembly.look_ahead()
-        self.assembly.commanded(v, answer is not None and sound)
         if answer is None:
             return BRAKED + UNSOUND if self.assembly.usable and not self._proven(wide) else BRAKED
         return flag if sound else flag + UNSOUND
@@ -163,12 +238,30 @@ class SolvedTick(Buffers):
         report[memory["v"]], report[memory["flag"]] = v, BRAKED
         report[memory["iterations"]] = 0.0
         report[memory["multipliers"]], report[memory["slack"]] = 0.0, self.lacking(qp, v)
+        self.assembly.find_lost(False)
         self.assembly.look_ahead()
         self.assembly.commanded(v, False)
 
     def rest(self, qp: QP) -> Array:
         """The command within the simple bounds that is nearest to rest."""
-        return self.assembly.rest(qp.lower[: self._nv], qp.upper[: self._nv])
+        return self.assembly.rest(qp.lower[: self._nv], qp.upper[: self._nv], self._coasting())
+
+    def _coasting(self) -> Array:
+        """Velocities of what has no acceleration limit: it stops together with the joint that takes longest."""
+        out = np.zeros(self._nv)
+        if self._commands_velocity:
+            slot, limit = self._brakes
+            slowly = slot >= 0
+            slowly[slowly] = self.bound_enabled[slot[slowly]] != 0.0
+            slowly, limit, speed = (
+                slowly[: self._velocities],
+                limit[: self._velocities],
+                self.v_last[: self._velocities],
+            )
+            held = slowly & (speed != 0.0)
+            share = (1.0 - limit[held] * self.dt[0] / np.abs(speed[held])).max(initial=0.0)
+            out[: self._velocities] = np.where(slowly, 0.0, share * speed)
+        return out
 
     def lacking(self, qp: QP, v: Array) -> Array:
         """By how much a tick of torques that brakes misses what no motion may cost: torques, and forces on a base."""

@@ -12,10 +12,11 @@ from wbc.controller.tick.buffers import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERA
 from wbc.controller.tick.reach import DEAD, Reach
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, row_units, unit_groups
-from wbc.stack.declaration import Declaration
+from wbc.stack.declaration import HIGHEST_PRICE, Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
+from wbc.stack.tables import bent_rows
 from wbc.validation import Array
 
 
@@ -72,8 +73,17 @@ class VmAssembly(Assembly):
         if program.torque is not None:
             given = [*arguments, self.report[memory["v"]], self._wide("enabled")]
             self._torques = _Call(program.torque, given, [self.report[memory["torque"]]])
-        self._force = _room(tasks)
-        self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if stack.calm else None
+        self._bent = np.array(bent_rows(layout, program), dtype=np.bool_)
+        self.bend, self.curving, self.stopped = view("bend"), view("curving"), view("stopped")
+        self.shortened, self._loss, self._assembled = view("shortened"), _room(rows), np.zeros(rows)
+        self._lost: _Call | None = None
+        if program.lost is not None:
+            given = [self._q, self.report[memory["v"]][: layout.nv], self._p, self.dt]
+            self._lost = _Call(program.lost, given, [self._loss])
+        self._force = _room(tasks + rows)
+        curved = stack.calm or self._bent.any()
+        self._reach = Reach(stack, layout, program, self._curvature_of(program, arguments)) if curved else None
+        self._calm = stack.calm
         jt, at = function.sparsity_out("jt"), function.sparsity_out("at")
         self._j_index = (np.repeat(np.arange(tasks), np.diff(jt.colind())), np.array(jt.row(), dtype=np.intp))
         self._a_index = (np.repeat(np.arange(rows), np.diff(at.colind())), np.array(at.row(), dtype=np.intp))
@@ -107,7 +117,7 @@ class VmAssembly(Assembly):
         return self._sides
 
     def _curvature_of(self, program: TickProgram, arguments: list[Array]) -> Callable[[Array], Array] | None:
-        """Weights of the task rows -> curvature, nv x nv."""
+        """Weights of the task rows, then of the general rows -> curvature, nv x nv."""
         if program.curvature is None:
             return None
         entries = _room(program.curvature.nnz_out(0))
@@ -144,6 +154,7 @@ class VmAssembly(Assembly):
         if bad:
             self.q[:] = self._q_good
         else:
+            self.unbend()
             self._q_good[:] = self.q
         return bad
 
@@ -169,24 +180,34 @@ class VmAssembly(Assembly):
         g = -weighted.T @ desired
         error = out["error"][first]
         low, high = self._bounds()
-        price = np.where(self._priced, self.p[self._price_at], 1.0)
+        price = np.where(self._priced, np.minimum(self.p[self._price_at], HIGHEST_PRICE), 1.0)
         on = (self.enabled != 0.0) & (price > 0.0)
         A = np.where(on[:, None], self._A, 0.0)
-        if self._reach is not None:
+        if self._reach is not None and self._calm:
             bounds, margin = out["low"][: layout.general_rows], out["margin"][: layout.margin_rows]
             self._reach.brake_for_margins(self._A, bounds, margin, self.p, float(self.dt[0]), self.bound_enabled)
         low_rows = np.where(on, out["low"][: layout.general_rows], -np.inf)
         high_rows = np.where(on, out["high"][: layout.general_rows], np.inf)
+        bend = np.where(self._bent, self.bend, 0.0)
+        low_rows, high_rows, self._assembled = low_rows + bend, high_rows + bend, bend
         self._usable &= bool(np.isfinite(A).all() and (low_rows < INFINITE).all() and (high_rows > -INFINITE).all())
         low_rows[low_rows <= -INFINITE], high_rows[high_rows >= INFINITE] = -np.inf, np.inf
         self._sides = low_rows, high_rows
         low_rows, high_rows = np.where(self._soft, -np.inf, low_rows), np.where(self._soft, np.inf, high_rows)
         self._curvature = None
-        if self._reach is not None and not self.plain[0] and self._usable and layout.leading:
+        if (
+            self._reach is not None
+            and (self._calm or self.curving[0])
+            and not self.plain[0]
+            and self._usable
+            and layout.leading
+        ):
             equal = _unit_equalities(low, high, low_rows, high_rows, A, self._dof_scales)
-            keepers = self._reach.keepers(A, self._sides[0] == self._sides[1], factor)
-            H, g = self._reach.change(H, J, weight, error, desired, self.q, self.p, equal, keepers, self.bound_enabled)
+            firm = self._reach.firm(A, self._sides[0] == self._sides[1], factor)
+            given = self.q, self.p, equal, firm, self.bound_enabled, self.stopped
+            H, g = self._reach.change(H, J, weight, error, desired, *given)
             self._curvature = self._reach.curvature
+        H = H + np.diag(self.shortened / self._dof_scales**2) if self.shortened[0] else H
         give = np.where(price > 0.0, self._row_units**2 / np.where(price > 0.0, price, 1.0), 1.0)
         give = np.where(self._priced & ~self._soft, give, 0.0)
         return QP(H, g, np.concatenate((low, low_rows)), np.concatenate((high, high_rows)), A, give)
@@ -248,6 +269,19 @@ class VmAssembly(Assembly):
             self._ahead.run()
             later = self._later[: self._layout.margin_rows]
             self.report[self.memory["ahead"]] = np.where(np.isnan(later), -np.inf, later)
+
+    def find_lost(self, everything: bool) -> float:
+        if self._lost is None:
+            return 0.0
+        self._lost.run()
+        low, high = self._sides
+        lost = self._loss[: self._layout.general_rows] + self.bend * self.dt[0]
+        if everything:
+            # the sides of the rows as they were assembled, and what has been added since
+            lost = lost + (self._A @ self.report[self.memory["v"]] - low - self.bend + self._assembled) * self.dt[0]
+        lost = np.where(self._bent & (low == high) & np.isfinite(lost), lost, 0.0)
+        self.report[self.memory["lost"]] = lost
+        return float(np.abs(lost / self._row_units).max(initial=0.0) / self.dt[0])
 
     def _find_torques(self) -> None:
         if self._torques is not None:

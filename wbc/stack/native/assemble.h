@@ -135,7 +135,7 @@ static void assemble(wbc_tick *t, int screen) {
         }
         double *row = t->at + a_start[k];
         const int priced = price_at[k] >= 0, count = a_end[k] - a_start[k];
-        const double price = priced ? t->p[price_at[k]] : 1.0;
+        const double price = priced ? smaller(t->p[price_at[k]], HIGHEST_PRICE) : 1.0;
         t->give[k] = priced && !MINIMISED(k) ? (price > 0.0 ? row_scale[k] * row_scale[k] / price : 1.0) : 0.0;
         if (t->enabled[k] == 0.0 || price == 0.0) {
             memset(row, 0, count * sizeof(double));
@@ -144,6 +144,12 @@ static void assemble(wbc_tick *t, int screen) {
         } else if (!(all_finite(row, count) && t->free_low[k] < WBC_INF && t->free_high[k] > -WBC_INF)) {
             t->unusable = 1.0;
         }
+#if BENDING > 0
+        if (bent[k] && t->enabled[k] != 0.0) {
+            t->free_low[k] += t->bend[k];
+            t->free_high[k] += t->bend[k];
+        }
+#endif
         if (t->free_low[k] < -WBC_INF) t->free_low[k] = -WBC_INF;
         if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
         t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
@@ -157,7 +163,11 @@ static void assemble(wbc_tick *t, int screen) {
 #if LEVELS > 0
     memcpy(t->straight, t->H, sizeof t->H);
 #endif
-    if (CALM && t->plain == 0.0 && LEADING > 0 && t->unusable == 0.0) reach(t);
+    if ((CALM || (BENDING > 0 && t->curving != 0.0)) && t->plain == 0.0 && LEADING > 0 && t->unusable == 0.0) reach(t);
+    for (int i = 0; BENDING > 0 && t->shortened != 0.0 && i < NV; i++) {
+        t->H[i * WIDE + i] += t->shortened / (dof_scale[i] * dof_scale[i]);
+        t->prepared = 0;
+    }
 }
 
 /* All rows of the QP */

@@ -55,7 +55,7 @@ static void strengthen(wbc_tick *t) {
             square += a * a;
         }
         if (square <= DEAD) continue;
-        t->strength[k] = t->stiffness / square * (t->firm && kept_of[k] >= 0 ? FIRM : 1.0);
+        t->strength[k] = t->stiffness / square * (t->firm && (kept_of[k] >= 0 || bent[k]) ? FIRM : 1.0);
 #if SOFT_ROWS > 0
         if (t->settled && t->give[k] > 0.0) {
             t->strength[k] = smaller(larger(MODEST * t->strength[k], SHARE / t->give[k]), 0.5 / t->give[k]);
@@ -282,12 +282,17 @@ static void load(wbc_tick *t) {
     strengthen(t);
 }
 
-static int decompose(wbc_tick *t) { return factor_rows(t, t->R, NULL); }
+/* Where it fails roots of negative numbers are about; those in rows behind the last would be in all factors from then on */
+static int decompose(wbc_tick *t) {
+    const int ok = factor_rows(t, t->R, NULL);
+    for (int i = NV * WIDE; !ok && i < TALL * WIDE; i++) t->R[i] = 0.0;
+    return ok;
+}
 
 /* H += a diagonal that makes it positive definite, with pivots of v / dof_scale of `least` or more, where it is not (Gill and
  * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. H without entries as large as `added` is
- * positive semidefinite. */
-static void decompose_amended(wbc_tick *t, double least, double added) {
+ * positive semidefinite. 1 where anything was added. */
+static int decompose_amended(wbc_tick *t, double least, double added) {
     const double share = 1.0 / sqrt(larger((double)NV * NV - 1.0, 1.0));
     double diagonal = 0.0, other = 0.0, scale[WIDE] = {0}, more[WIDE];
     wbc_pivots chosen = {.least = least, .scale = scale, .more = more};
@@ -298,7 +303,12 @@ static void decompose_amended(wbc_tick *t, double least, double added) {
         for (int j = i + 1; j < NV; j++) other = larger(other, fabs(t->H[i * WIDE + j]) * dof_scale[i] * dof_scale[j]);
     chosen.bound = larger(diagonal, other * share);
     factor_rows(t, t->H, &chosen);
-    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more[i];
+    int amended = 0;
+    for (int i = 0; i < NV; i++) {
+        t->H[i * WIDE + i] += more[i];
+        amended |= more[i] > 0.0;
+    }
+    return amended;
 }
 
 /* H = R'R, upper triangle of H only; leaves -g in y */

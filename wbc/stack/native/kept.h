@@ -1,4 +1,5 @@
-/* What keeps the direction of a scaled task takes part of its error, and that part has no curvature: see reach.h. */
+/* What rows exert that keep the direction of a scaled task, or equality rows that bend, in a metric in which they are firm: see
+ * reach.h. What keeps a direction takes part of its task's error, and that part has no curvature. */
 #ifndef WBC_KEPT_H
 #define WBC_KEPT_H
 
@@ -10,6 +11,11 @@ static void without_kept(const wbc_tick *t, const double *step, double *force) {
         const int row = kept_of[k];
         if (row >= 0 && t->strength[k] != 0.0) force[row] -= t->strength[k] * row_at(t, k, step) * t->report.factor[row];
     }
+}
+
+/* What equality rows that bend hold against the weighted errors, behind those */
+static void held_back(const wbc_tick *t, const double *step, double *force) {
+    for (int k = 0; k < MC; k++) force[MT + k] = bent[k] ? -t->strength[k] * row_at(t, k, step) : 0.0;
 }
 
 #endif

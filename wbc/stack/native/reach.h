@@ -102,13 +102,18 @@ static double largest_step(const double *x) {
     return largest;
 }
 
-/* 1 for joints that may move, 0 for those that their tasks push against a position limit; 1 if there are such */
+/* 1 for joints that may move, 0 for those that bounds stop or their tasks push against a position limit; 1 if there are such */
 static int find_free(const wbc_tick *t, const double *slope, double *free) {
     double steepest = 0.0;
     int blocked = 0;
     for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
     for (int i = 0; i < WIDE; i++) free[i] = 1.0;
     for (int i = 0; i < NV; i++) {
+        if (t->stopped[i] != 0.0) {
+            free[i] = 0.0;
+            blocked = 1;
+            continue;
+        }
         if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) continue;
         const double q = t->q[stop_q[i]], slack = slope[i] < 0.0 ? stop_high[i] - q : q - stop_low[i];
         if (slack >= 2.0 * AT_LIMIT * dof_scale[i]) continue;
@@ -188,16 +193,21 @@ static void sharpen(const wbc_tick *t, const double *free, double more, const do
     }
 }
 
+/* What on the diagonal of the metric, in units of dof_scale, keeps a step of this length down the slope to about TRUSTED */
+static double held_short(const double *slope, double length) {
+    double steepest = 0.0;
+    for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
+    return steepest / TRUSTED * (1.0 - TRUSTED / length);
+}
+
 /* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then; 0 for none */
 static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, int *changed) {
     solve_with(t, slope, step);
     sharpen(t, free, 0.0, slope, step);
     const double length = largest_step(step);
     if (length > TRUSTED) {
-        double steepest = 0.0;
-        for (int i = 0; i < NV; i++) steepest = larger(steepest, fabs(slope[i]) * dof_scale[i]);
+        const double more = held_short(slope, length);
         *changed = 1;
-        const double more = steepest / TRUSTED * (1.0 - TRUSTED / length);
         if (!cut_off(t, free, more)) return 0;
         solve_with(t, slope, step);
         sharpen(t, free, more, slope, step);
@@ -206,31 +216,40 @@ static int trusted_step(wbc_tick *t, const double *free, const double *slope, do
     return 1;
 }
 
-/* Weighted errors that this step leaves. R is the metric without curvature, before and after. */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force) {
+/* Weighted errors that this step leaves, and what equality rows hold against them. R is the metric without curvature, before and
+ * after; `firm`: with firm rows in between. */
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, int firm, double *force) {
     double step[WIDE], slope[WIDE] = {0};
-    int changed = KEPT;
+    int changed = firm;
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
-    t->firm = KEPT;
-    const int found = (!KEPT || cut_off(t, free, 0.0)) && trusted_step(t, free, slope, step, &changed);
+    t->firm = firm;
+    const int found = (!firm || cut_off(t, free, 0.0)) && trusted_step(t, free, slope, step, &changed);
     t->firm = 0;
     if (!found) return 0;
     along_all(t, step, force);
     for (int k = 0; k < LEADING; k++) force[k] = t->weight[k] * t->report.factor[k] * (error[k] - force[k]);
+    for (int k = LEADING; k < MT; k++) force[k] = 0.0;
     if (KEPT) without_kept(t, step, force);
+    held_back(t, step, force);
     return !changed || cut_off(t, free, 0.0);
 }
 
-/* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
-static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
-    double size = 0.0, whole = 0.0, most[4] = {0};
+/* Share in [0, 1] of the curvature that counts, by the errors that are left and the least pivot of H */
+static double counted(const wbc_tick *t, const double *error, const double *force, double least) {
+    double size = 0.0, whole = 0.0;
     for (int k = 0; k < LEADING; k++) {
         size += fabs(force[k]) * force_scale[k];
         whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * force_scale[k];
     }
     const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
-    const double share = counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
+    return counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
+}
+
+/* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
+static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
+    double most[4] = {0};
+    const double share = counted(t, error, force, least);
     if (!(share > 0.0)) return 0.0;
     const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
     double *res[1] = {t->curvature_entries};
@@ -254,16 +273,27 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
 }
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
-static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *force) {
-    double least, most;
+static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *whole, const double *force) {
+    double least, most, slope[WIDE] = {0}, step[WIDE];
     find_pivots(t, &least, &most);
     const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
-    decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);
+    const int amended = decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);
     /* The factor that is used has equality rows in it, and they are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
     t->prepared = equalities ? factor(t) : 1;
+    int held = 0;
+    for (int k = 0; k < MC; k++) held |= bent[k] && t->strength[k] != 0.0;
+    if (!t->prepared || !amended || !held) return 1;
+    /* What is definite by little only makes a step that is too long for what is held */
+    for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
+    solve_with(t, slope, step);
+    const double length = largest_step(step);
+    if (length <= TRUSTED) return 1;
+    const double more = held_short(slope, length);
+    for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
+    t->prepared = factor(t);
     return 1;
 }
 
@@ -333,15 +363,23 @@ static void reach(wbc_tick *t) {
         return;
     }
 #if NNZK > 0
-    double force[MT + 1];
-    if (!left_over(t, free, error, slope, force)) return;
+    double force[MT + MC + 1];
+    if (!left_over(t, free, error, slope, KEPT, force)) return;
+#if BENDING > 0
+    /* Errors that are left push against rows that bend: with how much is seen where these are firm */
+    double least, most;
+    if (BENDING > 0 && !KEPT) {
+        find_pivots(t, &least, &most);
+        if (counted(t, error, force, least) > 0.0 && !left_over(t, free, error, slope, 1, force)) return;
+    }
+#endif
     const int prepared = t->prepared;
     t->prepared = 1;
-    t->curved = add_curvature(t, free, error, force);
+    t->curved = add_curvature(t, free, error, slope, force);
     if (!t->prepared) return;
     if (!t->curved) t->prepared = prepared;
 #endif
-    const double allowed = stoppable(t, free, error, largest);
+    const double allowed = CALM ? stoppable(t, free, error, largest) : largest;
     if (!t->curved && allowed >= largest) return;
     double wanted[MT + 1], drift[MT + 1];
     int moving = 0;

@@ -18,6 +18,7 @@
 int rows(const double **arg, double **res, long long *iw, double *w, int mem);
 int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 int curvature(const double **arg, double **res, long long *iw, double *w, int mem);
+int lost(const double **arg, double **res, long long *iw, double *w, int mem);
 int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 
 /* What is commanded */
@@ -74,9 +75,11 @@ typedef long long wbc_bits;
 #error "single precision is for commands of velocities, without strict levels, soft rows and scaled tasks"
 #endif
 
+/* A row of a higher price is as good as hard; that of a kept direction grows with its task's weight, and stops there */
+#define HIGHEST_PRICE 1e9
 /* Iterations of a search with a higher price at most, see first_slack */
 #define BRIEF 30
-/* How much more than other equality rows those that keep a direction count while curvature is looked for */
+/* How much more than other equality rows those that keep a direction, or bend, count while curvature is looked for */
 #define FIRM 1e4
 /* Soft rows that are held are part of H where they count at most this often as much as it; of the price of others, as
  * much as that, or at least a share, is in the factor */

@@ -5,12 +5,25 @@
 #include "margins.h"
 #include "relax.h"
 
-/* The command that brings a joint to rest, and the wrench that a contact keeps */
-INLINE double rest(const wbc_tick *t, int i) {
 #if COMMAND == VELOCITY
-    (void)t, (void)i;
-    return 0.0;
+INLINE int brakes_slowly(const wbc_tick *t, int i) { return brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0; }
+
+/* Share of its speed that the joint has after this tick whose acceleration limit lets it stop last */
+static double kept_speed(const wbc_tick *t) {
+    double share = 0.0;
+    for (int i = 0; i < DOFS; i++)
+        if (brakes_slowly(t, i) && t->v_last[i] != 0.0) share = larger(share, 1.0 - brake_limit[i] * t->dt / fabs(t->v_last[i]));
+    return share;
+}
+#endif
+
+/* The command that brings a joint to rest, and the wrench that a contact keeps. What has no acceleration limit, such as a floating
+ * base, stops together with the joint that takes longest. */
+INLINE double rest(const wbc_tick *t, int i, double share) {
+#if COMMAND == VELOCITY
+    return i >= DOFS || brakes_slowly(t, i) ? 0.0 : share * t->v_last[i];
 #else
+    (void)share;
     return i < DOFS ? -t->v_last[i] / t->dt : t->kept[i];
 #endif
 }
@@ -19,9 +32,14 @@ INLINE double rest(const wbc_tick *t, int i) {
 static void brake(wbc_tick *t) {
     /* A relaxation may have moved the bounds */
     form_bounds(t);
+#if COMMAND == VELOCITY
+    const double share = kept_speed(t);
+#else
+    const double share = 0.0;
+#endif
     for (int i = 0; i < NV; i++) {
         const double low = t->low[i], high = t->high[i];
-        t->x[i] = low <= high ? clamp(rest(t, i), low, high) : 0.0;
+        t->x[i] = low <= high ? clamp(rest(t, i, share), low, high) : 0.0;
     }
     t->daqp.n_active = 0;
     t->warm = 0;

@@ -1,7 +1,7 @@
 /* The entry points of one stack's tick */
 #include "assemble.h"
 #include "levels.h"
-#include "primal.h"
+#include "bend.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
@@ -25,6 +25,7 @@ EXPORT int wbc_tick_check(wbc_tick *t) {
     for (int k = 0; !bad && k < SLEWED; k++) t->p[slewed_at[k]] = t->kept[slewed_dof[k]];
 #endif
     t->use_v = 0.0;
+    if (!bad) unbend(t);
     memcpy(bad ? t->q : t->q_good, bad ? t->q_good : t->q, NQ * sizeof(double));
     return bad;
 }
@@ -95,18 +96,16 @@ static void commanded(wbc_tick *t, int sound) {
 /* The tick again: accelerations and torques count from where they did */
 static void rewind_tick(wbc_tick *t) {
     memcpy(t->v_last, t->v_in, sizeof t->v_in);
+    unbend(t);
 #if SLEWED > 0
     for (int k = 0; k < SLEWED; k++) t->kept[slewed_dof[k]] = t->p[slewed_at[k]];
 #endif
 }
 
-EXPORT int wbc_tick_step(wbc_tick *t) {
-    const int bad = wbc_tick_check(t);
-    if (bad) return bad;
-    /* What accelerations count from, for who looks at the tick afterwards */
-    memcpy(t->v_in, t->v_last, sizeof t->v_in);
-    assemble(t, 1);
-    int flag = wbc_tick_solve(t), nameless = 0;
+/* The answer to the rows as they stand, certified; `nameless`: rows contradict each other by rounding only */
+static int answer(wbc_tick *t, int *nameless) {
+    int flag = wbc_tick_solve(t);
+    *nameless = 0;
 #if LEVELS > 0
     if (t->cap == 0.0 && unsound(t, flag) && flag == WBC_BRAKED && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
@@ -115,12 +114,66 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag))) {
         flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
         /* Rows that contradicted each other by rounding only: their frozen bounds are not what is to be certified */
-        nameless = flag == WBC_RELAXED && !report_slack(t, flag);
+        *nameless = flag == WBC_RELAXED && !report_slack(t, flag);
     } else if (flag == WBC_RELAXED) {
         /* The certificate may have refined the command */
-        nameless = !report_slack(t, flag);
+        *nameless = !report_slack(t, flag);
     }
 #endif
+    return flag;
+}
+
+static int has_answer(const wbc_tick *t, int flag) { return flag <= WBC_RELAXED && !unsound(t, flag); }
+
+#if BENDING > 0
+/* Sides are moved until the rows make up for what they lose, as far as that gets less; what they lose then, as a rate */
+static double corrected(wbc_tick *t, int all, int *flag, int *nameless) {
+    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all);
+    for (int n = 0; n < BENDINGS && worst > BENDS && has_answer(t, *flag); n++) {
+        const double before = worst;
+        for (int k = 0; k < MC; k++) {
+            last[k] = t->bend[k];
+            next[k] = last[k] - t->report.lost[k] / t->dt;
+        }
+        bend_rows(t, next);
+        *flag = answer(t, nameless);
+        worst = wbc_tick_find_lost(t, all);
+        if (worst < before && has_answer(t, *flag)) continue;
+        bend_rows(t, last);
+        *flag = answer(t, nameless);
+        return wbc_tick_find_lost(t, all);
+    }
+    return worst;
+}
+#endif
+
+/* Equality rows make up for what they lose within the tick; where that does not help, the step gets shorter */
+static int bent_answer(wbc_tick *t, int flag, int *nameless) {
+#if BENDING > 0
+    const int all = flag == WBC_SOLVED;
+    double worst = wbc_tick_find_lost(t, all);
+    const int bends = worst > BENDS;
+    if (worst > (CALM ? STRETCHED : BENDS) && has_answer(t, flag) && curve_rows(t)) flag = answer(t, nameless);
+    worst = corrected(t, all, &flag, nameless);
+    for (int n = 0; n < SHORTER && has_answer(t, flag) && (worst > BENDS || (bends && n == 0 && turns_round(t))); n++) {
+        shorten(t);
+        flag = answer(t, nameless);
+        worst = corrected(t, all, &flag, nameless);
+    }
+    if (worst > BENDS && flag <= WBC_RELAXED && report_lost(t)) flag = (int)(t->report.flag = WBC_RELAXED);
+#else
+    (void)t, (void)nameless;
+#endif
+    return flag;
+}
+
+EXPORT int wbc_tick_step(wbc_tick *t) {
+    const int bad = wbc_tick_check(t);
+    if (bad) return bad;
+    /* What accelerations count from, for who looks at the tick afterwards */
+    memcpy(t->v_in, t->v_last, sizeof t->v_in);
+    assemble(t, 1);
+    int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
     if (PRICES) report_soft_rows(t);
     wbc_tick_look_ahead(t);
     const int sound = !unsound(t, flag) && !nameless;

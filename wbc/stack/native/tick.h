@@ -12,6 +12,7 @@
  *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
  *   HANDED      numbers that the rows hand to the curvature; with none of both the rows have no such output
+ *   BENDING bent   general rows whose residual bends within a tick, and which they are: see bend.h
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
  *   force_scale  how much curvature a row of unit error may have
@@ -101,7 +102,7 @@ typedef struct {
     WBC_BUFFERS                  /* what the caller knows: see memory.h, which is generated */
     int prepared;                /* R is the factor of H, and y its right-hand side */
     int curved;                  /* H contains curvature */
-    int firm;                    /* rows that keep directions are firm in R */
+    int firm;                    /* rows that keep directions, or bend, are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double curvature_entries[NNZK + 1]; /* of its upper triangle */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
