@@ -18,7 +18,7 @@ from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
-from wbc.robot.sources.mjmodel import is_mjmodel, model_name
+from wbc.robot.sources.mjmodel import compiled, is_mjmodel, is_text, model_name
 from wbc.robot.sources.table import read_table
 from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
 from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
@@ -63,8 +63,8 @@ def load(
 
     Args:
         robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
-            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, a ``pin.Model``, a
-            ``mujoco.MjModel``, or DH rows.
+            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, MJCF as a string, a ``pin.Model``,
+            a ``mujoco.MjModel``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or file brings, or fixed.
@@ -90,8 +90,8 @@ def load(
         UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
         ShapeError, NotFiniteError, RangeError, BoundsError: a bad limit, lock or neutral value.
 
-    Cannot do: SDF and xacro files; closed kinematic chains (a URDF is a tree); loop closures of MJCF (said in
-    ``notes["mimic"]``).
+    Cannot do: SDF and xacro files; closed kinematic chains (a URDF is a tree; loops of MJCF, and what else of it a
+    robot cannot hold, are named in the log).
     """
     made = made_here(robot) if isinstance(robot, str) else None
     recipe, source = _find(robot) if made is None else (recipe_of(made), made.model)
@@ -147,6 +147,8 @@ def from_dh(
 
 def _find(robot: Any) -> tuple[Recipe, Any]:
     """(recipe, what to read): the table's row for a name, an empty recipe otherwise."""
+    if is_text(robot):
+        robot = compiled(robot)
     if isinstance(robot, str):
         recipe = _by_name().get(robot)
         if recipe is not None:

@@ -40,7 +40,7 @@ def write(folder: Path, body: str, head: str = "") -> Path:
 def test_structure_and_floating_base() -> None:
     robot = wbc.robots.load(CRAWLER)
     assert (robot.name, robot.base, robot.nq, robot.nv) == ("crawler", "floating", 15, 13)
-    assert robot.joint_names == ("base", "hinge", "slide", "ball", "Composite_h1")
+    assert robot.joint_names == ("base", "hinge", "slide", "ball", "h1", "h2")
     np.testing.assert_allclose(robot.neutral, [0, 0, 1, 0, 0, 0, 1, 0.1, 0.05, 0, 0, 0, 1, 0.1, 0.1])
     assert "home" in robot.notes["neutral"]
 
@@ -109,7 +109,8 @@ def test_defaults_limited_and_ref(tmp_path: Path, angle: str) -> None:
 
 def test_joint_classes_by_childclass_include_and_autolimits(tmp_path: Path) -> None:
     (tmp_path / "classes.xml").write_text(
-        '<mujoco><default><default class="s"><joint type="slide" range="1 2"/></default></default></mujoco>'
+        '<mujoco><default><default class="s"><joint type="slide" range="1 2" limited="false"/></default></default>'
+        "</mujoco>"
     )
     path = tmp_path / "outer.xml"
     path.write_text(
@@ -123,19 +124,22 @@ def test_joint_classes_by_childclass_include_and_autolimits(tmp_path: Path) -> N
     np.testing.assert_array_equal(robot.neutral, [0.0, 1.5])
 
 
-def test_joint_equalities_become_couplings(tmp_path: Path) -> None:
-    path = tmp_path / "pair.xml"
-    path.write_text(
-        '<mujoco><worldbody><body><joint name="a" axis="1 0 0"/><geom type="sphere" size=".1"/>'
-        '<body pos="1 0 0"><joint name="b" axis="1 0 0"/><geom type="sphere" size=".1"/></body></body></worldbody>'
-        '<equality><joint joint1="b" joint2="a" polycoef="0.1 -2 0 0 0"/>'
-        '<joint name="curve" joint1="b" joint2="a" polycoef="0 1 1 0 0"/></equality></mujoco>'
+def test_joint_equalities_become_couplings(caplog: pytest.LogCaptureFixture) -> None:
+    """Two of one follower couple what they follow; a circle that says the same is no more than one of them."""
+    arm = '<body pos="{k} 0 0"><joint name="{n}" axis="1 0 0" range="-90 90"/><geom size=".1"/></body>'
+    bodies = "".join(arm.format(k=k, n=name) for k, name in enumerate("abcd"))
+    equalities = (
+        '<joint joint1="b" joint2="a" polycoef="0.1 -2 0 0 0"/><joint joint1="b" joint2="c" polycoef="0 4 0 0 0"/>'
+        '<joint joint1="a" joint2="b" polycoef="0.05 -0.5 0 0 0"/>'
+        '<joint name="off" joint1="a" joint2="d" active="false"/>'
     )
-    robot = wbc.robots.load(path)
-    (coupling,) = robot.couplings
-    assert (robot.dof_names[coupling.follower], robot.dof_names[coupling.leader]) == ("b", "a")
-    assert (coupling.ratio, coupling.offset) == (-2.0, 0.1)
-    assert "curve" in robot.notes["mimic"]
+    robot = wbc.robots.load(f"<mujoco><worldbody>{bodies}</worldbody><equality>{equalities}</equality></mujoco>")
+    found = {robot.dof_names[c.follower]: (robot.dof_names[c.leader], c.ratio, c.offset) for c in robot.couplings}
+    assert found == {"b": ("c", 4.0, 0.0), "a": ("c", -2.0, pytest.approx(0.05))}
+    assert not caplog.text
+    more = equalities + '<joint name="curve" joint1="d" joint2="a" polycoef="0 1 1 0 0"/>'
+    wbc.robots.load(f"<mujoco><worldbody>{bodies}</worldbody><equality>{more}</equality></mujoco>")
+    assert "joint 'curve' (opens by up to" in caplog.text
 
 
 def test_several_root_bodies_and_bodies_without_names(tmp_path: Path) -> None:
@@ -171,16 +175,19 @@ def test_meshes_are_found_from_the_files_own_folder(tmp_path: Path) -> None:
 
 
 def test_refused_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # With MuJoCo installed its compiler has the last word
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(RobotFileError, match="MJCF parser refused"):
+    with pytest.raises(RobotFileError, match="MuJoCo refused it: XML Error: invalid keyword: 'spherical'"):
         wbc.robots.load(write(tmp_path, '<joint type="spherical"/>'))
-    with pytest.raises(RobotFileError, match="<frame> is not supported"):
-        wbc.robots.load(write(tmp_path, '<frame pos="1 0 0"><body/></frame>'))
+    with pytest.raises(RobotFileError, match=r"opening file .*missing\.stl"):
+        wbc.robots.load(write(tmp_path, "<joint/>", '<asset><mesh file="missing.stl"/></asset>'))
     broken = tmp_path / "loop.xml"
     broken.write_text('<mujoco><include file="loop.xml"/></mujoco>')
     with pytest.raises(RobotFileError, match="include"):
         wbc.robots.load(broken)
-    broken.write_text('<mujoco><include file="missing.xml"/></mujoco>')
-    with pytest.raises(RobotFileError, match="no such file"):
-        wbc.robots.load(broken)
+    with pytest.raises(RobotFileError, match="no MJCF: the root element is <robot>"):
+        wbc.robots.load("<!-- <mujoco> --><robot/>")
+    with pytest.raises(RobotFileError, match="no joint that moves a robot"):
+        wbc.robots.load("<mujoco/>")
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    for source in (CRAWLER, "<mujoco/>"):
+        with pytest.raises(RobotFileError, match=r"MJCF is read by MuJoCo's compiler: pip install wbc\[mujoco\]"):
+            wbc.robots.load(source)

@@ -85,7 +85,7 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     locked_dofs = tuple(int(model.idx_vs[j]) + k for j in undriven.values() for k in range(int(model.nvs[j])))
     if undriven:
         notes["undriven"] = f"nothing drives {', '.join(undriven)}, which is no base: its velocity must stay 0"
-        log.warning("%s: %s", description.source, notes["undriven"])
+        log.warning("%s: %s", description.source or model.name, notes["undriven"])
     if description.base == "differential":
         locked_dofs = (1, *locked_dofs)
         notes["base"] = "differential drive: the sideways velocity of the base (index 1 of v) must stay 0"

@@ -22,7 +22,6 @@ from wbc.robot.robot import Robot
 from wbc.robot.sources.description import Description, with_base
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder, read_xml
-from wbc.robot.sources.mjcf import read_mjcf
 from wbc.robot.sources.mjmodel import compiled, is_mjmodel, read_mjmodel
 from wbc.robot.sources.srdf import read_states
 from wbc.robot.sources.urdf import read_urdf
@@ -50,7 +49,7 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
         if tree.tag == "robot":
             return read_urdf(path, tree, base, recipe.mimic_leaders)
         if tree.tag == "mujoco":
-            return read_mjcf(path, base)
+            return read_mjmodel(compiled(path), base, str(path))
         raise RobotFileError("robot", str(path), f"neither URDF nor MJCF: the root element is <{tree.tag}>")
     if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
         return read_dh(source, base)
@@ -72,14 +71,7 @@ def build(
         WbcError: see ``wbc.robots.load``.
     """
     validation.one_of("shapes", shapes, SHAPES)
-    try:
-        description, geometry = read(source, base, recipe), source if is_mjmodel(source) else None
-    except RobotFileError:
-        geometry = compiled(source)
-        if geometry is None:
-            raise
-        description = read_mjmodel(geometry, base)
-    return finish(description, recipe, shapes, package_dirs, limits or {}, geometry)
+    return finish(read(source, base, recipe), recipe, shapes, package_dirs, limits or {})
 
 
 def finish(
@@ -88,10 +80,9 @@ def finish(
     shapes: str,
     package_dirs: Iterable[Any],
     limits: Mapping[str, Any],
-    geometry: Any = None,
 ) -> Robot:
-    """The robot of a description: states, joints, limits, shapes (of a compiled model where there is no file)."""
-    states = dict(description.states)
+    """The robot of a description: states, joints, limits, shapes."""
+    states, geometry = dict(description.states), description.geometry
     if recipe.state:
         states |= read_states(example_data_folder() / recipe.srdf)
     if not recipe.state and "home" in states:

@@ -11,13 +11,8 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.robot.robot import Robot, checked_robot
-from wbc.robot.sources.mjmodel import (
-    SIZES,
-    body_name,
-    is_mjmodel,
-    joint_name,
-    pose_of,
-)
+from wbc.robot.sources.mjmodel import is_mjmodel, pose_of
+from wbc.robot.sources.mjnames import SIZES, MjNames, names_of
 from wbc.rotations import TO_MUJOCO, TO_PINOCCHIO
 from wbc.validation import Array
 
@@ -28,8 +23,6 @@ log = logging.getLogger("wbc")
 
 #: Bodies are where both say to within this [m, rad], and weigh what both say to within this part
 NEAR, ALIKE = 1e-6, 1e-6
-#: What Pinocchio calls a joint that stands for several of one body
-COMPOSITE = "Composite_"
 
 
 class MujocoJoints:
@@ -62,32 +55,25 @@ class MujocoJoints:
         self.columns: dict[int, int] = {}
         #: For each joint: where its numbers begin, in qpos, qvel, q and v, and how many these are there
         self._places: list[tuple[int, int, int, int, int, int]] = []
-        names = {joint_name(model, j): j for j in range(model.njnt)}
+        names = names_of(model)
+        numbers = {name: j for j, name in enumerate(names.joints)}
         for k, name in enumerate(robot.joint_names, start=1):
-            self._add(model, k, name, names)
-        self._compare(model)
+            self._add(model, k, name, numbers)
+        self._compare(model, names)
 
-    def _add(self, model: mujoco.MjModel, k: int, name: str, names: dict[str, int]) -> None:
+    def _add(self, model: mujoco.MjModel, k: int, name: str, numbers: dict[str, int]) -> None:
         pins = int(self._robot.model.nqs[k]), int(self._robot.model.nvs[k])
         start, column = int(self._robot.model.idx_qs[k]), int(self._robot.model.idx_vs[k])
-        members = [names[name]] if name in names else []
-        first = names.get(name.removeprefix(COMPOSITE), -1)
-        if not members and name.startswith(COMPOSITE) and first >= 0:
-            body = int(model.jnt_bodyid[first])
-            members = list(range(first, int(model.body_jntadr[body]) + int(model.body_jntnum[body])))
-        if not members:
-            raise UnknownNameError("robot.joint_names", name, names)
-        sizes = [SIZES[int(model.jnt_type[j])] for j in members]
-        total = sum(nq for nq, _ in sizes), sum(nv for _, nv in sizes)
-        if pins != total and not (pins == (2, 1) and total == (1, 1)):
-            raise UnsupportedJointError("model", name, f"it has {total} numbers, the robot's joint {pins}")
-        for j, (nq, nv) in zip(members, sizes, strict=True):
-            nq = 2 if pins == (2, 1) else nq
-            self._places.append((int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j]), start, column, nq, nv))
-            self.columns[j] = column
-            start, column = start + nq, column + nv
+        if name not in numbers:
+            raise UnknownNameError("robot.joint_names", name, numbers)
+        j = numbers[name]
+        nq, nv = SIZES[int(model.jnt_type[j])]
+        if pins != (nq, nv) and not (pins == (2, 1) and nq == 1):
+            raise UnsupportedJointError("model", name, f"it has {(nq, nv)} numbers, the robot's joint {pins}")
+        self._places.append((int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j]), start, column, pins[0], nv))
+        self.columns[j] = column
 
-    def _compare(self, model: mujoco.MjModel) -> None:
+    def _compare(self, model: mujoco.MjModel, names: MjNames) -> None:
         """Bodies at a random configuration, each seen from the first so that the robot may stand elsewhere.
 
         Raises:
@@ -103,7 +89,7 @@ class MujocoJoints:
         first: tuple[pin.SE3, pin.SE3] | None = None
         moved = self._elsewhere(model)
         for b in range(1, model.nbody):
-            name = body_name(model, b)
+            name = names.bodies[b]
             if b in moved or not pinocchio.existFrame(name, pin.FrameType.BODY):
                 continue
             index = pinocchio.getFrameId(name, pin.FrameType.BODY)

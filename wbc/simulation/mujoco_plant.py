@@ -13,12 +13,17 @@ from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.mujoco_joints import MujocoJoints
 from wbc.robot.robot import checked_robot
-from wbc.robot.sources.mjmodel import BALL, FREE, TO_JOINT
+from wbc.robot.sources.mjactuators import control, force_ends, gears, joint_actuators
+from wbc.robot.sources.mjnames import BALL, FREE
 from wbc.simulation.plant import Command, CommandKind, PlantError, PlantState
 from wbc.validation import Array, one_of, real_array
 
 if TYPE_CHECKING:
     import mujoco
+
+
+#: Of what motors can together, where they can nothing
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,19 +81,29 @@ class MujocoPlant:
         self.reset(robot.neutral, 0.0)
 
     def _driven(self) -> dict[CommandKind, tuple[Array, Array, Array]]:
-        """For each kind of command: actuators, velocity coordinates, and ctrl for 1 there."""
-        m, found, columns = self._model, dict[CommandKind, list[tuple[int, int, float]]](), self._joints.columns
-        for a in range(m.nu):
-            joint = int(m.actuator_trnid[a, 0])
-            if int(m.actuator_trntype[a]) not in TO_JOINT or joint not in columns or m.jnt_type[joint] in (FREE, BALL):
-                continue
-            gain, (_, on_q, on_v) = float(m.actuator_gainprm[a, 0]), m.actuator_biasprm[a, :3]
-            kind = CommandKind.TORQUE
-            if on_q != 0.0 or on_v != 0.0:
-                kind = CommandKind.POSITION if on_q != 0.0 else CommandKind.VELOCITY
-            gear = float(m.actuator_gear[a, 0])
-            scale = 1.0 / (gear * gain) if kind is CommandKind.TORQUE else gear
-            found.setdefault(kind, []).append((a, columns[joint], scale))
+        """For each kind of command: places in ctrl, velocity coordinates, and ctrl for 1 there.
+
+        Motors of one joint share its torque in proportion to what each can.
+        """
+        import mujoco
+
+        m, found = self._model, dict[CommandKind, list[tuple[int, int, float]]]()
+        for joint, column in self._joints.columns.items():
+            motors = list[tuple[int, float, float]]()
+            for a in joint_actuators(m, joint):
+                if m.jnt_type[joint] in (FREE, BALL) or m.actuator_gaintype[a] != int(mujoco.mjtGain.mjGAIN_FIXED):
+                    continue
+                gain, gear = float(m.actuator_gainprm[a, 0]), float(gears(m, a, 1)[0])
+                _, on_q, on_v = m.actuator_biasprm[a, :3]
+                if on_q != 0.0 or on_v != 0.0:
+                    kind = CommandKind.POSITION if on_q != 0.0 else CommandKind.VELOCITY
+                    found.setdefault(kind, []).append((control(m, a), column, gear))
+                elif gear * gain != 0.0:
+                    motors.append((control(m, a), float(np.abs(gear * force_ends(m, a)).max()), gear * gain))
+            reach = np.array([most for _, most, _ in motors])
+            reach = np.isinf(reach) if np.isinf(reach).any() else reach
+            for (at, _, scale), share in zip(motors, reach / max(reach.sum(), TINY), strict=True):
+                found.setdefault(CommandKind.TORQUE, []).append((at, column, share / scale))
         made = {kind: np.array(rows).T for kind, rows in found.items()}
         return {kind: (a.astype(int), dof.astype(int), scale) for kind, (a, dof, scale) in made.items()}
 

@@ -18,8 +18,8 @@ from wbc.errors import RobotFileError, ShapeError
 from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
-from wbc.robot.sources.mjcf import read_mjcf_geometry
-from wbc.robot.sources.mjmodel import body_name, is_mjmodel, pose_of, trees_of
+from wbc.robot.sources.mjmodel import compiled, is_mjmodel, pose_of
+from wbc.robot.sources.mjnames import names_of
 from wbc.shapes import Capsule, Sphere
 from wbc.validation import Array
 
@@ -81,7 +81,7 @@ def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: Any = No
     path = pathlib.Path(robot.source)
     _, tree = read_xml(path)
     if tree.tag == "mujoco":
-        return _geometry_bodies(*read_mjcf_geometry(path))
+        return _mujoco_bodies(robot, compiled(path))
     folders = [
         validation.file_path("package_dirs", folder)
         for folder in validation.items("package_dirs", package_dirs, "folders")
@@ -164,13 +164,12 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
 
 def _mujoco_bodies(robot: Robot, model: Any) -> list[CollisionBody]:
     """Geoms of a compiled model that can touch something, on links of the robot that move or do not."""
-    bodies, own = [], set(trees_of(model).robot)
+    bodies, names = [], names_of(model).bodies
+    pairs = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     for g in range(model.ngeom):
-        body = int(model.geom_bodyid[g])
-        if body not in own or not (model.geom_contype[g] or model.geom_conaffinity[g]):
-            continue
-        link = body_name(model, body)
-        if robot.model.existFrame(link):
+        link = names[int(model.geom_bodyid[g])]
+        touches = model.geom_contype[g] or model.geom_conaffinity[g] or g in pairs
+        if touches and robot.model.existFrame(link):
             placement, mesh = pose_of(model.geom_pos[g], model.geom_quat[g]), int(model.geom_type[g]) == _MESH
             bodies.append(CollisionBody(link, mesh, placement, partial(_from_geom, model, g)))
     return bodies

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -40,6 +41,7 @@ class Description:
         notes: see :class:`~wbc.robot.Robot`.
         source: path of the file, "" for none.
         undriven: joints with several degrees of freedom that no motor moves, the base left out.
+        geometry: the ``mujoco.MjModel`` that has the shapes; None: the file has them.
     """
 
     model: pin.Model
@@ -50,6 +52,7 @@ class Description:
     notes: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
     undriven: tuple[str, ...] = ()
+    geometry: Any = None
 
 
 def root_joint(base: str) -> pin.JointModel | None:

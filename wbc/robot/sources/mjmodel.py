@@ -1,13 +1,15 @@
-"""Reading a compiled ``mujoco.MjModel``: whatever MuJoCo's own compiler made of a file or of a specification.
+"""Reading MJCF: MuJoCo compiles it, and the robot is made of the compiled arrays.
 
-Joints, inertias and frames are taken from the compiled arrays, so nothing that MJCF can say is read a second time
-here: <frame>, <replicate>, <attach>, defaults, masses of geoms that touch nothing.
+Nothing that MJCF can say is interpreted here: defaults, orientations, <frame>, <replicate>, <attach>, masses of
+geoms and meshes are numbers of the ``mujoco.MjModel``. What it says and a robot cannot hold is found in
+:mod:`wbc.robot.sources.mjcompared` by what MuJoCo itself computes.
 """
 
 from __future__ import annotations
 
-import os
+import logging
 import pathlib
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,18 +18,27 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import RobotFileError
-from wbc.robot.sources.description import Description, Mimic, with_base
+from wbc.robot.sources.description import Description, Mimic, own_base, with_base
+from wbc.robot.sources.files import captured_stderr
+from wbc.robot.sources.mjactuators import elsewhere, force_range, of_actuators
+from wbc.robot.sources.mjcompared import Compared, sentence
+from wbc.robot.sources.mjnames import BALL, FREE, HINGE, SIZES, SLIDE, MjNames, coordinates, names_of
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
 
 if TYPE_CHECKING:
     import mujoco
 
-#: Numbers of a joint in qpos and in qvel, by MuJoCo's type
-FREE, BALL, SLIDE, HINGE = range(4)
-SIZES = {FREE: (7, 6), BALL: (4, 3), SLIDE: (1, 1), HINGE: (1, 1)}
-#: Types of transmissions to a joint and of equalities of joints
-TO_JOINT, JOINT_EQUALITY = (0, 1), 2
+log = logging.getLogger("wbc")
+
+#: Degrees of freedom of the largest robot: Pinocchio's data of a model has four tensors of nv^3 doubles, 0.9 GB
+MOST = 300
+#: Equality of two joints
+_JOINT_EQUALITY = 2
+#: Components of an axis this much apart are the same
+_ALIGNED = 1e-15
+#: Numbers this much apart, for a coordinate of 1, say the same of two couplings
+_SAME = 1e-12
 
 
 def is_mjmodel(source: Any) -> bool:
@@ -36,26 +47,42 @@ def is_mjmodel(source: Any) -> bool:
     return kind.__name__ == "MjModel" and kind.__module__.startswith("mujoco")
 
 
+def is_text(source: Any) -> bool:
+    """Whether a string is XML instead of a name or path."""
+    return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
+
+
+def compiled(source: str | pathlib.Path) -> mujoco.MjModel:
+    """What MuJoCo's compiler makes of an MJCF file, or of MJCF as a string.
+
+    Raises:
+        RobotFileError: MuJoCo is not installed; it refuses the file, with its reason; a string that is no MJCF.
+    """
+    value = source if isinstance(source, str) else str(source)
+    if isinstance(source, str):
+        root = re.search(r"<([^\s<>/!?]+)", re.sub(r"<!--.*?-->", "", source, flags=re.DOTALL))
+        if root is None or root[1] != "mujoco":
+            reason = f"no MJCF: the root element is <{root[1] if root else ''}>, expected <mujoco>"
+            raise RobotFileError("robot", value, f"{reason}; other descriptions are read from files")
+    try:
+        import mujoco
+    except ModuleNotFoundError as error:
+        raise RobotFileError("robot", value, "MJCF is read by MuJoCo's compiler: pip install wbc[mujoco]") from error
+    try:
+        read = mujoco.MjModel.from_xml_string if isinstance(source, str) else mujoco.MjModel.from_xml_path
+        with captured_stderr() as noise:
+            model = read(value)
+        if noise.reason:
+            label = model_name(model) if isinstance(source, str) else value
+            log.warning("MuJoCo on %s: %s", label, noise.reason.replace("WARNING: ", ""))
+        return model
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        raise RobotFileError("robot", value, f"MuJoCo refused it: {' '.join(str(error).split())}") from error
+
+
 def model_name(model: mujoco.MjModel) -> str:
     """What the file calls its model."""
     return bytes(model.names).split(b"\0", 1)[0].decode() or "mujoco"
-
-
-def joint_name(model: mujoco.MjModel, joint: int) -> str:
-    """A joint's name, or one made of its body's where it has none, as Pinocchio's reader of MJCF makes it."""
-    given = str(model.joint(joint).name)
-    if given:
-        return given
-    body = int(model.jnt_bodyid[joint])
-    if int(model.jnt_type[joint]) == FREE:
-        return f"{body_name(model, body)}_free"
-    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    return f"{body_name(model, body)}_joint" + (f"{joint - first}" if count > 1 else "")
-
-
-def body_name(model: mujoco.MjModel, body: int) -> str:
-    """A body's name, or its number where it has none."""
-    return str(model.body(body).name) or f"body{body}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,29 +91,50 @@ class MjTrees:
 
     Attributes:
         robot: numbers of its bodies, parents first; bodies that are fixed to the world are among them.
-        objects: names of bodies that move freely and alone beside the robot, and are no part of it.
+        left_out: what is no part of it -> the bodies' numbers.
     """
 
     robot: tuple[int, ...]
-    objects: tuple[str, ...]
+    left_out: dict[str, list[int]]
 
 
 def trees_of(model: mujoco.MjModel) -> MjTrees:
-    """The robot's bodies: all but mocap bodies, and, where other joints move, trees that only have a free joint."""
+    """The robot's bodies. No part of it are, as trees of bodies on the world: those that a program moves (mocap)
+    and that have no joint, those of flexes, where anything else moves those that only have a free joint, and beside a
+    driven robot that moves freely all that nothing drives.
+    """
+    import mujoco
+
     joints: dict[int, list[int]] = {}
     for j in range(model.njnt):
         joints.setdefault(int(model.body_rootid[model.jnt_bodyid[j]]), []).append(j)
-    alone = [root for root, own in joints.items() if len(own) == 1 and int(model.jnt_type[own[0]]) == FREE]
-    driven = [root for root in alone if _is_pushed(model, root)]
-    objects = {root for root in alone if root not in driven} if len(alone) - len(driven) < len(joints) else set()
-    mocap = {b for b in range(1, model.nbody) if int(model.body_mocapid[int(model.body_rootid[b])]) >= 0}
-    kept = (b for b in range(1, model.nbody) if b not in mocap and int(model.body_rootid[b]) not in objects)
-    return MjTrees(tuple(kept), tuple(body_name(model, root) for root in sorted(objects)))
+    roots = [b for b in range(1, model.nbody) if int(model.body_parentid[b]) == 0]
+    # <flexcomp> makes bodies of its own, that slide and twist by joints without names
+    flexes = tuple(f"{mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, f)}_" for f in range(model.nflex))
+    bent = [
+        r
+        for r, own in joints.items()
+        if flexes and str(model.body(r).name).startswith(flexes) and not any(model.joint(j).name for j in own)
+    ]
+    alone = [r for r, own in joints.items() if len(own) == 1 and int(model.jnt_type[own[0]]) == FREE and r not in bent]
+    still = [r for r in joints if r not in bent and not _is_pushed(model, r)]
+    floating = [r for r in joints if r not in {*bent, *still} and int(model.jnt_type[joints[r][0]]) == FREE]
+    loose = still if len(floating) == 1 else [r for r in alone if r in still]
+    if len(loose) == len(joints.keys() - set(bent)) == 1:  # one body that moves freely is a robot
+        loose = []
+    left_out = {
+        "moved by a program (mocap)": [r for r in roots if model.body_mocapid[r] >= 0 and r not in joints],
+        "deformable": sorted(bent),
+        "driven by nothing": sorted(loose),
+    }
+    gone = {root for group in left_out.values() for root in group}
+    kept = tuple(b for b in range(1, model.nbody) if int(model.body_rootid[b]) not in gone)
+    return MjTrees(kept, {reason: group for reason, group in left_out.items() if group})
 
 
 def _is_pushed(model: mujoco.MjModel, root: int) -> bool:
     """Whether an actuator acts on a joint or a site of this tree, as a drone's propellers do."""
-    for a in range(model.nu):
+    for a in range(len(model.actuator_trntype)):
         target, kind = int(model.actuator_trnid[a, 0]), int(model.actuator_trntype[a])
         bodies = {0: model.jnt_bodyid, 1: model.jnt_bodyid, 4: model.site_bodyid}.get(kind)
         if bodies is not None and int(model.body_rootid[bodies[target]]) == root:
@@ -98,35 +146,65 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
     """The description in a compiled model: q is its qpos with quaternions x, y, z, w.
 
     Several joints of one body become joints one after the other. Keyframes are states, the model's own qpos0
-    too. Bodies that a program moves (mocap), and freely moving objects beside the robot, are left out.
+    too. What a robot cannot hold is said in the log, and in the notes.
 
     Raises:
-        RobotFileError: a model without joints; a base that contradicts it.
+        RobotFileError: a model without joints, with too many, or whose motion MuJoCo computes otherwise; a base that
+            contradicts it.
     """
-    trees = trees_of(model)
-    if not any(int(model.body_jntnum[b]) for b in trees.robot):
-        raise RobotFileError("robot", source or "MjModel", "the model has no joint")
-    whole, order = _built(model, trees)
-    notes = {"reader": "compiled by MuJoCo"}
-    if trees.objects:
-        notes["objects"] = f"move freely and are no part of the robot: {', '.join(trees.objects)}"
-    _set_limits(model, whole, order)
-    mimics, lost = _couplings(model, set(order))
-    if lost:
-        notes["mimic"] = f"equalities that are not represented: {', '.join(lost)}"
-    states = {"qpos0": _state(model, order, model.qpos0)}
-    for k in range(model.nkey):
-        states[str(model.key(k).name) or f"key{k}"] = _state(model, order, model.key_qpos[k])
+    import mujoco
+
+    label, names, trees = source or model_name(model), names_of(model), trees_of(model)
+    beside = "; ".join(sentence(why, [names.bodies[b] for b in group]) for why, group in trees.left_out.items())
+    own = [j for body in trees.robot for j in _joints(model, body)]
+    if not own:
+        raise RobotFileError(
+            "robot", label, "the model has no joint that moves a robot" + f" ({beside})" * bool(beside)
+        )
+    dofs = sum(SIZES[int(model.jnt_type[j])][1] for j in own)
+    if dofs > MOST:
+        count = len({int(model.body_rootid[model.jnt_bodyid[j]]) for j in own})
+        reason = f"{dofs} degrees of freedom in {count} trees of bodies, at most {MOST} are held"
+        raise RobotFileError("robot", label, f"{reason}: load a model of the robot alone")
+    whole, order = _built(model, trees, names)
+    mimics, lost = _couplings(model, set(order), names)
+    free = [names.joints[j] for j in own if model.jnt_type[j] == FREE and own_base(whole) == "fixed"]
+    heavy = [names.joints[j] for j in own if model.jnt_type[j] == FREE and model.dof_armature[model.jnt_dofadr[j]]]
+    carried = [names.bodies[b] for b in trees.robot if model.body_mocapid[b] >= 0]
+    said = {
+        "objects": f"no part of the robot are bodies {beside}" if beside else "",
+        "mocap": sentence("fixed here, and moved by a program in the file", carried),
+        "armature": sentence("armature is along the body's axes here, along the world's in MuJoCo, of", heavy),
+        **_set_limits(model, whole, order, names, {mimic.follower for mimic in mimics}),
+    }
+    try:
+        compared = Compared(model, whole, order, names, mimics)
+        difference = compared.difference()
+        said |= compared.forces() | compared.loops(lost, set(trees.robot))
+    except (RuntimeError, mujoco.FatalError) as error:  # no memory for a state, a plugin that does not begin
+        raise RobotFileError("robot", label, f"MuJoCo cannot compute it: {error}") from error
+    if difference:
+        raise RobotFileError("robot", label, difference)
+    said = {key: words for key, words in said.items() if words}
+    for words in said.values():
+        log.warning("%s: %s", label, words)
+    poses = {str(model.key(k).name) or f"key{k}": model.key_qpos[k] for k in range(model.nkey)}
+    states = {
+        key: {names.joints[j]: coordinates(model, j, qpos) for j in order}
+        for key, qpos in {"qpos0": model.qpos0, **poses}.items()
+    }
     drawn = np.concatenate(list(states["qpos0"].values()))
     based, kind = with_base(whole, base, drawn)
-    return Description(based, kind, mimics, states, notes=notes, source=source)
+    notes = {"reader": "compiled by MuJoCo", **said}
+    return Description(based, kind, mimics, states, notes=notes, source=source, undriven=tuple(free), geometry=model)
 
 
-def _built(model: mujoco.MjModel, trees: MjTrees) -> tuple[pin.Model, list[int]]:
+def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[pin.Model, list[int]]:
     """(the model with its frames, MuJoCo's joints in the order of q)."""
     out, order = pin.Model(), list[int]()
     out.name = model_name(model)
-    out.gravity = pin.Motion(np.array(model.opt.gravity), np.zeros(3))
+    gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
+    out.gravity = pin.Motion(gravity, np.zeros(3))
     # Of each body: the joint that carries it, its pose there, its frame
     at: dict[int, tuple[int, pin.SE3, int]] = {0: (0, pin.SE3.Identity(), 0)}
     armature, damping, friction = list[Array](), list[Array](), list[Array]()
@@ -139,31 +217,36 @@ def _built(model: mujoco.MjModel, trees: MjTrees) -> tuple[pin.Model, list[int]]
                 pose, anchor, made = pin.SE3.Identity(), pin.SE3.Identity(), pin.JointModelFreeFlyer()
             else:
                 anchor, made = _joint(model, j)
-            name = joint_name(model, j)
-            joint = out.addJoint(joint, made, pose * anchor, name)
+            joint = out.addJoint(joint, made, pose * anchor, names.joints[j])
             frame = out.addJointFrame(joint, frame)
             back = pin.SE3(np.eye(3), -np.array(model.jnt_pos[j])) if kind in (BALL, HINGE) else pin.SE3.Identity()
             pose = back
             order.append(j)
             dofs = slice(int(model.jnt_dofadr[j]), int(model.jnt_dofadr[j]) + SIZES[kind][1])
-            armature.append(np.array(model.dof_armature[dofs]))
-            damping.append(np.array(model.dof_damping[dofs]))
+            armature.append(np.array(model.dof_armature[dofs]) + of_actuators(model, j, "armature"))
+            damping.append(np.array(model.dof_damping[dofs]) + of_actuators(model, j, "damping"))
             friction.append(np.array(model.dof_frictionloss[dofs]))
-        frame = out.addBodyFrame(body_name(model, body), joint, pose, frame)
+        frame = out.addBodyFrame(names.bodies[body], joint, pose, frame)
         out.appendBodyToJoint(joint, _inertia(model, body), pose)
         at[body] = joint, pose, frame
-    for s in range(model.nsite):
-        body, site = int(model.site_bodyid[s]), str(model.site(s).name)
-        if site and body in at:
-            joint, pose, frame = at[body]
+    for s, site in enumerate(names.sites):
+        if site and int(model.site_bodyid[s]) in at:
+            joint, pose, frame = at[int(model.site_bodyid[s])]
             placed = pose * pose_of(model.site_pos[s], model.site_quat[s])
-            # A site may share its name with a body; its frame is then the one that comes second
-            label = f"{site}_site" if out.existFrame(site) else site
-            out.addFrame(pin.Frame(label, joint, frame, placed, pin.FrameType.OP_FRAME))
-    out.armature, out.damping = np.concatenate(armature), np.concatenate(damping)
-    out.upperDryFrictionLimit = np.concatenate(friction)
-    out.lowerDryFrictionLimit = -np.concatenate(friction)
+            out.addFrame(pin.Frame(site, joint, frame, placed, pin.FrameType.OP_FRAME))
+    out.armature, loss = np.concatenate(armature), np.concatenate(friction)
+    out.damping = np.concatenate(damping) * (not _off(model, "DAMPER", "PASSIVE"))
+    out.upperDryFrictionLimit = loss * (not _off(model, "FRICTIONLOSS", "CONSTRAINT"))
+    out.lowerDryFrictionLimit = -out.upperDryFrictionLimit
     return out, order
+
+
+def _off(model: mujoco.MjModel, *flags: str) -> bool:
+    """Whether one of MuJoCo's parts is switched off by the file, of those that this version has."""
+    import mujoco
+
+    bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}", None) for flag in flags)
+    return any(bit is not None and model.opt.disableflags & int(bit) for bit in bits)
 
 
 def _joints(model: mujoco.MjModel, body: int) -> Iterator[int]:
@@ -177,7 +260,7 @@ def _joint(model: mujoco.MjModel, j: int) -> tuple[pin.SE3, pin.JointModel]:
     if int(model.jnt_type[j]) == BALL:
         return pin.SE3(np.eye(3), anchor), pin.JointModelSpherical()
     axis, ref = axis / np.linalg.norm(axis), float(model.qpos0[int(model.jnt_qposadr[j])])
-    along = np.flatnonzero(axis > 1.0 - 1e-12)
+    along = np.flatnonzero(np.abs(axis - np.eye(3)).max(axis=1) < _ALIGNED)
     if int(model.jnt_type[j]) == SLIDE:
         kinds = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
         made = kinds[along[0]]() if along.size else pin.JointModelPrismaticUnaligned(axis)
@@ -200,66 +283,86 @@ def _inertia(model: mujoco.MjModel, body: int) -> pin.Inertia:
     return pin.Inertia(float(model.body_mass[body]), axes.translation, turned)
 
 
-def _set_limits(model: mujoco.MjModel, out: pin.Model, order: list[int]) -> None:
-    """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates."""
-    lower, upper = np.full(out.nq, -np.inf), np.full(out.nq, np.inf)
-    effort = np.zeros(out.nv)
+def _set_limits(
+    model: mujoco.MjModel, out: pin.Model, order: list[int], names: MjNames, followers: set[str]
+) -> dict[str, str]:
+    """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates.
+
+    Returns:
+        What of them a robot cannot hold, one sentence a key.
+    """
+    lower, upper, effort = np.full(out.nq, -np.inf), np.full(out.nq, np.inf), np.zeros(out.nv)
+    off, uneven, still = _off(model, "LIMIT", "CONSTRAINT"), list[str](), list[str]()
     for k, j in enumerate(order, start=1):
-        if int(model.jnt_type[j]) not in (SLIDE, HINGE):
+        kind, start = int(model.jnt_type[j]), int(out.idx_vs[k])
+        if kind == FREE:
             continue
-        if model.jnt_limited[j]:
+        if model.jnt_limited[j] and kind != BALL and not off:
             lower[out.idx_qs[k]], upper[out.idx_qs[k]] = model.jnt_range[j]
-        limits = [float(np.abs(model.jnt_actfrcrange[j]).max())] if model.jnt_actfrclimited[j] else []
-        for a in range(model.nu):
-            if int(model.actuator_trntype[a]) in TO_JOINT and int(model.actuator_trnid[a, 0]) == j:
-                gear = abs(float(model.actuator_gear[a, 0]))
-                if model.actuator_forcelimited[a]:
-                    limits.append(gear * float(np.abs(model.actuator_forcerange[a]).max()))
-                elif model.actuator_ctrllimited[a] and not model.actuator_biasprm[a, 1:3].any():
-                    reach = float(np.abs(model.actuator_ctrlrange[a]).max())
-                    limits.append(gear * abs(float(model.actuator_gainprm[a, 0])) * reach)
-        effort[out.idx_vs[k]] = min(limits, default=0.0)
+        size = SIZES[kind][1]
+        low, high = force_range(model, j, size)
+        effort[start : start + size] = most = np.maximum(-low, high)
+        if not np.allclose(-low, high, rtol=1e-9, atol=0.0):
+            ranges = (f"{least:.6g} to {largest:.6g}" for least, largest in zip(low, high, strict=True))
+            uneven.append(f"{names.joints[j]} ({', '.join(ranges)})")
+        if not most.all() and names.joints[j] not in followers:
+            still.append(names.joints[j])
     out.lowerPositionLimit, out.upperPositionLimit = lower, upper
     out.upperEffortLimit, out.lowerEffortLimit = effort, -effort
     out.upperVelocityLimit, out.lowerVelocityLimit = np.full(out.nv, np.inf), np.full(out.nv, -np.inf)
+    ranged = [j for j in order if model.jnt_limited[j] and (off or int(model.jnt_type[j]) == BALL)]
+    tendons = [str(model.tendon(t).name) or f"tendon {t}" for t in range(model.ntendon) if model.tendon_limited[t]]
+    if len(still) == len(order) or not len(model.actuator_trntype):  # a file that says nothing of actuators
+        still = []
+    return {
+        "position": sentence(
+            "limits that the file switches off" if off else "the cone of a ball joint is no limit here",
+            [names.joints[j] for j in ranged],
+        ),
+        "tendons": sentence("ranges of tendons are no limits here", [] if off else tendons),
+        "actuators": sentence(
+            "not held is what drives tendons, sites or free joints, or as a muscle", elsewhere(model)
+        ),
+        "motors": sentence("unlimited here is the torque of joints that no actuator drives", still),
+        "uneven": sentence("torques are limited alike both ways, by the larger of", uneven),
+    }
 
 
-def _couplings(model: mujoco.MjModel, joints: set[int]) -> tuple[tuple[Mimic, ...], list[str]]:
-    """Linear equalities of two joints, and the names of equalities that are none."""
-    mimics, lost = [], []
+def _couplings(model: mujoco.MjModel, joints: set[int], names: MjNames) -> tuple[tuple[Mimic, ...], list[int]]:
+    """Linear equalities of two joints, and the numbers of active equalities that are no couplings.
+
+    Where two say different things of one joint, the second couples the joints that lead: each joint follows at most
+    one, as ``q = ratio q[leader] + offset``.
+    """
+    mimics, lost = list[Mimic](), list[int]()
+    follows: dict[int, tuple[int, float, float]] = {}
+
+    def led(j: int) -> tuple[int, float, float]:
+        """(what leads a joint, ratio, offset), itself where nothing does."""
+        if j not in follows:
+            return j, 1.0, 0.0
+        leader, ratio, offset = follows[j]
+        above, rate, start = led(leader)
+        return above, ratio * rate, ratio * start + offset
+
     for k in range(model.neq):
-        if not model.eq_active0[k]:
+        if not model.eq_active0[k] or _off(model, "EQUALITY", "CONSTRAINT"):
             continue
         first, second, terms = int(model.eq_obj1id[k]), int(model.eq_obj2id[k]), model.eq_data[k, :5]
-        kinds = int(model.eq_type[k]) == JOINT_EQUALITY and second >= 0 and not terms[2:].any()
-        if not (kinds and {first, second} <= joints):
-            lost.append(str(model.eq(k).name) or f"equality {k}")
+        linear = int(model.eq_type[k]) == _JOINT_EQUALITY and second >= 0 and not terms[2:].any()
+        if not (linear and {first, second} <= joints):
+            lost.append(k)
             continue
         # y - y0 = a + b (x - x0)
         y0, x0 = (float(model.qpos0[int(model.jnt_qposadr[j])]) for j in (first, second))
         offset, ratio = y0 + float(terms[0]) - float(terms[1]) * x0, float(terms[1])
-        mimics.append(Mimic(joint_name(model, first), joint_name(model, second), ratio, offset))
+        (top, rate, start), (leader, pace, begin) = led(first), led(second)
+        pace, begin = ratio * pace, ratio * begin + offset
+        # rate q[top] + start = pace q[leader] + begin
+        if top == leader or rate == 0.0:
+            if max(abs(rate - pace), abs(start - begin)) > _SAME * max(1.0, abs(rate), abs(start)) or top != leader:
+                lost.append(k)
+            continue
+        follows[top] = leader, pace / rate, (begin - start) / rate
+        mimics.append(Mimic(names.joints[top], names.joints[leader], *follows[top][1:]))
     return tuple(mimics), lost
-
-
-def _state(model: mujoco.MjModel, order: list[int], qpos: Array) -> dict[str, Array]:
-    out = {}
-    for j in order:
-        start = int(model.jnt_qposadr[j])
-        numbers = np.array(qpos[start : start + SIZES[int(model.jnt_type[j])][0]], dtype=float)
-        if len(numbers) in (4, 7):
-            numbers[-4:] = numbers[-4:][TO_PINOCCHIO]
-        out[joint_name(model, j)] = numbers
-    return out
-
-
-def compiled(source: Any) -> mujoco.MjModel | None:
-    """An MJCF file compiled by MuJoCo; None where that is not installed or refuses it, and for what is no such file."""
-    if not isinstance(source, (str, os.PathLike)) or pathlib.Path(source).suffix.lower() not in (".xml", ".mjcf"):
-        return None
-    try:
-        import mujoco
-
-        return mujoco.MjModel.from_xml_path(str(source))
-    except (ModuleNotFoundError, ValueError):
-        return None
