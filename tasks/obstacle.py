@@ -46,7 +46,8 @@ class Obstacle(Constraint):
         links: link frames whose ``robot.shapes`` keep clear; None: all that have shapes and can move.
         margin: initial value of the input [m].
         pose: initial value of the input; None: the identity. Set one of them before the first step.
-        closest: rows of the sensed pairs; no more than there are such pairs.
+        closest: how many of the sensed pairs have rows at a time; no more than there are such pairs. A pair without one
+            is checked at the command, see :class:`wbc.tasks.SelfCollision`.
         corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
 
     Inputs:
@@ -78,7 +79,7 @@ class Obstacle(Constraint):
     links: tuple[str, ...] | None = None
     margin: float = 0.0
     pose: pin.SE3 | None = None
-    closest: int = 8
+    closest: int = 16
     corners: int = 4
 
     def __post_init__(self) -> None:

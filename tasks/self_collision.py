@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import logging
+import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
+import numpy as np
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError
@@ -18,17 +21,33 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
 from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
+from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
+
+log = logging.getLogger("wbc")
 
 METHODS = ("auto", "symbolic", "sensed")
 
 #: More pairs of shapes than this get no rows of their own: each is some 200 operations in every tick.
 SYMBOLIC_PAIRS = 200
 
+#: Pairs of shapes that no posture brings this far apart [m] are left out: they overlap whatever the robot does.
+APART = 1e-3
+
+#: A pair keeps at most this share of the most that a posture brings its shapes apart: all of it would hold its joints.
+SHARE = 0.5
+
+#: That is known of pairs which no posture brings farther apart than this, in parts of the characteristic length, or
+#: than the margin of the declaration over SHARE.
+SEARCHED = 0.05
+
 #: A shape of each of two links
 ShapePair = tuple[bodies.LinkShape, bodies.LinkShape]
+
+#: What was found of a robot's pairs, for pairs of links and the distance that was enough
+_FOUND: weakref.WeakKeyDictionary[Robot, dict[Any, dict[tuple[str, str], float]]] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -38,15 +57,22 @@ class SelfCollision(Constraint):
         h = (signed distance between a shape of one link and a shape of another) - margin >= 0     [m]
 
     Pairs of shapes have rows of their own in every tick, which are expressions (sphere with sphere, capsule, box,
-    cylinder; capsule with capsule), or are sensed: ``closest`` rows in all for the nearest of them, chosen before every
-    tick. A capsule with a box or a cylinder has two rows for its ends and is sensed, too. A row moves only the joints
-    between its two links.
+    cylinder; capsule with capsule), or are sensed: ``closest`` rows in all, for those that need them. A capsule with a
+    box or a cylinder has two rows for its ends and is sensed, too. A row moves only the joints between its two links.
+
+    A sensed pair without a row is checked at the command of every tick. Where it closes faster than its row would let
+    it, it takes the row of one that does not push, and the command is found again: rows are missing only where more
+    than ``closest`` pairs push at once, and then the tick brakes and the log says so.
+
+    A pair of shapes that no posture brings as far apart as twice the margin keeps half of the most that one does; pairs
+    that overlap in all postures are left out. Both are found by a search when the item is added; the log names pairs
+    that keep less than the margin, with the distances found.
 
     Attributes:
         pairs: pairs of links; None: ``robot.self_pairs``, and where that is None all pairs of links with shapes that
             are neither welded together nor neighbours across one joint.
         margin: initial value of the input [m].
-        closest: rows of the sensed pairs; no more than there are such pairs.
+        closest: how many of the sensed pairs have rows at a time; no more than there are such pairs.
         corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
         method: ``"auto"``: expressions where the shapes have one, if these are at most :data:`SYMBOLIC_PAIRS` pairs of
             shapes, else all are sensed; ``"symbolic"``: expressions or an error; ``"sensed"``: all are sensed.
@@ -58,10 +84,8 @@ class SelfCollision(Constraint):
     tick. From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
     ``relaxed``.
 
-    It cannot see what the link shapes do not cover. Shapes that are larger than the links may overlap in every
-    configuration: leave such pairs out. Pairs beyond the ``closest`` sensed ones have no row in a tick. Nearest points
-    of parallel capsules, of faces and of edges jump, and the gradient with them; see :mod:`wbc.tasks._gap` and
-    :mod:`wbc.proximity.corners`.
+    It cannot see what the link shapes do not cover. Nearest points of parallel capsules, of faces and of edges jump,
+    and the gradient with them; see :mod:`wbc.tasks._gap` and :mod:`wbc.proximity.corners`.
 
     Example:
         >>> SelfCollision([("left_wrist", "right_wrist"), ("left_wrist", "torso")], margin=0.02)
@@ -77,7 +101,7 @@ class SelfCollision(Constraint):
 
     pairs: tuple[tuple[str, str], ...] | None = None
     margin: float = 0.0
-    closest: int = 8
+    closest: int = 16
     corners: int = 4
     method: Literal["auto", "symbolic", "sensed"] = "auto"
 
@@ -106,10 +130,26 @@ class SelfCollision(Constraint):
                 raise RangeError("SelfCollision.pairs", (a, b), "no joint moves these links against each other")
         pairs = self._shape_pairs(robot)
         if not pairs:
-            raise MissingShapeError("SelfCollision.pairs", self.pairs, "no pair of links with shapes to keep apart")
+            none = (
+                "no posture brings the shapes of any pair apart"
+                if self._most_apart(robot)
+                else "no pair of links with shapes to keep apart"
+            )
+            raise MissingShapeError("SelfCollision.pairs", self.pairs, none)
         if self.method == "symbolic":
             self._check_symbolic(pairs)
+        self._say_kept(robot)
         bodies.check_sensed("SelfCollision.pairs", len(pairs))
+
+    def _say_kept(self, robot: Robot) -> None:
+        """Name the pairs that no posture brings as far apart as the margin, with the most that one does."""
+        most = {pair: d for pair, d in self._most_apart(robot).items() if d < max(self.margin, APART)}
+        gone = {pair: d for pair, d in most.items() if d <= APART}
+        if gone:
+            log.warning("SelfCollision: no posture brings these apart, nothing keeps them clear: %s", _listed(gone))
+        if near := {pair: d for pair, d in most.items() if d > APART}:
+            what = "SelfCollision: no posture brings these %.3g mm apart, they keep half of the most that one does: %s"
+            log.warning(what, 1e3 * self.margin, _listed(near))
 
     def _check_symbolic(self, pairs: list[ShapePair]) -> None:
         advice = "use method='sensed', or name fewer pairs"
@@ -151,7 +191,9 @@ class SelfCollision(Constraint):
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
         """Distances of the sensed pairs."""
-        return PairSensor(robot, self.sensed_pairs(robot), self._nearest(robot), numbers, corners=self.corners)
+        most = self._kept(robot, self._split(robot)[1])
+        pairs, count = self.sensed_pairs(robot), self._nearest(robot)
+        return PairSensor(robot, pairs, count, numbers, corners=self.corners, most=most)
 
     def _nearest(self, robot: Robot) -> int:
         return min(self.closest, len(self._split(robot)[1]))
@@ -169,18 +211,42 @@ class SelfCollision(Constraint):
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """See the class."""
-        rows = []
-        for (a, _, first), (b, _, second) in self._split(robot)[0]:
-            rows += gap.gaps(gap.on_link(kin, a, first), gap.on_link(kin, b, second))
-        own = kin.gaps(rows) - inputs["margin"] if rows else ca.SX(0, 1)
+        rows, kept, pairs = [], [], self._split(robot)[0]
+        for ((a, _, first), (b, _, second)), most in zip(pairs, self._kept(robot, pairs), strict=True):
+            more = gap.gaps(gap.on_link(kin, a, first), gap.on_link(kin, b, second))
+            rows += more
+            kept += [inputs["margin"] if np.isinf(most) else ca.fmin(inputs["margin"], most)] * len(more)
+        own = kin.gaps(rows) - ca.vertcat(*kept) if rows else ca.SX(0, 1)
         return ca.vertcat(own, bodies.sensed_margins(inputs, self.sensed_rows(robot)))
 
-    def _shape_pairs(self, robot: Robot) -> list[ShapePair]:
+    def _every_shape_pair(self, robot: Robot) -> list[ShapePair]:
         return [
             pair
             for a, b in self.link_pairs(robot)
             for pair in itertools.product(bodies.shapes_of(robot, (a,)), bodies.shapes_of(robot, (b,)))
         ]
+
+    def _shape_pairs(self, robot: Robot) -> list[ShapePair]:
+        """Those that some posture brings apart."""
+        most = self._most_apart(robot)
+        return [p for p in self._every_shape_pair(robot) if most.get(_names(p), np.inf) > APART]
+
+    def _most_apart(self, robot: Robot) -> dict[tuple[str, str], float]:
+        """What no posture brings as far apart as counts here, and how far apart some posture brings it [m]."""
+        from wbc.robot.pairs.apart import most_apart  # Coal is imported where it is used
+
+        enough = max(self.margin / SHARE, SEARCHED * robot.characteristic_length)
+        known, key = _FOUND.setdefault(robot, {}), (self.link_pairs(robot), enough)
+        if key not in known:
+            pairs = self._every_shape_pair(robot)
+            shapes = {bodies.label(*s[:2]): (s[0], s[2]) for pair in pairs for s in pair}
+            known[key] = most_apart(robot, shapes, [_names(pair) for pair in pairs], enough)
+        return known[key]
+
+    def _kept(self, robot: Robot, pairs: list[ShapePair]) -> Array:
+        """The margin that each pair keeps at most [m]; infinite where postures leave room for any."""
+        most = self._most_apart(robot)
+        return SHARE * np.array([most.get(_names(pair), np.inf) for pair in pairs])
 
     def _split(self, robot: Robot) -> tuple[list[ShapePair], list[ShapePair]]:
         """Pairs with rows of their own, and sensed ones; a pair may be both."""
@@ -189,6 +255,14 @@ class SelfCollision(Constraint):
         if self.method == "sensed" or (self.method == "auto" and len(own) > SYMBOLIC_PAIRS):
             return [], pairs
         return own, [pair for pair in pairs if _is_sensed(*pair)]
+
+
+def _names(pair: ShapePair) -> tuple[str, str]:
+    return bodies.label(*pair[0][:2]), bodies.label(*pair[1][:2])
+
+
+def _listed(found: dict[tuple[str, str], float]) -> str:
+    return ", ".join(f"{a} and {b} ({1e3 * most:.1f} mm)" for (a, b), most in found.items())
 
 
 def _is_sensed(first: bodies.LinkShape, second: bodies.LinkShape) -> bool:

@@ -22,6 +22,7 @@ from wbc.controller.tick.native import CompiledTick, NativeTick
 from wbc.controller.tick.solved import SolvedTick
 from wbc.controller.tick.vm import VmAssembly
 from wbc.controller.together import Plan, Together
+from wbc.controller.watch import Braking, Watch
 from wbc.errors import SolverError
 from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
@@ -108,6 +109,9 @@ class Core:
         self._carried: dict[str, Carried] = {}
         #: sensors with the handles of their items
         self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
+        self._escape: Escape | None = None
+        self._braking = Braking(stack, layout)
+        self.follow(self.fallback.policy)
         self.tick.dt[0] = stack.dt
         self.tick.q[:] = stack.robot.neutral
         self.tick.check()
@@ -135,13 +139,17 @@ class Core:
     def follow(self, policy: Policy) -> None:
         """Another policy from now on."""
         self.fallback.policy = policy
-        self.call = self._plain_call
+        self.call, self._escape = self._plain_call, None
         if policy.escape:
-            self.call = Escape(self._plain_call, self.tick, self.fallback, self.context, self.snapshot)
+            self.call = self._escape = Escape(self.call, self.tick, self.fallback, self.context, self.snapshot)
+        self._unwatched = self.call
+        if self.sensors:
+            drifts = [self.layout.blocks[h.item_name].slots["drift"].start for _, h in self.sensors]
+            self.call = Watch(self.call, self._forget, self.tick, self.fallback, self.sensors, drifts, self._braking)
 
     def again(self) -> Step:
-        """A tick on the buffers as they are."""
-        if (flag := self.call()) and self.finish(flag) < 0:
+        """A tick on the buffers as they are, sensed inputs included."""
+        if (flag := self._unwatched()) and self.finish(flag) < 0:
             self.refuse(self.tick.q.copy(), self.tick.v_in[: self.layout.nv].copy())
         return Step(self.snapshot(), self.context)
 
@@ -163,12 +171,18 @@ class Core:
         self.tick.v_last[: self.layout.nv] = velocity
         self.assembly.forget()
         self.tick.reset()
-        if isinstance(self.call, Escape):
-            self.call.reset()
+        if self._escape is not None:
+            self._escape.reset()
         for sensor, _ in self.sensors:
             sensor.reset()
         self.resets += 1
         self.waits = True
+
+    def _forget(self) -> None:
+        """The next call is the last tick again, from no active set."""
+        self.assembly.rewind()
+        self.tick.reset()
+        self.resets += 1
 
     def advance(self, dt: float | None) -> None:
         """Another dt than the last, and the ramps' next values."""

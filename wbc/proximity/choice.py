@@ -6,6 +6,7 @@ import numpy as np
 
 from wbc.proximity.measured import Measured
 from wbc.proximity.scene import Index
+from wbc.shapes import FAR
 
 #: A pair keeps its row until another one is closer by this share of its distance ...
 KEEP_SHARE = 0.1
@@ -22,16 +23,17 @@ class Choice:
 
         distance < (1 - KEEP_SHARE) max(distance of the other, 0) + min(distance of the other, 0) - KEEP_LENGTH length,
 
-    so that noise does not swap rows. A pair stays in its row as long as it is chosen; new pairs take the free rows,
-    the closest the first. Where there are as many rows as pairs, each has the row of its number.
+    so that noise does not swap rows. Urgent pairs come before all others, see :mod:`wbc.proximity.missing`. A pair
+    stays in its row as long as it is chosen; new pairs take the free rows, the closest the first. Where there are as
+    many rows as pairs, each has the row of its number.
 
     Attributes:
         pairs: number of the pair of each row, -1 without.
     """
 
-    def __init__(self, sensing: Measured, count: int) -> None:
+    def __init__(self, sensing: Measured, count: int, urgent: Index) -> None:
         length = sensing.scene.robot.characteristic_length
-        self.sensing, self.count = sensing, count
+        self.sensing, self.count, self._urgent = sensing, count, urgent
         self.pairs: Index = np.full(count, -1, dtype=np.intp)
         self._slack, self._off = KEEP_LENGTH * length, OFF * length
 
@@ -49,7 +51,7 @@ class Choice:
         some = has_row.nonzero()[0] if has_row.any() else np.sort(np.argsort(bounds, kind="stable")[: self.count])
         self.sensing.ask(some)
         worst = self._scores(some, has_row).max()
-        rest = ((bounds <= worst) & ~np.isin(np.arange(number), some)).nonzero()[0]
+        rest = (((bounds <= worst) | (self._urgent > 0)) & ~np.isin(np.arange(number), some)).nonzero()[0]
         self.sensing.ask(rest)
         self.sensing.measured += len(some)
         pairs = np.sort(np.concatenate([some, rest]))
@@ -61,5 +63,6 @@ class Choice:
 
     def _scores(self, pairs: Index, has_row: np.ndarray) -> np.ndarray:
         """Distances, less what lets a pair keep its row."""
-        gaps = self.sensing.distances[pairs]
-        return np.asarray(gaps - (KEEP_SHARE * np.maximum(gaps, 0.0) + self._slack) * has_row[pairs])
+        gaps = self.sensing.gaps(pairs)
+        kept = (KEEP_SHARE * np.maximum(gaps, 0.0) + self._slack) * has_row[pairs]
+        return np.asarray(gaps - FAR * self._urgent[pairs] - kept)

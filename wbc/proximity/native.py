@@ -18,6 +18,7 @@ from wbc.native.kernel import kernel
 from wbc.native.library import load_library
 from wbc.proximity.choice import KEEP_LENGTH, KEEP_SHARE
 from wbc.proximity.corners import NEAR, corners_of
+from wbc.proximity.missing import Screws
 from wbc.proximity.rows import PairRows
 from wbc.proximity.scene import TIE, TRUST, PairScene
 from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
@@ -37,6 +38,7 @@ _FILES = (
     "pair.h",
     "choose.h",
     "corners.h",
+    "missing.h",
     "sensor.c",
 )
 
@@ -53,8 +55,9 @@ _LENGTHS = ("far", "touch", "tie", "trust", "keep_share", "keep_length", "off", 
 _ARRAYS = (
     *("q", "joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
     *("body_joint", "body_place", "body_pose", "kind", "hull", "size", "points", "corner", "corner_count"),
-    *("first", "second", "outward", "pair_side", "answer", "doubtful", "has_row", "is_measured", "score"),
-    *("row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side", "pose", "velocity", "margin"),
+    *("first", "second", "outward", "pair_side", "most", "answer", "doubtful", "has_row", "is_measured", "urgent"),
+    *("score", "least", "row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side"),
+    *("pose", "velocity", "margin", "rate", "screws", "v", "braking", "joint_v", "joint_twist", "speed"),
 )
 
 
@@ -86,6 +89,7 @@ def library() -> ctypes.PyDLL | None:
     for name in ("wbc_sense", "wbc_measure"):
         getattr(found, name).argtypes = [ctypes.c_void_p]
         getattr(found, name).restype = None
+    found.wbc_missing.argtypes, found.wbc_missing.restype = [ctypes.c_void_p, ctypes.c_double], ctypes.c_int
     return found
 
 
@@ -95,6 +99,7 @@ class NativeSensing:
     Attributes:
         pairs: number of the pair of each row, -1 without.
         distances, normals, points, doubtful: of every pair at its last measurement.
+        urgent: which pairs come before others, see :class:`wbc.proximity.missing.Missing`.
     """
 
     def __init__(self, functions: ctypes.PyDLL, scene: PairScene, rows: PairRows | None = None) -> None:
@@ -104,15 +109,19 @@ class NativeSensing:
         self._answer, self._doubtful = np.zeros((pairs, 7)), np.zeros(pairs, dtype=np.int8)
         self.pairs = np.full(count, -1, dtype=np.int32)
         self._near, self._has_row = np.zeros(count, dtype=np.int8), np.zeros(pairs, dtype=np.int8)
+        self.urgent = np.zeros(pairs, dtype=np.int8)
+        self._v, self._braking = np.zeros(scene.robot.nv), np.zeros(scene.robot.nv)
+        self._screws = Screws(scene.robot.model)
         arrays = _kinematics(scene) | _bodies(scene) | {
             "q": self._q, "answer": self._answer, "doubtful": self._doubtful, "row_pair": self.pairs,
             "first": scene.first.astype(np.int32), "second": scene.second.astype(np.int32), "outward": scene.outward,
-            "has_row": self._has_row, "is_measured": np.zeros(pairs, dtype=np.int8),
-            "score": np.zeros(pairs), "heap": np.zeros(max(count, 1), dtype=np.int32), "row_near": self._near,
-            "row_fresh": np.zeros(count, dtype=np.int8), "pose": self._pose,
+            "has_row": self._has_row, "is_measured": np.zeros(pairs, dtype=np.int8), "urgent": self.urgent,
+            "score": np.zeros(pairs), "least": np.zeros(pairs), "heap": np.zeros(max(count, 1), dtype=np.int32),
+            "row_near": self._near, "row_fresh": np.zeros(count, dtype=np.int8), "pose": self._pose,
+            "screws": self._screws.rows, "v": self._v, "braking": self._braking,
         }  # fmt: skip
         if rows is not None:
-            names = ("distance", "drift", "line", "side", "pair_side", "margin", "pose", "velocity")
+            names = ("distance", "drift", "line", "side", "pair_side", "most", "margin", "rate", "pose", "velocity")
             arrays |= {name: getattr(rows, name) for name in names if getattr(rows, name) is not None}
         # Held, since the structure has their addresses only
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
@@ -126,7 +135,7 @@ class NativeSensing:
             **{name: array.ctypes.data for name, array in self._arrays.items()},
         )  # fmt: skip
         self._at = ctypes.c_void_p(ctypes.addressof(self._scene))
-        self._sense, self._measure = functions.wbc_sense, functions.wbc_measure
+        self._sense, self._measure, self._missing = functions.wbc_sense, functions.wbc_measure, functions.wbc_missing
         self.distances, self.normals, self.points = self._answer[:, 0], self._answer[:, 1:4], self._answer[:, 4:]
 
     @property
@@ -142,12 +151,18 @@ class NativeSensing:
     def reset(self) -> None:
         """Forget the rows."""
         self.pairs[:] = -1
-        self._has_row[:] = self._near[:] = 0
+        self._has_row[:] = self._near[:] = self.urgent[:] = 0
 
     def sense(self, q: Array) -> None:
         """Measure and write the rows."""
         self._q[:] = q
         self._sense(self._at)
+
+    def missing(self, v: Array, dt: float, braking: Array) -> int:
+        """See :meth:`wbc.proximity.sensor.PairSensor.missing`; at the configuration of the last :meth:`sense`."""
+        self._screws.place(self._q)
+        self._v[:], self._braking[:] = v, braking
+        return int(self._missing(self._at, dt))
 
     def measure(self, q: Array, pose: pin.SE3) -> None:
         """All pairs."""
@@ -175,6 +190,8 @@ def _kinematics(scene: PairScene) -> dict[str, Array]:
         "joint_steps": begin,
         "joint_place": places,
         "joint_pose": poses,
+        "joint_v": np.array([list(model.idx_vs), list(model.nvs)], dtype=np.int32).T,
+        "joint_twist": np.zeros((model.njoints + 1, 6)),
         "step_kind": np.array([step.kind for step in steps], dtype=np.int32),
         "step_q": np.array([step.q for step in steps], dtype=np.int32),
         "step_number": np.array([step.numbers for step in steps]).reshape(-1, 12),
@@ -195,6 +212,7 @@ def _bodies(scene: PairScene) -> dict[str, Array]:
         "body_joint": np.array(joints, dtype=np.int32),
         "body_place": np.array([place(pose) for pose in scene.places]),
         "body_pose": np.zeros((count, 12)),
+        "speed": np.zeros(count),
         "kind": np.array([_kind(shape) for shape in shapes], dtype=np.int32),
         "hull": np.stack([start[:-1], np.diff(start)], axis=1).astype(np.int32),
         "size": np.array([[*_size(s), r] for s, r in zip(shapes, scene.radii, strict=True)]),

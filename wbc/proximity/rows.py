@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc.errors import RangeError, ShapeError, UnknownNameError, UnsupportedJointError
-from wbc.proximity.scene import PairScene
+from wbc.proximity.scene import Index, PairScene
 from wbc.shapes import FAR
 from wbc.validation import Array
 
@@ -26,7 +26,8 @@ class PairRows:
         distance, drift, line, side: what is written, ``count * (1 + corners)`` rows of 1, 1, 6 and nv numbers.
         pair_side: of every pair the row of ``side``.
         pose, velocity: of what moves from outside, where something does.
-        margin: of the constraint [m].
+        margin: of the constraint [m]. rate: at which it may be used up [1/s]; infinite where none is given.
+        most: of the margin that each pair keeps [m].
     """
 
     count: int
@@ -39,9 +40,13 @@ class PairRows:
     pose: Array | None
     velocity: Array | None
     margin: Array
+    rate: Array
+    most: Array
 
     @classmethod
-    def of(cls, scene: PairScene, count: int, corners: int, numbers: Mapping[str, Array]) -> PairRows:
+    def of(
+        cls, scene: PairScene, count: int, corners: int, numbers: Mapping[str, Array], most: Array | None = None
+    ) -> PairRows:
         """Those of a scene.
 
         Raises:
@@ -55,7 +60,23 @@ class PairRows:
             pose = _view(numbers, "pose", 12)
             velocity = _view(numbers, "velocity", 6) if "velocity" in numbers else None
         margin = numbers["margin"] if "margin" in numbers else np.zeros(1)
-        return cls(count, corners, **found, pair_side=side, pose=pose, velocity=velocity, margin=margin)
+        rate = numbers["rate"] if "rate" in numbers else np.full(1, np.inf)
+        whole_margin = np.full(len(side), np.inf) if most is None else most
+        return cls(
+            count,
+            corners,
+            **found,
+            pair_side=side,
+            pose=pose,
+            velocity=velocity,
+            margin=margin,
+            rate=rate,
+            most=whole_margin,
+        )
+
+    def extra(self, pairs: Index) -> Array:
+        """What is added to the distances of some pairs that keep less than the margin [m]."""
+        return np.maximum(0.0, self.margin.item() - self.most[pairs])
 
     def clear(self) -> None:
         """No row has a pair."""

@@ -33,9 +33,10 @@ class PairSensor:
         pairs: bodies A and B each; normals point from A to B.
         count: how many pairs have rows.
         numbers: views that are written (``distance``, ``drift``, ``line``, ``side``) and read (``pose``, and
-            ``velocity`` where given, of what moves from outside; ``margin`` where given, [m]).
+            ``velocity`` where given, of what moves from outside; ``margin`` [m] and ``rate`` [1/s] where given).
         moving: one more name, besides ``"obstacle"``, for the frame that moves with ``numbers["pose"]``.
         corners: how many more rows a pair has.
+        most: of the margin that each pair keeps [m]; default: all of it.
 
     Raises:
         ShapeError, RangeError, UnknownNameError, DuplicateNameError: no pairs, too many, or bad ones.
@@ -51,6 +52,7 @@ class PairSensor:
         *,
         moving: str | None = None,
         corners: int = 0,
+        most: Array | None = None,
     ) -> None:
         outside = frozenset({OBSTACLE} if moving is None else {OBSTACLE, moving})
         checked = checked_pairs("pairs", robot, pairs, outside)
@@ -62,7 +64,7 @@ class PairSensor:
             raise RangeError("corners", corners, "expected an integer >= 0")
         scene = PairScene(robot, checked, outside)
         self._names = [(a.name, b.name) for a, b in checked]
-        self._rows = PairRows.of(scene, count, corners, numbers)
+        self._rows = PairRows.of(scene, count, corners, numbers, most)
         self._sensing = sensing(scene, self._rows)
         self.count, self._robot, self._shape = count, robot, (robot.nq,)
         self.reset()
@@ -93,10 +95,21 @@ class PairSensor:
             q = self._robot.configuration("q", q)
         self._sensing.sense(q)
 
+    def missing(self, v: Array, dt: float, braking: Array) -> int:
+        """The most that a pair without a row uses of what its row would allow, where the last :meth:`sense` was, at the
+        command v [nv]: :data:`wbc.proximity.missing.LITTLE` to ``INWARD``. From ``TOO_MUCH`` on the next :meth:`sense`
+        has rows for such pairs, and the command is to be found again.
+
+        Args:
+            dt: until the next command [s]. braking: deceleration of each degree of freedom that is counted on in front
+                of a margin [nv]; infinite where any will do.
+        """
+        return self._sensing.missing(v, dt, braking)
+
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """(name of A, name of B, distance [m]) of the rows that have a pair, in the last call."""
-        rows = zip(self._sensing.pairs.tolist(), self._rows.distance[: self.count].tolist(), strict=True)
-        return tuple((*self._names[k], d) for k, d in rows if k >= 0)
+        distances = self._sensing.distances
+        return tuple((*self._names[k], float(distances[k])) for k in self._sensing.pairs.tolist() if k >= 0)
 
 
 def sensing(scene: PairScene, rows: PairRows | None = None) -> NativeSensing | PlainSensing:

@@ -73,6 +73,8 @@ class Recorder:
         sizes |= {name: part.size for name, part in zip(TOLD, told, strict=True)}
         self._told = [part.data.cast("B") for part in told if part.size]
         self._given = [view.data.cast("B") for view in views.values() if view.size]
+        begin = 8 * sum(views[name].size for name in INPUTS[: INPUTS.index("p")])
+        self._values, self._place = views["p"].data.cast("B"), slice(begin, begin + 8 * views["p"].size)
         # the report begins with the command and the flag
         self._command = self._tick.report.data.cast("B")[: 8 * (layout.variables + 1)]
         pickled, problem = _pickled(controller.stack)
@@ -161,6 +163,10 @@ def _recorded(recorder: Recorder) -> int:
     if flag < 0:
         recorder._seen = seen
         return flag
+    if recorder._core.resets != resets:
+        # found again from other rows, which are sensed inputs, and from no active set
+        resets = recorder._core.resets
+        given = b"".join((given[: recorder._place.start], recorder._values, given[recorder._place.stop :]))
     recorder._rows.append(b"".join((given, WARM if resets == seen else COLD, recorder._command, *recorder._told)))
     recorder._seen = resets
     recorder.count += 1

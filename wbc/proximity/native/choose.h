@@ -1,7 +1,8 @@
 /* Which pairs have which rows: see wbc/proximity/choice.py, which does the same with all distances.
  *
- * A pair's score is its distance, less what lets it keep a row that it has. The `rows` least scores are chosen, of equal ones
- * the pair named first. Pairs whose bound is above the greatest score chosen so far are not measured. */
+ * A pair's score is its distance, less what lets it keep a row that it has; urgent ones come before all others. The `rows`
+ * least scores are chosen, of equal ones the pair named first. Pairs that are not urgent and whose bound is above the greatest
+ * score chosen so far are not measured. */
 #ifndef WBC_CHOOSE_H
 #define WBC_CHOOSE_H
 
@@ -28,8 +29,8 @@ static void sink(const scene_t *s, int count, int at) {
 
 static int offer(scene_t *s, int count, int pair) {
     measure(s, pair);
-    const double gap = s->answer[7 * pair];
-    s->score[pair] = gap - (s->has_row[pair] ? s->keep_share * fmax(gap, 0.0) + s->keep_length : 0.0);
+    const double gap = gap_of(s, pair);
+    s->score[pair] = gap - s->far * s->urgent[pair] - (s->has_row[pair] ? s->keep_share * fmax(gap, 0.0) + s->keep_length : 0.0);
     s->is_measured[pair] = 1;
     if (count < s->rows) {
         s->heap[count] = pair;
@@ -72,11 +73,16 @@ static void choose(scene_t *s) {
         return;
     }
     for (int k = 0; k < s->pairs; k++) s->is_measured[k] = 0;
-    for (int r = 0; r < s->rows; r++)
-        if (s->row_pair[r] >= 0) count = offer(s, count, s->row_pair[r]);
+    for (int r = 0; r < s->rows; r++) {
+        const int pair = s->row_pair[r];
+        if (pair < 0) continue;
+        count = offer(s, count, pair);
+        s->least[pair] = s->answer[7 * pair];
+    }
     for (int k = 0; k < s->pairs; k++) {
         if (s->is_measured[k]) continue;
-        if (count == s->rows && bound(s, k) - s->off > s->score[s->heap[0]]) continue;
+        s->least[k] = bound(s, k) - s->off;
+        if (!s->urgent[k] && count == s->rows && s->least[k] > s->score[s->heap[0]]) continue;
         count = offer(s, count, k);
     }
     assign(s, count);

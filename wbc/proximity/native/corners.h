@@ -39,19 +39,28 @@ static void corner_row(const scene_t *s, int own, int other, int c, double sign,
     line_through(point, normal, out->line);
 }
 
-/* The nearest corners of a row's pair, in a fixed order */
-static void corner_rows(scene_t *s, int row) {
-    const int pair = s->row_pair[row], more = s->corners, bodies[2] = {s->first[pair], s->second[pair]};
-    corner_t found[2 * MOST_CORNERS];
-    int order[2 * MOST_CORNERS], count = 0;
+/* All corners of a pair; how many */
+static int corners_of(const scene_t *s, int pair, corner_t *found) {
+    const int bodies[2] = {s->first[pair], s->second[pair]};
+    const double more = gap_of(s, pair) - s->answer[7 * pair];
+    int count = 0;
     for (int side = 0; side < 2; side++) {
         const int own = bodies[side], other = bodies[1 - side];
         if (s->kind[other] != SUM) continue;
         for (int c = 0; c < s->corner_count[own]; c++) {
             corner_row(s, own, other, c, side ? -1.0 : 1.0, found + count);
-            if (found[count].gap < s->far / 2) order[count] = count, count++;
+            if (found[count].gap < s->far / 2) found[count++].gap += more;
         }
     }
+    return count;
+}
+
+/* The nearest corners of a row's pair, in a fixed order */
+static void corner_rows(scene_t *s, int row) {
+    const int pair = s->row_pair[row], more = s->corners;
+    corner_t found[2 * MOST_CORNERS];
+    int order[2 * MOST_CORNERS], count = corners_of(s, pair, found);
+    for (int k = 0; k < count; k++) order[k] = k;
     for (int i = 1; i < count; i++) /* by distance; they are few */
         for (int k = i; k > 0 && found[order[k]].gap < found[order[k - 1]].gap; k--) {
             const int swap = order[k];

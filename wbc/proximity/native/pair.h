@@ -175,6 +175,9 @@ static void measure(scene_t *s, int k) {
     s->measured++;
 }
 
+/* Distance that counts for the margin: of a pair that keeps less than the margin it is larger by the difference */
+static inline double gap_of(const scene_t *s, int k) { return s->answer[7 * k] + fmax(0.0, s->margin[0] - s->most[k]); }
+
 /* No pair is closer than this: along the line of centres, or over a plane */
 static double bound(const scene_t *s, int k) {
     const int a = s->first[k], b = s->second[k];

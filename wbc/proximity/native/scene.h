@@ -30,15 +30,21 @@ typedef struct {
     const int *first, *second;
     const double *outward; /* 1: only B moves from outside, -1: only A */
     const double *pair_side; /* nv each */
+    const double *most;      /* of the margin that a pair keeps [m] */
     double *answer;          /* distance, normal, point: 7 each */
-    signed char *doubtful, *has_row, *is_measured;
-    double *score;
+    signed char *doubtful, *has_row, *is_measured, *urgent;
+    double *score, *least; /* a bound of the distance, of pairs without a row [m] */
     /* rows */
     int *row_pair, *heap;
     signed char *row_near, *row_fresh;
     double *distance, *drift, *line, *side;
-    const double *pose, *velocity, *margin;
-    int measured; /* how many pairs the last call measured */
+    const double *pose, *velocity, *margin, *rate;
+    /* a command: screws 6 a velocity, v, what each brakes with; velocities of a joint: the first, and how many */
+    const double *screws, *v, *braking;
+    const int *joint_v;
+    double *joint_twist; /* 6 each; 0 for what moves from outside */
+    double *speed;       /* of the fastest point of a body, at most */
+    int measured;        /* how many pairs the last call measured */
 } scene_t;
 
 #endif

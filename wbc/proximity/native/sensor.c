@@ -4,6 +4,7 @@
 #include "pair.h"
 #include "choose.h"
 #include "corners.h"
+#include "missing.h"
 
 long long wbc_scene_size(void) { return (long long)sizeof(scene_t); }
 
@@ -12,23 +13,6 @@ void wbc_measure(scene_t *s) {
     place_bodies(s);
     s->measured = 0;
     for (int k = 0; k < s->pairs; k++) measure(s, k);
-}
-
-/* d(distance)/dt of a row by what moves from outside */
-static double drift_of(const scene_t *s, const double *twist, int pair, const double *line) {
-    return s->outward[pair] * (dot3(line, twist) + dot3(line + 3, twist + 3));
-}
-
-/* The twist of what moves from outside, at the world's origin; 0 where it rests */
-static int outside_twist(const scene_t *s, double *twist) {
-    if (!s->has_velocity) return 0;
-    const double *v = s->velocity, *p = s->pose + 9;
-    double moment[3];
-    cross3(p, v + 3, moment);
-    for (int k = 0; k < 3; k++) twist[k] = v[k] + moment[k], twist[3 + k] = v[3 + k];
-    for (int k = 0; k < 6; k++)
-        if (v[k] != 0.0) return 1;
-    return 0;
 }
 
 /* Measure what can be among the closest, and write the rows */
@@ -41,14 +25,14 @@ void wbc_sense(scene_t *s) {
     for (int r = 0; r < s->rows; r++) {
         const int pair = s->row_pair[r];
         if (pair < 0) continue;
-        const double *found = s->answer + 7 * pair;
-        s->distance[r] = found[0];
+        const double *found = s->answer + 7 * pair, gap = gap_of(s, pair);
+        s->distance[r] = gap;
         line_through(found + 4, found + 1, s->line + 6 * r);
         s->drift[r] = moves ? drift_of(s, twist, pair, s->line + 6 * r) : 0.0;
         if (s->row_fresh[r])
             memcpy(s->side + (size_t)s->nv * r, s->pair_side + (size_t)s->nv * pair, s->nv * sizeof(double));
         if (!s->corners) continue;
-        if (found[0] < s->margin[0] + s->near) {
+        if (gap < s->margin[0] + s->near) {
             corner_rows(s, r);
             for (int k = 0; k < s->corners; k++) {
                 const int at = s->rows + r * s->corners + k;
@@ -61,3 +45,6 @@ void wbc_sense(scene_t *s) {
         }
     }
 }
+
+/* The most that a pair without a row uses of what its row would allow, at the command; such pairs are urgent from now on */
+int wbc_missing(scene_t *s, double dt) { return s->pairs > s->rows ? missing(s, dt) : LITTLE; }

@@ -1,4 +1,4 @@
-"""Moving two links together within the joint range."""
+"""Moving two links together, or apart, within the joint range."""
 
 from __future__ import annotations
 
@@ -26,11 +26,13 @@ class Descent:
 
         d distance / dq = n' (J_second - J_first),      n the normal, J at the witness points       [m/rad or 1]
 
-    until they touch, that is, until the distance is at most ``clearance`` [m].
+    until they touch, that is, until the distance is at most ``clearance`` [m]; ``away``: against it, until the distance
+    is more than that.
     """
 
-    def __init__(self, robot: Robot, links: Links, clearance: float) -> None:
-        self._robot, self._links, self._clearance = robot, links, clearance
+    def __init__(self, robot: Robot, links: Links, clearance: float, *, away: bool = False) -> None:
+        self._robot, self._links, self._sign = robot, links, -1.0 if away else 1.0
+        self._clearance = self._sign * clearance
         self._data = robot.model.createData()
         self._lower, self._upper = joint_range(robot)
         self._scale = np.array([1.0 if unit == "rad" else robot.characteristic_length for unit in robot.dof_units])
@@ -56,10 +58,12 @@ class Descent:
                 here, distance, gradient = there, reached, slope
             else:
                 size /= 2
-        return distance
+        return self._sign * distance
 
     def _slope(self, first: str, second: str, step: Array) -> tuple[float, Array]:
-        """(signed distance [m], its gradient, followers of mimic joints counted with their leaders)."""
+        """(signed distance [m], its gradient, followers of mimic joints counted with their leaders); both against the
+        sign of the descent.
+        """
         model, data, parts = self._robot.model, self._data, self._links.parts
         pin.computeJointJacobians(model, data, configuration(self._robot, step))
         joints = [parts[first][0].joint, parts[second][0].joint]
@@ -75,4 +79,4 @@ class Descent:
             gradient[coupling.follower] = 0.0
         gradient[: self._robot.base_nv] = 0.0
         # Coal has no normal for some bodies one inside the other: there is nothing to follow then
-        return distance, gradient if np.isfinite(gradient).all() else np.zeros(model.nv)
+        return self._sign * distance, self._sign * gradient if np.isfinite(gradient).all() else np.zeros(model.nv)

@@ -7,7 +7,7 @@ The narrow phase asks Coal in the order of the bounds, until they exceed the lea
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -51,18 +51,21 @@ class LinkPart:
 class Links:
     """The shapes of a robot's links, for the two phases.
 
+    Args:
+        shapes: name -> link and shape, for shapes one by one; default: all shapes of a link are one body.
+
     Attributes:
         parts: link -> its shapes.
         index: number of a joint that carries shapes -> its place among those.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, shapes: Mapping[str, tuple[str, PlacedShape]] | None = None) -> None:
         self.robot = robot
-        self.parts: dict[str, tuple[LinkPart, ...]] = {
-            link: tuple(_part(robot, link, placed) for placed in shapes)
-            for link, shapes in robot.shapes.items()
-            if shapes
-        }
+        self.parts: dict[str, tuple[LinkPart, ...]] = (
+            {link: tuple(_part(robot, link, placed) for placed in own) for link, own in robot.shapes.items() if own}
+            if shapes is None
+            else {name: (_part(robot, *one),) for name, one in shapes.items()}
+        )
         self._joints = sorted({part.joint for group in self.parts.values() for part in group})
         self.index = {joint: k for k, joint in enumerate(self._joints)}
         self._request = coal.DistanceRequest()
