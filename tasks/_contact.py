@@ -63,6 +63,8 @@ class Contact(Constraint):
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5)
     #: What counts of the target, as of :class:`wbc.tasks.Input`
     part: ClassVar[Literal["", "position"]] = ""
+    #: Class of the rows of :meth:`cone` in the order of sacrifice
+    cone_order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     frame: str
 
@@ -141,6 +143,9 @@ class Pressing:
         ShapeError, NotFiniteError, RangeError: on construction.
     """
 
+    #: No surface pulls, or gives more friction than it has: the contact moves before that
+    cone_order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
+
     friction: float
     least: float
     most: float
@@ -165,10 +170,15 @@ class ContactWrench(Constraint):
     """What the wrench of a contact may be. Made by the stack, under the name ``"<contact> wrench"``."""
 
     abstract: ClassVar[bool] = True
-    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     of: str
     contact: Contact
+    floating: bool = False
+
+    @property
+    def order(self) -> SacrificeOrder:
+        """That of the contact's cone where a base floats, which nothing else holds; else that of margins."""
+        return self.contact.cone_order if self.floating else SacrificeOrder.MARGIN
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """Those of the contact's cone."""

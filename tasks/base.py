@@ -421,6 +421,10 @@ class Constraint(Item):
         """Largest change of each velocity per second that :meth:`bounds` leave, nv numbers; inf where there is none."""
         return np.full(robot.nv, np.inf)
 
+    def velocity_limits(self, robot: Robot) -> NDArray[np.float64]:
+        """Largest velocities that :meth:`bounds` leave, nv numbers; inf where there is none."""
+        return np.full(robot.nv, np.inf)
+
     def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(lower, upper) of the coordinates that :meth:`bounds` keep within limits, nv numbers each; else +-inf."""
         return np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)

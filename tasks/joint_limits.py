@@ -136,6 +136,10 @@ class JointLimits(Constraint):
         """The description's, of the chosen joints and of what follows or leads them."""
         return self.limits(robot).acceleration
 
+    def velocity_limits(self, robot: Robot) -> NDArray[np.float64]:
+        """The description's, of the chosen joints and of what follows or leads them."""
+        return self.limits(robot).velocity
+
     def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The description's less the margin, of the chosen joints that have one coordinate."""
         limits = self.limits(robot)

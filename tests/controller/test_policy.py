@@ -121,6 +121,7 @@ def test_a_solver_that_gives_up_is_followed_by_another(monkeypatch: pytest.Monke
     bad = conflicting("python")
     steps = []
     for each in (good, bad):
+        each.policy = Policy(chain=("cold", "daqp", "osqp", "elastic"))
         each.reset(bot.neutral, np.zeros(7))
         each["hand"].target = pin.SE3(np.eye(3), np.array([0.6, 0.4, 0.2]))
         each["grip"].enabled = False

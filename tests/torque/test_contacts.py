@@ -132,16 +132,16 @@ def test_a_load_is_handed_over_by_a_ramp_without_a_jump_in_torque() -> None:
     assert max(jumps) < 20.0 < 0.7 * np.abs(tick.step(q, v).torque - last.torque).max()
 
 
-def test_what_cannot_be_borne_gives_way_by_name_in_newtons() -> None:
+def test_a_wrench_that_nothing_bears_moves_contacts_by_name() -> None:
     _, q, v = standing()
     tick = controller("talos").clone()
     tick.reset(q)
-    tick["left foot"].least = 20_000.0
+    tick["left foot"].least = 3000.0
     step = tick.step(q, v)
     assert step.status == "relaxed"
-    slack = {str(s).split(" by ")[0]: s for s in step.relaxed}
-    assert slack["left foot wrench/normal"].unit == "N"
-    assert slack["left foot wrench/normal"].amount > 1000.0
+    assert step.forces["left foot"][2] >= 3000.0 - 1e-6
+    assert {slack.unit for slack in step.relaxed} <= {"m/s^2", "rad/s^2"}
+    assert any(slack.item.endswith("foot") for slack in step.relaxed)
     assert (np.abs(step.torque) <= tick.stack.robot.limits.effort).all()
     assert "left foot wrench/normal" in str(step.explain())
 
@@ -157,7 +157,7 @@ def test_motors_that_are_too_weak_give_the_motion_of_contacts_up() -> None:
     assert (np.abs(step.torque) <= 0.02 * tick.stack.robot.limits.effort + 1e-12).all()
 
 
-def test_a_tick_without_an_answer_keeps_the_wrenches_and_brakes() -> None:
+def test_a_tick_without_an_answer_bears_the_weight_and_damps() -> None:
     _, q, v = standing()
     tick = controller("talos").clone()
     tick.reset(q)
@@ -166,11 +166,10 @@ def test_a_tick_without_an_answer_keeps_the_wrenches_and_brakes() -> None:
     tick["left foot"].target = pin.SE3(np.eye(3), np.array([1e300, 0.0, 0.0]))
     step = tick.step(q, v)
     assert step.status == "braked"
+    weight = 9.81 * pin.computeTotalMass(tick.stack.robot.model)
     for name, force in step.forces.items():
-        assert force == pytest.approx(held[name], abs=1e-9)
-    # joints that their limits let come to rest by the next tick do so
-    assert (np.abs(step.v) < 1e-12).sum() >= len(v) - 4
-    assert (np.abs(step.a) <= tick.stack.robot.limits.acceleration).all()
+        assert force == pytest.approx(held[name], abs=0.2 * weight)
+    assert np.abs(step.a + 20.0 * v).max() < 5.0
     assert np.isfinite(step.torque).all()
     assert (np.abs(step.torque) <= tick.stack.robot.limits.effort).all()
 

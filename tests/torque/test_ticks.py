@@ -178,7 +178,8 @@ def test_random_ticks_end_without_exceptions_nan_or_torques_beyond_limits() -> N
         for numbers in (step.a, step.torque, *step.forces.values()):
             assert np.isfinite(numbers).all(), k
         assert (np.abs(step.torque[6:]) <= scale * limits[6:] + 1e-12).all()
-        assert (np.abs(step.a) <= bot.limits.acceleration + 1e-9).all()
+        # limits of motion of a base that floats give way before what motors can do
+        assert step.status != "solved" or (np.abs(step.a) <= bot.limits.acceleration + 1e-9).all()
     assert {"solved", "relaxed"} <= statuses
 
 

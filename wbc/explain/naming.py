@@ -53,7 +53,7 @@ class Naming:
         which = "equal" if qp.lower[row] == qp.upper[row] else ("upper" if upper else "lower")
         order = SacrificeOrder.ACTUATOR
         if block is not None and isinstance(block.entry.item, Constraint):
-            order = block.entry.item.order
+            order = block.entry.order
         item = block.entry.name if block is not None else "bounds"
         actuator = order == SacrificeOrder.ACTUATOR
         robot = past.stack.robot

@@ -38,6 +38,10 @@ TOLERANCE = 1e-9
 #: that they contradict each other, per largest multiplier
 FAR_AWAY, _BROKEN = 1e6, 1e-6
 
+#: What brings variables to rest that nothing else moves where rows give way at prices, per largest entry on the
+#: diagonal of H; as in ``native/settings.h``
+STEADY = 1e-4
+
 #: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
 _PUSHING = 1e-6
 
@@ -57,6 +61,7 @@ class Relaxed:
         lower, upper: the bounds that x minimises the objective over, the given ones but for what gave way and
             what was held for it [n + m].
         iterations: of all solver calls together.
+        added: what was added to the diagonal of H, and to g, where rows give way at prices; else None.
     """
 
     x: Array
@@ -67,18 +72,32 @@ class Relaxed:
     lower: Array
     upper: Array
     iterations: int
+    added: tuple[Array, Array] | None = None
 
 
 class Relaxation:
     """The cascade, with kept solvers, for problems with ``n`` variables and ``m`` general rows."""
 
-    def __init__(self, n: int, m: int, solver: Backend | None = None) -> None:
-        """``solver`` solves the problems in v (default: DAQP behind prepared equalities)."""
+    def __init__(self, n: int, m: int, solver: Backend | None = None, price: Array | None = None) -> None:
+        """``solver`` solves the problems in v (default: DAQP behind prepared equalities).
+
+        ``price``: rows give way at prices in place of an order: what a violation of one unit costs, per largest entry
+        on the diagonal of H; 0 for rows that never give way [m].
+        """
         self.n, self.m = n, m
         self._final = solver if solver is not None else Prepared(Daqp(n, m))
         self._stage = Prepared(Daqp(n + m, m))
+        self._price = price
+        self._priced = None if price is None else Prepared(Daqp(n + int((price > 0.0).sum()), m))
 
-    def solve(self, qp: QP, order: NDArray[np.int_], unit: Array | None = None, size: Array | None = None) -> Relaxed:
+    def solve(
+        self,
+        qp: QP,
+        order: NDArray[np.int_],
+        unit: Array | None = None,
+        size: Array | None = None,
+        rest: Array | None = None,
+    ) -> Relaxed:
         """Solve ``qp`` with its rows, or with as few as must give way in the declared order.
 
         Args:
@@ -87,6 +106,8 @@ class Relaxation:
                 the row, so that slacks are compared as joint motion [m].
             size: value of each variable that counts as 1, default 1: the problem is solved in x / size, so that the
                 variables' units do not matter [n].
+            rest: where rows give way at prices, what variables tend to that nothing else moves; NaN for those that do
+                not [n].
 
         Raises:
             ShapeError: ``order``, ``unit`` or ``size`` of the wrong length.
@@ -100,11 +121,11 @@ class Relaxation:
             i = int(crossed[0])
             raise BoundsError(f"lower[{i}]", float(qp.lower[i]), f"above upper {qp.upper[i]:g}")
         if size is None:
-            return self._solve(qp, order, scale)
+            return self._solve(qp, order, scale, rest)
         size = validation.real_array("size", size, (self.n,))
         ends = np.concatenate((size, np.ones(self.m)))
         scaled = QP(qp.H * np.outer(size, size), qp.g * size, qp.lower / ends, qp.upper / ends, qp.A * size)
-        found = self._solve(scaled, order, scale)
+        found = self._solve(scaled, order, scale, None if rest is None else rest / size)
         x = np.clip(found.x * size, qp.lower[: self.n], qp.upper[: self.n])
         # a bound that is as it was comes back to the last digit
         lower = np.where(found.lower == scaled.lower, qp.lower, found.lower * ends)
@@ -112,7 +133,8 @@ class Relaxation:
         low = (found.lower != scaled.lower) & (found.lower == scaled.upper)
         high = (found.upper != scaled.upper) & (found.upper == scaled.lower)
         lower, upper = np.where(low, qp.upper, lower), np.where(high, qp.lower, upper)
-        return replace(found, x=x, multipliers=found.multipliers / ends, lower=lower, upper=upper)
+        added = None if found.added is None else (found.added[0] / size**2, found.added[1] / size)
+        return replace(found, x=x, multipliers=found.multipliers / ends, lower=lower, upper=upper, added=added)
 
     def impossible(self, qp: QP, rows: NDArray[np.bool_], unit: Array, size: Array | None = None) -> bool:
         """Whether it is proven that no x within the simple bounds keeps ``rows`` [m].
@@ -139,11 +161,35 @@ class Relaxation:
         rounding = 1e3 * np.finfo(float).eps * float(np.abs(at).sum() + np.abs(reach).sum())
         return bool(at.sum() + reach.sum() > _BROKEN * np.abs(y).max(initial=0.0) + rounding)
 
-    def _solve(self, qp: QP, order: NDArray[np.int_], scale: Array) -> Relaxed:
+    def _solve(self, qp: QP, order: NDArray[np.int_], scale: Array, rest: Array | None) -> Relaxed:
         plain = self._final.solve(qp)
         if plain.solved:
             return self._answer(qp, plain, "solved", plain.iterations, scale, (qp.lower, qp.upper))
+        if self._price is not None and self._priced is not None:
+            found = self._elastic(qp, scale, rest, self._price, self._priced)
+            if found.flag != "failed":
+                return found
         return self._cascade(qp, order, scale, plain.iterations)
+
+    def _elastic(self, qp: QP, unit: Array, rest: Array | None, price: Array, solver: Backend) -> Relaxed:
+        """The optimum where rows give way at their prices; the sides of those that do are moved to it."""
+        n, gives = self.n, price > 0.0
+        largest = float(np.diag(qp.H).max(initial=0.0))
+        cost = np.where(gives, price * largest / unit**2, 1.0)
+        tends = np.full(n, np.nan) if rest is None else rest
+        more = np.where(np.isnan(tends), 0.0, STEADY * largest)
+        less = -more * np.where(np.isnan(tends), 0.0, tends)
+        steady = replace(qp, H=qp.H + np.diag(more), g=qp.g + less, give=np.where(gives, 1.0 / cost, 0.0))
+        found = solver.solve(steady.with_slacks(), warm=False)
+        x = np.clip(found.x[:n], qp.lower[:n], qp.upper[:n])
+        lower, upper, at = qp.lower.copy(), qp.upper.copy(), np.where(gives, qp.A @ x, np.nan)
+        equal = lower[n:] == upper[n:]
+        lower[n:], upper[n:] = np.fmin(lower[n:], at), np.fmax(upper[n:], at)
+        lower[n:], upper[n:] = np.where(equal & gives, at, lower[n:]), np.where(equal & gives, at, upper[n:])
+        multipliers = np.concatenate((found.multipliers[:n], found.multipliers[-self.m :]))
+        last = QPSolution(x, multipliers, found.flag)
+        flag = "relaxed" if found.solved else "failed"
+        return replace(self._answer(qp, last, flag, found.iterations, unit, (lower, upper)), added=(more, less))
 
     def _cascade(self, qp: QP, order: NDArray[np.int_], unit: Array, iterations: int) -> Relaxed:
         n = self.n

@@ -101,6 +101,7 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
                 "HANDED": next((f.numel_out("handed") for f in functions if "handed" in f.name_out()), 0),
                 "CALM": int(stack.calm),
                 "BENDING": sum(bent_rows(layout, program)),
+                "ELASTIC": int(layout.elastic),
                 "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),

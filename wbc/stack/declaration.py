@@ -27,7 +27,7 @@ from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
 from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
-from wbc.tasks.base import Command, Constraint, Item, SacrificeOrder, Task
+from wbc.tasks.base import Command, Constraint, Form, Item, SacrificeOrder, Task
 from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.moving_frame import MovingFrame
@@ -58,7 +58,8 @@ class Entry:
     """One item of a stack, with the name, level and weight it was added with; ``price``: of a soft constraint.
 
     ``frame``: name of the moving frame that it is stated in, whose world that is; "" for the world. ``added``: the item
-    as the user has it, where ``item`` is another.
+    as the user has it, where ``item`` is another. ``yielding``: simple bounds that stand as rows, so that they may give
+    way.
     """
 
     item: Item
@@ -69,12 +70,22 @@ class Entry:
     price: float | None = None
     frame: str = ""
     added: Item | None = None
+    yielding: bool = False
 
     @property
     def order(self) -> SacrificeOrder:
         """Class of a constraint in the order of sacrifice; that of a soft one is the last."""
         assert isinstance(self.item, Constraint)
-        return self.item.order if self.hard and self.price is None else SacrificeOrder.SOFT
+        if not self.hard or self.price is not None:
+            return SacrificeOrder.SOFT
+        planned = self.yielding and self.item.order == SacrificeOrder.ACTUATOR
+        return SacrificeOrder.MARGIN if planned else self.item.order
+
+    @property
+    def form(self) -> Form:
+        """How a constraint stands in the QP."""
+        assert isinstance(self.item, Constraint)
+        return "rows" if self.yielding else self.item.form
 
     @property
     def is_task(self) -> bool:
@@ -162,6 +173,9 @@ class Declaration:
             "<contact> wrench"  what the wrench of a contact may be (torques)
             "<contact> force"   what it should be (torques)
 
+        Simple bounds of a robot whose base floats stand as rows of a stack of torques: what the base, motors and
+        contacts can do decides its motion, and limits of motion that contradict it give way.
+
         Raises:
             UnknownNameError: another command.
             CommandError: an item has no meaning for it, and why; the stack commands something else already; the robot
@@ -197,15 +211,20 @@ class Declaration:
         added = [Entry(Damping(gain=REST), rest, last + 1 if cascade else last, weight)]
         if self._command == "torque":
             contacts = [entry.name for entry in self.entries if isinstance(entry.item, Contact)]
-            if self._robot.base == "floating":
+            floating = self._robot.base == "floating"
+            if floating:
                 added.append(Entry(Unactuated(), self._free_name("base"), 0, 1.0))
+                bounds = [e for e in self.constraints if e.form == "bounds"]
+                self._entries |= {e.name: dataclasses.replace(e, yielding=True) for e in bounds}
             for entry in self.entries:
                 if isinstance(entry.item, WrenchSum):
                     for name in entry.item.contacts:
                         validation.one_of(f"{entry.name}.contacts", name, contacts)
                 if isinstance(entry.item, Contact):
                     name = entry.name
-                    added.append(Entry(ContactWrench(name, entry.item), self._free_name(f"{name} wrench"), 0, 1.0))
+                    added.append(
+                        Entry(ContactWrench(name, entry.item, floating), self._free_name(f"{name} wrench"), 0, 1.0)
+                    )
                     force = ContactForce(name, entry.item)
                     added.append(Entry(force, self._free_name(f"{name} force"), last, FORCE_WEIGHT))
         self._entries |= {entry.name: entry for entry in added}

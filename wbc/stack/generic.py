@@ -29,9 +29,9 @@ PREBUILT = pathlib.Path(__file__).parent / "prebuilt_libraries"
 
 #: Whole sizes of ``stack.h``, and real ones
 SIZES = (
-    "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "UNITS", "LAST_ORDER",
-    "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST", "SOFT_MAX",
-    "BLOCKED",
+    "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "ELASTIC", "UNITS",
+    "LAST_ORDER", "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST",
+    "SOFT_MAX", "BLOCKED",
 )  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of

@@ -70,6 +70,7 @@ class Layout:
         price_at: offset in the parameters of the price of each general row that is soft, -1 for the others.
         command: what is commanded. nv: degrees of freedom. variables: of the QP; what comes after the velocities, or
             accelerations, are shares of scaled tasks, or the wrenches of contacts.
+        elastic: limits of motion are rows, and they and what is held give way at prices and not in order.
         forces: where the wrench of each contact is among the variables, by the contact's name.
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
             that is asked for.
@@ -82,6 +83,7 @@ class Layout:
         robot = stack.robot
         self.nq, self.nv = robot.nq, robot.nv
         self.command = stack.command
+        self.elastic = stack.command == "torque" and robot.base == "floating"
         self.variables = self.nv
         self.forces: dict[str, slice] = {}
         if stack.command == "torque":
@@ -130,11 +132,12 @@ class Layout:
         declared = list(item.inputs(robot))
         form: Form = "task"
         if isinstance(item, Constraint):
-            form = item.form
+            form = entry.form
             count = item.sensed_rows(robot)
             if count:
                 declared += inputs.sensed(robot, count)
-            if form == "margins" or (form == "rows" and self.command != "velocity" and not _on_forces(item, rows)):
+            decays = self.command != "velocity" and not (entry.yielding or _on_forces(item, rows))
+            if form == "margins" or (form == "rows" and decays):
                 declared.append(Input("rate", unit="1/s", default=item.default_rate, low=0.0))
             if self.command == "torque" and (isinstance(item, Contact) or item.is_load):
                 declared.append(Input(CLOSED, default=1.0, low=0.0, high=1.0, sensed=True))

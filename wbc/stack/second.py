@@ -25,6 +25,7 @@ from wbc.symbolic.motion import Motion
 from wbc.symbolic.tracer import Tracer, along
 from wbc.tasks._contact import Contact, ContactForce, ContactWrench, Unactuated
 from wbc.tasks.base import Constraint, Rows, Task
+from wbc.tasks.braking import clip
 from wbc.tasks.wrench_sum import WrenchSum
 
 if TYPE_CHECKING:
@@ -126,6 +127,8 @@ class SecondOrder:
             return Rows(self._sum(item, block), target, target), None, None
         if not block.rows:
             return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
+        if block.entry.yielding:
+            return self._limits(block, item), None, None
         if block.form == "rows":
             return self._rates(block, item, tracer), None, None
         margins = item.margins(robot, tracer, inputs)
@@ -138,6 +141,22 @@ class SecondOrder:
         rate = self._b.p[block.slots["rate"].span]
         low = -bias - rate * (2.0 * first + rate * value) / (1.0 + 0.5 * rate * self._b.dt)
         return Rows(self._wide(jacobian), low, ca.SX.inf(len(block.rows))), value, factor
+
+    def _limits(self, block: Block, item: Constraint) -> Rows:
+        """Bounds on accelerations as rows. A joint that something has thrown beyond its limit of velocity is brought
+        back within the tick: limits of acceleration are of what is planned.
+        """
+        b, v = self._b, self._kinematics.v
+        longest = b.stack.dt_range[1]
+        bounds = item.acceleration_bounds(self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest)
+        assert bounds is not None
+        ends = [b.column(block, "lower", bounds.lower), b.column(block, "upper", bounds.upper)]
+        for i in np.flatnonzero(np.isfinite(most := item.velocity_limits(self._robot))):
+            back = (clip(v[i], -most[i], most[i]) - v[i]) / b.dt
+            for end in ends:
+                slower = ca.if_else(v[i] > most[i], ca.fmin(end[i], back), ca.fmax(end[i], back))
+                end[i] = ca.if_else(ca.fabs(v[i]) > most[i], slower, end[i])
+        return Rows(self._wide(ca.SX.eye(self._layout.nv)), *ends)
 
     def _rates(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
         """Rows on velocities: what they are off decays at ``rate``."""

@@ -39,6 +39,8 @@ SOUND, KNOWN, OPTIMAL, FIRMLY = 1e-6, 1e-3, 1e-9, 1e-8
 #: not counted on, how often rows are corrected, how often the step gets shorter and by how much, and from which rate on
 #: a joint turns round; as in ``native/bend.h``
 BENDS, STRETCHED, BENDINGS, SHORTER, STEEPER, TURNING = 1e-3, 2e-2, 8, 3, 100.0, 1.0
+#: How fast a robot whose base floats loses its velocity where a tick has no answer [1/s]; as in ``native/settings.h``
+REST_RATE = 20.0
 
 #: Paths to another answer, in the order in which they are tried by default; braking is always the last
 CHAIN = ("cold", "daqp", "osqp", "elastic")
@@ -112,6 +114,8 @@ class Assembly(Buffers, ABC):
     _torque: slice
     #: places in ``p`` of torques that may change only so fast, and their degrees of freedom
     _slewed: tuple[list[int], list[int]]
+    #: limits of motion give way, see :class:`wbc.stack.layout.Layout`
+    _elastic: bool
 
     @abstractmethod
     def check(self) -> int:
@@ -212,11 +216,14 @@ class Assembly(Buffers, ABC):
             getattr(self, name)[:] = 0.0
 
     def rest(self, lower: Array, upper: Array, coasting: Array) -> Array:
-        """The command within simple bounds that is nearest to rest, or of velocities to ``coasting``."""
+        """The command within simple bounds that is nearest to rest: of velocities ``coasting``; else at once or, on a
+        floating base, by damping.
+        """
         nearest = coasting.copy()
         if self._command != "velocity":
             nv = self._dofs
-            nearest[:nv], nearest[nv:] = -self.v_last[:nv] / float(self.dt[0]), self.kept[nv:]
+            rate = REST_RATE if self._elastic else 1.0 / float(self.dt[0])
+            nearest[:nv], nearest[nv:] = -rate * self.v_last[:nv], self.kept[nv:]
         return np.minimum(np.maximum(nearest, lower), upper)
 
     @abstractmethod

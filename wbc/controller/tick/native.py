@@ -36,7 +36,7 @@ class CompiledTick(Assembly):
         self.q, self.p, self.dt, self.cap = view("q"), view("p"), view("dt"), view("cap")
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self._command, self._dofs = layout.command, layout.nv
-        self._slewed = layout.slewed
+        self._slewed, self._elastic = layout.slewed, layout.elastic
         if layout.command == "torque":
             self._torque = places["torque"]
         if layout.command != "velocity":

@@ -16,6 +16,7 @@ from wbc.controller.tick.buffers import (
     KNOWN,
     OPTIMAL,
     RELAXED,
+    REST_RATE,
     SHORTER,
     SOLVED,
     SOUND,
@@ -34,17 +35,22 @@ from wbc.qp.polish import polish
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
-from wbc.stack.codegen import row_orders, row_units
+from wbc.stack.codegen import PRICED, row_orders, row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.tables import brakes, reported_slacks
+from wbc.tasks.base import SacrificeOrder
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
 _ROUNDING = 1e-12
 #: Corrections of the active set where a solver's answer has no certificate
 POLISH_ROUNDS = 200
+#: Prices of what is held and of limits of motion where these are rows, as in ``native/settings.h``
+HOLD_PRICE, MOTION_PRICE = 1e2, 0.1
+#: What a wrench off by its unit costs beside an acceleration off by its own where a tick has no answer; as there
+WRENCH_SHARE = 1e-2
 #: Of a tick that brakes
 _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 
@@ -58,11 +64,13 @@ class SolvedTick(Buffers):
         self._nv, self._velocities = layout.variables, layout.nv
         self._memory = Memory(layout)
         self._solver = make_solver(solver, layout.with_slacks, layout.general_rows)
-        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver)
         self._torques, self._commands_velocity = layout.command == "torque", layout.command == "velocity"
         slots, limits = brakes(stack, layout)
         self._brakes = np.array(slots, dtype=np.intp), limits
         self._orders = np.array(row_orders(layout), dtype=np.int_)
+        self._elastic = layout.elastic
+        price = class_prices(self._orders) if layout.elastic else None
+        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver, price)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = self._own_scales = layout.dof_scales(stack)
         self._longest = max(1.0, float(scales.max(initial=1.0)), float(self._units.max(initial=1.0)))
@@ -170,6 +178,8 @@ class SolvedTick(Buffers):
         certificate, multipliers = _NONE, np.zeros(qp.lower.size)
         if answer is not None:
             self._name_frozen_bounds(qp, answer)
+            if answer.added is not None:
+                wide = replace(wide, H=wide.H + np.diag(answer.added[0]), g=wide.g + answer.added[1])
             if levels is None:
                 multipliers = qp.rows_of(answer.multipliers)
                 bounded = QP(wide.H, wide.g, *self._met(wide, answer, x), wide.A)
@@ -243,8 +253,22 @@ class SolvedTick(Buffers):
         self.assembly.commanded(v, False)
 
     def rest(self, qp: QP) -> Array:
-        """The command within the simple bounds that is nearest to rest."""
-        return self.assembly.rest(qp.lower[: self._nv], qp.upper[: self._nv], self._coasting())
+        """The command within the simple bounds that is nearest to rest; where a base floats as ``damp`` in
+        ``native/solve.h`` has it.
+        """
+        nv = self._nv
+        nearest = self.assembly.rest(qp.lower[:nv], qp.upper[:nv], self._coasting())
+        if not self._elastic or not self.assembly.usable:
+            return nearest
+        low = qp.lower[qp.n :]
+        equal = self._hard & (low == qp.upper[qp.n :])
+        base = equal & (self._orders == 0)
+        size = np.ones(nv) if self._dof_scales is None else self._dof_scales[:nv]
+        A, cost = qp.A[:, :nv] * size, np.where(np.arange(nv) < self._velocities, 1.0, WRENCH_SHARE)
+        count = int(base.sum())
+        K = np.block([[np.diag(cost), A[base].T], [A[base], np.zeros((count, count))]])
+        x = np.linalg.lstsq(K, np.concatenate((cost * nearest / size, low[base])), rcond=None)[0][:nv] * size
+        return x if np.isfinite(x).all() else nearest
 
     def _coasting(self) -> Array:
         """Velocities of what has no acceleration limit: it stops together with the joint that takes longest."""
@@ -302,11 +326,19 @@ class SolvedTick(Buffers):
             bounded, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
                 return BRAKED, self.rest(qp), None
-            answer = self._relaxation.solve(bounded, self._orders, self._units, self._dof_scales)
+            answer = self._relaxation.solve(bounded, self._orders, self._units, self._dof_scales, self._tends())
             if answer.flag != "failed":
                 answer = self._soft.polished(qp, answer)
                 return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
         return BRAKED, self.rest(qp), None
+
+    def _tends(self) -> Array | None:
+        """What accelerations tend to where limits of motion give way."""
+        if not self._elastic:
+            return None
+        out = np.full(self._solver.n, np.nan)
+        out[: self._velocities] = -REST_RATE * self.assembly.v_last[: self._velocities]
+        return out
 
     def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
         """Rows whose bounds have crossed are met half-way; and which of them give way by more than rounding."""
@@ -318,6 +350,12 @@ class SolvedTick(Buffers):
         middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
         out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
         return out, gap > 4.0 * TOLERANCE * self._units
+
+
+def class_prices(orders: NDArray[np.int_]) -> Array:
+    """What rows cost that give way at prices, by their classes; see ``native/relax.h``."""
+    held, moves = orders == SacrificeOrder.HOLD, (orders > SacrificeOrder.HOLD) & (orders < PRICED)
+    return np.where(held, HOLD_PRICE, np.where(moves, MOTION_PRICE, 0.0))
 
 
 class SoftRows:

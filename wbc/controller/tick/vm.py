@@ -51,7 +51,7 @@ class VmAssembly(Assembly):
         self.q, self.p, self.dt, self.cap, self.plain = (view(name) for name in ("q", "p", "dt", "cap", "plain"))
         self.v_last, self.v_in, self.use_v = view("v_last"), view("v_in"), view("use_v")
         self._command, self._dofs = layout.command, layout.nv
-        self._slewed = layout.slewed
+        self._slewed, self._elastic = layout.slewed, layout.elastic
         if layout.command == "torque":
             self._torque = memory["torque"]
         if layout.command != "velocity":

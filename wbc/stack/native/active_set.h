@@ -266,7 +266,8 @@ static int from_last(wbc_tick *t, double angle) {
     return flag;
 }
 
-static int constrained(wbc_tick *t, double angle) {
+/* The distance problem of the factor at hand */
+static void see_rows(wbc_tick *t) {
     if (!t->factored) {
         invert(t);
         pack(t);
@@ -275,6 +276,10 @@ static int constrained(wbc_tick *t, double angle) {
         t->factored = 1;
     }
     shift(t);
+}
+
+static int constrained(wbc_tick *t, double angle) {
+    see_rows(t);
     return from_last(t, angle);
 }
 

@@ -127,7 +127,7 @@ static void assemble(wbc_tick *t, int screen) {
     (void)screen;
     if (CALM) brake_for_margins(t);
     for (int k = 0; k < MC; k++) {
-        t->report.slack[k] = 0.0;
+        t->report.slack[k] = t->spring[k] = 0.0;
         if (t->far[k]) {
             t->low[NV + k] = t->free_low[k];
             t->high[NV + k] = t->free_high[k] = WBC_INF;

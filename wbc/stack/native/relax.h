@@ -220,8 +220,118 @@ static int optimum_of_the_rest(wbc_tick *t) {
     return 0;
 }
 
+/* What a violation of one unit of a class costs that gives way where limits of motion do, per largest entry on the diagonal
+ * of H; 0: it never does */
+static double class_price(int order) { return order < HOLDS ? 0.0 : order == HOLDS ? HOLD_PRICE : MOTION_PRICE; }
+
+/* Equality row k at a price: a part of H and g, and no row */
+static void as_task(wbc_tick *t, int k, double price) {
+    for (int e = a_start[k]; e < a_end[k]; e++) {
+        const double f = price * t->at[e];
+        t->g[a_col[e]] -= f * t->low[NV + k];
+        for (int c = e; c < a_end[k]; c++) t->H[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
+    }
+    t->spring[k] = price;
+    t->low[NV + k] = -WBC_INF;
+    t->high[NV + k] = WBC_INF;
+    t->idle[k] = 1;
+}
+
+/* The optimum where what is held and limits of motion give way at prices, in one search: of a robot whose base floats what
+ * motors and contacts can do, the classes before, has an answer unless a wrench must be larger than motors bear. */
+static int elastic_search(wbc_tick *t) {
+    double largest = 0.0, soft_scaling[M_ALL], loose[MC + 1];
+    int flag = -1, warm = t->warm;
+    for (int i = 0; i < NV; i++) largest = larger(largest, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
+    for (int i = 0; i < DOFS; i++) {
+        const double firm = STEADY * largest / (dof_scale[i] * dof_scale[i]);
+        t->H[i * WIDE + i] += firm;
+        t->g[i] += firm * REST_RATE * t->v_last[i];
+    }
+    for (int k = 0; k < MC; k++) {
+        const double price = class_price(row_order[k]) * largest / (row_scale[k] * row_scale[k]);
+        const int given = price > 0.0 && !MINIMISED(k) && !t->idle[k] && !(t->give[k] > 0.0);
+        loose[k] = t->give[k];
+        if (given && t->low[NV + k] == t->high[NV + k]) as_task(t, k, price);
+        else if (given) loose[k] = 1.0 / price;
+    }
+#if SOFT_ROWS > 0
+    memset(t->held, 0, sizeof t->held);
+    memcpy(t->own_H, t->H, sizeof t->H);
+    memcpy(t->own_g, t->g, sizeof t->g);
+#endif
+    t->prepared = t->factored = 0;
+    if (!factor(t)) {
+        steady(t->H);
+        if (!factor(t)) return -1;
+    }
+    solve_transposed(t, t->y);
+    see_rows(t);
+    /* A price may be too high for the search, which then calls rows infeasible that are not */
+    for (double cheaper = 1.0; flag < 0 && cheaper <= CHEAPEST && !t->spent; cheaper *= warm ? 1.0 : 10.0, warm = 0) {
+        memcpy(soft_scaling, t->scaling, sizeof soft_scaling);
+        for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
+        for (int k = 0; k < MC; k++) {
+            if (!(loose[k] > 0.0) || t->idle[k]) continue;
+            t->sense[NV + k] = SOFT;
+            soft_scaling[NV + k] *= sqrt(loose[k] * (t->give[k] > 0.0 ? 1.0 : cheaper));
+        }
+        t->daqp.scaling = soft_scaling;
+        t->settings.rho_soft = 1.0;
+        flag = active_set(t, warm, HOLDS, TIGHT, NULL);
+        t->daqp.scaling = t->scaling;
+        t->settings.rho_soft = RHO;
+    }
+    if (flag < 0) return flag;
+    for (int k = 0; k < MC; k++) {
+        const double value = row_at(t, k, t->x);
+        if (LEVELS > 0 && t->spring[k] > 0.0) t->low[NV + k] = t->high[NV + k] = value;
+        if (!(loose[k] > 0.0) || t->give[k] > 0.0) continue;
+        t->low[NV + k] = smaller(t->low[NV + k], value);
+        t->high[NV + k] = larger(t->high[NV + k], value);
+    }
+    memcpy(t->met, t->x, sizeof t->met);
+    /* The same point as that of hard rows, whose factors a refinement takes */
+    for (int i = 0; i < M_ALL; i++) {
+        t->keep[i] = t->sense[i];
+        t->sense[i] = i >= NV && t->give[i - NV] > 0.0 ? SOFT : 0;
+    }
+    shift(t);
+    if (active_set(t, 1, HOLDS, LOOSE, NULL) >= 0) return 0;
+    memcpy(t->x, t->met, sizeof t->met);
+    t->daqp.n_active = 0;
+    t->factored = 0;
+    return 0;
+}
+
+/* The same, or the problem as it was where the search has no answer. Accelerations may be thousands, of which the tolerance of
+ * other searches is less than rounding. */
+static int elastic(wbc_tick *t) {
+    const double tolerance = t->settings.primal_tol;
+    double H[NV * WIDE], g[WIDE], low[M_ALL], high[M_ALL];
+    memcpy(H, t->H, sizeof t->H);
+    memcpy(g, t->g, sizeof t->g);
+    memcpy(low, t->low, sizeof low);
+    memcpy(high, t->high, sizeof high);
+    t->settings.primal_tol = ELASTIC_TOLERANCE;
+    const int flag = elastic_search(t);
+    t->settings.primal_tol = tolerance;
+    if (flag >= 0 || t->spent) return flag;
+    memcpy(t->H, H, sizeof t->H);
+    memcpy(t->g, g, sizeof t->g);
+    memcpy(t->low, low, sizeof low);
+    memcpy(t->high, high, sizeof high);
+    memset(t->spring, 0, sizeof t->spring);
+    t->prepared = 0;
+    return flag;
+}
+
 static int relaxed(wbc_tick *t) {
     double base[WIDE] = {0};
+    if (ELASTIC) {
+        const int flag = elastic(t);
+        if (flag >= 0 || t->spent) return flag;
+    }
     t->warm = 0;
     memset(t->idle, 0, sizeof t->idle);
     /* Rows of class 0 never give way */

@@ -77,6 +77,19 @@ typedef long long wbc_bits;
 
 /* A row of a higher price is as good as hard; that of a kept direction grows with its task's weight, and stops there */
 #define HIGHEST_PRICE 1e9
+/* The class of what is held; of a robot whose base floats it and later classes give way at these prices */
+#define HOLDS 2
+#define HOLD_PRICE 1e2
+#define MOTION_PRICE 1e-1
+#define ELASTIC_TOLERANCE 1e-8
+/* What then brings joints to rest that no other task moves, per largest entry on the diagonal of H */
+#define STEADY 1e-4
+/* What a wrench off by its unit costs beside an acceleration off by its own where a tick has no answer */
+#define WRENCH_SHARE 1e-2
+/* What they may be divided by where the search has no answer */
+#define CHEAPEST 1e3
+/* How fast a robot whose base floats loses its velocity where a tick has no answer [1/s] */
+#define REST_RATE 20.0
 /* Iterations of a search with a higher price at most, see first_slack */
 #define BRIEF 30
 /* How much more than other equality rows those that keep a direction, or bend, count while curvature is looked for */

@@ -17,32 +17,15 @@ static double kept_speed(const wbc_tick *t) {
 }
 #endif
 
-/* The command that brings a joint to rest, and the wrench that a contact keeps. What has no acceleration limit, such as a floating
- * base, stops together with the joint that takes longest. */
+/* The command that brings a joint to rest, and the wrench that a contact keeps. Of velocities, what has no acceleration limit, such
+ * as a floating base, stops together with the joint that takes longest; of torques a robot whose base floats stops as by damping. */
 INLINE double rest(const wbc_tick *t, int i, double share) {
 #if COMMAND == VELOCITY
     return i >= DOFS || brakes_slowly(t, i) ? 0.0 : share * t->v_last[i];
 #else
     (void)share;
-    return i < DOFS ? -t->v_last[i] / t->dt : t->kept[i];
+    return i < DOFS ? -t->v_last[i] * (ELASTIC ? REST_RATE : 1.0 / t->dt) : t->kept[i];
 #endif
-}
-
-/* Come to rest as fast as the bounds let each joint */
-static void brake(wbc_tick *t) {
-    /* A relaxation may have moved the bounds */
-    form_bounds(t);
-#if COMMAND == VELOCITY
-    const double share = kept_speed(t);
-#else
-    const double share = 0.0;
-#endif
-    for (int i = 0; i < NV; i++) {
-        const double low = t->low[i], high = t->high[i];
-        t->x[i] = low <= high ? clamp(rest(t, i, share), low, high) : 0.0;
-    }
-    t->daqp.n_active = 0;
-    t->warm = 0;
 }
 
 /* Rows whose bounds have crossed are met half-way; 1 if any gives way by more than rounding. Actuators never do. */
@@ -58,6 +41,67 @@ static int uncross(wbc_tick *t) {
         if (row_order[k] == 0) t->unusable = 1.0;
     }
     return crossed;
+}
+
+/* The bounds as they were before anything gave way, those that cross met half-way */
+static void own_sides(wbc_tick *t) {
+    form_bounds(t);
+    for (int k = 0; k < MC; k++) {
+        t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
+        t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
+    }
+    uncross(t);
+}
+
+/* Damping and the weight, of a robot whose base floats: the accelerations nearest to -REST_RATE v, which contacts are in accord
+ * with, and the wrenches nearest to those that are kept, that the base has. What motors lack for them their torques are cut by. */
+static void damp(wbc_tick *t) {
+    double H[NV * WIDE], g[WIDE], nearest[NV];
+    memcpy(H, t->H, sizeof t->H);
+    memcpy(g, t->g, sizeof t->g);
+    memcpy(nearest, t->x, sizeof nearest);
+    own_sides(t);
+    memset(t->H, 0, sizeof t->H);
+    memset(t->g, 0, sizeof t->g);
+    for (int i = 0; i < NV; i++) {
+        t->H[i * WIDE + i] = (i < DOFS ? 1.0 : WRENCH_SHARE) / (dof_scale[i] * dof_scale[i]);
+        t->g[i] = -t->H[i * WIDE + i] * nearest[i];
+    }
+    for (int k = 0; k < MC; k++) {
+        if (row_order[k] == 0 && t->low[NV + k] == t->high[NV + k]) continue;
+        t->low[NV + k] = -WBC_INF;
+        t->high[NV + k] = WBC_INF;
+        t->idle[k] = 1;
+    }
+    t->factored = 0;
+    if (factor(t)) {
+        solve_transposed(t, t->y);
+        see_rows(t);
+        memset(t->sense, 0, sizeof t->sense);
+        if (active_set(t, 0, 0, LOOSE, NULL) < 0 || !all_finite(t->x, NV)) memcpy(t->x, nearest, sizeof nearest);
+    }
+    memcpy(t->H, H, sizeof t->H);
+    memcpy(t->g, g, sizeof t->g);
+    t->factored = t->prepared = 0;
+    own_sides(t);
+}
+
+/* Come to rest as fast as the bounds let each joint */
+static void brake(wbc_tick *t) {
+    /* A relaxation may have moved the bounds */
+    form_bounds(t);
+#if COMMAND == VELOCITY
+    const double share = kept_speed(t);
+#else
+    const double share = 0.0;
+#endif
+    for (int i = 0; i < NV; i++) {
+        const double low = t->low[i], high = t->high[i];
+        t->x[i] = low <= high ? clamp(rest(t, i, share), low, high) : 0.0;
+    }
+    if (ELASTIC && t->unusable == 0.0) damp(t);
+    t->daqp.n_active = 0;
+    t->warm = 0;
 }
 
 /* The cap ended the search. From braking towards the velocity that was found so far, `found`, as far as no row leaves
@@ -96,16 +140,6 @@ static void command(wbc_tick *t) {
         const int i = t->daqp.WS[a];
         if (i < NV) t->report.v[i] = t->sense[i] & LOWER ? t->low[i] : t->high[i];
     }
-}
-
-/* The bounds as they were before anything gave way, those that cross met half-way */
-static void own_sides(wbc_tick *t) {
-    form_bounds(t);
-    for (int k = 0; k < MC; k++) {
-        t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
-        t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
-    }
-    uncross(t);
 }
 
 /* By how much rows give way at the command; whether any does */

@@ -175,6 +175,8 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     assemble(t, 1);
     int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
     if (PRICES) report_soft_rows(t);
+    for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++)
+        if (t->spring[k] > 0.0) t->report.lambda[NV + k] = t->spring[k] * (row_at(t, k, t->report.v) - t->free_low[k]);
     wbc_tick_look_ahead(t);
     const int sound = !unsound(t, flag) && !nameless;
     commanded(t, sound && flag != WBC_BRAKED);

@@ -8,6 +8,7 @@
  *   j_start j_col a_start a_end a_col   their positions, row by row
  *   damping     cost of each velocity
  *   CALM        0: the linear model as it is
+ *   ELASTIC     1: limits of motion are rows, and they and what is held give way at prices
  *   COMMAND     0: velocities, 1: accelerations, 2: torques; of the last two the variables are accelerations and the
  *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
@@ -128,6 +129,7 @@ typedef struct {
     int warm;                    /* the sense array holds the active set of the last tick */
     int spent;                   /* the cap has ended a search of this tick */
     double met[NV];              /* where the classes of a relaxation met */
+    double spring[MC + 1];       /* price of an equality row that a relaxation has made a part of H; 0 for the others */
     double firm_missed;          /* the largest violation of a row that never gives way */
     int proven;                  /* nothing within the bounds keeps the rows that never give way */
     int brief;                   /* iterations of a search that may fail; 0: as many as it takes */

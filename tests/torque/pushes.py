@@ -1,0 +1,194 @@
+"""Humanoids that stand in MuJoCo and are pushed, and a plain QP of accelerations and forces as the peer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import quadprog
+from scipy.spatial import ConvexHull
+
+import wbc
+from wbc.controller import Controller
+from wbc.robot import Robot
+from wbc.shapes import Box, PlacedShape
+from wbc.simulation import Command, CommandKind, MujocoPlant, mujoco_model
+
+#: Tick; when a push begins, how long it lasts, how long a run [s]
+DT, BEGINS, LASTS, SECONDS = 0.002, 0.05, 0.1, 1.2
+FRICTION, G = 0.6, 9.81
+#: A robot whose centre of mass is below this share of its height has fallen
+FALLEN = 0.75
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """A robot on two rectangles of half lengths ``half``, and the frames that tasks are about."""
+
+    robot: Robot
+    soles: tuple[str, str]
+    half: tuple[float, float]
+    chest: str
+    hand: str
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Of a sole, in its frame [4, 3]."""
+        return np.array([[x * self.half[0], y * self.half[1], 0.0] for x in (1, -1) for y in (1, -1)])
+
+    @property
+    def floor(self) -> float:
+        return float(self.robot.pose(self.robot.neutral, self.soles[0]).translation[2])
+
+
+@cache
+def stand(name: str) -> Stand:
+    """TALOS or a G1 with limits of acceleration; the soles of the G1 are about its contact spheres."""
+    robot = wbc.robots.load(name)
+    if name == "talos":
+        soles, half = ("left_sole_link", "right_sole_link"), (0.1, 0.06)
+        return Stand(
+            robot.with_limits(acceleration=40.0), soles, half, "torso_2_link", "gripper_right_fingertip_1_link"
+        )
+    for side in ("left", "right"):
+        under = pin.SE3(np.eye(3), np.array([0.035, 0.0, -0.035]))
+        robot = robot.with_frame(f"{side} sole", f"{side}_ankle_roll_link", under)
+    robot = robot.with_limits(acceleration=100.0)
+    return Stand(robot, ("left sole", "right sole"), (0.085, 0.03), "torso_link", "right_wrist_yaw_link")
+
+
+@cache
+def controller(name: str, backend: str = "auto", soft: float | None = None) -> Controller:
+    """Balance, chest, hand and posture on two feet, as in ``examples/mujoco_humanoid.py``."""
+    one, tasks = stand(name), wbc.tasks
+    stack = wbc.Stack(one.robot, dt=DT)
+    stack.add(tasks.CenterOfMass(gain=4.0), name="balance", weight=10.0)
+    stack.add(tasks.EndEffector(one.chest, kind="orientation", gain=5.0), name="chest")
+    stack.add(tasks.EndEffector(one.hand, kind="position", gain=5.0), name="hand")
+    stack.add(tasks.Posture(gain=5.0), name="posture", weight=1e-4)
+    stack.add(tasks.JointLimits()).add(tasks.TorqueLimits())
+    for sole in one.soles:
+        stack.add(tasks.SurfaceContact(sole, half_lengths=one.half, friction=FRICTION), name=sole, soft=soft)
+    return stack.compile(command="torque", backend=backend)
+
+
+class Peer:
+    """min sum of weight |task|^2 + 1e3 |feet|^2 over accelerations and forces at the soles' corners, by quadprog: the
+    base's rows, friction pyramids and torque limits; no bounds on accelerations.
+    """
+
+    def __init__(self, one: Stand) -> None:
+        self.one, self.model = one, one.robot.model
+        self.data, q = self.model.createData(), one.robot.neutral
+        pin.framesForwardKinematics(self.model, self.data, q)
+        self.center = pin.centerOfMass(self.model, self.data, q).copy()
+        self.weight = G * pin.computeTotalMass(self.model)
+        self.start = {f: self.data.oMf[self.model.getFrameId(f)].copy() for f in (one.chest, one.hand, *one.soles)}
+        self.last = np.zeros(self.model.nv)
+
+    def _frame(self, name: str, gain: float) -> tuple[np.ndarray, np.ndarray]:
+        """J of a frame and the acceleration that it is asked for, along the world's axes."""
+        index, axes = self.model.getFrameId(name), pin.LOCAL_WORLD_ALIGNED
+        J = pin.getFrameJacobian(self.model, self.data, index, axes)
+        bias = pin.getFrameClassicalAcceleration(self.model, self.data, index, axes).vector
+        rate = pin.getFrameVelocity(self.model, self.data, index, axes).vector
+        at, start = self.data.oMf[index], self.start[name]
+        off = np.concatenate([at.translation - start.translation, pin.log3(at.rotation @ start.rotation.T)])
+        return np.array(J), -bias - 4.0 * gain * rate - 4.0 * gain**2 * off
+
+    def torque(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Of all degrees of freedom; the last ones where quadprog finds none."""
+        one, model, data, nv = self.one, self.model, self.data, self.model.nv
+        M = pin.crba(model, data, q)
+        M, h = np.triu(M) + np.triu(M, 1).T, pin.nonLinearEffects(model, data, q, v).copy()
+        pin.centerOfMass(model, data, q, v, np.zeros(nv))
+        fall = -data.acom[0] - 16.0 * data.vcom[0] - 64.0 * (data.com[0] - self.center)
+        parts = [(pin.jacobianCenterOfMass(model, data, q).copy(), fall.copy(), 10.0)]
+        pin.computeJointJacobians(model, data, q)
+        pin.forwardKinematics(model, data, q, v, np.zeros(nv))
+        pin.updateFramePlacements(model, data)
+        (chest, turn), (hand, move) = self._frame(one.chest, 5.0), self._frame(one.hand, 5.0)
+        posture = -20.0 * v - 100.0 * pin.difference(model, one.robot.neutral, q)
+        parts += [(chest[3:], turn[3:], 1.0), (hand[:3], move[:3], 1.0), (np.eye(nv)[6:], posture[6:], 1e-4)]
+        forces = []
+        for sole in one.soles:
+            J, asked = self._frame(sole, 5.0)
+            parts.append((J, asked, 1e3))
+            turned = data.oMf[model.getFrameId(sole)].rotation
+            forces += [J[:3] - pin.skew(turned @ corner) @ J[3:] for corner in one.corners]
+        down, count = np.vstack(forces).T, 3 * len(forces)
+        H = np.diag(np.concatenate([np.full(nv, 1e-6), np.full(count, 1e-4 / self.weight**2)]))
+        g = np.zeros(nv + count)
+        for J, asked, weight in parts:
+            H[:nv, :nv] += weight * J.T @ J
+            g[:nv] += weight * J.T @ asked
+        moved, most = np.hstack([M, -down]), one.robot.limits.effort[6:]
+        mu = FRICTION / np.sqrt(2.0)
+        pyramid = np.array([[0, 0, 1], [1, 0, mu], [-1, 0, mu], [0, 1, mu], [0, -1, mu]])
+        cones = np.hstack([np.zeros((5 * len(forces), nv)), np.kron(np.eye(len(forces)), pyramid)])
+        rows = np.vstack([moved, -moved[6:], cones])
+        ends = np.concatenate([-h[:6], -most - h[6:], -most + h[6:], np.zeros(len(cones))])
+        size = 1.0 / np.sqrt(np.diag(H))
+        length = np.linalg.norm(rows * size, axis=1)
+        try:
+            x = (
+                size
+                * quadprog.solve_qp(
+                    H * np.outer(size, size), g * size, (rows * size / length[:, None]).T, ends / length, 6
+                )[0]
+            )
+        except ValueError:
+            return self.last
+        self.last = np.concatenate([np.zeros(6), np.clip((moved @ x + h)[6:], -most, most)])
+        return self.last
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of a push: whether the robot fell; how far inside the soles' hull its capture point was during the push, at least
+    [m]; the largest rate and torque, of their limits.
+    """
+
+    fell: bool
+    inside: float
+    rate: float
+    torque: float
+
+
+@cache
+def _plant(name: str) -> MujocoPlant:
+    one = stand(name)
+    sole = Box((2.0 * one.half[0], 2.0 * one.half[1], 0.02))
+    boxes = {f: [PlacedShape(sole, pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.01])))] for f in one.soles}
+    model = mujoco_model(one.robot, time_step=DT / 2, contacts=boxes, ground=one.floor, friction=0.8, drawn=False)
+    return MujocoPlant(model, one.robot)
+
+
+def pushed(name: str, torque: Callable[[np.ndarray, np.ndarray], np.ndarray], impulse: np.ndarray) -> Outcome:
+    """The robot stands and is pushed at its chest; ``impulse`` [N s] along the world's x and y."""
+    one, plant = stand(name), _plant(name)
+    robot, q = one.robot, one.robot.neutral
+    model, data = robot.model, robot.model.createData()
+    plant.reset(q, 0.0)
+    hull = ConvexHull(np.vstack([robot.pose(q, f).act(c)[:2] for f in one.soles for c in one.corners])).equations
+    height = float(pin.centerOfMass(model, data, q)[2]) - one.floor
+    inside, rate, share = np.inf, 0.0, 0.0
+    for k in range(round(SECONDS / DT)):
+        state, t = plant.read(), DT * k
+        center, speed = pin.centerOfMass(model, data, state.q, state.v), data.vcom[0]
+        if BEGINS <= t <= BEGINS + LASTS + DT:
+            capture = center[:2] + speed[:2] * np.sqrt(height / G)
+            inside = min(inside, float(-(hull[:, :2] @ capture + hull[:, 2]).max()))
+        if center[2] - one.floor < FALLEN * height:
+            return Outcome(True, inside, rate, share)
+        rate = max(rate, float(np.abs(state.v[6:] / robot.limits.velocity[6:]).max()))
+        sent = torque(state.q, state.v)
+        share = max(share, float(np.abs(sent[6:] / robot.limits.effort[6:]).max()))
+        force = impulse / LASTS if BEGINS <= t < BEGINS + LASTS else np.zeros(2)
+        plant.data.body(one.chest).xfrc_applied[:2] = force
+        plant.apply(Command(CommandKind.TORQUE, sent))
+        plant.advance(DT)
+    return Outcome(False, inside, rate, share)
