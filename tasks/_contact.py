@@ -107,7 +107,7 @@ class Contact(Constraint):
         """Those of ``Hold``: J v = -gain e."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
-    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """That of the motion."""
         return self._hold.residual(robot, kin, inputs)
 

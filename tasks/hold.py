@@ -115,11 +115,14 @@ class Hold(Constraint):
             matrix.append((turn.T @ jacobian[3:, :]) / ca.fmax(along * along + across * across, UPRIGHT))
         elif self.kind != "position":
             matrix.append(jacobian[3:, :])
-        wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
+        wanted = -inputs["gain"] * self._error(kin, inputs)
         return Rows(ca.vertcat(*matrix), wanted, wanted)
 
-    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """e of the class."""
+        return self._error(kin, inputs)
+
+    def _error(self, kin: Tracer, inputs: Values) -> ca.SX:
         pose, target = kin.pose(self.frame), inputs["target"]
         drift = [] if self.kind == "orientation" else [pose.position - target.position]
         if self.kind == "axis":

@@ -24,7 +24,8 @@ def test_no_shapes_overlap(name: str, method: str, caplog: pytest.LogCaptureFixt
         found = drive(name, repeats.repeats(5), method=method)
     assert found.overlaps == 0, found
     ticks = found.status.total()
-    assert found.status["solved"] > 0.97 * ticks, found
+    # Two arms begin within the margin
+    assert found.status["solved"] >= 0.95 * ticks, found
     assert not found.status["braked"], found
     assert "push at once" not in caplog.text
     assert ("left_wrist_1_link[0] and left_wrist_3_link[0]" in caplog.text) == (name == "two ur5")

@@ -216,6 +216,7 @@ def test_infeasible_bounds(case: str, way: str) -> None:
 
 
 LINKS = '<link name="a"/><link name="b"/>'
+AXIS = '<axis xyz="0 0 0"/>'
 LIMIT = '<limit lower="{}" upper="{}" velocity="1" effort="1"/>'
 JOINT = '<joint name="j" type="{}"><parent link="a"/><child link="b"/>{}</joint>'
 FILES: dict[str, tuple[bytes, type[WbcError]]] = {
@@ -224,9 +225,9 @@ FILES: dict[str, tuple[bytes, type[WbcError]]] = {
     "noise.urdf": (bytes(range(128, 256)), RobotFileError),
     "html.urdf": (b"<html/>", RobotFileError),
     "kind.urdf": (f'<robot name="r">{LINKS}{JOINT.format("rotary", "")}</robot>'.encode(), RobotFileError),
-    "crossed.urdf": (
-        f'<robot name="r">{LINKS}{JOINT.format("revolute", LIMIT.format(1, -1))}</robot>'.encode(),
-        BoundsError,
+    "axis.urdf": (
+        f'<robot name="r">{LINKS}{JOINT.format("revolute", LIMIT.format(-1, 1) + AXIS)}</robot>'.encode(),
+        RobotFileError,
     ),
 }
 

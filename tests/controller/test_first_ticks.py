@@ -94,7 +94,7 @@ def test_no_tick_imports_or_makes_a_solver(backend: str) -> None:
     assert done.returncode == 0, done.stderr
     at_compile, found = json.loads(done.stdout)
     # What is loaded then is not loaded by importing the package (tests/project/test_import.py)
-    assert {"scipy.linalg", "osqp"} <= set(at_compile)
+    assert "scipy.linalg" in at_compile
     links = ("cold", "daqp", "osqp", "elastic")
     for kind, rows in found.items():
         ends = {name: tuple(row[:2]) for name, row in rows.items()}

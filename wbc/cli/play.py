@@ -36,7 +36,7 @@ def play(
     ] = "",
     silence: Annotated[
         float,
-        typer.Option(help="The robot stops where the page, or the viewer, gives no sign of life for so long [s]."),
+        typer.Option(help="The robot stops where the page, or the viewer, gives no sign of life for so many seconds."),
     ] = SILENCE,
     seconds: viewing.Seconds = None,
     backend: Backend = "auto",

@@ -148,7 +148,7 @@ class Stack(Declaration):
         targets: Mapping[str, Any] | None = None,
         *,
         seed: int = 0,
-        budget: float | None = 0.005,
+        budget: float | None = None,
         restarts: int = 100,
         tolerance: float = 1e-5,
         goals: Iterable[str] | None = None,

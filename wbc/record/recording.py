@@ -187,7 +187,7 @@ class Recording:
         """Name of a task -> its error before each tick, ticks x rows, in the units of :attr:`units`.
 
         Raises:
-            RecordingError: as of :meth:`names`.
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         return self._by_item("error")
 
@@ -196,7 +196,7 @@ class Recording:
         """Name of a constraint with margins -> these before each tick, ticks x rows; at least 0 where they are kept.
 
         Raises:
-            RecordingError: as of :meth:`names`.
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         return self._by_item("margin")
 
@@ -206,9 +206,9 @@ class Recording:
         its rotation by columns, then its position.
 
         Raises:
-            RecordingError: as of :meth:`names`.
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
-        places, p = self.names("inputs"), self["p"]
+        places, p = self._names("inputs"), self["p"]
         return {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places}
 
     @property
@@ -216,7 +216,7 @@ class Recording:
         """Unit of each column of :meth:`table` that has one.
 
         Raises:
-            RecordingError: as of :meth:`names`.
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         return {"time": "s"} | {name: unit for name, unit, _, _ in self._columns() if unit}
 
@@ -226,7 +226,7 @@ class Recording:
         ``TASK.INPUT``, with ``.0``, ``.1``, ... where it has several numbers.
 
         Raises:
-            RecordingError: as of :meth:`names`.
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         parts: dict[str, Array] = {}
         out: dict[str, Array | tuple[str, ...]] = {"time": self.time, "status": self.status}
@@ -236,7 +236,7 @@ class Recording:
             out[name] = parts[part][:, place]
         return out
 
-    def names(self, part: str) -> list[list[Any]]:
+    def _names(self, part: str) -> list[list[Any]]:
         """What ``about.json`` says of the numbers of a part.
 
         Raises:
@@ -253,17 +253,17 @@ class Recording:
         yield "dt", "s", "dt", 0
         own = {"q": "q.", "v": "v." if self.about.get("command") == "velocity" else "a.", "others": ""}
         for part, prefix in own.items():
-            for place, (name, unit) in enumerate(self.names(part)):
+            for place, (name, unit) in enumerate(self._names(part)):
                 yield f"{prefix}{name}", unit, part, place
         for part, prefix in (("error", "residual"), ("margin", "margin")):
-            for place, (item, row, unit) in enumerate(self.names(part)):
+            for place, (item, row, unit) in enumerate(self._names(part)):
                 yield f"{prefix}.{item}.{row}", unit, part, place
-        for item, name, start, stop, unit in self.names("inputs"):
+        for item, name, start, stop, unit in self._names("inputs"):
             for place in range(start, stop):
                 yield f"{item}.{name}" + (f".{place - start}" if stop - start > 1 else ""), unit, "p", place
 
     def _by_item(self, part: str) -> dict[str, Array]:
-        rows, numbers = self.names(part), self[part]
+        rows, numbers = self._names(part), self[part]
         return {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows}
 
     def __getitem__(self, name: str) -> Array:

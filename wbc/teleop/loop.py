@@ -58,8 +58,13 @@ class SessionLog:
         return [one.lost for one in self.seen]
 
     def lost_in(self, part: float) -> list[int]:
-        """Ticks in which more than a part of the command was lost, the worst first; ramps do not count."""
-        ticks = [k for k, one in enumerate(self.seen) if one.lost > part and not one.ramping]
+        """Ticks in which more than a part of the command was lost, the worst first; ramps do not count.
+
+        Raises:
+            ShapeError, NotFiniteError: no number.
+        """
+        least = validation.scalar("part", part)
+        ticks = [k for k, one in enumerate(self.seen) if one.lost > least and not one.ramping]
         return sorted(ticks, key=lambda k: -self.seen[k].lost)
 
     def add(self, time: float, q: Array, seen: Seen, cost: float = 0.0) -> None:

@@ -127,7 +127,7 @@ static int has_answer(const wbc_tick *t, int flag) { return flag <= WBC_RELAXED 
 
 #if BENDING > 0
 /* Sides are moved until the rows make up for what they lose, as far as that gets less; what they lose then, as a rate */
-static double corrected(wbc_tick *t, int all, int *flag, int *nameless) {
+static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
     double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all);
     for (int n = 0; n < BENDINGS && worst > BENDS && has_answer(t, *flag); n++) {
         const double before = worst;
@@ -154,11 +154,11 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
     double worst = wbc_tick_find_lost(t, all);
     const int bends = worst > BENDS;
     if (worst > (CALM ? STRETCHED : BENDS) && has_answer(t, flag) && curve_rows(t)) flag = answer(t, nameless);
-    worst = corrected(t, all, &flag, nameless);
+    worst = correct_rows(t, all, &flag, nameless);
     for (int n = 0; n < SHORTER && has_answer(t, flag) && (worst > BENDS || (bends && n == 0 && turns_round(t))); n++) {
         shorten(t);
         flag = answer(t, nameless);
-        worst = corrected(t, all, &flag, nameless);
+        worst = correct_rows(t, all, &flag, nameless);
     }
     if (worst > BENDS && flag <= WBC_RELAXED && report_lost(t)) flag = (int)(t->report.flag = WBC_RELAXED);
 #else

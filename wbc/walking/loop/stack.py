@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -42,6 +43,20 @@ def hold_kind(structure: Structure, hold: int) -> HoldKind:
     return KINDS[structure.free_rolls[hold], bool(structure.tilts[hold] >= LEAST_TILT)]
 
 
+@dataclass(frozen=True)
+class LedHold(tasks.Hold):
+    """A hold whose target leads by what rates take it off within a period, see :class:`Curvature`: the tick does not
+    make up for that a second time.
+    """
+
+    #: Made here, so it is not in the table of items
+    abstract: ClassVar[bool] = True
+
+    def residual(self, *_: Any) -> None:
+        """None, see the class."""
+        return None
+
+
 class HoldItems:
     """For each arm one ``Hold`` of every kind that a structure needs, an ``AxisCone`` where hands may tilt, and an
     ``AxisAlign`` of the x axis that turns an open hand to a roll.
@@ -59,7 +74,7 @@ class HoldItems:
         self._rolls = bool({"pose", "roll"} & set(self.kinds))
         for arm in walker.arms:
             for kind in self.kinds:
-                item = tasks.Hold(arm.hand, kind=kind, gain=self.gain)
+                item = LedHold(arm.hand, kind=kind, gain=self.gain)
                 stack.add(item, name=f"{arm.name} hold {kind}")
             if self._tilts:
                 stack.add(tasks.AxisCone(arm.hand, half_angle=1.0), name=f"{arm.name} tilt")
