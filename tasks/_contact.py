@@ -170,15 +170,11 @@ class ContactWrench(Constraint):
     """What the wrench of a contact may be. Made by the stack, under the name ``"<contact> wrench"``."""
 
     abstract: ClassVar[bool] = True
+    order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     of: str
     contact: Contact
     floating: bool = False
-
-    @property
-    def order(self) -> SacrificeOrder:
-        """That of the contact's cone where a base floats, which nothing else holds; else that of margins."""
-        return self.contact.cone_order if self.floating else SacrificeOrder.MARGIN
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """Those of the contact's cone."""

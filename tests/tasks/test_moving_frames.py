@@ -199,7 +199,8 @@ def test_the_curvature_is_that_of_the_robot_placed_in_the_frame() -> None:
                 p[slot.span] = run_time.flat(machine, slot.input.name, slot.input, value)
             curvature = program.build(stack, layout).curvature
             assert curvature is not None
-            found.append(curvature(q, np.zeros(machine.nv), p, DT, force).full())
+            weights = np.concatenate([force, np.zeros(layout.general_rows)])
+            found.append(curvature(q, np.zeros(machine.nv), p, DT, weights).full())
         close(found[0], found[1], 1e-9)
         assert np.abs(found[0]).max() > 1e-3
 

@@ -124,7 +124,7 @@ def test_files_that_are_no_plans_are_refused(file: Path, tmp_path: Path) -> None
         bad.write_text(json.dumps({**good, **change}))
         with pytest.raises(StructureFileError, match="not a plan"):
             read_plan(bad)
-    with pytest.raises(StructureFileError, match="not a plan"):
+    with pytest.raises(StructureFileError, match="no such file"):
         read_plan(tmp_path / "none.json")
 
 

@@ -78,6 +78,9 @@ class Entry:
         assert isinstance(self.item, Constraint)
         if not self.hard or self.price is not None:
             return SacrificeOrder.SOFT
+        if isinstance(self.item, ContactWrench) and self.item.floating:
+            # Nothing but its contacts holds a floating base
+            return self.item.contact.cone_order
         planned = self.yielding and self.item.order == SacrificeOrder.ACTUATOR
         return SacrificeOrder.MARGIN if planned else self.item.order
 

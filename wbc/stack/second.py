@@ -151,7 +151,7 @@ class SecondOrder:
         bounds = item.acceleration_bounds(self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest)
         assert bounds is not None
         ends = [b.column(block, "lower", bounds.lower), b.column(block, "upper", bounds.upper)]
-        for i in np.flatnonzero(np.isfinite(most := item.velocity_limits(self._robot))):
+        for i in np.flatnonzero(np.isfinite(most := item.velocity_limits(self._robot))).tolist():
             back = (clip(v[i], -most[i], most[i]) - v[i]) / b.dt
             for end in ends:
                 slower = ca.if_else(v[i] > most[i], ca.fmin(end[i], back), ca.fmax(end[i], back))

@@ -181,7 +181,7 @@ class _Search:
         grid = np.linspace(0.0, 1.0, FIRST + 1).tolist() if np.abs(self.step).max(initial=0.0) > 0.0 else [0.0, 1.0]
         for _ in range(ROUNDS):
             good, high, sigma = self._table(grid)
-            served = high[: self._given].any(axis=0)
+            served = np.asarray(high[: self._given].any(axis=0))
             # Given pairs whose rows change too much from one sample to the next, or that are nearly lost at one of them
             coarse = (served[:-1] & served[1:]) | ((served[:-1] | served[1:]) & (np.diff(grid) > FINEST))
             bare = ~good.any(axis=0) | (coarse & ~good[: self._given].any(axis=0))
