@@ -38,10 +38,6 @@ TOLERANCE = 1e-9
 #: that they contradict each other, per largest multiplier
 FAR_AWAY, _BROKEN = 1e6, 1e-6
 
-#: What brings variables to rest that nothing else moves where rows give way at prices, per largest entry on the
-#: diagonal of H; as in ``native/settings.h``
-STEADY = 1e-4
-
 #: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
 _PUSHING = 1e-6
 
@@ -78,16 +74,24 @@ class Relaxed:
 class Relaxation:
     """The cascade, with kept solvers, for problems with ``n`` variables and ``m`` general rows."""
 
-    def __init__(self, n: int, m: int, solver: Backend | None = None, price: Array | None = None) -> None:
+    def __init__(
+        self,
+        n: int,
+        m: int,
+        solver: Backend | None = None,
+        price: Array | None = None,
+        steady: Array | None = None,
+    ) -> None:
         """``solver`` solves the problems in v (default: DAQP behind prepared equalities).
 
         ``price``: rows give way at prices in place of an order: what a violation of one unit costs, per largest entry
-        on the diagonal of H; 0 for rows that never give way [m].
+        on the diagonal of H; 0 for rows that never give way [m]. ``steady``: what then brings variables to rest that
+        nothing else moves, likewise; 0 by default [n].
         """
         self.n, self.m = n, m
         self._final = solver if solver is not None else Prepared(Daqp(n, m))
         self._stage = Prepared(Daqp(n + m, m))
-        self._price = price
+        self._price, self._steady = price, np.zeros(n) if steady is None else steady
         self._priced = None if price is None else Prepared(Daqp(n + int((price > 0.0).sum()), m))
 
     def solve(
@@ -106,8 +110,7 @@ class Relaxation:
                 the row, so that slacks are compared as joint motion [m].
             size: value of each variable that counts as 1, default 1: the problem is solved in x / size, so that the
                 variables' units do not matter [n].
-            rest: where rows give way at prices, what variables tend to that nothing else moves; NaN for those that do
-                not [n].
+            rest: where rows give way at prices, what variables tend to that nothing else moves, 0 by default [n].
 
         Raises:
             ShapeError: ``order``, ``unit`` or ``size`` of the wrong length.
@@ -176,9 +179,8 @@ class Relaxation:
         n, gives = self.n, price > 0.0
         largest = float(np.diag(qp.H).max(initial=0.0))
         cost = np.where(gives, price * largest / unit**2, 1.0)
-        tends = np.full(n, np.nan) if rest is None else rest
-        more = np.where(np.isnan(tends), 0.0, STEADY * largest)
-        less = -more * np.where(np.isnan(tends), 0.0, tends)
+        more = self._steady * largest
+        less = np.zeros(n) if rest is None else -more * rest
         steady = replace(qp, H=qp.H + np.diag(more), g=qp.g + less, give=np.where(gives, 1.0 / cost, 0.0))
         found = solver.solve(steady.with_slacks(), warm=False)
         x = np.clip(found.x[:n], qp.lower[:n], qp.upper[:n])

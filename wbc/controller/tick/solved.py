@@ -47,8 +47,9 @@ from wbc.validation import Array
 _ROUNDING = 1e-12
 #: Corrections of the active set where a solver's answer has no certificate
 POLISH_ROUNDS = 200
-#: Prices of what is held and of limits of motion where these are rows, as in ``native/settings.h``
-HOLD_PRICE, MOTION_PRICE = 1e2, 0.1
+#: Prices of what is held and of limits of motion where these are rows, and what brings accelerations and wrenches to
+#: rest; as in ``native/settings.h``
+HOLD_PRICE, MOTION_PRICE, STEADY, WRENCH_STEADY = 1e2, 1e-2, 1e-4, 1e-2
 #: What a wrench off by its unit costs beside an acceleration off by its own where a tick has no answer; as there
 WRENCH_SHARE = 1e-2
 #: Of a tick that brakes
@@ -70,7 +71,9 @@ class SolvedTick(Buffers):
         self._orders = np.array(row_orders(layout), dtype=np.int_)
         self._elastic = layout.elastic
         price = class_prices(self._orders) if layout.elastic else None
-        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver, price)
+        steady = np.zeros(layout.with_slacks)
+        steady[: layout.variables], steady[: layout.nv] = WRENCH_STEADY, STEADY
+        self._relaxation = Relaxation(layout.with_slacks, layout.general_rows, self._solver, price, steady)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)
         scales = self._own_scales = layout.dof_scales(stack)
         self._longest = max(1.0, float(scales.max(initial=1.0)), float(self._units.max(initial=1.0)))
@@ -336,7 +339,7 @@ class SolvedTick(Buffers):
         """What accelerations tend to where limits of motion give way."""
         if not self._elastic:
             return None
-        out = np.full(self._solver.n, np.nan)
+        out = np.zeros(self._solver.n)
         out[: self._velocities] = -REST_RATE * self.assembly.v_last[: self._velocities]
         return out
 

@@ -243,10 +243,10 @@ static int elastic_search(wbc_tick *t) {
     double largest = 0.0, soft_scaling[M_ALL], loose[MC + 1];
     int flag = -1, warm = t->warm;
     for (int i = 0; i < NV; i++) largest = larger(largest, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
-    for (int i = 0; i < DOFS; i++) {
-        const double firm = STEADY * largest / (dof_scale[i] * dof_scale[i]);
+    for (int i = 0; i < NV; i++) {
+        const double firm = (i < DOFS ? STEADY : WRENCH_STEADY) * largest / (dof_scale[i] * dof_scale[i]);
         t->H[i * WIDE + i] += firm;
-        t->g[i] += firm * REST_RATE * t->v_last[i];
+        if (i < DOFS) t->g[i] += firm * REST_RATE * t->v_last[i];
     }
     for (int k = 0; k < MC; k++) {
         const double price = class_price(row_order[k]) * largest / (row_scale[k] * row_scale[k]);

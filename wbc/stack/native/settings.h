@@ -77,13 +77,17 @@ typedef long long wbc_bits;
 
 /* A row of a higher price is as good as hard; that of a kept direction grows with its task's weight, and stops there */
 #define HIGHEST_PRICE 1e9
-/* The class of what is held; of a robot whose base floats it and later classes give way at these prices */
+/* The class of what is held; of a robot whose base floats it and later classes give way at these prices. At 0.1 for
+ * motion pushes fell a TALOS that stands at 0.01 */
 #define HOLDS 2
 #define HOLD_PRICE 1e2
-#define MOTION_PRICE 1e-1
+#define MOTION_PRICE 1e-2
 #define ELASTIC_TOLERANCE 1e-8
 /* What then brings joints to rest that no other task moves, per largest entry on the diagonal of H */
 #define STEADY 1e-4
+/* What wrenches then cost, likewise: as cheap as they are else, more rows of motors and friction bind than wrenches are apart by
+ * more than rounding of the search, which takes them for a contradiction */
+#define WRENCH_STEADY 1e-2
 /* What a wrench off by its unit costs beside an acceleration off by its own where a tick has no answer */
 #define WRENCH_SHARE 1e-2
 /* What they may be divided by where the search has no answer */
