@@ -31,7 +31,7 @@ demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into ru
 	$(BIN)/wbc walk --out runs/walk --force
 
 test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases; build/failed.txt names those that failed
-	WBC_REPEATS=$(REPEATS) $(BIN)/python -m pytest -n $(PYTEST_JOBS) --failed-list build/failed.txt $(PYTEST_ARGS)
+	WBC_REPEATS=$(REPEATS) $(BIN)/python -m pytest -n $(PYTEST_JOBS) --failed-list=build/failed.txt $(PYTEST_ARGS)
 
 check: $(READY) lint types  ## between edits: lint, types and the tests that are quick
 	$(BIN)/python -m pytest -n $(PYTEST_JOBS) -q -m "not slow" $(PYTEST_ARGS)
