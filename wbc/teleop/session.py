@@ -223,7 +223,7 @@ class Teleoperation:
             UnknownNameError: no such pair. ShapeError, NotFiniteError, RotationError: no configuration.
         """
         pair = self.control.pairs[validation.one_of("pair", name, self.control.pairs)]
-        (here,) = Adviser(self.robot, [pair]).advise(q)
+        here = next(one for one in self.adviser.advise(q) if one.pair == name)
         lost = f"where {'its task' if here.condition is Condition.TASK else 'the pair'} loses rank"
         known = closed_form(self.robot, pair)
         found = known.nearest(q) if known is not None else None

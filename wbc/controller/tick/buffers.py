@@ -42,9 +42,8 @@ BENDS, STRETCHED, BENDINGS, SHORTER, STEEPER, TURNING = 1e-3, 2e-2, 8, 3, 100.0,
 #: How fast a robot whose base floats loses its velocity where a tick has no answer [1/s]; as in ``native/settings.h``
 REST_RATE = 20.0
 
-#: Paths to another answer, in the order in which they are tried by default; braking is always the last
+#: Paths to another answer, the quickest first, of which ``Policy`` tries some by default; braking is always the last
 CHAIN = ("cold", "daqp", "osqp", "elastic")
-
 
 #: Buffers that are 0 when a tick begins, and that the tick itself writes
 OWN = ("bend", "curving", "stopped", "shortened")
