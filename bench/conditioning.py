@@ -18,7 +18,7 @@ from rich.console import Console
 import wbc
 from bench.qp.reference import reference
 from bench.sheet import Sheet, us
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import SolverError
 from wbc.explain.past import past_of
 from wbc.qp import make_solver

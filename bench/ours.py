@@ -17,7 +17,7 @@ from bench.problems import Array, Case
 from bench.reference import Referee
 from bench.solids import keep_clear, link_shapes
 from wbc.controller import core_of
-from wbc.controller.tick.native import NativeTick
+from wbc.tick.native import NativeTick
 
 
 class Ours(Contender):

@@ -24,8 +24,8 @@ import wbc
 from bench.pool import ROOT
 from bench.soak.machines import machine
 from bench.soak.stacks import pose
-from wbc.controller import Controller, Stack, core_of
-from wbc.controller.outcome import STATUSES
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.errors import WbcError
 from wbc.export.exporting import RUN, SAME, vectors
 from wbc.export.folder import MARK
@@ -33,6 +33,7 @@ from wbc.export.solver_code import SolverSourceError
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture, WorkspaceBox
+from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 
 #: Exit code where something that is needed is not installed

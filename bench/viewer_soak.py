@@ -24,7 +24,7 @@ from bench.figures import store
 from bench.measured.viewer import watched
 from bench.pool import ROOT
 from bench.sheet import Sheet
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.viewer import Viewer, show
 from wbc.viewer.presets import playground
 

@@ -21,7 +21,8 @@ def closure(name: str, extras: frozenset[str], seen: dict[str, str]) -> None:
             requirement.marker.evaluate({"extra": extra}) for extra in (extras or {""})
         )
         child = canonicalize_name(requirement.name)
-        if not wanted or child in seen:
+        # An extra may ask for others of its own package
+        if not wanted or (child in seen and child != name):
             continue
         seen[child] = metadata.version(child)
         closure(child, frozenset(requirement.extras), seen)

@@ -196,6 +196,11 @@ class ContactForce(Task):
 
     With the target 0 and a small weight, the first values, loads are shared so that the sum of the weighted squares
     of all wrenches is least.
+
+    Inputs:
+        target: in the axes of the frame [N; N m].
+        measured: the same, by a sensor.
+        feedback: k, >= 0 [1].
     """
 
     abstract: ClassVar[bool] = True
@@ -204,7 +209,7 @@ class ContactForce(Task):
     contact: Contact
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``measured``, in the axes of the frame [N; N m], and ``feedback`` [1]."""
+        """``target``, ``measured`` and ``feedback``, see the class."""
         count, unit = self.contact.components, "N, N m" if max(self.contact.axes) >= 3 else "N"
         return (
             Input("target", unit=unit, size=count, default=np.zeros(count)),

@@ -173,6 +173,10 @@ def as_value(declared: Input, numbers: ca.SX) -> ca.SX | Pose:
     return ca.reshape(numbers, 3, 3) if declared.kind == "rotation" else numbers
 
 
+#: Names of the inputs of sensed rows
+SENSED = ("distance", "drift", "line", "side")
+
+
 def sensed(robot: Robot, count: int) -> tuple[Input, ...]:
     """The inputs of ``count`` sensed rows, see :meth:`wbc.tasks.base.Constraint.sensed_rows`."""
     return (

@@ -15,7 +15,7 @@ from __future__ import annotations
 import pytest
 
 from tests import optimised, repeats
-from wbc.controller import stack
+from wbc.api import stack
 from wbc.native import toolchain
 from wbc.stack import artifact, program
 from wbc.stack.artifact import Artifact, compile_stack

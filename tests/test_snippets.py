@@ -15,8 +15,9 @@ from typing import Any
 import pytest
 
 import wbc
+from wbc.api import Controller, Stack
 from wbc.batch import Batch, BatchStep
-from wbc.controller import Controller, Stack, Step
+from wbc.controller import Step
 from wbc.controller.handle import Handle
 from wbc.robot import Robot
 

@@ -30,12 +30,14 @@ if TYPE_CHECKING:
     from wbc import trajectory as trajectory
     from wbc import viewer as viewer
     from wbc import walking as walking
-    from wbc.controller import Certificate, Controller, Policy, Stack, Status, Step
+    from wbc.api import Controller, Stack
+    from wbc.controller import Certificate, Policy, Status, Step
     from wbc.errors import WbcError
     from wbc.explain import Explanation
     from wbc.ik import InverseKinematics, Solution
-    from wbc.record import Recording, replay
-    from wbc.record import Replay as Replay
+    from wbc.record import Recording
+    from wbc.replaying import Replay as Replay
+    from wbc.replaying import replay
 else:
     __getattr__ = lazy.attach(__name__, __file__)
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc import extras
+
 #: Colours by meaning
 BLUE, ORANGE, GREEN, RED, PURPLE, TEAL, GREY = (
     "#1f5fa8",
@@ -53,6 +55,7 @@ SETTINGS: dict[str, Any] = {
 @contextlib.contextmanager
 def pyplot() -> Iterator[Any]:
     """matplotlib.pyplot with these settings, on the back end that draws into files."""
+    extras.require("plots", "a plot")
     import matplotlib
     from cycler import cycler
 

@@ -6,9 +6,9 @@ import wbc
 from bench.measured.ticks import median_us
 from bench.sheet import Sheet, us
 from wbc.controller import core_of
-from wbc.controller.tick.generic import GenericTick
 from wbc.robot import Robot
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Posture
+from wbc.tick.generic import GenericTick
 
 #: Backend -> what runs where
 BACKENDS = {

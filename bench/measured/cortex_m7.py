@@ -29,8 +29,8 @@ from bench.single import (
     ticks_here,
 )
 from tests.export.cases import panda
-from wbc.controller.outcome import STATUSES, Status
 from wbc.export.exporting import vectors
+from wbc.tick.outcome import STATUSES, Status
 
 #: States of the Panda and of a random stack, and random stacks
 COUNT, STATES, STACKS = 500, 300, 18

@@ -13,7 +13,8 @@ from scipy import sparse
 
 from bench.measured.torques import fixed_arm, humanoid, near, two_grips
 from bench.sheet import Sheet, us
-from wbc.controller import Stack, core_of
+from wbc.api import Stack
+from wbc.controller import core_of
 from wbc.qp.problem import QP
 from wbc.qp.solvers.daqp import Daqp
 from wbc.tasks import TorqueLimits

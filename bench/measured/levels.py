@@ -7,7 +7,7 @@ import numpy as np
 import wbc
 from bench.measured.ticks import median_us
 from bench.sheet import Sheet, us
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.tasks import Elbow, EndEffector, JointLimits, Posture
 
 START = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])

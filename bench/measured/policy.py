@@ -12,12 +12,12 @@ import pinocchio as pin
 import wbc
 from bench.measured.ticks import median_us
 from bench.sheet import Sheet, us
-from wbc.controller import Controller, Policy
-from wbc.controller.controller import core_of
+from wbc.api import Controller
+from wbc.controller import Policy, core_of
 from wbc.controller.policy import CHAIN
-from wbc.controller.tick.buffers import UNSOUND
 from wbc.shapes import Sphere
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Obstacle, Posture, SurfaceContact, TorqueLimits
+from wbc.tick.buffers import UNSOUND
 
 TICKS = 200
 #: States of the humanoid, in which contacts, torques and limits have no common answer

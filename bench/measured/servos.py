@@ -12,7 +12,7 @@ import pinocchio as pin
 import wbc
 from bench.pool import ROOT
 from bench.sheet import Sheet
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.servo import Response, Servo
 from wbc.simulation import Command, CommandKind, MujocoPlant

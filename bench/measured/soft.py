@@ -8,7 +8,7 @@ import pinocchio as pin
 import wbc
 from bench.measured.ticks import median_us
 from bench.sheet import Sheet, us
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.tasks import EndEffector, JointLimits, Posture
 
 TIP, DT = "panda_hand_tcp", 0.005

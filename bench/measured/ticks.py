@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from wbc.controller import Controller
+from wbc.api import Controller
 
 
 def median_us(controller: Controller, q: np.ndarray, ticks: int = 1000, turns: int = 5) -> float:

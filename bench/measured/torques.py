@@ -16,7 +16,7 @@ import wbc
 from bench.descriptions import write_urdf
 from bench.prepare import DESCRIPTIONS
 from bench.sheet import Sheet, us
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.robot import Robot
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Posture, RigidGrasp, SurfaceContact, TorqueLimits
 

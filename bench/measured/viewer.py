@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from bench.pool import ROOT
 from bench.sheet import Sheet, us
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.viewer import Viewer, show
 from wbc.viewer.chromium import Chromium, program
 from wbc.viewer.presets import playground

@@ -12,7 +12,8 @@ from bench.soak.judge import Judge, Outside
 from bench.soak.levels import with_levels
 from bench.soak.machines import configuration, machine
 from bench.soak.stacks import DT, provoke, random_stack
-from wbc.controller import Controller, Step
+from wbc.api import Controller
+from wbc.controller import Step
 from wbc.validation import Array
 
 #: Ticks from one start on

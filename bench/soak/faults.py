@@ -15,7 +15,7 @@ from bench.soak.episodes import Plant, episode
 from bench.soak.judge import Judge
 from bench.soak.machines import machine
 from bench.soak.stacks import DT, random_stack
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import RangeError
 from wbc.qp.solvers import daqp
 from wbc.validation import Array

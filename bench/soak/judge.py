@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bench.soak.referee import SAME, distance
-from wbc.controller import Controller, Status, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Status, Step, core_of
 from wbc.explain.past import past_of
 from wbc.robot import Robot
 from wbc.validation import Array

@@ -11,7 +11,8 @@ from bench.soak.episodes import label
 from bench.soak.machines import configuration, machine
 from bench.soak.referee import SAME, distance
 from bench.soak.stacks import DT, pose, weight
-from wbc.controller import Controller, Stack, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture

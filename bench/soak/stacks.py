@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.tasks import (

@@ -10,7 +10,7 @@ import pinocchio as pin
 import wbc
 from bench.soak.machines import machine
 from bench.soak.stacks import DT, pose, weight
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Coupling, Robot
 from wbc.robot.transmission import Transmission
 from wbc.shapes import HalfSpace, Sphere

@@ -13,7 +13,8 @@ from bench.soak.judge import Judge, Outside
 from bench.soak.machines import configuration
 from bench.soak.stacks import DT
 from bench.soak.torque_stacks import followed, provoke, strong, torque_stack
-from wbc.controller import Controller, Status, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Status, Step, core_of
 from wbc.robot import Robot
 from wbc.stack.codegen import row_units
 from wbc.tasks import (

@@ -20,7 +20,7 @@ from bench.soak.known import problems
 from bench.soak.machines import machine
 from bench.soak.stacks import random_stack
 from bench.soak.torques import torques
-from wbc.controller import Controller
+from wbc.api import Controller
 
 
 def wrong(counts: Counter[str]) -> dict[str, int]:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc.robots
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.robot import Robot
 from wbc.tasks import EndEffector, Hold, JointLimits, Posture
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import wbc
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture

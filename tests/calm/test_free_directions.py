@@ -8,7 +8,7 @@ import pytest
 
 import wbc
 from tests.calm.scenes import TIPS, Array, machine
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.tasks import AxisAlign, EndEffector, JointLimits, LookAt, Posture
 
 START = np.array([0.0, -0.3, 0.0, -2.0, 0.0, 1.8, 0.5])

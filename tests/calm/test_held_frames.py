@@ -13,7 +13,7 @@ import pytest
 import wbc.robots
 from tests.calm import held
 from tests.repeats import repeats
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.tasks import (
     Constraint,
     EndEffector,

@@ -7,8 +7,8 @@ from importlib import resources
 
 import pytest
 
-from wbc.controller.tick import reach
 from wbc.ik import descent, search
+from wbc.tick import reach
 
 NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "CORRECTIONS")
 

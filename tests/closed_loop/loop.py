@@ -13,7 +13,7 @@ import wbc
 from tests.closed_loop.eyes import Array, Eyes
 from tests.optimised import ticks
 from tests.tasks.robots import FRAMES, Frames
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.tasks import Item
 

@@ -14,7 +14,8 @@ import wbc
 from tests.evaluation import Numbers, numbers
 from tests.refusals import assert_refused
 from tests.tasks.robots import FRAMES, placement, random_configuration, robot
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.errors import BoundsError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
 from wbc.tasks import AxisCone, GazeCone, Item, JointLimits, Posture, WorkspaceBox, WorkspacePolyhedron
 from wbc.tasks._cone import COINCIDENT

@@ -9,7 +9,7 @@ import pytest
 from tests.constraints.items import tip
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.hold import Hold

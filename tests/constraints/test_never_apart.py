@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 from tests import models
-from wbc.controller import Stack, Status
+from wbc.api import Stack
+from wbc.controller import Status
 from wbc.errors import MissingShapeError
 from wbc.robot import Limits, Robot
 from wbc.robot.pairs.apart import most_apart

@@ -13,7 +13,8 @@ import wbc
 from tests.closed_loop.eyes import Gaps
 from tests.evaluation import random_configuration
 from tests.repeats import repeats
-from wbc.controller import Stack, Status, core_of
+from wbc.api import Stack
+from wbc.controller import Status, core_of
 from wbc.robot import Robot
 from wbc.tasks import EndEffector, JointLimits, Posture
 from wbc.tasks.self_collision import SelfCollision

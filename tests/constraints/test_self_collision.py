@@ -13,7 +13,8 @@ from tests.closed_loop.collisions import ROCK
 from tests.closed_loop.eyes import Gaps
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
-from wbc.controller import Controller, Stack, Status
+from wbc.api import Controller, Stack
+from wbc.controller import Status
 from wbc.errors import (
     DuplicateNameError,
     MissingShapeError,

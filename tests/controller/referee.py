@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.constraints.test_joint_limits import expected as joint_interval
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.shapes import Capsule, Sphere
 from wbc.tasks import (
     CenterOfMass,

@@ -11,7 +11,8 @@ import pinocchio as pin
 import wbc
 from tests.constraints.robots import robot as limited_robot
 from tests.tasks.robots import FRAMES, random_configuration
-from wbc.controller import Controller, Stack, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.native import toolchain
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere

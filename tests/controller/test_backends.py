@@ -12,7 +12,8 @@ import pytest
 from tests.controller.stacks import DT, aim, controller, inside, near_limits, quarrel, randomise
 from tests.repeats import repeats
 from tests.stack.small import stack as small
-from wbc.controller import Controller, Status, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Status, Step, core_of
 from wbc.errors import SolverError
 
 Setup = Callable[[Controller, np.random.Generator], Any]

@@ -12,7 +12,8 @@ import pytest
 import wbc
 from tests.repeats import ALL, MORE, repeats
 from tests.tasks.robots import FRAMES, robot
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.shapes import Box, Capsule, PlacedShape, Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 

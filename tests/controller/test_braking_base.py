@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
-from wbc.controller import Policy, Stack
+from wbc.api import Stack
+from wbc.controller import Policy
 from wbc.tasks import Hold, JointLimits, Posture
 
 DT, LIMIT = 0.01, 20.0

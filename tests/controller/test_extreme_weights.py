@@ -10,7 +10,7 @@ import pytest
 
 import wbc.robots
 from tests.repeats import repeats
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.shapes import Sphere
 from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
 

@@ -15,7 +15,7 @@ from wbc.controller import core_of
 import wbc
 from tests.stack import small
 from wbc.controller.policy import CHAIN
-from wbc.controller.tick.buffers import UNSOUND
+from wbc.tick.buffers import UNSOUND
 from wbc.qp.solvers.backend import Backend
 
 made = [0]

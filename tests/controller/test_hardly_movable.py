@@ -10,7 +10,8 @@ import pytest
 from tests.backends import COMPILED
 from tests.closed_loop.machines import anywhere
 from tests.controller.stacks import FRAMES, robot
-from wbc.controller import Stack, Status
+from wbc.api import Stack
+from wbc.controller import Status
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Limit, Posture
 
 

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from wbc.api import Controller
 from wbc.controller import core_of
-from wbc.controller.controller import Controller
 from wbc.controller.handle import InputGroup
 from wbc.errors import NotFiniteError
 

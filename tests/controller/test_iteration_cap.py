@@ -10,10 +10,11 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import aim, arm, controller, inside, robot
-from wbc.controller import Controller, Status, core_of
+from wbc.api import Controller
+from wbc.controller import Status, core_of
 from wbc.errors import RangeError, SolverError
 from wbc.qp.problem import QP
-from wbc.record import replay
+from wbc.replaying import replay
 
 
 def hard(c: Controller, rng: np.random.Generator) -> np.ndarray:

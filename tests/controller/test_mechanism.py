@@ -11,7 +11,8 @@ import pytest
 import wbc.robots
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
 from wbc.robot.robot import Coupling

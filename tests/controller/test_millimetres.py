@@ -12,7 +12,7 @@ import pytest
 import wbc.robots
 from tests.controller.stacks import DT, FRAMES, inside, near_limits, robot
 from tests.repeats import ALL, MORE
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.robot import Robot
 from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
 from wbc.tasks import (

@@ -6,7 +6,8 @@ import numpy as np
 
 from tests.controller.stacks import controller, near_limits, quarrel, robot
 from tests.optimised import ticks
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 
 
 def optimised(rows: str, tick: str) -> Controller:

@@ -13,14 +13,15 @@ import wbc
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
-from wbc.controller import Controller, Policy, Status, core_of
+from wbc.api import Controller
+from wbc.controller import Policy, Status, core_of
 from wbc.controller.policy import CHAIN
-from wbc.controller.tick.buffers import UNSOUND
 from wbc.errors import DuplicateNameError, ShapeError, SolverError, UnknownNameError
 from wbc.qp import QP, QPSolution, make_solver
 from wbc.qp.certificate import certify
 from wbc.qp.solvers import daqp as daqp_module
 from wbc.tasks import Hold
+from wbc.tick.buffers import UNSOUND
 
 
 @pytest.fixture(scope="module", params=("python", COMPILED))
@@ -162,7 +163,7 @@ def test_recovered_and_braked_ticks_replay(tick: Controller, tmp_path: Path, mon
             tick.policy = Policy()
     found = wbc.replay(tmp_path / "run.npz")
     assert found.identical, str(found)
-    (tick_then, *_) = wbc.record.replayed(wbc.Recording(tmp_path / "run.npz"))
+    (tick_then, *_) = wbc.replaying.replayed(wbc.Recording(tmp_path / "run.npz"))
     assert tick_then.step.answered_by == "policy"
     assert tick.clone().policy == tick.policy
 

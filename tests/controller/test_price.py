@@ -13,7 +13,8 @@ import wbc
 from tests.backends import COMPILED
 from tests.controller.softness import Soft, Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
 from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
 

@@ -9,7 +9,8 @@ import pytest
 
 import wbc
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.errors import RangeError, UnknownNameError
 from wbc.tasks import JointLimits, Posture
 

@@ -12,7 +12,8 @@ import pytest
 
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
-from wbc.controller import Controller, Stack, Status, Step, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, Step, core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Posture, Row, Rows, SacrificeOrder
 

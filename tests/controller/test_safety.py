@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, aim, controller, near_limits, quarrel, random_configuration, robot
 from tests.controller.test_sacrifice import within_actuators
-from wbc.controller import Stack, Status, Step, core_of
+from wbc.api import Stack
+from wbc.controller import Status, Step, core_of
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks import (
     Bounds,

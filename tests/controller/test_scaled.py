@@ -10,7 +10,8 @@ import wbc
 from tests.backends import COMPILED
 from tests.controller.softness import Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.tasks import Damping, Elbow, EndEffector, Hold, JointLimits, Posture
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.stack.small import DT, Q, arm
-from wbc.controller import Controller, Stack, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.shapes import Box, Capsule, PlacedShape
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
 

@@ -11,7 +11,8 @@ import pytest
 
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.errors import RangeError, ShapeError
 from wbc.tasks import Constraint, EndEffector, Fixed, Input, JointLimits, Posture, Row, Rows
 

@@ -10,7 +10,8 @@ import pytest
 from bench.qp.reference import reference
 from tests.controller.stacks import aim, controller, inside
 from tests.qp.problems import quadprog_solution
-from wbc.controller import Controller, Status, core_of
+from wbc.api import Controller
+from wbc.controller import Status, core_of
 from wbc.qp import QPSolution
 
 WEIGHTS = (1.0, 1e-2, 1e-4, 1e-6)

@@ -11,7 +11,8 @@ import pytest
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
 from tests.repeats import ALL, MORE
-from wbc.controller import Controller, Stack, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.qp import QP
 from wbc.tasks import CenterOfMass, Damping, Elbow, EndEffector, Obstacle, Posture
 

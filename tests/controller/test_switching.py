@@ -22,7 +22,8 @@ from tests.evaluation import numbers, sample
 from tests.repeats import covering
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import FRAMES, robot
-from wbc.controller import Controller, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Step, core_of
 from wbc.robot import Robot
 from wbc.tasks import Constraint, EndEffector, Item, JointLimits, Posture
 

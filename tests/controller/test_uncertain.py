@@ -11,14 +11,15 @@ from bench.soak import machines, stacks
 from bench.soak.levels import with_levels
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
-from wbc.controller import Controller, Stack, Status, core_of
-from wbc.controller.tick.buffers import BRAKED, SOLVED, UNSOUND
-from wbc.controller.tick.native import CompiledTick
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.qp.polish import polish
 from wbc.qp.problem import QP, QPSolution
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
+from wbc.tick.buffers import BRAKED, SOLVED, UNSOUND
+from wbc.tick.native import CompiledTick
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link5"
 #: What a step without any other solver reports besides the flags of a tick, as in ``native/tick.h``

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import FRAMES, arm, robot
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import SolverError, UnknownNameError
 from wbc.tasks import Hold
 

@@ -14,7 +14,8 @@ import pytest
 
 from tests.controller.stacks import DT, FRAMES, robot
 from tests.torque.problems import controller
-from wbc.controller import Controller, Stack, Status, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import Status, core_of
 from wbc.errors import SolverError
 from wbc.explain.explanation import Bound, Contradiction, Give, Price, by_item, by_task
 from wbc.explain.naming import Naming

@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 import wbc.robots
 from tests.constraints.robots import robot as limited_robot
 from tests.repeats import ALL, MORE
-from wbc.controller import Controller, Policy, Stack, Step
+from wbc.api import Controller, Stack
+from wbc.controller import Policy, Step
 from wbc.explain.reason import Reason
 from wbc.robot import Robot
 from wbc.shapes import Sphere

@@ -12,7 +12,7 @@ import pinocchio as pin
 import wbc
 from tests.controller.stacks import arm
 from tests.torque.problems import controller as torques
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.shapes import Sphere
 
 TRAP = Path(__file__).with_name("trap.c")

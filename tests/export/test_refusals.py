@@ -19,7 +19,7 @@ import pytest
 
 from tests.export.cases import panda
 from tests.stack import small
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import RangeError, SolverError
 from wbc.export import ExportError, solver_code
 from wbc.export.solver_code import ARCHIVE, SolverSourceError

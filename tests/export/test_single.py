@@ -25,8 +25,8 @@ from bench.single import (
     ticks_here,
 )
 from tests.export.cases import panda
-from wbc.controller.outcome import STATUSES, Status
 from wbc.export.exporting import vectors
+from wbc.tick.outcome import STATUSES, Status
 
 
 @pytest.fixture(scope="module")

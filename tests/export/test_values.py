@@ -13,7 +13,8 @@ import wbc
 from tests.export.cases import CASES, STRICT, build, exported, panda, run
 from tests.repeats import ALL, MORE
 from tests.stack import small
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.export.memory import bytes_of_tick
 from wbc.shapes import Box
 

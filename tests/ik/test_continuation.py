@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import (
     ContinuityError,
     InfeasibleError,

@@ -12,7 +12,8 @@ from scipy.optimize import minimize
 
 import wbc
 from tests.constraints.test_obstacle import coal_pose, coal_shape
-from wbc.controller import Stack, core_of
+from wbc.api import Stack
+from wbc.controller import core_of
 from wbc.ik import Ending, InverseKinematics
 from wbc.ik.timeless import searching, timeless
 from wbc.robot import Robot

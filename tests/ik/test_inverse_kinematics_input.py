@@ -13,7 +13,7 @@ import pytest
 
 import wbc
 from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.ik import InverseKinematics
 from wbc.tasks import Damping, EndEffector, FrameVelocityLimit, JointLimits, Posture, SelfCollision

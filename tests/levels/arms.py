@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.robot import Robot
 from wbc.robots import DHRow, from_dh
 from wbc.shapes import PlacedShape, Sphere

@@ -8,7 +8,8 @@ import pytest
 
 from tests.controller.test_policy import spread
 from tests.levels import arms
-from wbc.controller import Controller, Policy, Status
+from wbc.api import Controller
+from wbc.controller import Policy, Status
 from wbc.controller.policy import CHAIN
 
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])

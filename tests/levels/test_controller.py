@@ -12,7 +12,8 @@ import pytest
 import wbc
 from tests.levels import arms
 from tests.levels.reference import Goal, hierarchy
-from wbc.controller import Controller, Status, core_of
+from wbc.api import Controller
+from wbc.controller import Status, core_of
 from wbc.errors import LevelError
 from wbc.stack.codegen import row_units
 from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Posture

@@ -9,7 +9,8 @@ import pytest
 
 import wbc
 from tests.levels import arms
-from wbc.controller import Controller, Status, Step
+from wbc.api import Controller
+from wbc.controller import Status, Step
 from wbc.errors import SolverError
 from wbc.tasks import Elbow, EndEffector, Fixed, Hold, JointLimits, Posture
 

@@ -20,10 +20,11 @@ from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
-from wbc.record import recorder, replayed
+from wbc.record import recorder
 from wbc.record import recording as files
 from wbc.record.recorder import INPUTS
 from wbc.record.recording import RecordingError, Writer
+from wbc.replaying import replayed
 from wbc.shapes import Box
 from wbc.tasks import Obstacle
 
@@ -423,7 +424,7 @@ def test_a_fork_leaves_the_file_to_its_parent(tmp_path: Path, monkeypatch: pytes
 
 def test_parts_are_all_that_a_tick_reads() -> None:
     """A buffer that is added to the tick must be added to the recording."""
-    from wbc.controller.tick.buffers import OWN, Buffers
+    from wbc.tick.buffers import OWN, Buffers
 
     # the wrenches that are kept are those of stacks that command accelerations
     assert {*INPUTS, "kept"} == set(Buffers.__annotations__) - {"report", "state", *OWN}

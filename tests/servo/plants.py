@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import wbc
 from tests.models import Y, Z, add_chain
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Limits, Robot
 from wbc.simulation import Command, CommandKind, PlantState
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.repeats import repeats
 from tests.servo.plants import DT, HOME, Drives, arm, controller
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.servo import Following, Response, Servo, identify
 from wbc.simulation import Command, CommandKind
 

@@ -12,7 +12,7 @@ import wbc
 from tests.refusals import assert_refused
 from tests.servo.plants import DT, HOME, Drives, arm, controller
 from tests.servo.test_following import follow
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.servo import Following, Response, Servo, identify
 from wbc.servo.laws import Feedback

@@ -11,7 +11,7 @@ from tests.repeats import repeats
 from tests.servo.plants import DT, Drives, arm, controller
 from tests.servo.random_servos import told_beside_untold
 from tests.servo.test_following import follow
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.servo import Following, Response, Servo
 from wbc.servo.servo import DOUBTFUL, LONGEST_DELAY
 from wbc.simulation import CommandKind

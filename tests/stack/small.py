@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import wbc
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.robots import DHRow, from_dh
 from wbc.tasks import EndEffector, JointLimits, Posture
 

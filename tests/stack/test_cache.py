@@ -21,7 +21,7 @@ import pytest
 import wbc
 from tests.repeats import ALL, MORE
 from tests.stack import small
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.native import cache, toolchain
 from wbc.shapes import HalfSpace, PlacedShape, Sphere
 from wbc.stack import artifact

@@ -12,7 +12,7 @@ import pytest
 
 import wbc.robots
 from tests.stack import small
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import (
     DuplicateNameError,
     LevelError,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import wbc.robots
-from wbc.controller import Stack
-from wbc.controller.stack import warn_free_base, warn_no_accelerations
+from wbc.api import Stack
+from wbc.api.stack import warn_free_base, warn_no_accelerations
 from wbc.tasks import Damping, FrameVelocityLimit, Hold, JointLimits, Posture
 
 

@@ -5,9 +5,9 @@ import pytest
 
 import wbc
 from wbc.controller import core_of
-from wbc.controller.tick.generic import GenericTick
 from wbc.robot import Robot
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Obstacle, Posture
+from wbc.tick.generic import GenericTick
 
 
 def stack(levels: bool, soft: bool) -> wbc.Stack:

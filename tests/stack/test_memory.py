@@ -8,11 +8,11 @@ import pytest
 
 from tests.stack import small
 from wbc.controller import core_of
-from wbc.controller.tick.native import NativeTick
 from wbc.errors import CompileError
 from wbc.stack.artifact import compile_stack
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory, structures
+from wbc.tick.native import NativeTick
 
 
 def test_fields_follow_each_other_without_a_gap() -> None:

@@ -13,7 +13,8 @@ import wbc.robots
 from tests.repeats import covering, repeats
 from tests.stack.millimetres import configuration, moved, scaled, velocity
 from tests.stack.small import arm
-from wbc.controller import Controller, Stack, Step
+from wbc.api import Controller, Stack
+from wbc.controller import Step
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxation

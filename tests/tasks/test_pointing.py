@@ -16,7 +16,7 @@ from tests.evaluation import later, numbers, sample, slope
 from tests.refusals import assert_refused
 from tests.tasks.items_pointing import FACTORIES, axes, line_of_sight
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Limits, Robot
 from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum

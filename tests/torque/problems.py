@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc.robots
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.robot import Robot
 from wbc.tasks import (
     CenterOfMass,

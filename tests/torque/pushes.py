@@ -12,7 +12,7 @@ import quadprog
 from scipy.spatial import ConvexHull
 
 import wbc
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.shapes import Box, PlacedShape
 from wbc.simulation import Command, CommandKind, MujocoPlant, mujoco_model

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import quadprog
 
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.tasks import CenterOfMass, EndEffector, PointContact, Posture, RigidGrasp, SurfaceContact

@@ -8,7 +8,7 @@ import pytest
 
 import wbc.robots
 from tests.torque.problems import controller, robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.errors import CommandError, RangeError
 from wbc.robot import Robot
 from wbc.support import braking

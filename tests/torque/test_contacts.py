@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 from tests.torque.problems import DT, controller, robot
 from tests.torque.referee import Referee
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import BoundsError, CommandError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks import EndEffector, PointContact, RigidGrasp, SurfaceContact, TorqueLimits
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import linprog
 
 from tests.torque.problems import DT, robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.errors import BoundsError, CommandError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.tasks import (

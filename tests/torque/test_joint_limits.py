@@ -16,7 +16,8 @@ import wbc.robots
 from tests.repeats import repeats
 from tests.torque.problems import controller, robot
 from tests.torque.referee import acceleration_interval
-from wbc.controller import Stack, core_of
+from wbc.api import Stack
+from wbc.controller import core_of
 from wbc.robot import Coupling, Robot
 from wbc.tasks import JointLimits, Posture
 from wbc.tasks.stopping import allowed_accelerations, stopping_deceleration

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.constraints.robots import with_test_shapes
 from tests.torque.problems import robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, Obstacle, Posture, WorkspaceBox
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.torque.problems import DT, robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.errors import BoundsError, RangeError, ShapeError, UnknownNameError
 from wbc.robot.transmission import Transmission
 from wbc.tasks import DriveTorqueLimits, EndEffector, JointLimits, Posture, TorqueLimits

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from tests.torque.problems import robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.tasks import EndEffector, Posture
 from wbc.tasks.frames import frame_pose
 

@@ -12,7 +12,8 @@ import pytest
 from tests.repeats import repeats
 from tests.torque.pushes import DT, Peer, controller, pushed, stand
 from wbc import Policy
-from wbc.controller import Controller, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Step, core_of
 
 #: How far inside the soles' hull a capture point is that is held [m]
 HELD = 0.04

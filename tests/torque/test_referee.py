@@ -8,7 +8,7 @@ import pytest
 
 from tests.torque.problems import DT, NAMES, controller
 from tests.torque.referee import Referee
-from wbc.controller import Controller
+from wbc.api import Controller
 
 STATES = 4
 #: How far targets are away [m]

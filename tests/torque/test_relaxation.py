@@ -14,7 +14,8 @@ from bench.soak.torque_stacks import strong, torque_stack
 from bench.soak.torques import Needed
 from tests.torque.problems import controller
 from wbc import Status
-from wbc.controller import Controller, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Step, core_of
 
 DATA = Path(__file__).parent / "data"
 

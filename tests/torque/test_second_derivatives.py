@@ -19,7 +19,7 @@ from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.repeats import ALL, MORE
 from tests.tasks.items import FACTORIES
 from tests.tasks.robots import NAMES, random_configuration, robot
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import CommandError
 from wbc.robot import Robot
 from wbc.stack.layout import Block, Layout

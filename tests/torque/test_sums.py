@@ -8,7 +8,7 @@ import pytest
 
 import wbc.robots
 from tests.torque.problems import DT, robot, stack
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import CommandError, DuplicateNameError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks import (
     DivergentComponent,

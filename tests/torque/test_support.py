@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from tests.torque.problems import DT, controller, robot
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.errors import CommandError, RangeError
 from wbc.support import Region, lacking, region
 from wbc.tasks import CenterOfMass, Posture, SupportRegion

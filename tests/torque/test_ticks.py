@@ -12,7 +12,7 @@ import pytest
 
 import wbc
 from tests.torque.problems import DT, controller, robot, stack
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.errors import CommandError
 from wbc.tasks import EndEffector, JointLimits, Posture, RigidGrasp, TorqueLimits, WorkspaceBox
 

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.controller.step import state_of
 from wbc.viewer.link import State
 

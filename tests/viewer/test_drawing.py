@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.controller.step import state_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, PointContact, Posture
 from wbc.viewer.bodies import Mesh

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.viewer.arms import ACCELERATION, DT, fresh
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.errors import WbcError
 from wbc.viewer.messages import RATE_LASTS
 from wbc.viewer.operation import FASTEST, Operation, turned

@@ -15,15 +15,15 @@ from wbc.batch import numbers
 from wbc.batch.batch_step import BatchStep
 from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import Clones, Compiled, Engine, Given
-from wbc.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
-from wbc.controller.tick.buffers import INFINITE
-from wbc.controller.tick.native import NativeTick
 from wbc.controller.together import main_input
 from wbc.errors import RangeError, ShapeError, SolverError
 from wbc.stack.codegen import unit_groups
 from wbc.stack.layout import Slot
 from wbc.tasks.inputs import require_order
+from wbc.tick.buffers import INFINITE
+from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
 #: Most robots, and most threads, of a batch
@@ -45,7 +45,7 @@ class Batch:
         changes: how often anything was changed.
     """
 
-    def __init__(self, controller: Controller, count: int, threads: int | None = None) -> None:
+    def __init__(self, controller: CompiledStack, count: int, threads: int | None = None) -> None:
         core = core_of(controller)
         _require_count("count", count)
         if threads is not None:

@@ -9,10 +9,11 @@ import numpy as np
 
 from wbc import validation
 from wbc.batch.derivatives import Derivatives
-from wbc.controller.outcome import STATUSES, Status
-from wbc.controller.step import Context, Step
+from wbc.controller.step import Step
 from wbc.errors import CommandError, SolverError
 from wbc.stack.layout import CLOSED
+from wbc.tick.context import Context
+from wbc.tick.outcome import STATUSES, Status
 from wbc.validation import Array
 
 #: Place of each status in ``list(Status)``, by the tick's flag

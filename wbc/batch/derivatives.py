@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller.step import Context
-from wbc.controller.tick.native import NativeTick
+from wbc.tick.context import Context
+from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
 #: Displacement by which the QP's own numbers are differentiated, as for a single step

@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from wbc.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.core import Core
-from wbc.controller.tick.buffers import RELAXED, UNSOUND
-from wbc.controller.tick.native import NativeTick
+from wbc.tick.buffers import RELAXED, UNSOUND
+from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
 #: Robots from which on a second thread is worth waking
@@ -72,7 +72,7 @@ class Compiled:
     A tick that its certificate or the policy hands on is done again on a controller of its own, in Python.
     """
 
-    def __init__(self, controller: Controller, count: int, threads: int) -> None:
+    def __init__(self, controller: CompiledStack, count: int, threads: int) -> None:
         self._spare = core_of(controller.clone())
         tick = self._spare.tick
         assert isinstance(tick, NativeTick)
@@ -178,7 +178,7 @@ class Compiled:
 class Clones:
     """A controller of its own for each robot, stepped in Python, one after the other."""
 
-    def __init__(self, controller: Controller, count: int) -> None:
+    def __init__(self, controller: CompiledStack, count: int) -> None:
         self._cores = [core_of(controller.clone()) for _ in range(count)]
 
     def fit(self, given: list[Given]) -> bool:

@@ -1,4 +1,4 @@
-"""``wbc docs``: the pages of tasks and constraints, from their declarations."""
+"""``wbc docs``: the pages of tasks and constraints and the types of their values, from their declarations."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from wbc import pages
 from wbc.cli.bench import ROOT
 from wbc.cli.console import out
 from wbc.errors import WbcError
+from wbc.pages import stub
 
 FOLDER = ROOT / "docs" / "tasks"
 
@@ -26,7 +27,7 @@ def docs(
     """Write what the code declares into the pages of tasks and constraints (needs the repository)."""
     if not folder.is_dir():
         raise DocsError("folder", str(folder), "no such folder; run it from a clone of the repository")
-    names = pages.stale(folder) if check else pages.update(folder)
+    names = pages.stale(folder) + stub.stale() if check else pages.update(folder) + stub.update()
     for name in names:
         out().print(f"{'stale' if check else 'written'}: {name}")
     if check and names:

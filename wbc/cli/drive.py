@@ -18,6 +18,7 @@ from wbc.cli.folders import filled, run_folder
 from wbc.cli.options import Backend
 from wbc.coordinates import Condition, parts
 from wbc.errors import RangeError, UnknownNameError
+from wbc.extras import MissingPackageError
 from wbc.robot import Robot
 from wbc.robots import load
 from wbc.teleop import Keyboard, RateFile, Seen, SessionLog, Teleoperation, run_session
@@ -108,7 +109,7 @@ def _pages(found: SessionLog, session: Teleoperation, folder: Path) -> list[str]
     with filled(folder) as fresh:
         found.write(fresh / LOG, session.robot.dof_names)
         # A session is worth keeping where what draws the page is not installed, and without a tick there is none
-        with contextlib.suppress(ViewerError):
+        with contextlib.suppress(ViewerError, MissingPackageError):
             save_motion(session.robot, found.time, found.q, fresh / REPLAY)
         save_report(session, found, fresh)
     return [name for name in WRITTEN if (folder / name).is_file()]

@@ -50,10 +50,10 @@ def explore(
     from rich.table import Table
 
     from wbc import robots, tasks, validation
+    from wbc.api import Stack
     from wbc.cli.analysis.advise import configuration_of
     from wbc.cli.console import out as console
     from wbc.cli.planning import comma_numbers, given_obstacles, tip_frame
-    from wbc.controller import Stack
     from wbc.errors import ShapeError
     from wbc.explore import Explorer
     from wbc.explore.pictures import save_pieces

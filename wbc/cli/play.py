@@ -9,11 +9,11 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from wbc import extras
 from wbc.cli import viewing
 from wbc.cli.console import err
 from wbc.cli.options import Backend
 from wbc.viewer import run
-from wbc.viewer.beside import require_viser
 from wbc.viewer.local import require_local
 from wbc.viewer.presets import PRESETS, playground
 
@@ -42,7 +42,7 @@ def play(
     backend: Backend = "auto",
 ) -> None:
     """Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."""
-    require_viser()
+    extras.require("viewer", "a page in the browser")
     if zeromq:
         require_local(zeromq)
     begin: Callable[..., None]

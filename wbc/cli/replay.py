@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from wbc import record, validation
+from wbc import record, replaying, validation
 from wbc.cli.console import OutputError, err, out
 from wbc.cli.session import RECORDING, STRIDE
 
@@ -58,7 +58,7 @@ def replay(
                 bar.update(stage, completed=ticks)
 
         chosen = None if backend == BACKENDS[0] else backend
-        found = record.replay(recording, backend=chosen, trust=trust, progress=progress)
+        found = replaying.replay(recording, backend=chosen, trust=trust, progress=progress)
     report(recording, found)
     for note in found.notes:
         console.print(f"[yellow]note[/yellow]: {escape(note)}", soft_wrap=True)
@@ -84,7 +84,7 @@ def save_table(recording: record.Recording, file: Path) -> None:
         raise OutputError("table", str(file), f"cannot be written: {error.strerror}") from error
 
 
-def report(recording: record.Recording, found: record.Replay) -> None:
+def report(recording: record.Recording, found: replaying.Replay) -> None:
     """Print what was replayed and what came of it."""
     about = recording.about
     table = Table(title=f"{about['robot']}: {recording.path}", title_justify="left", title_style="bold")

@@ -14,9 +14,10 @@ from rich.progress import Progress
 from rich.table import Table
 
 from wbc import validation
+from wbc.api import Controller
 from wbc.cli.console import err, out, progress_bar
 from wbc.cli.folders import filled, run_folder
-from wbc.controller import Controller
+from wbc.extras import MissingPackageError
 from wbc.interrupts import interrupts
 from wbc.record.recording import Recording, RecordingError
 from wbc.simulation import Plant
@@ -138,7 +139,6 @@ def _pages(
     out: list[Path] = []
     said: dict[int, str] = {}
     if recorded is not None and len(log):
-        from wbc.viewer.errors import ViewerError
         from wbc.viewer.runs import PAGE_RATE, REPLAY, save_page, sentences_of, states_of
 
         recording = Recording(recorded)
@@ -147,7 +147,7 @@ def _pages(
         if plots:
             bar.update(stage, description="replay page")
             # A run is worth keeping where what draws the page is not installed
-            with contextlib.suppress(ViewerError):
+            with contextlib.suppress(MissingPackageError):
                 out.append(save_page(*states_of(recording, rate=PAGE_RATE), folder / REPLAY))
     return [*out, save_report(log, figures, folder, said)]
 

@@ -11,14 +11,14 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from wbc import robots, validation
+from wbc import extras, robots, validation
 from wbc.cli import viewing
 from wbc.cli.console import err, out
 from wbc.errors import UnknownNameError, nearest
 from wbc.record.recording import Recording
 from wbc.robot import Robot
 from wbc.viewer import run
-from wbc.viewer.beside import require_viser, token_for
+from wbc.viewer.beside import token_for
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.presets import of_robot
 from wbc.viewer.runs import REPLAY, recording_in, save_page, states_of
@@ -41,7 +41,7 @@ def view(
     seconds: viewing.Seconds = None,
 ) -> None:
     """Show a robot with its joints on sliders, or a run with its time on one."""
-    require_viser()
+    extras.require("viewer", "a page in the browser")
     path = pathlib.Path(what)
     if not validation.exists("what", what) and (path.name != what or path.suffix):
         raise ViewerError("what", what, validation.no_such(what, "there is no such file or folder"))

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from wbc.api import Controller, Stack
 from wbc.cli.console import err, out
-from wbc.controller import Controller, Stack
 from wbc.viewer import Viewer
 
 Host = Annotated[

@@ -12,15 +12,9 @@ import pinocchio as pin
 from wbc import validation
 from wbc.controller.escape import Escape
 from wbc.controller.handle import POSE, Directions, Handle
-from wbc.controller.handles import kind_of
 from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
-from wbc.controller.step import Context, Step
-from wbc.controller.tick.buffers import BAD_V, Assembly
-from wbc.controller.tick.generic import generic_tick
-from wbc.controller.tick.native import CompiledTick, NativeTick
-from wbc.controller.tick.solved import SolvedTick
-from wbc.controller.tick.vm import VmAssembly
+from wbc.controller.step import Step
 from wbc.controller.together import Plan, Together
 from wbc.controller.watch import Braking, Watch
 from wbc.errors import SolverError
@@ -29,6 +23,12 @@ from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint, Sensor
+from wbc.tick.buffers import BAD_V, Assembly
+from wbc.tick.context import Context
+from wbc.tick.generic import generic_tick
+from wbc.tick.native import CompiledTick, NativeTick
+from wbc.tick.solved import SolvedTick
+from wbc.tick.vm import VmAssembly
 from wbc.validation import Array
 
 
@@ -100,7 +100,7 @@ class Core:
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self.first: dict[Slot, str] = {}
         self.waiting: dict[Slot, str] = {}
-        self.handles = {name: kind_of(block.entry.item)(self, block) for name, block in layout.blocks.items()}
+        self.handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
         self.together = Together(self.handles, self.assembly)
         #: where a pose waits to be taken, and what takes it
         self._poses: dict[Slot, tuple[memoryview, Callable[[], int]]] = {}

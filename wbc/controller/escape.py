@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.controller import hooks
+from wbc import explain
 from wbc.controller.policy import Fallback
-from wbc.controller.step import Context
-from wbc.controller.tick.buffers import Buffers
+from wbc.tick.buffers import Buffers
+from wbc.tick.context import Context
 from wbc.validation import Array
 
 #: Joints slower than this rest; how fast the way out is gone [rad/s, characteristic lengths per second]; how long [s]
@@ -73,7 +73,7 @@ class Escape:
 
     def _lead(self) -> None:
         before = self._way
-        way: Array | None = hooks.escape(self._snapshot(), self._context, before)
+        way = explain.escape(self._snapshot(), self._context, before)
         self._gone = 0.0 if before is None else self._gone + float(self._tick.dt[0])
         late = self._gone > _LONGEST
         if way is None or late or not self._fallback.lead(way, _SPEED):

@@ -11,13 +11,14 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.ramps import Ramps
-from wbc.controller.tick.buffers import Buffers
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.tasks import inputs
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
+from wbc.tasks.base import Item
+from wbc.tick.buffers import Buffers
 from wbc.validation import LARGEST, Array
 
 _ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
@@ -95,7 +96,7 @@ class Handle:
     _robot: Robot
     _row_weights: Array
     _weight: float
-    # For type checkers; the methods below answer. Values of items: see wbc/controller/handles.py
+    # For type checkers; the methods below answer. Values of items: see handles.pyi
     enabled: bool
     mask: Any
 
@@ -274,6 +275,10 @@ class Handle:
                 lower, upper = (numbers.get(s.input.name, p[s.span]) for s in (low, high))
                 reason = f"{low.input.name} is above {high.input.name}"
                 inputs.require_order(self._field(name), lower, upper, reason)
+
+    def is_of(self, kind: type[Item]) -> bool:
+        """Whether its item is of a class."""
+        return isinstance(self._block.entry.item, kind)
 
     @property
     def item_name(self) -> str:

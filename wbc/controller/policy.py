@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wbc import validation
-from wbc.controller.tick.buffers import (
+from wbc.errors import DuplicateNameError, ShapeError
+from wbc.qp.factor import load
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.memory import Memory
+from wbc.tick.buffers import (
     BRAKED,
     CHAIN,
     CHAIN_BRAKED,
@@ -19,14 +24,9 @@ from wbc.controller.tick.buffers import (
     UNSOUND,
     Assembly,
 )
-from wbc.controller.tick.elastic import ElasticTick
-from wbc.controller.tick.native import CompiledTick
-from wbc.controller.tick.solved import SolvedTick
-from wbc.errors import DuplicateNameError, ShapeError
-from wbc.qp.factor import load
-from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Layout
-from wbc.stack.memory import Memory
+from wbc.tick.elastic import ElasticTick
+from wbc.tick.native import CompiledTick
+from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
 #: What to do with rows that cannot all hold

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wbc.controller import hooks
-from wbc.controller.outcome import (
+from wbc import explain
+from wbc.errors import CommandError
+from wbc.explain import Explanation
+from wbc.qp.certificate import Certificate
+from wbc.stack.declaration import bends
+from wbc.stack.layout import CLOSED, rate_unit
+from wbc.tick.buffers import INFINITE
+from wbc.tick.context import Context
+from wbc.tick.outcome import (
     ANSWERED,
     STATUSES,
     Binding,
@@ -21,45 +26,7 @@ from wbc.controller.outcome import (
     certificates,
     scales,
 )
-from wbc.controller.tick.buffers import INFINITE, Assembly
-from wbc.errors import CommandError
-from wbc.qp.certificate import Certificate
-from wbc.stack.declaration import Declaration, bends
-from wbc.stack.layout import CLOSED, Block, Layout, rate_unit
-from wbc.stack.memory import Memory
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.explain.explanation import Explanation
-
-
-class Context:
-    """What all steps of a controller share: names and offsets."""
-
-    def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
-        self.stack, self.layout, self.assembly = stack, layout, assembly
-        self.nv, self.command = layout.nv, layout.command
-        self.memory = Memory(layout)
-        self.flag_offset = 8 * self.memory.flag
-
-    def __getstate__(self) -> dict[str, Any]:
-        # the memory of a process; a step from a pickle tells everything but its explanation
-        return vars(self) | {"assembly": None}
-
-    def variable(self, number: int) -> str:
-        """Name of a variable of the QP."""
-        return self.stack.robot.dof_names[number] if number < self.nv else self.layout.variable(number)[0]
-
-    @cached_property
-    def general(self) -> list[tuple[Block, int]]:
-        """(block, row within it) of every general row."""
-        return [(b, k) for b in self.layout.of_form("margins", "rows") for k in range(len(b.rows))]
-
-    @cached_property
-    def bounds(self) -> list[Block]:
-        """Bound blocks by number."""
-        return self.layout.of_form("bounds")
-
 
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
@@ -274,8 +241,7 @@ class Step:
         Raises:
             SolverError: the step comes from a pickle, which holds no code to set its tick up with.
         """
-        explanation: Explanation = hooks.explain(self._data, self._context, str(self.status), self.answered_by)
-        return explanation
+        return explain.explain(self._data, self._context, str(self.status), self.answered_by)
 
     def derivative(self, name: str, value: str | None = None) -> Array:
         """dv/dx [nv, k], how the command moves with what the tick was given, as long as the same rows bind.
@@ -291,8 +257,7 @@ class Step:
             UnknownNameError: no such item or value.
             SolverError: the step comes from a pickle, rows gave way, or there is no optimum.
         """
-        found: Array = hooks.derivative(self._data, self._context, name, value)
-        return found
+        return explain.derivative(self._data, self._context, name, value)
 
     def __repr__(self) -> str:
         text = f"Step({self.status}, |v| = {np.linalg.norm(self.v):.4g}"

@@ -9,9 +9,9 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.handle import POSE, Handle
-from wbc.controller.tick.buffers import Assembly
 from wbc.errors import ShapeError
 from wbc.stack.layout import Slot
+from wbc.tick.buffers import Assembly
 
 _POSE_SHAPE = (4, 4)
 

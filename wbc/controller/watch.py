@@ -9,14 +9,14 @@ import numpy as np
 
 from wbc.controller.handle import Handle
 from wbc.controller.policy import Fallback
-from wbc.controller.tick.buffers import BRAKED, CHAIN_BRAKED, POLICY_BRAKED, UNSOUND, Buffers
-from wbc.controller.tick.reach import BRAKING_MARGIN
 from wbc.proximity.missing import INWARD, TOO_MUCH
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.tables import brakes
 from wbc.tasks.base import Sensor
+from wbc.tick.buffers import BRAKED, CHAIN_BRAKED, POLICY_BRAKED, UNSOUND, Buffers
+from wbc.tick.reach import BRAKING_MARGIN
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")

@@ -5,8 +5,8 @@ What works that out is imported when somebody asks.
 
 from __future__ import annotations
 
-from wbc.controller.step import Context
 from wbc.explain.explanation import Explanation
+from wbc.tick.context import Context
 from wbc.validation import Array
 
 __all__ = ["Explanation", "derivative", "escape", "explain"]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.outcome import certificates, scales
-from wbc.controller.tick.buffers import BENDS
 from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Residue
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
@@ -14,6 +12,8 @@ from wbc.explain.reasons import reasons
 from wbc.qp.conflict import TOLERANCE, Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block, rate_unit
+from wbc.tick.buffers import BENDS
+from wbc.tick.outcome import certificates, scales
 from wbc.validation import Array
 
 _NONE = Residue(np.inf, "", "")

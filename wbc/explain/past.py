@@ -8,10 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.controller.step import Context
-from wbc.controller.tick.buffers import Assembly
-from wbc.controller.tick.solved import SolvedTick
-from wbc.controller.tick.vm import VmAssembly
 from wbc.errors import SolverError
 from wbc.qp.levels.hierarchy import Hierarchy, LevelsAnswer
 from wbc.qp.levels.sensitivity import FrozenLevels
@@ -22,6 +18,10 @@ from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
 from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
+from wbc.tick.buffers import Assembly
+from wbc.tick.context import Context
+from wbc.tick.solved import SolvedTick
+from wbc.tick.vm import VmAssembly
 from wbc.validation import Array
 
 

@@ -8,8 +8,7 @@ import pathlib
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.controller import Controller, core_of
-from wbc.controller.outcome import STATUSES, Status
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.step import Step
 from wbc.errors import RangeError
 from wbc.export.folder import checked_folder, write
@@ -17,6 +16,7 @@ from wbc.export.snapshot import Snapshot
 from wbc.robot import Robot
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Task
+from wbc.tick.outcome import STATUSES, Status
 from wbc.validation import Array
 
 #: Ticks from one configuration on before the next is drawn
@@ -33,7 +33,7 @@ SAME, SIMILAR = 1e-9, 1e-6
 
 
 def export(
-    controller: Controller,
+    controller: CompiledStack,
     folder: str | os.PathLike[str],
     overwrite: bool,
     solver_source: bool | str | os.PathLike[str],
@@ -69,7 +69,7 @@ def export(
     return write(snapshot, folder, overwrite, solver_source)
 
 
-def vectors(controller: Controller, count: int, seed: int = 0) -> Array:
+def vectors(controller: CompiledStack, count: int, seed: int = 0) -> Array:
     """States row by row: q, v measured, the run-time inputs, flag, command.
 
     Short runs of the controller from random configurations within the joints' ranges, with targets near the hand and
@@ -110,7 +110,7 @@ def _configuration(robot: Robot, rng: np.random.Generator) -> Array:
     return q
 
 
-def _vary(controller: Controller, q: Array, rng: np.random.Generator) -> None:
+def _vary(controller: CompiledStack, q: Array, rng: np.random.Generator) -> None:
     """Inputs of another moment: what follows the configuration is where q has it, the rest near where it was."""
     core = core_of(controller)
     for name, block in core.layout.blocks.items():

@@ -9,8 +9,6 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller.tick.buffers import Assembly
-from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
 from wbc.qp.factor import load
 from wbc.qp.problem import QP
@@ -18,6 +16,8 @@ from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
+from wbc.tick.buffers import Assembly
+from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
 #: As in ``native/converge.h``

@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.core import Core
 from wbc.controller.handle import Handle
 from wbc.controller.step import Step
-from wbc.controller.tick.buffers import Assembly
-from wbc.controller.tick.native import NativeTick
-from wbc.controller.tick.solved import SolvedTick
 from wbc.ik.descent import Search
 from wbc.ik.search import FOUND, NativeSearch, Query, SearchResult
 from wbc.ik.solution import Ending
@@ -24,6 +21,9 @@ from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.tables import stops
 from wbc.tasks.base import Constraint, Sensor
+from wbc.tick.buffers import Assembly
+from wbc.tick.native import NativeTick
+from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
 #: How far constraints may be off at an answer [m, rad, or the margin's unit]
@@ -72,7 +72,7 @@ class Engine:
     def __init__(self, stack: Declaration, goals: Iterable[str] | None, backend: str) -> None:
         self.goals = chosen_goals(stack, goals)
         self.stack = timeless(stack)
-        self.controller: Controller = searching(self.stack, backend)
+        self.controller: CompiledStack = searching(self.stack, backend)
         hasten(self.controller)
         self.core = core_of(self.controller)
         layout, tick = self.core.layout, self.core.tick

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller import core_of
+from wbc.controller.compiled_stack import core_of
 from wbc.controller.handles import Handles
-from wbc.controller.tick.native import NativeTick
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.branches import Branches, branches
 from wbc.ik.continuation import PathBranch, branch
@@ -24,6 +23,7 @@ from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
 from wbc.ik.solution import Batch, Ending, Solution
 from wbc.ik.timeless import TICK
 from wbc.stack.declaration import Declaration
+from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
 #: Share of the time that is kept for the question which goals contradict each other

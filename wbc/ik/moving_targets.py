@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import ShapeError
 from wbc.robot import Robot
 from wbc.tasks.base import Input
@@ -35,7 +35,7 @@ class MovingTargets:
             coordinates. WbcError: a target that is none.
     """
 
-    def __init__(self, controller: Controller, targets: Mapping[str, Any], s: Array) -> None:
+    def __init__(self, controller: CompiledStack, targets: Mapping[str, Any], s: Array) -> None:
         self._p = core_of(controller).tick.p
         targets = validation.mapping("targets", targets, "tasks to targets")
         #: between neighbouring coordinates all targets go straight

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.controller.tick.native import NativeTick
+from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
 #: How a search ended, as in ``native/converge.h``

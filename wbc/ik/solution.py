@@ -8,8 +8,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from wbc.controller.outcome import Binding, Residual
 from wbc.controller.step import Step
+from wbc.tick.outcome import Binding, Residual
 from wbc.validation import Array
 
 

@@ -8,8 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from wbc import validation
-from wbc.controller.controller import Controller, core_of
-from wbc.controller.stack import Stack
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import LevelError, RangeError
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
@@ -27,7 +26,7 @@ LONGEST = 1.0
 FIRST = 1e8
 
 
-def timeless(stack: Declaration) -> Stack:
+def timeless(stack: Declaration) -> Declaration:
     """The same items on joints that may move by :data:`LONGEST` a tick, without accelerations; always calm.
 
     Raises:
@@ -44,7 +43,7 @@ def timeless(stack: Declaration) -> Stack:
     scales = np.array([stack.length if u == "m" else 1.0 for u in stack.robot.dof_units])
     robot = stack.robot.with_limits(velocity=LONGEST / TICK * scales, acceleration=np.inf)
     # dt_range ends at twice the declared step
-    out = Stack(robot, 0.5 * TICK, damping=stack.damping, length=stack.length)
+    out = Declaration(robot, 0.5 * TICK, damping=stack.damping, length=stack.length)
     for entry in stack.entries:
         item = entry.item
         if isinstance(item, JointLimits):
@@ -55,7 +54,7 @@ def timeless(stack: Declaration) -> Stack:
     return out
 
 
-def searching(stack: Stack, backend: str) -> Controller:
+def searching(stack: Declaration, backend: str) -> CompiledStack:
     """The stack's controller, with inverse kinematics in its library; :meth:`Stack.compile` leaves that out.
 
     Raises:
@@ -63,10 +62,10 @@ def searching(stack: Stack, backend: str) -> Controller:
     """
     from wbc import __version__
 
-    return Controller(stack, compile_stack(stack, backend, __version__, search=True), "daqp")
+    return CompiledStack(stack, compile_stack(stack, backend, __version__, search=True), "daqp")
 
 
-def hasten(controller: Controller) -> None:
+def hasten(controller: CompiledStack) -> None:
     """Errors and margins are corrected in one tick; limits of speed are off, which mean nothing without time."""
     for entry in controller.stack.entries:
         handle, item = controller[entry.name], entry.item
@@ -99,7 +98,7 @@ def chosen_goals(stack: Declaration, goals: Iterable[str] | None) -> tuple[str, 
     return chosen
 
 
-def goal_rows(controller: Controller, goals: Iterable[str]) -> Array:
+def goal_rows(controller: CompiledStack, goals: Iterable[str]) -> Array:
     """1 for the task rows of goals, 0 for those of secondary tasks."""
     out = np.zeros(core_of(controller).layout.task_rows)
     for name in goals:

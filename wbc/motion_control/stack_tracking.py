@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, measured
 from wbc.robot import Robot
 from wbc.tasks import JointLimits, Posture, TorqueLimits

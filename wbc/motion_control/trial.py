@@ -82,7 +82,7 @@ def make_plant(kind: str, robot: Robot, dt: float) -> TorquePlant:
     """A plant of :data:`PLANTS` with steps that divide a control period [s].
 
     Raises:
-        UnknownNameError: no such plant. ModuleNotFoundError: ``pip install wbc[mujoco]`` is to be done.
+        UnknownNameError: no such plant. MissingPackageError: MuJoCo is not installed.
     """
     step = dt / max(1, int(np.ceil(dt / PLANT_STEP - 1e-9)))
     if validation.one_of("plant", kind, PLANTS) == "pinocchio":

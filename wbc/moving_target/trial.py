@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller import Controller, Stack
+from wbc.api import Controller, Stack
 from wbc.estimation import DropoutPolicy, FrameMotion
 from wbc.moving_target.knowledge import Knowledge, Known, Measurement
 from wbc.moving_target.motions import Motion

@@ -56,9 +56,14 @@ def read(cls: type) -> Docstring:
     if not opening:
         raise PageError(where, "", "expected a first sentence and a formula, indented by four")
     attributes, _ = _entries(_section(lines, "Attributes"))
-    inputs, rest = _entries(_section(lines, "Inputs"))
+    inputs, rest = inputs_of(cls)
     other = re.split(r"\. |, and", rest)[0].rstrip(".")
     return Docstring(opening, _resolved(attributes), inputs, other)
+
+
+def inputs_of(cls: type) -> tuple[dict[str, str], str]:
+    """The section Inputs of a class: name -> text, and what belongs to no name."""
+    return _entries(_section((inspect.getdoc(cls) or "").splitlines(), "Inputs"))
 
 
 def markdown(text: str) -> str:

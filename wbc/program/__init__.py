@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wbc import lazy
+from wbc import extras, lazy
 
 if TYPE_CHECKING:
     from wbc.program.hand import Gripper
@@ -48,6 +48,9 @@ __all__ = [
     "Retreat",
     "Runner",
 ]
+
+
+extras.require("programs", "a program of steps")
 
 
 def __dir__() -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.program.reference import HandReference
 from wbc.tasks import EndEffector
 from wbc.tasks.frames import frame_pose

@@ -13,7 +13,7 @@ from py_trees.common import Status
 from py_trees.composites import Selector
 from py_trees.composites import Sequence as InOrder
 
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.program import steps
 from wbc.program.hand import Gripper, ProgramHand
 from wbc.program.steps import AnyStep, Guard

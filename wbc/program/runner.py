@@ -13,7 +13,7 @@ from py_trees.common import Status
 from py_trees.display import unicode_tree
 
 from wbc import validation
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.program import leaves, steps
 from wbc.program.hand import Gripper, ProgramHand
 from wbc.program.steps import Guard, Program

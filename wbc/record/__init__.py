@@ -1,7 +1,6 @@
-"""Recordings of ticks and their replay (floor 7)."""
+"""Recordings of ticks (floor 9)."""
 
 from wbc.record.recorder import Recorder, record
 from wbc.record.recording import Recording, RecordingError
-from wbc.record.replaying import Replay, replay, replayed
 
-__all__ = ["Recorder", "Recording", "RecordingError", "Replay", "record", "replay", "replayed"]
+__all__ = ["Recorder", "Recording", "RecordingError", "record"]

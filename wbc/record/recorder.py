@@ -16,7 +16,7 @@ from importlib import metadata
 from typing import Any
 
 from wbc import validation
-from wbc.controller.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.record.recording import FORMAT, RecordingError, Writer
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
@@ -58,7 +58,7 @@ class Recorder:
         count: ticks so far. Refused inputs are no tick.
     """
 
-    def __init__(self, controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> None:
+    def __init__(self, controller: CompiledStack, path: str | os.PathLike[str], overwrite: bool) -> None:
         self.path = validation.file_path("path", path)
         self.count = 0
         self._core = core = core_of(controller)
@@ -175,14 +175,14 @@ def _recorded(recorder: Recorder) -> int:
     return flag
 
 
-def record(controller: Controller, path: str | os.PathLike[str], overwrite: bool) -> Recorder:
+def record(controller: CompiledStack, path: str | os.PathLike[str], overwrite: bool) -> Recorder:
     """See :meth:`wbc.Controller.record`."""
     if (other := core_of(controller).recording) is not None:
         raise RecordingError("path", str(path), f"the controller records into {other} already")
     return Recorder(controller, path, validation.flag("overwrite", overwrite))
 
 
-def about(controller: Controller) -> dict[str, Any]:
+def about(controller: CompiledStack) -> dict[str, Any]:
     """What a recording says about its controller, besides the sizes of a tick's parts."""
     from wbc import __version__
 
@@ -203,7 +203,7 @@ def about(controller: Controller) -> dict[str, Any]:
     }
 
 
-def names(controller: Controller) -> dict[str, Any]:
+def names(controller: CompiledStack) -> dict[str, Any]:
     """What the numbers of a tick are: [name, unit] of each coordinate, command and other variable; [item, row, unit] of
     each residual and margin; [item, input, first, end, unit] of each input, which are places in ``p``.
     """

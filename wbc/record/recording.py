@@ -28,8 +28,8 @@ from typing import IO, Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller.outcome import STATUSES
 from wbc.errors import WbcError
+from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 
 #: Of what is written, and of what is read: 2 has no names, residuals and margins

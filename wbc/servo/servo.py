@@ -11,7 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller, Step
+from wbc.controller import Step
+from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
 from wbc.servo.laws import Feedback, quickness
 from wbc.servo.response import ENOUGH, PER_JOINT, SHOWN, Identification, Response
@@ -128,7 +129,7 @@ class Servo:
 
     def __init__(
         self,
-        controller: Controller,
+        controller: CompiledStack,
         kind: str | CommandKind,
         *,
         response: Response | None = None,
@@ -138,7 +139,7 @@ class Servo:
         damping: Any = 0.0,
     ) -> None:
         self.kind = CommandKind(validation.one_of("kind", str(kind), [str(one) for one in CommandKind]))
-        validation.instance("controller", controller, Controller, "a compiled stack")
+        validation.instance("controller", controller, CompiledStack, "a compiled stack")
         self.controller, self._robot, self._dt = controller, controller.stack.robot, controller.stack.dt
         self._model, nv = self._robot.model, self._robot.nv
         if self._robot.base != "fixed":

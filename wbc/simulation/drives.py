@@ -86,7 +86,7 @@ def driven(name: str, robot: Robot, time_step: float = 0.001) -> Plant | None:
 
     Raises:
         UnknownNameError: no such plant. RangeError: a robot without masses, or whose base moves.
-        ModuleNotFoundError: MuJoCo is not installed.
+        MissingPackageError: MuJoCo is not installed.
     """
     from wbc.simulation.mujoco_model import mujoco_model
     from wbc.simulation.mujoco_plant import MujocoPlant

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
@@ -46,6 +46,7 @@ def mujoco_spec(
     Raises:
         As of :func:`mujoco_model`.
     """
+    extras.require("mujoco", "a MuJoCo model")
     import mujoco
 
     robot = checked_robot(robot)
@@ -99,7 +100,7 @@ def mujoco_model(
         drawn: whether the robot's own shapes are in it, to be seen; they weigh and touch nothing.
 
     Raises:
-        ModuleNotFoundError: ``pip install wbc[mujoco]`` is to be done.
+        MissingPackageError: MuJoCo is not installed.
         UnsupportedJointError: a joint that MuJoCo has none for: planar and helical ones, and composites.
         RangeError: inertias that MuJoCo refuses, and why; a time step or a friction out of range.
         UnknownNameError: no such kind of actuator, or frame.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from wbc import extras
 from wbc.errors import RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.mujoco_joints import MujocoJoints
@@ -56,12 +57,13 @@ class MujocoPlant:
         data: of the simulation, ``mujoco.MjData``, for what else a program wants to read or to push.
 
     Raises:
-        ModuleNotFoundError: ``pip install wbc[mujoco]`` is to be done.
+        MissingPackageError: MuJoCo is not installed.
         WbcError: as of :class:`wbc.robots.MujocoJoints`.
         RangeError: no actuator that drives a joint of the robot.
     """
 
     def __init__(self, model: mujoco.MjModel, robot: Robot) -> None:
+        extras.require("mujoco", "MuJoCo as a plant")
         import mujoco
 
         self._step, self._forward, self._clear = mujoco.mj_step, mujoco.mj_forward, mujoco.mj_resetData

@@ -2,7 +2,7 @@
 
 All numbers here are doubles. First comes the report, then what the caller writes: a step copies both in one piece. Then
 comes what solvers in Python read of the QP, and behind it what only C knows (``native/tick.h``). A library says where
-each field is in its memory, and :class:`wbc.controller.tick.native.NativeTick` refuses one that differs.
+each field is in its memory, and :class:`wbc.tick.native.NativeTick` refuses one that differs.
 """
 
 from __future__ import annotations

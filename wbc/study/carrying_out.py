@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.errors import SolverError, WbcError
 from wbc.study.declaration import Study
 from wbc.study.kept import Done, Kept
@@ -134,11 +134,10 @@ def _done(future: Any) -> Done:
 @contextmanager
 def connected(workers: int | None, address: str | None) -> Iterator[Any]:
     """A client of a cluster, which is made and ended where no address is given."""
-    try:
-        import dask
-        import distributed
-    except ImportError as error:
-        raise SolverError("workers", workers, "needs dask.distributed: pip install 'wbc[cluster]'") from error
+    extras.require("cluster", "a study on several workers")
+    import dask
+    import distributed
+
     settings = {
         "distributed.scheduler.allowed-failures": LOSSES,
         # Lost workers are expected, and the counts say what came of it

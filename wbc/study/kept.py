@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from wbc import extras
 from wbc.errors import BusyError, RangeError, RobotFileError
 from wbc.study.declaration import Study
 from wbc.study.scenario import Row, Trial
@@ -104,6 +105,7 @@ class Kept:
         Raises:
             RobotFileError: it cannot be written.
         """
+        extras.require("recordings", RESULTS)
         import pyarrow as pa
         import pyarrow.parquet as pq
 

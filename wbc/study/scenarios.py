@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import robots, validation
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import RangeError
 from wbc.tasks import EndEffector, JointLimits
 from wbc.validation import Array

@@ -29,7 +29,7 @@ from scipy.optimize import linprog
 from scipy.sparse.csgraph import connected_components
 
 from wbc import validation
-from wbc.controller import Controller
+from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import CommandError, RangeError
 from wbc.robot import Robot
 from wbc.support.statics import Rows, Statics, least_lack
@@ -64,7 +64,7 @@ class Braking:
 
 
 def braking(
-    robot: Robot | Controller,
+    robot: Robot | CompiledStack,
     q: Any = None,
     *,
     share: float = 0.95,
@@ -98,7 +98,7 @@ def braking(
     count, rate = validation.integer("samples", samples, low=1), validation.scalar("speed", speed, low=0.0, high=1.0)
     part = validation.scalar("share", share, low=0.0, high=1.0, open_low=True)
     random = np.random.default_rng(validation.integer("seed", seed))
-    if isinstance(robot, Controller):
+    if isinstance(robot, CompiledStack):
         far = validation.scalar("spread", spread, low=0.0)
         return _WithContacts(robot, q, part, rate, far).search(random, count)
     if robot.base != "fixed":
@@ -153,7 +153,7 @@ def _pace(random: np.random.Generator, count: int, k: int) -> Array:
 class _WithContacts:
     """The linear programs of one controller: variables (a, w) in units of their sizes, then s."""
 
-    def __init__(self, controller: Controller, q: Any, share: float, speed: float, spread: float) -> None:
+    def __init__(self, controller: CompiledStack, q: Any, share: float, speed: float, spread: float) -> None:
         if q is None:
             raise CommandError("q", q, "give the configuration about which the contacts stay")
         self._rows = Rows(controller)

@@ -21,7 +21,7 @@ import pinocchio as pin
 from scipy.optimize import linprog
 
 from wbc import validation
-from wbc.controller import Controller, core_of
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import CommandError, RangeError
 from wbc.support.statics import Statics, statics
 from wbc.validation import Array
@@ -108,7 +108,7 @@ class Region:
         panel.set_ylabel("y [m]")
 
 
-def region(controller: Controller, q: Any, *, torque: bool = True, tolerance: float = 1e-5) -> Region:
+def region(controller: CompiledStack, q: Any, *, torque: bool = True, tolerance: float = 1e-5) -> Region:
     """The region of the contacts of a controller at a configuration.
 
     Args:

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from wbc.controller import Controller, core_of
-from wbc.controller.tick.buffers import INFINITE, Assembly
+from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import CommandError, SolverError
 from wbc.stack.layout import Slot
 from wbc.tasks._contact import ContactWrench, Unactuated
 from wbc.tasks.base import Constraint
 from wbc.tasks.wrench_sum import WrenchSum
+from wbc.tick.buffers import INFINITE, Assembly
 from wbc.validation import Array
 
 #: What is lacking counts from this share of a row's size on
@@ -72,7 +72,7 @@ class Rows:
             these are as in :class:`Statics`. held: of equalities on motions. scale: of all variables of the QP.
     """
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: CompiledStack) -> None:
         core = core_of(controller)
         if core.layout.command != "torque":
             reason = f'this controller commands {core.layout.command}; compile the stack with command="torque"'
@@ -141,7 +141,7 @@ class Rows:
         return qp.A.copy(), lower, upper
 
 
-def statics(controller: Controller, q: Any) -> Statics:
+def statics(controller: CompiledStack, q: Any) -> Statics:
     """The rows at a configuration.
 
     Raises:
@@ -156,7 +156,7 @@ def statics(controller: Controller, q: Any) -> Statics:
     return Statics(A[at, nv:], lower[at], upper[at], rows.sizes, rows.base, rows.torques, rows.names, scale)
 
 
-def lacking(controller: Controller, q: Any) -> tuple[Lacking, ...]:
+def lacking(controller: CompiledStack, q: Any) -> tuple[Lacking, ...]:
     """What contacts and motors lack to hold the robot at rest at a configuration, the worst first; empty where they
     can.
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.errors import WbcError
 from wbc.validation import Array
 
@@ -87,6 +87,7 @@ def _write(log: Log, folder: pathlib.Path, kind: str, file: pathlib.Path) -> Non
         with fresh.open("wb") as stream:
             np.savez_compressed(stream, allow_pickle=False, **arrays)
     else:
+        extras.require("recordings", "a log of kind parquet")
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -131,6 +132,7 @@ def _read_npz(path: pathlib.Path) -> tuple[dict[str, np.ndarray], str]:
 
 
 def _read_parquet(path: pathlib.Path) -> tuple[dict[str, np.ndarray], str]:
+    extras.require("recordings", "a log of kind parquet")
     import pyarrow.parquet as pq
 
     table = pq.read_table(path)

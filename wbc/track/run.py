@@ -20,7 +20,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller, Status, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Status, Step, core_of
 from wbc.shapes import Sphere
 from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import shapes, tasks, validation
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import ShapeError, WbcError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.continuation import Tracker
 from wbc.ik.engine import Engine

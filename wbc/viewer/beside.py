@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import json
 import logging
 import os
@@ -13,8 +12,9 @@ import sys
 import webbrowser
 from typing import IO
 
-from wbc import validation
-from wbc.controller import Controller, Step, core_of
+from wbc import extras, validation
+from wbc.api import Controller
+from wbc.controller import Step, core_of
 from wbc.controller.step import state_of
 from wbc.errors import WbcError
 from wbc.viewer import messages
@@ -201,10 +201,11 @@ def show(
         silence: while somebody has control, the robot stops where their page, or the viewer, is silent for so long [s].
 
     Raises:
-        ViewerError: viser is not installed, the stack cannot be pickled, or the process did not start.
+        MissingPackageError: viser is not installed.
+        ViewerError: the stack cannot be pickled, or the process did not start.
     """
     validation.instance("controller", controller, Controller, "a wbc Controller")
-    require_viser()
+    extras.require("viewer", "a page in the browser")
     name = validation.name("host", host)
     longest = validation.scalar("silence", silence, low=0.1, unit="s")
     number = validation.integer("port", port, 0, 65535)
@@ -219,12 +220,6 @@ def show(
 def token_for(host: str) -> str | None:
     """A new token where others than this machine can connect."""
     return None if host in LOOPBACK else os.urandom(16).hex()
-
-
-def require_viser() -> None:
-    """Raise :class:`ViewerError` where viser is not installed."""
-    if importlib.util.find_spec("viser") is None:
-        raise ViewerError("viewer", "viser", "is not installed: pip install 'wbc[viewer]'")
 
 
 def _pickled(controller: Controller) -> bytes:

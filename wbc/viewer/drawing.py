@@ -10,7 +10,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.robot import Robot
 from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.rotations import TO_MUJOCO, quaternion

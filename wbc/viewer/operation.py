@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.controller.handle import Handle
-from wbc.controller.handles import TaskHandle
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
@@ -169,10 +169,7 @@ class Operation:
             self._rates.pop(name, None)
         handle.set(**inputs)
         for value, number in others.items():
-            if value == "enabled":
-                handle.switch(number)
-            else:
-                _task(handle).weight = number
+            setattr(handle, value, number)
 
     def _rate_of(self, handle: Handle, sent: Any) -> Array:
         slots = self._core.layout.blocks[handle.item_name].slots
@@ -238,11 +235,6 @@ class Operation:
 def _owner(kind: str) -> str:
     """Who obeys a message that a stack does not."""
     return "only a walk obeys it" if kind in WALKED else "only an arm that is driven by pairs obeys it"
-
-
-def _task(handle: Handle) -> TaskHandle:
-    """A handle that has a weight."""
-    return validation.instance(handle.item_name, handle, TaskHandle, "a task")
 
 
 def turned(rotation: Array, angles: Array) -> Array:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from wbc.controller import Controller
+from wbc.api import Controller
 from wbc.simulation import Connection, Plant
 from wbc.viewer.beside import SILENT, Viewer, show
 

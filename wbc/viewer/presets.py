@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import robots, tasks, validation
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array

@@ -14,7 +14,7 @@ import signal
 import sys
 import threading
 
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.viewer.aside import CoreLeft, step_aside
 from wbc.viewer.link import ViewerEnd
 from wbc.viewer.session import Session

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.explain.explanation import Explanation
 from wbc.tasks import Posture
 from wbc.tasks.base import Task

@@ -12,15 +12,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from wbc import record, validation
-from wbc.controller import Controller, Stack
+from wbc import extras, validation
+from wbc.api import Controller, Stack
 from wbc.controller.step import state_of
 from wbc.record.recording import Recording
-from wbc.record.replaying import compiled
+from wbc.replaying.ticks import compiled, replayed
 from wbc.robot import Robot
 from wbc.tasks import EndEffector, Posture
 from wbc.validation import Array
-from wbc.viewer.beside import require_viser
 from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.link import State
@@ -45,7 +44,7 @@ def states_of(
     """
     controller = compiled(recording, backend="auto", trust=trust)
     dt, states, due = float(recording.about["dt"]), [], 0.0
-    for tick in record.replayed(recording, controller):
+    for tick in replayed(recording, controller):
         time = tick.number * dt
         if time >= due - 1e-9:
             states.append(State(tick.number + 1, time, state_of(tick.step)))
@@ -60,7 +59,7 @@ def states_of(
 def sentences_of(recording: Recording, ticks: Sequence[int]) -> dict[int, str]:
     """Number of a tick of a recording -> why its command was what it was."""
     wanted, out = set(ticks), {}
-    for tick in record.replayed(recording, compiled(recording, backend="auto")):
+    for tick in replayed(recording, compiled(recording, backend="auto")):
         if tick.number in wanted:
             out[tick.number] = " ".join(sentences(tick.step.explain()))
             if len(out) == len(wanted):
@@ -112,9 +111,10 @@ def save_page(controller: Controller, states: Sequence[State], file: pathlib.Pat
     """Write states as one HTML file that plays in a browser, without a network or this package.
 
     Raises:
-        ViewerError: viser is not installed, there is nothing to write, or the file cannot be written.
+        MissingPackageError: viser is not installed.
+        ViewerError: there is nothing to write, or the file cannot be written.
     """
-    require_viser()
+    extras.require("viewer", "a page in the browser")
     import viser
 
     if not states:

@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.errors import WbcError
 from wbc.tasks.base import Constraint
 from wbc.validation import Array

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc.controller import Controller, Step, core_of
+from wbc.api import Controller
+from wbc.controller import Step, core_of
 from wbc.stack.layout import Block
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks.base import Item

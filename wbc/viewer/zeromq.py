@@ -12,6 +12,7 @@ import threading
 import time
 from typing import Any
 
+from wbc import extras
 from wbc.viewer.errors import ViewerError
 from wbc.viewer.local import require_local
 
@@ -27,17 +28,16 @@ class ZeroMqEnd:
         page: address of the page. silence: after which a peer is dropped [s].
 
     Raises:
-        ViewerError: pyzmq is not installed, the address is not this machine's, or it cannot be listened on.
+        MissingPackageError: pyzmq is not installed.
+        ViewerError: the address is not this machine's, or it cannot be listened on.
     """
 
     def __init__(self, address: str, page: str, silence: float) -> None:
         require_local(address)
-        try:
-            # pyzmq is an extra, and has no types without it
-            self._zmq: Any = importlib.import_module("zmq")
-            self._asyncio: Any = importlib.import_module("zmq.asyncio")
-        except ImportError as error:
-            raise ViewerError("zeromq", "pyzmq", "is not installed: pip install 'wbc[zeromq]'") from error
+        extras.require("zeromq", "a ZeroMQ socket")
+        # pyzmq has no types where it is not installed
+        self._zmq: Any = importlib.import_module("zmq")
+        self._asyncio: Any = importlib.import_module("zmq.asyncio")
         self._address, self._silence = address, silence
         self._page = page.replace("http", "ws", 1).partition("?")[0] + "wbc/"
         self._peers: dict[bytes, tuple[asyncio.Task[None], asyncio.Queue[str]]] = {}

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from wbc import validation
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.coordinates import expressions
 from wbc.coordinates.items import FollowRows, KeepRows
 from wbc.coordinates.pair import CoordinatePair, is_pose, pairs_of

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.controller import Controller, core_of
+from wbc.api import Controller
+from wbc.controller import core_of
 from wbc.coordinates.control.integrals import RateIntegrals, Rows
 from wbc.coordinates.control.pair_stack import PairStack, metric_of
 from wbc.coordinates.expressions import DRIFT

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import tasks
-from wbc.controller import Stack
+from wbc.api import Stack
 from wbc.errors import InfeasibleError, RangeError
 from wbc.published.ikor.legacy import LegacyHermies
 from wbc.published.ikor.machines import ArmMachine

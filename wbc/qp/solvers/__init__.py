@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.qp.solvers.backend import Backend, Prepared
 
 #: Solvers that are held to one answer by the tests, and the module and class of each
@@ -36,11 +36,13 @@ def make_solver(name: str, n: int, m: int, prepared: bool = True) -> Backend:
         prepared: equality rows are made independent and orthonormal first (:class:`Prepared`).
 
     Raises:
-        UnknownNameError: no solver of that name here.
+        UnknownNameError: no solver of that name here. MissingPackageError: its package is not installed.
         SolverError: the solver cannot take problems of this form.
     """
     validation.one_of("solver", name, available_solvers(experimental=True))
     if name in _SUPPORTED:
+        if name in extras.EXTRAS:
+            extras.require(name, "this solver")
         module, kind = _SUPPORTED[name]
         inner: Backend = getattr(importlib.import_module(module), kind)(n, m)
     else:

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import pinocchio as pin
 
 from wbc.errors import RobotFileError
+from wbc.extras import MissingPackageError
 from wbc.robot.sources.xml_text import parse
 
 #: What the C++ parsers' exceptions become in Python.
@@ -30,7 +31,7 @@ def example_data_folder() -> pathlib.Path:
     else found through the wheel's own list of files.
 
     Raises:
-        RobotFileError: the wheel is not installed, or has no robots.
+        MissingPackageError: the wheel is not installed. RobotFileError: it has no robots.
     """
     folder = pathlib.Path(pin.__file__).resolve().parents[4] / "share" / _DATA_WHEEL / "robots"
     return folder if folder.is_dir() else listed_data_folder()
@@ -47,7 +48,8 @@ def listed_data_folder() -> pathlib.Path:
     try:
         files = metadata.distribution(_DATA_WHEEL).files or []
     except metadata.PackageNotFoundError as error:
-        raise RobotFileError("robot", _DATA_WHEEL, "the package that holds the robot files is not installed") from error
+        reason = "descriptions of robots by name are in this package: pip install 'wbc[robots]'"
+        raise MissingPackageError("robot", _DATA_WHEEL, reason) from error
     for file in files:
         if file.suffix == ".urdf":
             parts = file.parts

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from wbc import extras
 from wbc.errors import RobotFileError
 from wbc.robot.sources.description import Description, Mimic, own_base, with_base
 from wbc.robot.sources.files import captured_stderr
@@ -56,7 +57,8 @@ def compiled(source: str | pathlib.Path) -> mujoco.MjModel:
     """What MuJoCo's compiler makes of an MJCF file, or of MJCF as a string.
 
     Raises:
-        RobotFileError: MuJoCo is not installed; it refuses the file, with its reason; a string that is no MJCF.
+        MissingPackageError: MuJoCo is not installed.
+        RobotFileError: it refuses the file, with its reason; a string that is no MJCF.
     """
     value = source if isinstance(source, str) else str(source)
     if isinstance(source, str):
@@ -64,10 +66,9 @@ def compiled(source: str | pathlib.Path) -> mujoco.MjModel:
         if root is None or root[1] != "mujoco":
             reason = f"no MJCF: the root element is <{root[1] if root else ''}>, expected <mujoco>"
             raise RobotFileError("robot", value, f"{reason}; other descriptions are read from files")
-    try:
-        import mujoco
-    except ModuleNotFoundError as error:
-        raise RobotFileError("robot", value, "MJCF is read by MuJoCo's compiler: pip install wbc[mujoco]") from error
+    extras.require("mujoco", "MJCF, which MuJoCo's compiler reads,")
+    import mujoco
+
     try:
         read = mujoco.MjModel.from_xml_string if isinstance(source, str) else mujoco.MjModel.from_xml_path
         with captured_stderr() as noise:

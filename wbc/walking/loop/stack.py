@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import tasks
-from wbc.controller.controller import Controller, core_of
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.controller.handle import InputGroup
-from wbc.controller.stack import Stack
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerArm
 from wbc.validation import Array

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wbc.extras import MissingPackageError
 from wbc.robots import Walker
 from wbc.track.page import FILE as REPORT
 from wbc.walking.checker import Report, Rules, check_run
@@ -20,7 +21,7 @@ from wbc.walking.report.animation import save_animation
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.plots import save_plots
 from wbc.walking.report.reach_map import save_reach_map
-from wbc.walking.report.replay_page import ReplayPageError, save_replay_page
+from wbc.walking.report.replay_page import save_replay_page
 from wbc.walking.report.run_report import save_report
 from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
@@ -101,7 +102,7 @@ def save_pictures(
     told("replay page", None)
     try:
         files += [page for page in [save_replay_page(run, log, folder, asked)] if page is not None]
-    except ReplayPageError as error:
+    except MissingPackageError as error:
         missing.append(str(error))
     if not asked():
         told("stills", None)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import WbcError
+from wbc import extras
 from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import PlacedShape
 from wbc.track import render
@@ -37,22 +37,16 @@ DISTANCE = 5.2
 SHOWN = 1.9
 
 
-class ReplayPageError(WbcError):
-    """A replay page that cannot be made, as what makes it is not installed."""
-
-
 def save_replay_page(
     run: WalkRun, log: WalkLog, folder: pathlib.Path, stop: Callable[[], bool] | None = None
 ) -> pathlib.Path | None:
     """Writes ``replay.html`` with viser; None if ``stop`` ended it.
 
     Raises:
-        ReplayPageError: viser is not installed.
+        MissingPackageError: viser is not installed.
     """
-    try:
-        viser: Any = importlib.import_module("viser")
-    except ImportError as error:
-        raise ReplayPageError("replay", FILE, "needs viser: pip install 'wbc[viewer]'") from error
+    extras.require("viewer", FILE)
+    viser: Any = importlib.import_module("viser")
     # What is recorded is what a server would send; nobody is asked to connect, so its address is not printed
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", verbose=False)

@@ -72,7 +72,7 @@ class PlantChoice:
         """The plant with the loop of torques over it, for a walker without masses.
 
         Raises:
-            ModuleNotFoundError: MuJoCo is not installed. ShapeError: the two-ended arm, which has no masses.
+            MissingPackageError: MuJoCo is not installed. ShapeError: the two-ended arm, which has no masses.
             RangeError: holds that let hands tilt. UnknownNameError: a fault of an arm or a joint that is not there.
         """
         heavy, faults = with_masses(walker, self.gravity), tuple(map(Fault.read, self.faults))

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from wbc import tasks
-from wbc.controller.controller import Controller
-from wbc.controller.stack import Stack
+from wbc.api import Controller, Stack
 from wbc.errors import RangeError
 from wbc.robot.transmission import Transmission
 from wbc.robots import HoldRating, Walker, hold_rating

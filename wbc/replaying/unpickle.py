@@ -16,7 +16,7 @@ from wbc.errors import PicklingError
 from wbc.stack.declaration import Declaration
 
 _PLACES = (
-    *("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.controller.stack"),
+    *("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.api.stack"),
     *("wbc.coordinates.items", "wbc.coordinates.rows", "wbc.coordinates.point_sets", "wbc.analysis.rows"),
 )
 _OTHERS = {

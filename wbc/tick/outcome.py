@@ -8,10 +8,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from wbc.controller.tick.buffers import CHAIN, INFINITE
 from wbc.stack.layout import Block, Layout, rate_unit
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction
+from wbc.tick.buffers import CHAIN, INFINITE
 from wbc.validation import Array
 
 
@@ -24,8 +24,8 @@ class Status(StrEnum):
     RELAXED = "relaxed"
     #: No optimum was found: v brings every joint to rest as fast as its bounds allow
     BRAKED = "braked"
-    #: :attr:`Controller.iteration_cap` ended the search: v is as near to what it had found as the rows allow, seen from
-    #: braking
+    #: :attr:`wbc.Controller.iteration_cap` ended the search: v is as near to what it had found as the rows allow, seen
+    #: from braking
     CAPPED = "capped"
     #: The first answer had no certificate; another way led to one that has, see :attr:`Step.answered_by`. Rows may have
     #: given way, see :attr:`Step.relaxed`

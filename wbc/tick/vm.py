@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.tick.buffers import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, Assembly, TaskRows
-from wbc.controller.tick.reach import DEAD, Reach
 from wbc.qp.problem import QP
 from wbc.stack.codegen import bound_sequence, row_units, unit_groups
 from wbc.stack.declaration import HIGHEST_PRICE, Declaration
@@ -17,6 +15,8 @@ from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
 from wbc.stack.tables import bent_rows
+from wbc.tick.buffers import BAD_Q, BAD_UNIT, BAD_V, INFINITE, TOLERANCE, UNIT_TOLERANCE, Assembly, TaskRows
+from wbc.tick.reach import DEAD, Reach
 from wbc.validation import Array
 
 

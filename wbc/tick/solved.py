@@ -7,7 +7,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.controller.tick.buffers import (
+from wbc.qp.certificate import Certificate, certify
+from wbc.qp.levels.hierarchy import LevelsAnswer
+from wbc.qp.polish import polish
+from wbc.qp.problem import QP, QPSolution
+from wbc.qp.relax import Relaxation, Relaxed
+from wbc.qp.solvers import make_solver
+from wbc.stack.codegen import PRICED, row_orders, row_units
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Layout
+from wbc.stack.memory import Memory
+from wbc.stack.tables import brakes, reported_slacks
+from wbc.tasks.base import SacrificeOrder
+from wbc.tick.buffers import (
     BENDINGS,
     BENDS,
     BRAKED,
@@ -28,19 +40,7 @@ from wbc.controller.tick.buffers import (
     Assembly,
     Buffers,
 )
-from wbc.controller.tick.levels import Levels
-from wbc.qp.certificate import Certificate, certify
-from wbc.qp.levels.hierarchy import LevelsAnswer
-from wbc.qp.polish import polish
-from wbc.qp.problem import QP, QPSolution
-from wbc.qp.relax import Relaxation, Relaxed
-from wbc.qp.solvers import make_solver
-from wbc.stack.codegen import PRICED, row_orders, row_units
-from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Layout
-from wbc.stack.memory import Memory
-from wbc.stack.tables import brakes, reported_slacks
-from wbc.tasks.base import SacrificeOrder
+from wbc.tick.levels import Levels
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers

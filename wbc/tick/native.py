@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from wbc.controller.tick.buffers import INFINITE, Assembly, TaskRows
 from wbc.errors import SolverError
 from wbc.native.builtin import builtin
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
+from wbc.tick.buffers import INFINITE, Assembly, TaskRows
 from wbc.validation import Array
 
 
 class CompiledTick(Assembly):
     """Memory of one controller and the functions of a library that works on it; see
-    :class:`wbc.controller.tick.Buffers`.
+    :class:`wbc.tick.Buffers`.
 
     Args:
         memory: begins with the fields of :class:`wbc.stack.memory.Memory`. pointer: what the functions take.

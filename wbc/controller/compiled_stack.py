@@ -1,44 +1,37 @@
-"""The controller: checks what the user says, makes one call, wraps the report."""
+"""A compiled stack that ticks: checks what the user says, makes one call, wraps the report."""
 
 from __future__ import annotations
 
-import os
-import pathlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.controller import hooks
 from wbc.controller.core import Core
 from wbc.controller.handle import Handle
 from wbc.controller.handles import Handles
 from wbc.controller.policy import Policy
 from wbc.controller.step import Step
-from wbc.controller.tick.buffers import Assembly
-from wbc.controller.tick.native import CompiledTick
 from wbc.errors import BusyError, PicklingError, RangeError, ShapeError, SolverError
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
+from wbc.tick.buffers import Assembly
+from wbc.tick.native import CompiledTick
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.batch import Batch
-    from wbc.record.recorder import Recorder
 
 _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
 _SE3 = pin.SE3
 
 
-class Controller(Handles):
-    """A compiled stack with its run-time values. Made by :meth:`wbc.Stack.compile`.
+class CompiledStack(Handles):
+    """The ticks of a compiled stack with its run-time values; :class:`wbc.Controller` adds what is made of one.
 
-    Each controller has its own memory, see :meth:`clone`; one controller must not be stepped from two threads at once.
+    Each has its own memory, see :meth:`clone`; one of them must not be stepped from two threads at once.
 
     Attributes:
         stack: the declaration that it was compiled from.
@@ -149,45 +142,14 @@ class Controller(Handles):
         velocity = np.zeros(self._v_shape) if v is None else validation.real_array("v", v, self._v_shape)
         self._core.begin(None if q is None else self.stack.robot.configuration("q", q), velocity)
 
-    def record(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Recorder:
-        """Record every tick into a file from now on, until the recorder is closed; see :func:`wbc.replay`.
-
-        Args:
-            overwrite: a file that is there may be replaced.
-
-        Raises:
-            RecordingError: the file is there or cannot be written, or the controller records already.
-            SolverError: its policy has an escape.
-        """
-        if self.policy.escape:
-            raise SolverError("record", self.policy, "a recording holds no escape; set a policy without it")
-        recorder: Recorder = hooks.record(self, path, overwrite)
-        return recorder
-
-    def clone(self) -> Controller:
+    def clone(self) -> Self:
         """Another controller of the same compiled stack, with its own memory and this one's values and last command.
 
         Its solver and sensors start as after a reset. Nothing is read from disk or compiled.
         """
-        out = Controller(self.stack, self._artifact, self.solver, self._core.assembly.twin())
+        out = type(self)(self.stack, self._artifact, self.solver, self._core.assembly.twin())
         out._core.assume(self._core)
         return out
-
-    def batch(self, count: int, *, threads: int | None = None) -> Batch:
-        """Many robots, or candidate states, of this compiled stack, which tick in one call; docs/batch.md.
-
-            batch = controller.batch(10_000)
-            batch.set(hand=poses)                   # [10_000, 4, 4]
-            v = batch.step(q).v                     # [10_000, nq] -> [10_000, nv]
-
-        Args:
-            count: how many. threads: that tick at a time; default: one a core.
-
-        Raises:
-            RangeError: not an integer >= 1. SolverError: the stack measures distances, or its policy has an escape.
-        """
-        batch: Batch = hooks.batch(self, count, threads)
-        return batch
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         reason = "lives in the memory of its process; pickle controller.stack, and compile it there"
@@ -269,38 +231,6 @@ class Controller(Handles):
             raise SolverError("iteration_cap", cap, reason)
         self._core.tick.cap[0] = float(cap)
 
-    def export(
-        self,
-        folder: str | os.PathLike[str],
-        *,
-        overwrite: bool = False,
-        solver_source: bool | str | os.PathLike[str] = False,
-        states: int = 1000,
-    ) -> pathlib.Path:
-        """Write the tick as self-contained C99, with its QP solver, a header, build files and a check.
-
-            controller.reset(q)
-            controller.export("arm_tick")           # then: make -C arm_tick run
-
-        The values that the controller has now (targets, gains, weights, switches, the cap) are those that the C code
-        begins with. Nothing is compiled, and any backend will do; the C code is the native tick. docs/export.md.
-
-        Args:
-            folder: where to; it must be empty or not there.
-            overwrite: an export that is there is replaced.
-            solver_source: the solver's source in place of the library for this platform: True fetches it from the
-                package index, or the path of its archive. Its hash is checked.
-            states: how many states the check has, with this controller's commands; other backends than the native one
-                give those of them that they solve with certainty.
-
-        Raises:
-            ExportError: the folder is not empty or cannot be written.
-            SolverError: run-time values still wait for the first configuration.
-            SolverSourceError: the solver cannot be had. RangeError: ``states`` is no integer >= 1.
-        """
-        folder = hooks.export(self, folder, overwrite, solver_source, states)
-        return pathlib.Path(folder)
-
     def pairs(self, name: str) -> tuple[tuple[str, str, float], ...]:
         """What the sensed rows of an item were about in the last tick: names of both bodies, distance [m].
 
@@ -322,7 +252,7 @@ class Controller(Handles):
             self._core.take_first(configuration)
 
 
-def core_of(controller: Controller) -> Core:
+def core_of(controller: CompiledStack) -> Core:
     """What a controller is inside, for the packages above this one."""
     return controller._core
 

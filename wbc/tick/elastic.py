@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.tick.buffers import BRAKED, RELAXED, Assembly
-from wbc.controller.tick.solved import SolvedTick
 from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxed
 from wbc.qp.solvers.backend import Prepared
 from wbc.qp.solvers.daqp import Daqp
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
+from wbc.tick.buffers import BRAKED, RELAXED, Assembly
+from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
 #: Price of a squared slack of one unit, against the largest diagonal entry of H

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc import validation
-from wbc.controller.controller import Controller, core_of
-from wbc.controller.outcome import STATUSES
+from wbc.api import Controller, Stack
+from wbc.controller import core_of
 from wbc.controller.policy import Policy
-from wbc.controller.stack import Stack
 from wbc.controller.step import Step
 from wbc.errors import ShapeError
 from wbc.record.recorder import about, declaration_key, recorded_inputs
 from wbc.record.recording import Recording, RecordingError
-from wbc.record.unpickle import load_stack
+from wbc.replaying.unpickle import load_stack
 from wbc.stack.artifact import BACKENDS
 from wbc.stack.declaration import Declaration
+from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 
 
@@ -95,7 +95,7 @@ def replay(
         recording: the file, or what was read from it.
         stack: the declaration; default: the one in the recording.
         backend: default: that of the recording. Another gives the same commands only up to rounding.
-        trust: see :func:`wbc.record.unpickle.load_stack`.
+        trust: see :func:`wbc.replaying.unpickle.load_stack`.
         progress: called with the number of finished ticks after each.
 
     Raises:

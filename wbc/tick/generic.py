@@ -12,7 +12,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from wbc.controller.tick.native import CompiledTick
 from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.library import load_library
@@ -22,6 +21,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
+from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
 #: No two contexts of a process have the same

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.controller.tick.buffers import INFINITE, Assembly
 from wbc.qp.certificate import Certificate
 from wbc.qp.levels.cascade import NOISE, PUSHING, Cascade
 from wbc.qp.levels.hierarchy import Hierarchy, Level, LevelsAnswer
@@ -15,6 +14,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, Memory
 from wbc.stack.tables import left_free
+from wbc.tick.buffers import INFINITE, Assembly
 from wbc.validation import Array
 
 

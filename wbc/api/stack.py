@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller import hooks
-from wbc.controller.controller import Controller, core_of
+from wbc.api.controller import Controller
+from wbc.controller import core_of
 from wbc.qp.solvers import available_solvers
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration, bends
@@ -139,8 +139,9 @@ class Stack(Declaration):
         Raises:
             UnknownNameError: unknown task or backend. RangeError: no goal is left. CompileError: see :meth:`compile`.
         """
-        kinematics: InverseKinematics = hooks.inverse_kinematics(self, goals, backend)
-        return kinematics
+        from wbc.ik import InverseKinematics
+
+        return InverseKinematics(self, goals, backend)
 
     def solve(
         self,

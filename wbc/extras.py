@@ -1,0 +1,41 @@
+"""Packages that only parts of this one need: each is installed with an extra, and a part without it says so."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+
+from wbc.errors import WbcError
+
+#: Extra of pyproject.toml -> modules that it brings
+EXTRAS = {
+    "analysis": ("flint",),
+    "cluster": ("distributed",),
+    "mujoco": ("mujoco",),
+    "osqp": ("osqp",),
+    "plots": ("matplotlib",),
+    "programs": ("py_trees", "pydantic", "yaml"),
+    "recordings": ("pyarrow",),
+    "studies": ("pydantic", "yaml"),
+    "viewer": ("viser", "websockets"),
+    "zeromq": ("zmq",),
+}
+
+
+class MissingPackageError(WbcError, ModuleNotFoundError):
+    """What was asked for needs a package that is not installed; the text has the command that installs it."""
+
+
+def require(extra: str, what: str) -> None:
+    """Pass where the packages of an extra are installed.
+
+    Args:
+        what: needs them, in the words of the text: "exact rank analysis".
+
+    Raises:
+        MissingPackageError: the first that is not.
+    """
+    for module in EXTRAS[extra]:
+        if sys.modules.get(module) is None and importlib.util.find_spec(module) is None:
+            reason = f"{what} needs this package: pip install 'wbc[{extra}]'"
+            raise MissingPackageError(extra, module, reason)

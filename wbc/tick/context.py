@@ -1,0 +1,39 @@
+"""What all ticks of a controller share: names, and where everything stands in a report."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+from wbc.stack.declaration import Declaration
+from wbc.stack.layout import Block, Layout
+from wbc.stack.memory import Memory
+from wbc.tick.buffers import Assembly
+
+
+class Context:
+    """What all steps of a controller share: names and offsets."""
+
+    def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
+        self.stack, self.layout, self.assembly = stack, layout, assembly
+        self.nv, self.command = layout.nv, layout.command
+        self.memory = Memory(layout)
+        self.flag_offset = 8 * self.memory.flag
+
+    def __getstate__(self) -> dict[str, Any]:
+        # the memory of a process; a step from a pickle tells everything but its explanation
+        return vars(self) | {"assembly": None}
+
+    def variable(self, number: int) -> str:
+        """Name of a variable of the QP."""
+        return self.stack.robot.dof_names[number] if number < self.nv else self.layout.variable(number)[0]
+
+    @cached_property
+    def general(self) -> list[tuple[Block, int]]:
+        """(block, row within it) of every general row."""
+        return [(b, k) for b in self.layout.of_form("margins", "rows") for k in range(len(b.rows))]
+
+    @cached_property
+    def bounds(self) -> list[Block]:
+        """Bound blocks by number."""
+        return self.layout.of_form("bounds")
