@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from wbc.robot.carried import carry
     from wbc.robot.geometry.convex_parts import ConvexParts
     from wbc.robot.geometry.link_shapes import convex_parts, fit_shapes
+    from wbc.robot.loops import JointCurve, Loop, LoopError
     from wbc.robot.mujoco_joints import MujocoJoints
     from wbc.robot.pairs.collision_pairs import LinkPair, SelfPairs
     from wbc.robot.pairs.pairs_file import read_self_pairs, save_self_pairs
@@ -31,8 +32,11 @@ __all__ = [
     "ConvexParts",
     "DHRow",
     "HoldRating",
+    "JointCurve",
     "Limb",
     "LinkPair",
+    "Loop",
+    "LoopError",
     "Margins",
     "MujocoJoints",
     "OperatorArm",

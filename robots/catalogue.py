@@ -58,6 +58,7 @@ def load(
     velocity: Any = None,
     acceleration: Any = None,
     effort: Any = None,
+    loops: bool = True,
 ) -> Robot:
     """A robot from the table, a file, a model, or a chain of Denavit-Hartenberg rows.
 
@@ -82,20 +83,23 @@ def load(
         position_lower, position_upper, velocity, acceleration, effort: limits that replace the description's, in SI
             units (rad or m, s, N m or N); one number for all joints but the base, nv numbers, or a mapping from joint
             (or degree of freedom) to a number; infinite for none.
+        loops: keep the closed loops of an MJCF file (``connect``, ``weld`` and ``joint`` of its equalities) closed, see
+            :meth:`~wbc.robot.Robot.with_loops`; False: an open tree.
 
     Raises:
+        LoopError: no configuration closes the loops.
         UnknownNameError: no such robot (nearest names first), base, joint or frame.
         RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF
             nor MJCF; a base that contradicts the description.
         UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
         ShapeError, NotFiniteError, RangeError, BoundsError: a bad limit, lock or neutral value.
 
-    Cannot do: SDF and xacro files; closed kinematic chains (a URDF is a tree; loops of MJCF, and what else of it a
-    robot cannot hold, are named in the log).
+    Cannot do: SDF and xacro files. What a robot cannot hold of an MJCF file is named in the log; loops of a URDF, which
+    is a tree, are given by :meth:`~wbc.robot.Robot.with_loops`.
     """
     made = made_here(robot) if isinstance(robot, str) else None
     recipe, source = _find(robot) if made is None else (recipe_of(made), made.model)
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"loops": validation.flag("loops", loops)}
     if lock is not None:
         changes["lock"] = lock_mapping(lock)
         changes["pairs"] = ""  # other links move against each other

@@ -317,6 +317,9 @@ class Constraint(Item):
     #: Rows are equalities (lower == upper)
     equality: ClassVar[bool] = False
 
+    #: What the rows keep at 0, :meth:`residual`, is 0 at q (+) v dt to rounding, whatever that costs
+    exact: ClassVar[bool] = False
+
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
 

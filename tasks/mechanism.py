@@ -1,4 +1,4 @@
-"""What the mechanism itself imposes on the joint velocities: mimic joints and undriven directions."""
+"""What the mechanism itself imposes on the joint velocities: mimic joints, undriven directions and closed loops."""
 
 from __future__ import annotations
 
@@ -8,41 +8,59 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
+from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Values
+from wbc.tasks.braking import clip
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
 
+#: How fast a loop that is open closes [characteristic lengths or rad per second]
+CLOSING = 0.1
+
+
 @dataclass(frozen=True)
 class Mechanism(Constraint):
-    """Equality rows of the robot's couplings and of its undriven degrees of freedom; every stack has them by itself.
+    """Equality rows of the robot's couplings, of its undriven degrees of freedom and of its closed loops; every stack
+    has them by itself.
 
         mimic joint   v_follower - ratio v_leader = -gain (q_follower - ratio q_leader - offset)      [rad/s or m/s]
         undriven      v_i = 0          (a differential-drive base sideways; what no motor moves)      [m/s or rad/s]
+        loop          de/dq v = -e / dt, as fast as 0.1 lengths or rad/s allow, and e(q (+) v dt) = 0 to 1e-10 of them
 
-    The right side of a mimic row brings back a configuration that does not fit. It is added under the name
-    ``mechanism`` where ``robot.couplings`` or ``robot.locked_dofs`` is not empty.
+    The right side of a mimic row brings back a configuration that does not fit, that of a loop one that is open. What e
+    bends by within a tick is made up for, see docs/reach.md. It is added under the name ``mechanism`` where
+    ``robot.couplings``, ``robot.locked_dofs`` or ``robot.loops`` is not empty.
 
     Inputs:
         gain: how fast a configuration that does not fit its couplings is brought back [1/s].
 
-    It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only).
+    It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only). Loops are kept
+    by stacks that command velocities alone.
     """
 
     stands_in_world: ClassVar[bool] = False
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
     equality: ClassVar[bool] = True
+    exact: ClassVar[bool] = True
+
+    def refusal(self, robot: Robot, command: Command) -> str:
+        """Torques that a loop transmits are not computed."""
+        if robot.loops and command != "velocity":
+            names = ", ".join(loop.name for loop in robot.loops.loops)
+            return f"keeps the loops {names}, which only velocities are computed for; robot.with_loops() opens them"
+        return ""
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``gain`` of the mimic rows."""
         return (Input("gain", unit="1/s", default=5.0, low=0.0),)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a coupling, named by its follower, then one an undriven degree of freedom."""
+        """One row a coupling, named by its follower, one an undriven degree of freedom, then those of loops."""
         dofs = [c.follower for c in robot.couplings] + list(robot.locked_dofs)
-        return tuple(Row(robot.dof_names[i], f"{robot.dof_units[i]}/s") for i in dofs)
+        rows = [Row(robot.dof_names[i], f"{robot.dof_units[i]}/s") for i in dofs]
+        return (*rows, *(Row(label, f"{unit}/s") for label, unit in robot.loops.rows))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
@@ -56,4 +74,15 @@ class Mechanism(Constraint):
                 right[k] = -inputs["gain"] * (kin.q[here] - coupling.ratio * kin.q[there] - coupling.offset)
         for k, i in enumerate(robot.locked_dofs, start=len(robot.couplings)):
             matrix[k, i] = 1
+        if robot.loops:
+            error = robot.loops.error(kin)
+            most = ca.SX([robot.characteristic_length if unit == "m" else 1.0 for _, unit in robot.loops.rows])
+            matrix = ca.vertcat(matrix, kin.slope(error))
+            right = ca.vertcat(right, clip(-error / dt, -CLOSING * most, CLOSING * most))
         return Rows(matrix, right, right)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """e of loops; couplings do not bend."""
+        if not robot.loops:
+            return None
+        return ca.vertcat(ca.SX(len(robot.couplings) + len(robot.locked_dofs), 1), robot.loops.error(kin))

@@ -14,7 +14,7 @@ import pytest
 import wbc
 from tests.refusals import assert_refused
 from wbc.errors import RobotFileError
-from wbc.robots import MujocoJoints
+from wbc.robots import LoopError, MujocoJoints
 from wbc.simulation import MujocoPlant
 from wbc.simulation.plant import Command, CommandKind
 
@@ -92,29 +92,6 @@ SAID = {
         document('<body><joint type="free" name="f" armature="1"/><geom size=".1"/></body>'),
         "along the world's in MuJoCo, of: f",
     ),
-    "connect": (
-        document(PAIR, '<equality><connect name="pin" body1="a" body2="b" anchor=".5 0 0"/></equality>'),
-        "connect 'pin' (opens by up to",
-    ),
-    "weld": (
-        document(PAIR, '<equality><weld name="glue" body1="a"/></equality>'),
-        "weld 'glue' (opens by up to",
-    ),
-    "curve": (
-        document(PAIR, '<equality><joint name="c" joint1="a" joint2="b" polycoef="0 1 1"/></equality>'),
-        "joint 'c' (opens by up to",
-    ),
-    "constant": (
-        document(PAIR, '<equality><joint name="c" joint1="a" polycoef=".2"/></equality>'),
-        "joint 'c' (opens by up to",
-    ),
-    "circle": (
-        document(
-            PAIR,
-            '<equality><joint joint1="a" joint2="b" polycoef="0 2"/><joint name="c" joint1="b" joint2="a"/></equality>',
-        ),
-        "joint 'c' (opens by up to",
-    ),
     "length": (
         document(
             PAIR,
@@ -154,15 +131,18 @@ def test_what_it_holds_is_no_word_in_the_log(caplog: pytest.LogCaptureFixture) -
 
 
 @pytest.mark.parametrize(("length", "angle"), [(0.125, 0.3), (0.25, 1.4)])
-def test_how_far_a_loop_opens_is_what_mujoco_has(length: float, angle: float, caplog: pytest.LogCaptureFixture) -> None:
-    """A slide and a hinge within little ranges about where a weld is open by a known distance and angle."""
+def test_a_loop_that_ranges_keep_open_is_refused_by_how_far(
+    length: float, angle: float, caplog: pytest.LogCaptureFixture
+) -> None:
     joints = (
         f'<joint name="s" type="slide" axis="1 0 0" range="{length} {length + 1e-6}"/>'
         f'<joint name="h" axis="0 0 1" range="{angle} {angle + 1e-6}"/>'
     )
     bodies = f'<body name="a">{joints}<geom size=".1"/></body>'
-    wbc.robots.load(document(bodies, '<equality><weld name="glue" body1="a" torquescale="7"/></equality>'))
-    assert f"weld 'glue' (opens by up to {length:.3g} m and {angle:.3g} rad)" in caplog.text
+    text = document(bodies, '<equality><weld name="glue" body1="a" torquescale="7"/></equality>')
+    assert_refused(lambda: wbc.robots.load(text), LoopError, f"open by {max(length, angle):.3g}")
+    assert not wbc.robots.load(text, loops=False).loops
+    assert "not kept closed, as load(loops=False) asked: glue" in caplog.text
 
 
 @pytest.fixture

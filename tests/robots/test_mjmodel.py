@@ -14,6 +14,7 @@ import wbc
 from tests.refusals import assert_refused
 from tests.repeats import repeats
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError, UnsupportedJointError
+from wbc.extras import MissingPackageError
 from wbc.robots import MujocoJoints
 
 KINDS = ("hinge", "hinge", "slide", "ball")
@@ -131,7 +132,7 @@ def test_a_scene_is_its_robot(cell: Path) -> None:
 
 def test_without_mujoco_a_scene_says_what_to_install(cell: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
-    assert_refused(lambda: wbc.robots.load(cell), RobotFileError, "pip install wbc[mujoco]")
+    assert_refused(lambda: wbc.robots.load(cell), MissingPackageError, "pip install 'wbc[mujoco]'")
 
 
 def test_other_robots_and_other_weights_are_not_silent(cell: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -17,7 +17,7 @@ from tests.robots.random_mjcf import random_mjcf
 from wbc.errors import RobotFileError
 from wbc.robot import Robot
 from wbc.robot.sources.mjmodel import trees_of
-from wbc.robots import MujocoJoints
+from wbc.robots import LoopError, MujocoJoints
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 
 NEAR = 1e-10
@@ -173,7 +173,11 @@ def loaded(seed: int) -> tuple[mujoco.MjModel, Robot] | None:
         armed = model.tendon_armature.any() or model.actuator_armature[model.actuator_trntype == 3].any()
         armed = armed and not ours.isdisjoint(model.wrap_objid.tolist())
         if ours and not armed:
-            return model, wbc.robots.load(text, shapes="exact")
+            try:
+                return model, wbc.robots.load(text, shapes="exact")
+            except LoopError:  # equalities are drawn without regard to each other
+                model.eq_active0[:] = 0
+                return model, wbc.robots.load(text, shapes="exact", loops=False)
         refusal = ValueError("armature of tendons: cord" if armed else "no joint that moves")
     reason = " ".join(str(refusal).split())[:60]
     assert_refused(lambda: wbc.robots.load(text), RobotFileError, reason)
@@ -200,7 +204,7 @@ def check(model: mujoco.MjModel, robot: Robot, seed: int) -> None:
     near(mass + np.triu(mass, 1).T, axes @ moved.T, "inertia")
     near(pin.computeGeneralizedGravity(robot.model, where, q), axes @ weight(model, data), "weight")
     for rate, side in zip(rates, (-STEP, STEP), strict=True):
-        joints.put_v(rate, robot.integrate(q, v, side), v)
+        joints.put_v(rate, pin.integrate(robot.model, q, side * v), v)
     turning = axes @ data.qfrc_bias + moved @ ((rates[1] - rates[0]) / (2.0 * STEP))
     free = any(int(model.jnt_type[j]) == 0 for j in joints.columns)
     bias = pin.nonLinearEffects(robot.model, where, q, v)

@@ -52,6 +52,7 @@ class StackRows:
         for name in values:
             if name not in stack:
                 raise UnknownNameError("values", name, [e.name for e in stack.entries])
+        self.robot.require_tree("the search of a robot's free motions")
         held, margins, still = list[Entry](), list[Entry](), list[int]()
         for entry in stack.constraints:
             item: Any = entry.item

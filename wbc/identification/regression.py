@@ -56,6 +56,7 @@ class Regression:
         self.robot = validation.instance("robot", robot, Robot, "a wbc Robot")
         if robot.base not in ("fixed", "floating") or robot.couplings:
             raise UnsupportedJointError("robot", robot.name, "expected a fixed or floating base and no coupled joints")
+        robot.require_tree("identification")
         self.friction = validation.flag("friction", friction)
         kin = Kinematics(robot.model)
         dynamics = TwoVelocityDynamics(kin)

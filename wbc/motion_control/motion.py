@@ -67,6 +67,7 @@ def checked_dynamics(robot: Robot, q: Array) -> Robot:
     robot = validation.instance("robot", robot, Robot, "a wbc Robot")
     if robot.base not in ("fixed", "floating"):
         raise UnsupportedJointError("robot.base", robot.base, "torques are for a fixed or a floating base")
+    robot.require_tree("torque that follows a motion")
     if robot.couplings:
         name = robot.dof_names[robot.couplings[0].follower]
         raise UnsupportedJointError("robot", name, "a joint that follows another has no torque of its own")

@@ -14,6 +14,7 @@ from wbc import validation
 from wbc.errors import BoundsError, RangeError, ShapeError, UnsupportedJointError
 from wbc.robot.frames import make_frames_unique
 from wbc.robot.limits import Limits
+from wbc.robot.loops import AnyLoop, JointCurve, LoopError
 from wbc.robot.rebuilt import without_joints
 from wbc.robot.recipe import Recipe, expand
 from wbc.robot.robot import Coupling, Robot
@@ -103,7 +104,28 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     )
     for role, frame in recipe.frames.items():
         robot.check_frame(f"frames.{role}", frame)
+    if description.loops and not recipe.loops:
+        names = ", ".join(loop.name for loop in description.loops)
+        log.warning("%s: loops that are not kept closed, as load(loops=False) asked: %s", robot.name, names)
+    elif description.loops:
+        robot = robot.with_loops(*(_unlocked(loop, locked) for loop in description.loops))
     return _with_accelerations(robot, {**description.acceleration, **recipe.acceleration}, recipe.source)
+
+
+def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
+    """A loop of a robot of which some joints are locked: what follows one of them stands still.
+
+    Raises:
+        LoopError: the joint that follows is locked, the one that leads it is not.
+    """
+    if not isinstance(loop, JointCurve) or not {loop.follower, loop.leader} & set(locked):
+        return loop
+    if loop.follower in locked:
+        raise LoopError(f"lock[{loop.follower!r}]", locked[loop.follower], f"it follows {loop.leader}: lock that")
+    assert loop.leader is not None
+    away = float(locked[loop.leader][0]) - loop.origin[1]
+    value = float(np.polynomial.polynomial.polyval(away, loop.coefficients))
+    return replace(loop, leader=None, coefficients=(value,))
 
 
 def _check_order(model: pin.Model) -> None:

@@ -11,8 +11,8 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.robot.robot import Robot, checked_robot
-from wbc.robot.sources.mjmodel import is_mjmodel, pose_of
-from wbc.robot.sources.mjnames import SIZES, MjNames, names_of
+from wbc.robot.sources.mjmodel import is_mjmodel
+from wbc.robot.sources.mjnames import SIZES, MjNames, names_of, pose_of
 from wbc.rotations import TO_MUJOCO, TO_PINOCCHIO
 from wbc.validation import Array
 

@@ -51,6 +51,7 @@ class Recipe:
         shapes: spheres and capsules fitted in advance.
         pairs: file of the pairs of links that must not touch, found with these shapes and locks; "" for none.
         problem: why the file cannot be loaded; "" for robots that can.
+        loops: whether closed loops of the description are kept, see :meth:`~wbc.robot.Robot.with_loops`.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Recipe:
     shapes: tuple[LinkShape, ...] = ()
     pairs: str = ""
     problem: str = ""
+    loops: bool = True
 
 
 def lock_mapping(lock: Any) -> dict[str, float | None]:

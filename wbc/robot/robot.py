@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -13,8 +14,9 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import pickling, validation
-from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError
+from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError, UnsupportedJointError
 from wbc.robot.limits import Limits
+from wbc.robot.loops import CLOSED, AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows, Range
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
@@ -25,6 +27,10 @@ log = logging.getLogger("wbc")
 MUJOCO_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 BASES = ("fixed", "floating", "planar", "differential")
+#: Random configurations from which loops are closed before they are said to be open for ever
+DRAWS = 100
+#: Configurations about neutral at which rows that others imply are found, and how far joints are from it [rad, m]
+LOOKS, NEAR = 8, 0.5
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,7 @@ class Robot:
             velocity of a differential-drive base, a URDF's floating joint that is no base). Indices into v.
         source: the file that the model was read from; "" for a model made in memory.
         self_pairs: pairs of links with shapes that must not touch each other; None: not chosen yet.
+        loops: closed loops of the mechanism, see :meth:`with_loops`; ``neutral`` is a configuration that closes them.
     """
 
     name: str
@@ -70,6 +77,7 @@ class Robot:
     locked_dofs: tuple[int, ...] = ()
     source: str = ""
     self_pairs: tuple[tuple[str, str], ...] | None = None
+    loops: LoopRows = field(default_factory=LoopRows)
 
     def __post_init__(self) -> None:
         validation.one_of("robot.base", self.base, BASES)
@@ -229,13 +237,15 @@ class Robot:
         return np.asarray(pin.computeFrameJacobian(self.model, data, q, index, axes))
 
     def integrate(self, q: Any, v: Any, dt: float = 1.0) -> Array:
-        """q (+) v dt: the configuration after moving with a velocity for a time [s].
+        """q (+) v dt: the configuration after moving with a velocity for a time [s]; of a mechanism with loops the
+        nearest that closes them, or leaves them open least.
 
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration, velocity or time.
         """
         step = validation.real_array("v", v, (self.nv,)) * validation.real_array("dt", dt, ())
-        return np.asarray(pin.normalize(self.model, pin.integrate(self.model, self.configuration("q", q), step)))
+        later = np.asarray(pin.normalize(self.model, pin.integrate(self.model, self.configuration("q", q), step)))
+        return self._closing.close(later)[0] if self.loops else later
 
     def difference(self, a: Any, b: Any) -> Array:
         """b (-) a: the velocity that leads from one configuration to another within a second [nv].
@@ -248,20 +258,23 @@ class Robot:
     def random(self, seed: int | np.random.Generator = 0) -> Array:
         """A configuration within the position limits; what has none is within half a turn, or a metre, of neutral.
 
-        Joints that follow others are where those put them, within their own limits.
+        Joints that follow others are where those put them, within their own limits; loops are closed.
 
         Args:
             seed: a whole number, which gives the same configuration each time, or the generator that draws.
 
         Raises:
-            RangeError: a seed below 0.
+            RangeError: a seed below 0. LoopError: a hundred draws led to no configuration that closes the loops.
         """
         if isinstance(seed, np.random.Generator):
             rng = seed
         else:
             rng = np.random.default_rng(int(validation.scalar("seed", seed, low=0.0)))
+        return self._closing.first(self._drawn(rng) for _ in range(DRAWS)) if self.loops else self._drawn(rng)
+
+    def _drawn(self, rng: np.random.Generator) -> Array:
         reach = np.where(np.array([unit == "rad" for unit in self.dof_units]), np.pi, 1.0)
-        out = self.integrate(self.neutral, rng.uniform(-reach, reach))
+        out = np.asarray(pin.normalize(self.model, pin.integrate(self.model, self.neutral, rng.uniform(-reach, reach))))
         limits, index = self.coupled(self.limits), self.position_index
         lower, upper = limits.position_lower, limits.position_upper
         for k in np.flatnonzero(index >= 0).tolist():
@@ -327,6 +340,81 @@ class Robot:
             kind = pin.FrameType.OP_FRAME
             model.addFrame(pin.Frame(name, above.parentJoint, index, above.placement * local, kind))
         return replace(self, model=model)
+
+    def with_loops(self, *loops: AnyLoop) -> Robot:
+        """A copy whose mechanism has these closed loops, in place of those it had; none: an open tree.
+
+            robot.with_frame("pin", "coupler", offset).with_loops(Loop("four-bar", "pin", "rocker_end"))
+
+        ``neutral`` becomes the nearest configuration that closes them. Rows that others imply are left out: those out
+        of the plane of a planar mechanism, and loops that add nothing. Every stack of velocities keeps them closed.
+
+        Raises:
+            UnknownNameError: no such frame or joint. DuplicateNameError: two loops of one name.
+            LoopError: no configuration closes them all; by how much the nearest that was found does not.
+        """
+        for loop in loops:
+            validation.instance("loops", loop, (Loop, JointCurve), "a Loop or a JointCurve")
+            if isinstance(loop, Loop):
+                self.check_frame(f"{loop.name}.first", loop.first)
+                self.check_frame(f"{loop.name}.second", loop.second)
+        names = [loop.name for loop in loops]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise DuplicateNameError("loops", twice, "two loops have this name")
+        bare = replace(self, loops=LoopRows())
+        if not loops:
+            return bare
+        closing, rng = replace(bare, loops=LoopRows(loops))._closing, np.random.default_rng(0)
+        neutral = closing.first(itertools.chain([self.neutral], (bare._drawn(rng) for _ in range(DRAWS))))
+        near = (pin.integrate(self.model, neutral, rng.uniform(-NEAR, NEAR, self.nv)) for _ in range(DRAWS))
+        found = (q for q, opened in map(closing.close, near) if opened <= CLOSED)
+        looks = [neutral, *itertools.islice(found, LOOKS)]
+        units = {name: self.dof_units[self.dofs(name).start] for name in self.joint_names}
+        rows = closing.rows(len(loops), looks, units)
+        for loop, basis in zip(loops, rows.bases, strict=True):
+            if not len(basis):
+                log.warning("%s: the loop %r adds nothing to the others", self.name, loop.name)
+        return replace(bare, neutral=neutral, loops=rows)
+
+    def require_tree(self, what: str) -> None:
+        """Refuse a mechanism with closed loops.
+
+        Args:
+            what: needs a tree, in the words of the text: "a plant of rigid bodies".
+
+        Raises:
+            UnsupportedJointError: it has loops; which, and that :meth:`with_loops` without any opens them.
+        """
+        if self.loops:
+            names = ", ".join(loop.name for loop in self.loops.loops)
+            raise UnsupportedJointError("robot", names, f"{what} knows no closed loops; robot.with_loops() opens them")
+
+    def closed(self, q: Any) -> Array:
+        """The nearest configuration that closes the loops, by Newton's shortest steps from q.
+
+        Raises:
+            ShapeError, NotFiniteError, RotationError: no configuration. LoopError: they led to none.
+        """
+        start = self.configuration("q", q)
+        if not self.loops:
+            return start
+        found, opened = self._closing.close(start)
+        if opened > CLOSED:
+            raise LoopError(
+                "q", q, f"no configuration near it closes the loops; the nearest is open by {opened:.3g} m or rad"
+            )
+        return found
+
+    @cached_property
+    def _closing(self) -> Closing:
+        joints = {int(self.model.idx_vs[j]): str(self.model.names[j]) for j in range(1, self.model.njoints)}
+        coupled = [
+            JointCurve(f"coupling {joints[c.follower]}", joints[c.follower], joints[c.leader], (c.offset, c.ratio))
+            for c in self.couplings
+            if min(self.position_index[[c.follower, c.leader]]) >= 0
+        ]
+        limits = Range(self.limits.position_lower, self.limits.position_upper, self.position_index)
+        return Closing(self.model, [*self.loops.loops, *coupled], limits)
 
     def seen_from(self, pose: pin.SE3) -> Robot:
         """A copy whose world is the frame at ``pose``: links and gravity are there as seen from that frame.
@@ -446,7 +534,9 @@ class Robot:
             self.neutral,
         ):
             h.update(np.ascontiguousarray(array).tobytes())
-        h.update(repr((self.base, self.couplings, self.locked_dofs, self.self_pairs)).encode())
+        h.update(repr((self.base, self.couplings, self.locked_dofs, self.self_pairs, self.loops.loops)).encode())
+        for basis in self.loops.bases:
+            h.update(basis.tobytes())
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())

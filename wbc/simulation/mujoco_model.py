@@ -50,6 +50,7 @@ def mujoco_spec(
     import mujoco
 
     robot = checked_robot(robot)
+    robot.require_tree("a MuJoCo model that is made of a robot")
     spec = mujoco.MjSpec()
     spec.modelname = robot.name or "robot"
     spec.option.timestep = validation.scalar("time_step", time_step, low=0.0, open_low=True, unit="s")

@@ -73,6 +73,7 @@ class PinocchioPlant(Gripping):
         seed: of all noise.
 
     Raises:
+        UnsupportedJointError: closed loops.
         RangeError: a link of negative mass or inertia, a mass matrix that is singular at the robot's neutral
             configuration, a time step that is too coarse (the largest that works is named). UnknownNameError: no such
             frame or integrator. ShapeError, NotFiniteError: numbers that are none.
@@ -102,6 +103,7 @@ class PinocchioPlant(Gripping):
         self._rate = validation.scalar("rate", rate, low=0.0, unit="1/s")
         self._seed = validation.integer("seed", seed)
         self._encoders = encoders or Encoders()
+        robot.require_tree("a plant of rigid bodies")
         self._drive = Drive(motors or Motors(), robot, self.time_step)
         model = robot.model.copy()
         for name, inertia in (payloads or {}).items():

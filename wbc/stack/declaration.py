@@ -126,7 +126,7 @@ class Declaration:
         self._length = validation.scalar("length", chosen, low=0.0, open_low=True, unit="m")
         self._calm = validation.flag("calm", calm)
         self._entries: dict[str, Entry] = {}
-        if robot.couplings or robot.locked_dofs:
+        if robot.couplings or robot.locked_dofs or robot.loops:
             self.add(Mechanism())
 
     def __repr__(self) -> str:

@@ -19,6 +19,7 @@ from wbc.stack.declaration import Declaration, inner_items
 #: this with the imports themselves, and with what runs. The robots' data are not here: they are in the key.
 PARTS = (
     "wbc.errors",
+    "wbc.extras",
     "wbc.native",
     "wbc.pickling",
     "wbc.proximity",

@@ -78,10 +78,14 @@ def force_scales(stack: Declaration, layout: Layout, program: TickProgram) -> li
 
 
 def bent_rows(layout: Layout, program: TickProgram) -> list[int]:
-    """1 for general rows whose residual bends within a tick, see :meth:`Constraint.residual`; else 0."""
+    """1 for general rows whose residual bends within a tick, see :meth:`Constraint.residual`, 2 for those of them that
+    are exact; else 0.
+    """
     out = np.zeros(layout.general_rows, dtype=np.int_)
     if program.lost is not None:
         out[program.lost.jac_sparsity(0, 1).row()] = 1
+        for block in layout.of_form("rows"):
+            out[block.span] *= 1 + int(getattr(block.entry.item, "exact", False))
     return [int(x) for x in out]
 
 

@@ -110,6 +110,8 @@ def show(
         names = robot.dof_names
         text = ", ".join(f"{names[c.follower]} = {c.ratio:g} {names[c.leader]} + {c.offset:g}" for c in robot.couplings)
         console.print(f"[bold]coupled[/bold]  {text}")
+    if robot.loops:
+        console.print("[bold]loops[/bold]    " + ", ".join(escape(loop.name) for loop in robot.loops.loops))
     if robot.frames:
         console.print("[bold]roles[/bold]    " + ", ".join(f"{role}: {frame}" for role, frame in robot.frames.items()))
     if robot.shapes:

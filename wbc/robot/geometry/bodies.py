@@ -18,8 +18,8 @@ from wbc.errors import RobotFileError, ShapeError
 from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
-from wbc.robot.sources.mjmodel import compiled, is_mjmodel, pose_of
-from wbc.robot.sources.mjnames import names_of
+from wbc.robot.sources.mjmodel import compiled, is_mjmodel
+from wbc.robot.sources.mjnames import names_of, pose_of
 from wbc.shapes import Capsule, Sphere
 from wbc.validation import Array
 

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError
+from wbc.robot.loops import AnyLoop
 from wbc.robot.rebuilt import on_joint, without_joints
 from wbc.robot.robot import BASES
 from wbc.validation import Array
@@ -42,6 +43,7 @@ class Description:
         source: path of the file, "" for none.
         undriven: joints with several degrees of freedom that no motor moves, the base left out.
         geometry: the ``mujoco.MjModel`` that has the shapes; None: the file has them.
+        loops: closed loops, between frames of ``model``.
     """
 
     model: pin.Model
@@ -53,6 +55,7 @@ class Description:
     source: str = ""
     undriven: tuple[str, ...] = ()
     geometry: Any = None
+    loops: tuple[AnyLoop, ...] = ()
 
 
 def root_joint(base: str) -> pin.JointModel | None:

@@ -23,8 +23,8 @@ from wbc.robot.sources.description import Description, Mimic, own_base, with_bas
 from wbc.robot.sources.files import captured_stderr
 from wbc.robot.sources.mjactuators import elsewhere, force_range, of_actuators
 from wbc.robot.sources.mjcompared import Compared, sentence
-from wbc.robot.sources.mjnames import BALL, FREE, HINGE, SIZES, SLIDE, MjNames, coordinates, names_of
-from wbc.rotations import TO_PINOCCHIO
+from wbc.robot.sources.mjloops import loops_of
+from wbc.robot.sources.mjnames import BALL, FREE, HINGE, SIZES, SLIDE, MjNames, coordinates, names_of, pose_of
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -181,6 +181,7 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
     try:
         compared = Compared(model, whole, order, names, mimics)
         difference = compared.difference()
+        loops, lost = loops_of(model, lost, trees.robot, set(order), names, whole)
         said |= compared.forces() | compared.loops(lost, set(trees.robot))
     except (RuntimeError, mujoco.FatalError) as error:  # no memory for a state, a plugin that does not begin
         raise RobotFileError("robot", label, f"MuJoCo cannot compute it: {error}") from error
@@ -197,7 +198,9 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
     drawn = np.concatenate(list(states["qpos0"].values()))
     based, kind = with_base(whole, base, drawn)
     notes = {"reader": "compiled by MuJoCo", **said}
-    return Description(based, kind, mimics, states, notes=notes, source=source, undriven=tuple(free), geometry=model)
+    return Description(
+        based, kind, mimics, states, notes=notes, source=source, undriven=tuple(free), geometry=model, loops=loops
+    )
 
 
 def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[pin.Model, list[int]]:
@@ -269,13 +272,6 @@ def _joint(model: mujoco.MjModel, j: int) -> tuple[pin.SE3, pin.JointModel]:
     kinds = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
     made = kinds[along[0]]() if along.size else pin.JointModelRevoluteUnaligned(axis)
     return pin.SE3(pin.exp3(-ref * axis), anchor), made
-
-
-def pose_of(position: Array, quaternion: Array) -> pin.SE3:
-    """A pose from MuJoCo's w, x, y, z."""
-    turn = pin.Quaternion(np.array(quaternion)[TO_PINOCCHIO])
-    turn.normalize()
-    return pin.SE3(turn.toRotationMatrix(), np.array(position, dtype=float))
 
 
 def _inertia(model: mujoco.MjModel, body: int) -> pin.Inertia:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
@@ -82,3 +83,10 @@ def _unique(given: Sequence[str], made: Sequence[str], reserved: Collection[str]
             taken.add(new)
         out.append(new)
     return out
+
+
+def pose_of(position: Array, quaternion: Array) -> pin.SE3:
+    """A pose from MuJoCo's w, x, y, z."""
+    turn = pin.Quaternion(np.array(quaternion)[TO_PINOCCHIO])
+    turn.normalize()
+    return pin.SE3(turn.toRotationMatrix(), np.array(position, dtype=float))

@@ -6,11 +6,15 @@
 
 /* A residual may bend by so much [rad, or characteristic lengths, per second]; at a gain of 10/s a tenth of that remains */
 #define BENDS 1e-3
+/* Rows that are exact may miss 0 at q (+) v dt by so much [rad, or characteristic lengths] */
+#define EXACT 1e-10
 /* Where joints that are stopped by bounds are to be left out of account, as others make up for them in one tick more than their
  * Jacobians say: as above */
 #define STRETCHED 2e-2
-/* Corrections at most; and how often at most the step gets shorter, each time by so much more on the diagonal of H */
+/* Corrections at most, and where exact rows alone miss what they may; how often at most the step gets shorter, each time by so much
+ * more on the diagonal of H */
 #define BENDINGS 8
+#define REFINED 24
 #define SHORTER 3
 #define STEEPER 100.0
 /* A joint that moves at this rate and moved at it the other way in the last tick turns round [rad, or characteristic lengths, per
@@ -35,6 +39,16 @@ EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
     return 0.0;
 #endif
 }
+
+#if BENDING > 0
+/* How far rows are from what is allowed: `worst` of those that bend, and what exact ones miss; above 1 where they are */
+static double bent_by(const wbc_tick *t, double worst) {
+    double opened = 0.0;
+    for (int k = 0; k < MC; k++)
+        if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
+    return larger(worst / BENDS, opened / EXACT);
+}
+#endif
 
 /* The rows as they are at q */
 static void unbend(wbc_tick *t) {

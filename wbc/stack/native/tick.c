@@ -128,9 +128,9 @@ static int has_answer(const wbc_tick *t, int flag) { return flag <= WBC_RELAXED 
 #if BENDING > 0
 /* Sides are moved until the rows make up for what they lose, as far as that gets less; what they lose then, as a rate */
 static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
-    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all);
-    for (int n = 0; n < BENDINGS && worst > BENDS && has_answer(t, *flag); n++) {
-        const double before = worst;
+    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all), off = bent_by(t, worst);
+    for (int n = 0; n < (worst > BENDS ? BENDINGS : REFINED) && off > 1.0 && has_answer(t, *flag); n++) {
+        const double before = off;
         for (int k = 0; k < MC; k++) {
             last[k] = t->bend[k];
             next[k] = last[k] - t->report.lost[k] / t->dt;
@@ -138,7 +138,8 @@ static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
         bend_rows(t, next);
         *flag = answer(t, nameless);
         worst = wbc_tick_find_lost(t, all);
-        if (worst < before && has_answer(t, *flag)) continue;
+        off = bent_by(t, worst);
+        if (off < before && has_answer(t, *flag)) continue;
         bend_rows(t, last);
         *flag = answer(t, nameless);
         return wbc_tick_find_lost(t, all);
@@ -146,6 +147,23 @@ static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
     return worst;
 }
 #endif
+
+/* Exact rows make up for what they would lose at the last command, which this one is near to */
+static void foresee(wbc_tick *t) {
+#if BENDING > 0
+    double next[MC + 1] = {0};
+    int exact = 0;
+    for (int k = 0; k < MC; k++) exact |= bent[k] == 2;
+    if (!exact) return;
+    memcpy(t->report.v, t->v_last, sizeof t->report.v);
+    wbc_tick_find_lost(t, 0);
+    for (int k = 0; k < MC; k++)
+        if (bent[k] == 2) next[k] = -t->report.lost[k] / t->dt;
+    bend_rows(t, next);
+#else
+    (void)t;
+#endif
+}
 
 /* Equality rows make up for what they lose within the tick; where that does not help, the step gets shorter */
 static int bent_answer(wbc_tick *t, int flag, int *nameless) {
@@ -173,6 +191,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     /* What accelerations count from, for who looks at the tick afterwards */
     memcpy(t->v_in, t->v_last, sizeof t->v_in);
     assemble(t, 1);
+    foresee(t);
     int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
     if (PRICES) report_soft_rows(t);
     for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++)

@@ -1,0 +1,258 @@
+"""Closed loops of a mechanism: two places on a robot that its parts keep together, and joints that follow a curve."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from wbc import validation
+from wbc.errors import WbcError
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.tracer import Tracer
+from wbc.validation import Array
+
+#: Rows of each kind of loop, with their units
+LABELS = {"connect": ("x", "y", "z"), "weld": ("x", "y", "z", "rx", "ry", "rz")}
+#: A loop is closed where its residual is below this [m, rad]: rounding of poses metres from the origin
+CLOSED = 1e-11
+#: Steps towards a closed configuration at most: they converge quadratically, or not at all
+STEPS = 60
+#: The longest step of a joint [rad, m]: residuals of rotations are straight over a fraction of a turn
+LONGEST = 0.3
+#: Singular values below this share of the largest are none: rows that they stand for are dependent
+DEPENDENT = 1e-7
+
+
+class LoopError(WbcError):
+    """A loop that cannot be closed, or that contradicts another one."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Two frames that stay together:
+
+        e = (R_a' (p_b - p_a); log3(R_a' R_b)) = 0,      the first three rows alone for ``connect``
+
+    Attributes:
+        name: of the loop.
+        first, second: names of the frames a and b; ``"world"`` is one.
+        kind: ``connect``: their origins meet, as in a ball joint, and as hinges in a plane do; ``weld``: their poses
+            are equal.
+    """
+
+    name: str
+    first: str
+    second: str
+    kind: Literal["connect", "weld"] = "connect"
+
+    def __post_init__(self) -> None:
+        validation.name("Loop.name", self.name)
+        validation.one_of("Loop.kind", self.kind, LABELS)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """A label a row; those of rotations begin with r."""
+        return LABELS[self.kind]
+
+    def error(self, kin: Tracer) -> ca.SX:
+        """e of the class, 3 or 6 rows [m, rad]."""
+        first, second = kin.pose(self.first), kin.pose(self.second)
+        gap = first.rotation.T @ (second.position - first.position)
+        if self.kind == "connect":
+            return gap
+        return ca.vertcat(gap, kin.rotation_error(self.second, self.first, ca.SX.eye(3)))
+
+
+@dataclass(frozen=True)
+class JointCurve:
+    """A joint that follows another along a polynomial, or stands still where no joint leads:
+
+        e = (y - y0) - sum_k c_k (x - x0)^k = 0
+
+    Attributes:
+        name: of the loop.
+        follower, leader: names of joints with one coordinate each, y and x; no leader: x = x0.
+        coefficients: c_0, c_1, ... [of the follower's unit and powers of the leader's].
+        origin: (y0, x0).
+    """
+
+    name: str
+    follower: str
+    leader: str | None
+    coefficients: tuple[float, ...]
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        validation.name("JointCurve.name", self.name)
+        numbers = validation.real_array("JointCurve.coefficients", self.coefficients).reshape(-1)
+        object.__setattr__(self, "coefficients", tuple(numbers.tolist()))
+        object.__setattr__(
+            self, "origin", tuple(validation.real_array("JointCurve.origin", self.origin, (2,)).tolist())
+        )
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """That of its one row."""
+        return (self.follower,)
+
+    def error(self, kin: Tracer) -> ca.SX:
+        """e of the class, one row.
+
+        Raises:
+            UnknownNameError: no such joint with one coordinate.
+        """
+        x = ca.SX(0.0) if self.leader is None else kin.joint(self.leader) - self.origin[1]
+        curve = ca.SX(0.0)
+        for coefficient in reversed(self.coefficients):
+            curve = curve * x + coefficient
+        return kin.joint(self.follower) - self.origin[0] - curve
+
+
+AnyLoop = Loop | JointCurve
+
+
+@dataclass(frozen=True, eq=False)
+class LoopRows:
+    """What keeps the loops of a robot closed.
+
+    Attributes:
+        loops: in the order of their rows.
+        bases: of each loop the directions of its residual that no other row has, rows x residual.
+        rows: label and unit of each row; one that mixes several is named by the largest of them.
+    """
+
+    loops: tuple[AnyLoop, ...] = ()
+    bases: tuple[Array, ...] = ()
+    rows: tuple[tuple[str, str], ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.loops)
+
+    def error(self, kin: Tracer) -> ca.SX:
+        """Residuals of all rows [m, rad]."""
+        parts = [ca.DM(basis) @ loop.error(kin) for loop, basis in zip(self.loops, self.bases, strict=True)]
+        return ca.SX(ca.vertcat(*parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Range:
+    """Position limits by degree of freedom, and the index in q of the coordinate of each, -1 for none."""
+
+    lower: Array
+    upper: Array
+    index: Array
+
+
+class Closing:
+    """Newton's shortest steps towards configurations at which loops are closed.
+
+    Args:
+        model: the robot's. loops: its loops. limits: that the configurations keep.
+    """
+
+    def __init__(self, model: pin.Model, loops: Sequence[AnyLoop], limits: Range) -> None:
+        self._model, self._limits, self._loops = model, limits, loops
+        kin = Tracer(Kinematics(model))
+        error = ca.SX(ca.vertcat(*[loop.error(kin) for loop in loops]))
+        outputs = [ca.densify(part) for part in kin.expanded(error, ca.densify(kin.slope(error)))]
+        self._function = ca.Function("loops", [kin.q], outputs)
+
+    def look(self, q: Array) -> tuple[Array, Array]:
+        """(residual [rows], its Jacobian [rows, nv])."""
+        error, jacobian = self._function(q)
+        return np.array(error).ravel(), np.array(jacobian)
+
+    def close(self, q: Array) -> tuple[Array, float]:
+        """(the best configuration on the way, what its loops are open by there [m, rad])."""
+        error, jacobian = self.look(q)
+        best = q, float(np.abs(error).max(initial=0.0))
+        for _ in range(STEPS):
+            if best[1] <= CLOSED:
+                break
+            step = -np.linalg.lstsq(jacobian, error, rcond=DEPENDENT)[0]
+            step *= min(1.0, LONGEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
+            q = self._within(np.asarray(pin.integrate(self._model, q, step)))
+            error, jacobian = self.look(q)
+            opened = float(np.abs(error).max(initial=0.0))
+            if opened < best[1]:
+                best = q, opened
+        return best
+
+    def first(self, starts: Iterable[Array]) -> Array:
+        """The first of the configurations that searches lead to that closes the loops.
+
+        Raises:
+            LoopError: none does; which loop is open most, and by how much, at the nearest.
+        """
+        nearest: tuple[Array, float] = np.zeros(0), np.inf
+        for start in starts:
+            found = self.close(start)
+            if found[1] <= CLOSED:
+                return found[0]
+            nearest = min(nearest, found, key=lambda one: one[1])
+        error = np.abs(self.look(nearest[0])[0])
+        opened = {loop.name: float(error[rows].max()) for loop, rows in zip(self._loops, self.spans, strict=True)}
+        worst = max(opened, key=lambda name: opened[name])
+        reason = f"no configuration was found that closes it with the others; open by {opened[worst]:.3g} m or rad"
+        raise LoopError("loops", worst, f"{reason} at the nearest, q = {np.array2string(nearest[0], precision=4)}")
+
+    @property
+    def spans(self) -> list[slice]:
+        """The rows of each loop."""
+        ends = np.cumsum([0, *(len(loop.labels) for loop in self._loops)]).tolist()
+        return [slice(first, end) for first, end in itertools.pairwise(ends)]
+
+    def rows(self, count: int, looks: Sequence[Array], units: Mapping[str, str]) -> LoopRows:
+        """The first ``count`` loops with the directions that are independent at some configurations; ``units``: of the
+        joints' coordinates.
+        """
+        bases = independent(self.spans[:count], np.array([self.look(q)[1] for q in looks]))
+        rows = []
+        for loop, basis in zip(self._loops, bases, strict=False):
+            for row in basis:
+                k = int(np.argmax(np.abs(row)))
+                unit = units[loop.follower] if isinstance(loop, JointCurve) else "m" if k < 3 else "rad"
+                rows.append((f"{loop.name}.{loop.labels[k]}", unit))
+        return LoopRows(tuple(self._loops[:count]), bases, tuple(rows))
+
+    def _within(self, q: Array) -> Array:
+        out, has = np.array(pin.normalize(self._model, q)), self._limits.index >= 0
+        at = self._limits.index[has]
+        out[at] = np.clip(out[at], self._limits.lower[has], self._limits.upper[has])
+        return out
+
+
+def independent(parts: Sequence[slice], jacobians: Array) -> tuple[Array, ...]:
+    """Orthonormal directions of each residual that are independent of those before.
+
+    Args:
+        parts: the rows of each loop. jacobians: of all residuals at several configurations [looks, rows, nv].
+
+    A direction of a residual that moves with no joint, or as one combination of rows before it at every configuration,
+    is left out: of a planar mechanism what points out of its plane.
+    """
+    wide = np.concatenate(list(jacobians), axis=1)
+    least = DEPENDENT * max(1.0, float(np.abs(wide).max(initial=0.0))) * np.sqrt(len(jacobians))
+    known, out = np.zeros((0, wide.shape[1])), list[Array]()
+    for rows in parts:
+        own = wide[rows]
+        rest = own - own @ np.linalg.pinv(known) @ known if len(known) else own
+        left, sizes, _ = np.linalg.svd(rest)
+        basis = _straightened(left.T[: int((sizes > least).sum())])
+        out.append(basis)
+        known = np.concatenate([known, basis @ own])
+    return tuple(out)
+
+
+def _straightened(basis: Array) -> Array:
+    """The same directions, with axes among them where they span some."""
+    span = basis.T @ basis
+    axes = np.eye(len(span))[np.diag(span) > 1.0 - 1e-12]
+    rest = basis - basis @ axes.T @ axes
+    return np.concatenate([axes, np.linalg.svd(rest)[2][: len(basis) - len(axes)]]) if len(basis) else basis
