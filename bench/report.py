@@ -11,7 +11,7 @@ from bench.code import tables as code
 from bench.curve_report import NOTES, curve_readme, curve_sheets
 from bench.deadlines import run as deadlines
 from bench.goals import Goal, goals
-from bench.sheet import Sheet, line, us
+from bench.sheet import Sheet, us
 
 #: Contender that ratios are taken to
 OURS = "wbc"
@@ -150,23 +150,8 @@ def markdown(results: dict[str, Any]) -> str:
 
 
 def readme(results: dict[str, Any]) -> str:
-    """The README's table: medians of the user's call, and of the whole cycle, on every problem."""
-    problems: dict[str, Any] = results["problems"]
-    names = list(
-        dict.fromkeys(name for p in problems.values() for name in p["contenders"] if "+expression" not in name)
-    )
-    lines = [line(["one tick / with new targets [us], medians", *(p["title"] for p in problems.values())])]
-    lines.append(line(["---", *("---:" for _ in problems)]))
-    for name in names:
-        cells = []
-        for problem in problems.values():
-            found = problem["contenders"].get(name)
-            parts = [us(found["durations"][part]["median"]) for part in ("call", "cycle")] if found else ["-"]
-            cells.append(" / ".join(parts))
-        lines.append(line([name, *cells]))
-    lines += ["", "All reach the same pose to the same error."]
-    if results.get("curves"):
-        lines += ["", *curve_readme(results["curves"]), "", "![Tick against size](docs/images/bench_curves.png)", ""]
+    """The README's table: medians of ticks of random problems of growing size."""
+    lines = [*curve_readme(results["curves"]), "", "![Tick against size](docs/images/bench_curves.png)", ""]
     lines.append(
         "What each call contains, percentiles, phases, compile times and goals: [bench/results.md](bench/results.md)."
     )

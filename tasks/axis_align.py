@@ -27,28 +27,13 @@ class AxisAlign(Task):
 
         e = F' R' theta n                 theta = angle from d to a, n = d x a / |d x a|           [rad]
 
-    theta n is the rotation vector of the shortest turn that takes d to a. F = (b1, b2) are two unit vectors fixed in
-    the frame and perpendicular to a, so that no direction of a or d is left out; theta n has no part along a. The rows
-    are those of the angular velocity across a,
+    theta n is the rotation vector of the shortest turn that takes d to a; F = (b1, b2) are two unit vectors fixed in
+    the frame and perpendicular to a. The rows are those of the angular velocity across a,
 
         F' R' (w - w_b - d x dd/dt) = -gain e,
 
     with w_b that of the reference. Hence theta falls exactly like exp(-gain t) and a moves, as seen from b, on the
-    great circle to d, whatever the spin about a does. The rows have unit size at every angle, while the derivative of e
-    itself grows without bound towards theta = pi; along e both agree: e' J v is the rate of theta^2 / 2.
-
-    Opposite directions: from theta = pi to within 1e-9 rad, where every turn is as short, it turns about ``around``.
-
-    Inputs:
-        target: d, 3 numbers of any length but 0 in the axes of the reference, kept as a unit vector. Default: where a
-            points at the first step.
-        feedforward: dd/dt, rate of the unit vector [1/s]; its part along d has no effect. Default 0.
-
-    Example:
-        >>> AxisAlign("panda_hand", axis=(0, 0, 1))          # then target = (0, 0, -1): the hand points down
-
-    What it cannot do: it does not choose the turn about the axis, and it tells a direction from its opposite (for a
-    line without a sense choose the nearer of the two as target). Noise may choose the turn's sense near theta = pi.
+    great circle to d, whatever the spin about a does. From theta = pi (to within 1e-9 rad) it turns about ``around``.
 
     Attributes:
         frame: name of the frame that the axis is fixed in.
@@ -56,6 +41,23 @@ class AxisAlign(Task):
         relative_to: frame b that the target is given in; ``"world"``, a frame of the robot or a moving frame.
         around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
             that follows the one nearest to ``axis`` (x, y for a z axis).
+
+    Inputs:
+        target: d, 3 numbers of any length but 0 in the axes of the reference, kept as a unit vector. Default: where a
+            points at the first step.
+        feedforward: dd/dt, rate of the unit vector [1/s]; its part along d has no effect. Default 0.
+
+    What it cannot do: choose the turn about the axis, or tell a line's two directions apart: give the nearer one as
+    target. Its rows are not the derivative of e, so a ``Limit`` cannot have it; ``AxisCone`` limits the angle.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp", kind="position"), name="place")
+        >>> stack.add(wbc.tasks.AxisAlign("panda_hand_tcp", axis=(0, 0, 1)), name="down")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["down"].target = (0, 0, -1)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

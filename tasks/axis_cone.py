@@ -26,23 +26,8 @@ class AxisCone(Constraint):
 
         h = (alpha - theta) (1 + min(theta / alpha, 1)) / 2 >= 0,    theta = angle between R a and R_b d     [rad]
 
-    On the cone h has slope -1 in theta: near it h is the angle that is left, beyond it exactly alpha - theta, and on
-    the axis of the cone alpha / 2 with slope 0, where alpha - theta itself would have a tip. The turn about the axis
-    is free.
-
-    Inputs:
-        direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.
-        direction_rate: derivative of the unit vector d [1/s]; w x d for a direction that turns at w. Default 0.
-        half_angle: alpha in 0.001 to pi [rad].
-        half_angle_rate: its rate [rad/s]. Default 0.
-
-    Example:
-        >>> AxisCone("panda_hand", axis=(0, 0, -1), half_angle=0.2)       # the cup in the hand stays level
-
-    What it cannot do: at theta = pi every turn back is as short: one is taken, and noise may choose another. It limits
-    an angle and not the point that the axis goes through (see ``GazeCone``). Over one tick of length dt an axis that
-    turns at w against the direction may leave the cone by (1 + 1 / alpha) (w dt)^2 / 2: a cone must be wide against
-    w dt. A direction that moves faster than the joints can follow is lost: actuator limits come first.
+    On the cone h has slope -1 in theta: near it h is the angle that is left, beyond it exactly alpha - theta. The turn
+    about the axis is free.
 
     Attributes:
         frame: name of the frame that the axis is fixed in.
@@ -50,6 +35,26 @@ class AxisCone(Constraint):
         axis: a in that frame, of any length.
         direction: first value of the input; ``(0, 0, 1)`` is up.
         relative_to: frame b that the direction is given in, ``"world"``, a frame of the robot or a moving frame.
+
+    Inputs:
+        direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.
+        direction_rate: derivative of the unit vector d [1/s]; w x d for a direction that turns at w. Default 0.
+        half_angle: alpha [rad].
+        half_angle_rate: its rate [rad/s]. Default 0.
+
+    What it cannot do: hold an axis in a direction (``AxisAlign``, ``Hold``), or limit the point that the axis goes
+    through (``GazeCone``). Over one tick an axis that turns at w against the direction may leave the cone by (1 + 1 /
+    alpha) (w dt)^2 / 2, so alpha must be large against w dt.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.AxisCone("panda_hand_tcp", axis=(0, 0, -1), half_angle=0.2), name="cup")
+        >>> stack.add(wbc.tasks.JointLimits())
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["cup"].half_angle = 0.1
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError: a bad field.

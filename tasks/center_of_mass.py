@@ -28,19 +28,24 @@ class CenterOfMass(Task):
 
     The rows are components along the axes of a frame a. Links welded to the world have no part in c.
 
+    Attributes:
+        axes: frame a along whose axes rows and weights are counted: ``"world"`` or a frame's name.
+        weights: three numbers >= 0, None: 1 each.
+
     Inputs:
         target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
         feedforward: velocity of the target in the world [m/s]. Default 0.
 
+    What it cannot do: balance: it knows no support polygon, contact force or momentum. Masses are those of the
+    description; a payload that is not in it is not seen. The target is in the world; for one relative to a foot write
+    an ``Expression``.
+
     Example:
-        >>> CenterOfMass(weights=(1, 1, 0))                  # balance: the height is free
-
-    What it cannot do: it is no balance criterion: it knows no support polygon, no contact force and no
-    momentum. Masses come from the robot's description; a payload that is not in it is not seen.
-
-    Attributes:
-        axes: frame a along whose axes rows and weights are counted: ``"world"`` or a frame's name.
-        weights: three numbers >= 0, None: 1 each.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> stack.add(wbc.tasks.Hold("left_sole_link"), name="left foot")
+        >>> stack.add(wbc.tasks.Hold("right_sole_link"), name="right foot")
+        >>> stack.add(wbc.tasks.CenterOfMass(weights=(1, 1, 0)), name="balance")
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`; a

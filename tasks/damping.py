@@ -19,23 +19,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Damping(Task):
-    """Every velocity is wished to be zero, with a weight of its own:
+    """Every velocity is to be zero, with a weight of its own:
 
         v_i = 0                             [rad/s or m/s, as each degree of freedom]
 
-    There is no error to correct: e is zero, its rows are those of the identity, and ``gain`` has no effect.
+    There is no error to correct: e is zero, its rows are those of the identity, and ``gain`` has no effect. Rows have
+    the labels ``robot.dof_names``, so a mask can spare one joint at run time.
+
+    Attributes:
+        weights: one number >= 0 a degree of freedom, the base's included, in the order of v; None: 1 each.
 
     Inputs:
         gain: has no effect.
 
+    What it cannot do: bring the robot back anywhere (``Posture`` does) or smooth the command (acceleration limits do).
+    It slows the other tasks of its level by about its weight over theirs, in all directions and not only next to a
+    singularity.
+
     Example:
-        >>> Damping(weights=(1, 1, 1, 1, 1, 1, 100))     # spare the last joint of seven
-
-    What it cannot do: it does not bring the robot back anywhere (use Posture), it does not smooth the command
-    (acceleration limits do), and it slows the other tasks of its level by about its weight over theirs.
-
-    Attributes:
-        weights: one number >= 0 a degree of freedom, the base's included, in the order of v; None: 1 each.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.Damping(weights=(1, 1, 1, 1, 1, 1, 100)), name="spare the last joint", weight=1e-4)
 
     Raises:
         ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -32,24 +32,31 @@ class Distance(Task):
     sphere round the point. Its gradient by the points is a unit vector everywhere; where they coincide to within 1e-10
     m, and no line is defined, they part along the z axis of the other frame.
 
-    Inputs:
-        target: the distance, >= 0 [m]. Default: what it is at the first step.
-        feedforward: rate of the target [m/s]. Default 0.
-        point: the point of the other frame [m]; first value: the field ``point``.
-        point_velocity: its rate in the axes of the other frame [m/s]. Default 0.
-
-    Example:
-        >>> Distance("gripper_left", "gripper_right")            # the hands keep their distance, however they turn
-
-    What it cannot do: keep two bodies apart: it has one desired distance of two points, no margin (use Obstacle).
-    A target of 0 leaves the direction of approach to the other tasks and is served up to the tick's rounding of a
-    cone's tip; to bring two points together command a position (EndEffector with ``relative_to``).
-
     Attributes:
         frame: name of the frame of the first point.
         other: frame b of the second point; ``"world"`` or a frame of the robot, which may move.
         offset: the first point in its frame [m].
         point: first value of the input ``point`` [m].
+
+    Inputs:
+        target: the distance, >= 0 [m]. Default: what it is at the first step.
+        feedforward: rate of the target [m/s]. Default 0.
+        point: the point of the other frame [m].
+        point_velocity: its rate in the axes of the other frame [m/s]. Default 0.
+
+    What it cannot do: keep two bodies apart: it has one desired distance of two points and no margin (``Obstacle``
+    has). Where on the sphere the point is, other tasks decide. With a target of 0 a tick oversteps; to bring two
+    points together command a position (``EndEffector`` with ``relative_to``).
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.Distance("panda_hand_tcp", point=(0.6, 0.0, 0.4)), name="range")
+        >>> stack.add(wbc.tasks.LookAt("panda_hand_tcp"), name="sight")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["range"].target = 0.3
+        >>> controller["sight"].target = (0.6, 0.0, 0.4)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -26,14 +26,17 @@ class DivergentComponent(Task):
         xi = c + (dc/dt) / omega,   d xi/dt = feedforward - gain (xi - target),   omega = sqrt(g / height)     [m, m/s]
 
     (Takenaka, Matsumoto and Yoshiike, IROS 2009; Englsberger, Ott and Albu-Schaeffer, IEEE T-RO 31(2), 2015). c itself
-    converges to xi, by dc/dt = -omega (c - xi), so only xi has to be kept over the feet. Its projection on level ground
-    is the capture point (Pratt, Carff, Drakunov and Goswami, Humanoids 2006): where a pendulum of this height comes to
-    rest above. The rows ask for the acceleration of c that this takes,
+    converges to xi, so only xi has to be kept over the feet; its projection on level ground is the capture point. The
+    rows ask for the acceleration
 
         d2c/dt2 = omega (feedforward - gain (xi - target) - dc/dt),
 
     and the error that a step reports is e = c - target. Only a stack that commands accelerations or torques can have
-    it: for velocities a row of ``CenterOfMass`` with gain omega puts xi on its target at once.
+    it (docs/torque.md): for velocities a row of ``CenterOfMass`` with gain omega puts xi on its target at once.
+
+    Attributes:
+        omega: first value of the input: sqrt(g / height), for 0.8 m on earth 3.5/s.
+        weights: three numbers >= 0, by default x and y alike and the height free.
 
     Inputs:
         target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
@@ -41,15 +44,15 @@ class DivergentComponent(Task):
         gain: how fast xi reaches its target [1/s].
         omega: of the pendulum [1/s].
 
+    What it cannot do: guarantee balance: whether the contacts can make the acceleration is decided by their friction
+    cones. omega is that of a pendulum of constant height: a robot that rises or sinks quickly needs another value in
+    every tick.
+
     Example:
-        >>> DivergentComponent(omega=3.5)                  # x and y: the capture point
-
-    What it cannot do: it is no balance criterion: whether the contacts can make the acceleration is for their cones to
-    say.
-
-    Attributes:
-        omega: first value of the input: sqrt(g / height), for 0.8 m on earth 3.5/s.
-        weights: three numbers >= 0, by default x and y alike and the height free.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> stack.add(wbc.tasks.DivergentComponent(omega=3.5), name="capture point")
+        >>> stack.add(wbc.tasks.Posture(), name="posture", weight=1e-2)
 
     Raises:
         ShapeError, NotFiniteError, RangeError: on construction; a robot without mass in :meth:`validate`.

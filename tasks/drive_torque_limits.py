@@ -31,21 +31,31 @@ class DriveTorqueLimits(Constraint):
     a stack that commands torques can have them. ``transmission.inverse.T @ step.torque[...]`` is what the drives are to
     give.
 
+    Attributes:
+        transmission: joints and drives.
+        torque: first value of the input, one number or one a drive.
+
     Inputs:
         scale: shrinks the limits, from 0 to 1.
         torque: T, one number a drive [N m, N].
 
+    What it cannot do: know the inertia of the drives' rotors: ``model.armature`` is one number a joint and has no
+    place for what couples joints. ``TorqueLimits`` of the same joints are limits of their own; in a tick that has no
+    answer those of the drives count. Speeds of drives are limited by a ``Limit`` on a ``JointCoupling``.
+
     Example:
-        >>> drives = {"a": {"pitch": 1.0, "roll": 1.0}, "b": {"pitch": 1.0, "roll": -1.0}}
-        >>> DriveTorqueLimits(Transmission(("pitch", "roll"), drives), torque=5.0)
-
-    What it cannot do: the inertia of the drives' rotors is that of ``model.armature``, one number a joint, which has no
-    place for what couples joints. ``TorqueLimits`` of the same joints are limits of their own: in a tick that has no
-    answer, where torques are cut to their limits, those of the drives count.
-
-    Attributes:
-        transmission: joints and drives.
-        torque: first value of the input, one number or one a drive.
+        >>> import wbc
+        >>> from wbc.robot.transmission import Transmission
+        >>> wrist = Transmission(
+        ...     ("panda_joint6", "panda_joint7"),
+        ...     {
+        ...         "left": {"panda_joint6": 1.0, "panda_joint7": 1.0},
+        ...         "right": {"panda_joint6": 1.0, "panda_joint7": -1.0},
+        ...     },
+        ... )
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.001)
+        >>> stack.add(wbc.tasks.DriveTorqueLimits(wrist, torque=5.0), name="wrist")
+        >>> stack.add(wbc.tasks.Posture())
 
     Raises:
         ShapeError, NotFiniteError, BoundsError: on construction. UnknownNameError: no such joint. RangeError: a joint

@@ -36,21 +36,24 @@ class Elbow(Task):
 
     The rows are components along the axes of a frame a.
 
-    Inputs:
-        target: 3 numbers in the world [m]. Default: where the point is at the first step.
-        feedforward: velocity of the target in the world [m/s]. Default 0.
-
-    Example:
-        >>> Elbow("panda_link4", offset=(0, 0, 0.05), weights=(0, 0, 1))   # only the height of the elbow
-
-    What it cannot do: it commands a point, not the swivel of the arm: with a hand task above it only the part of e that
-    is tangent to the elbow's circle can be served (use PitchPlane for the angle).
-
     Attributes:
         frame: frame of the body.
         offset: the point in that frame [m].
         axes: frame a along whose axes rows and weights are counted: ``"world"``, ``"frame"`` (its own) or a name.
         weights: three numbers >= 0, None: 1 each.
+
+    Inputs:
+        target: 3 numbers in the world [m]. Default: where the point is at the first step.
+        feedforward: velocity of the target in the world [m/s]. Default 0.
+
+    What it cannot do: command the swivel angle of an arm: while the hand is held, only the part of e along the elbow's
+    curve can be served (``PitchPlane`` commands the angle). Other points of the body are not watched.
+
+    Example:
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.Elbow("panda_link4", offset=(0, 0, 0.05), weights=(0, 0, 1)), name="elbow", weight=1e-2)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

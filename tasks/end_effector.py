@@ -37,23 +37,10 @@ class EndEffector(Task):
         e = [ R_a' (p - p_d)                      p_d = p_b + R_b p_t         [m]
               R_a' R_d log3(R_d' R) ]             R_d = R_b R_t               [rad]
 
-    The rows are components along the axes of a frame a. Position and rotation are decoupled (R^3 x SO(3)), so with
-    nothing in the way the position moves on a straight line and the rotation about one axis, both as seen from axes a.
-    The logarithm is exact; its rows are finite up to an error of pi, where the direction of turning is ambiguous.
-
-    Inputs:
-        target: ``pose`` kind: ``pin.SE3``, 4x4 matrix or (position, quaternion x, y, z, w) in the reference [m];
-            ``position``: 3 numbers [m]; ``orientation``: 3x3 matrix or quaternion x, y, z, w.
-            Default: where the frame is at the first step.
-        feedforward: rate of the target in the axes of the reference: twist (linear; angular) [m/s, rad/s], its linear
-            part alone or its angular part alone. Default 0.
-
-    Example:
-        >>> EndEffector("tool0", kind="pose", axes="frame", weights=(1, 1, 1, 1, 1, 0))   # free about the tool's z
-
-    What it cannot do: it does not plan; a target that jumps is a velocity that jumps. From an error of exactly
-    pi it turns about one of the two possible axes, and noise may choose the other. Axes other than those of the
-    reference turn the path: it is straight as seen from those axes.
+    The rows are components along the axes of a frame a. Position and rotation are decoupled (R^3 x SO(3)): where
+    nothing limits it the position moves on a straight line and the rotation about one axis, both decaying like
+    exp(-gain t), as seen from axes a. A hand that follows the other hand takes it as ``relative_to``; ``axes="frame"``
+    with weights (1, 1, 1, 1, 1, 0) leaves the turn about the tool's z axis free.
 
     Attributes:
         frame: name of the frame that moves.
@@ -62,6 +49,25 @@ class EndEffector(Task):
         axes: frame a along whose axes rows and weights are counted: ``"reference"`` (those of b), ``"frame"`` (its
             own), ``"world"`` or a frame's name.
         weights: one number >= 0 a row, None: 1 each.
+
+    Inputs:
+        target: ``pose`` kind: ``pin.SE3``, 4x4 matrix or (position, quaternion x, y, z, w) in the reference [m];
+            ``position``: 3 numbers [m]; ``orientation``: 3x3 matrix or quaternion x, y, z, w.
+            Default: where the frame is at the first step.
+        feedforward: rate of the target in the axes of the reference: twist (linear; angular) [m/s, rad/s], its linear
+            part alone or its angular part alone. Default 0.
+
+    What it cannot do: plan: a target that jumps is a velocity that jumps; limits bound it, nothing smooths it. In axes
+    other than those of the reference the path is straight as seen from those axes.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp", axes="frame", weights=(0, 0, 0, 1, 1, 0)), name="upright")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["hand"].target = [0.5, 0.0, 0.4, 1.0, 0.0, 0.0, 0.0]      # position, quaternion x, y, z, w
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -31,23 +31,23 @@ class Expression(Task):
 
         e = function(kin, p)                                  [units]
 
-    ``kin`` is the :class:`wbc.symbolic.Tracer` (poses, positions and rotations of frames, centre of mass, joint
-    coordinates, q); ``p`` holds the declared inputs by name: SX scalars and vectors, 3x3 rotations, poses. The
-    result is a CasADi SX scalar or column, or a list of them; the number of rows is found by running the function. The
-    Jacobian is exact, by differentiation along the tangent space, and so is the feed-forward of an input with a
-    ``rate``.
+    ``kin`` is a :class:`wbc.symbolic.Tracer`. It answers with CasADi SX expressions, in the world and in SI units:
 
-    Inputs:
-        as declared. Each needs a default: nothing else can tell where the function starts from.
+        kin.position(frame), kin.position(frame, offset)     a frame's origin, or a point in it (3)
+        kin.rotation(frame)                                  rotation matrix (3x3)
+        kin.pose(frame)                                      both, with point, inverse_point, times, inverse
+        kin.rotation_error(frame, base, target)              rotation vector from a 3x3 target in base to the frame (3)
+        kin.manipulability(frame, base, rows, length)        see Manipulability
+        kin.center_of_mass()                                 centre of mass (3)
+        kin.joint(name), kin.q                               a joint's coordinate; the whole configuration
 
-    Example:
-        >>> height = Expression(
-        ...     lambda kin, p: kin.position("panda_hand")[2] - p["height"],
-        ...     units="m", inputs=(Input("height", unit="m", default=0.4),))
+    ``p`` holds the declared inputs by name: scalars, vectors, 3x3 rotations, poses. The result is a scalar, a column
+    or a list of them. The Jacobian is exact, by differentiation along the tangent space, and so is the feed-forward of
+    an input that names the input of its ``rate``. The compiled code is cached by the traced formula, not by the Python
+    source.
 
-    What it cannot do: the error may not depend on the velocity. Python branches run once, when the function is traced:
-    use ``casadi.if_else`` for a choice that depends on q or on inputs. It is no better than its formula: where that has
-    no derivative (a norm at zero) the row has none.
+    A pickle of it finds the function by its name again. A lambda or local function has none and is pickled by value,
+    for which ``cloudpickle`` must be installed; else pickling raises a ``PicklingError``.
 
     Attributes:
         function: called as ``function(kin, p)`` each time the task is built; it must give the same each time.
@@ -57,8 +57,22 @@ class Expression(Task):
         labels: name of each row; None: "value" for one row, else "0", "1", ...
         weights: one number >= 0 a row, None: 1 each.
 
-    A pickle of it finds the function by its name again. A lambda or local function has none and is pickled by value,
-    for which ``cloudpickle`` must be installed; else pickling raises a ``PicklingError``.
+    Inputs:
+        as declared. Each needs a default: nothing else can tell where the function starts from.
+
+    What it cannot do: depend on the velocity. Python branches run once, when the function is traced: for a choice that
+    depends on q or on inputs use ``casadi.if_else``, with both branches finite. Where the formula has no derivative (a
+    norm at zero) the row has none.
+
+    Example:
+        >>> import wbc
+        >>> from wbc.tasks import Expression, Input
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.005)
+        >>> stack.add(Expression(
+        ...     lambda kin, p: kin.position("panda_hand")[2] - p["height"],
+        ...     units="m", inputs=(Input("height", unit="m", default=0.4),)), name="height")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["height"].height = 0.5
 
     Raises:
         WbcError: the function raised. UnknownNameError: a frame, joint, input or unit that does not exist.

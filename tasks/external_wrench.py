@@ -19,25 +19,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExternalWrench(Load):
-    """A wrench w = (f; m) that is known to act on a frame of the robot, along the axes of the world and about the
-    frame's origin, is part of its dynamics:
+    """A known wrench on a frame is part of the dynamics: w = (f; m), along the axes of the world and about the frame's
+    origin,
 
         M a + h = tau + J'w,        J = (J_lin; J_ang), 6 x nv
 
     so that the torques bear it: a payload that the description does not have, a push that a force sensor measures,
     what a tool is known to do. Only a stack that commands torques can have it.
 
+    Attributes:
+        frame: name of the frame.
+
     Inputs:
         wrench: on the robot, force and moment [N, N m]. Default 0.
 
+    What it cannot do: estimate: what is written is taken as true, and is as old and noisy as its sensor. A wrench that
+    a contact of the stack bears would be counted twice. A payload's inertia is not known before the acceleration is;
+    put it into the description.
+
     Example:
-        >>> ExternalWrench("panda_hand_tcp")
-
-    What it cannot do: it does not estimate. A measured wrench is as old and as noisy as its sensor, and one that a
-    contact of the stack bears would be counted twice.
-
-    Attributes:
-        frame: name of the frame.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.002).add(wbc.tasks.Posture())
+        >>> stack.add(wbc.tasks.ExternalWrench("panda_hand_tcp"), name="payload")
+        >>> controller = stack.compile(command="torque")
+        >>> controller["payload"].wrench = [0.0, 0.0, -20.0, 0.0, 0.0, 0.0]
 
     Raises:
         UnknownNameError, RangeError: in :meth:`validate`: no such frame, or one that no joint moves.

@@ -24,15 +24,21 @@ class Fixed(Constraint):
 
         v_i = v0_i - clip(v0_i, -A dt, A dt)     for every degree of freedom i of the joints     [rad/s, m/s]
 
-    with v0 the velocity that accelerations are counted from. For a joint at rest it is 0.
+    ``enabled`` and ``mask`` fix and release joints while running. Full braking is always within ``JointLimits``, so
+    the two never contradict each other inside the position limits. A joint outside them returns if a ``JointLimits``
+    asks for it, which comes first in the order of sacrifice.
 
     Attributes:
         joints: names of the joints, one or several; a base joint fixes the whole base.
         acceleration: bring moving joints to rest at ``robot.limits.acceleration``; False: at once.
 
-    It fixes velocities, not positions: a joint that was moved by something else is not brought back (see ``Posture``).
-    A joint outside its position limits returns if a ``JointLimits`` of the stack asks for it, which comes first in the
-    order of sacrifice. A joint that never moves costs less as a locked joint of the robot.
+    What it cannot do: fix positions: a joint that something else moved is not brought back (``Posture`` does). It
+    saves no time; a joint that never moves is better locked when the robot is loaded.
+
+    Example:
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> stack.add(wbc.tasks.Fixed(["head_1_joint", "head_2_joint"]), name="head")
     """
 
     stands_in_world: ClassVar[bool] = False

@@ -35,16 +35,22 @@ class FrameVelocityLimit(Constraint):
         frame: name of the frame.
         linear, angular: initial values of the inputs: one number for all three axes, three numbers, or None for no
             limit. inf in place of a number: this axis has no limit and no row.
-        axes: name of the frame whose axes the rows are in; ``"world"`` by default.
-        relative_to: frame that the velocity is relative to, the robot's or a moving one; ``"world"`` by default.
+        axes: name of the frame whose axes the rows are in.
+        relative_to: frame that the velocity is relative to, the robot's or a moving one.
 
     Inputs:
-        linear: >= 0, one number a limited axis [m/s].
-        angular: >= 0, one number a limited axis [rad/s].
+        linear: one number a limited axis [m/s].
+        angular: one number a limited axis [rad/s].
 
-    It is a box, so the speed along a diagonal may be sqrt(3) times the limit: divide by sqrt(3) to bound the
-    norm. It limits one point; other points of the body may be faster. It cannot slow a frame down faster than
-    ``JointLimits`` lets the joints brake, so a limit that drops suddenly may be broken for some ticks.
+    What it cannot do: limit the norm: it is a box, and along a diagonal the speed may be sqrt(3) times the limit.
+    Other points of the body may be faster. A limit that drops suddenly is broken for as long as ``JointLimits`` lets
+    the joints brake. For a frame that stands still use ``Hold``, which also takes drift back.
+
+    Example:
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.005)
+        >>> slow = wbc.tasks.FrameVelocityLimit("panda_hand", linear=0.25, angular=(1.0, 1.0, float("inf")))
+        >>> stack.add(slow, name="slow hand")
     """
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN

@@ -31,22 +31,7 @@ class GazeCone(Constraint):
         r = R' (p_t + R_t point - p) - apex,        (R, p) the frame, (R_t, p_t) the frame of the point
 
     Near the cone h is the length of the arc, at the point's distance, that is left to the cone; beyond it exactly that
-    arc, negative. Unlike an angle it has a finite derivative everywhere: in the apex, where h = 0, it leads along the
-    axis.
-
-    Inputs:
-        point: 3 numbers in the axes of ``point_frame`` [m].
-        point_velocity: their rate [m/s]. Default 0.
-        half_angle: alpha in 0.001 to pi [rad].
-        half_angle_rate: its rate [rad/s]. Default 0.
-
-    Example:
-        >>> GazeCone("camera_link", half_angle=0.5, axis=(0, 0, 1), point_frame="panda_hand")   # the hand stays in view
-
-    What it cannot do: it sees no occlusion and no nearest or farthest distance of sharp sight, and it looks along one
-    axis: a rectangular image is its inscribed cone. Straight behind the apex every turn back is as short: one is taken,
-    and noise may choose another. A point that moves faster than the joints can follow is lost: actuator limits come
-    first.
+    arc, negative.
 
     Attributes:
         frame: name of the frame that carries the cone; ``"world"`` for one at rest.
@@ -55,6 +40,26 @@ class GazeCone(Constraint):
         apex: tip of the cone in ``frame`` [m].
         point_frame: name of the frame that carries the point; ``"world"`` for one that the input moves.
         point: first value of the input [m].
+
+    Inputs:
+        point: 3 numbers in the axes of ``point_frame`` [m].
+        point_velocity: their rate [m/s]. Default 0.
+        half_angle: alpha [rad].
+        half_angle_rate: its rate [rad/s]. Default 0.
+
+    What it cannot do: see what hides the point, keep it between two distances (``Limit`` of a ``Distance``), match a
+    rectangular image (it is the cone within it), or turn the camera to the point (``LookAt``). Over one tick a point
+    that moves by s across the line of sight leaves the cone by about (1 / alpha + 1) s^2 / (2 |r|).
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("talos")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> hand = "gripper_left_base_link"
+        >>> stack.add(wbc.tasks.EndEffector(hand, kind="position"), name="hand")
+        >>> view = wbc.tasks.GazeCone("head_2_link", half_angle=0.5, axis=(1, 0, 0), point_frame=hand)
+        >>> stack.add(view, name="hand in view")
+        >>> stack.add(wbc.tasks.JointLimits())
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError: a bad field.

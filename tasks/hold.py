@@ -37,8 +37,9 @@ class Hold(Constraint):
         roll         J = [J_lin; de/dq] (4 x nv), e = (p - p_target, atan2(x'Y, x'X)), x of the frame, X and Y of the
                      target: the turn about the target's z axis is held, z itself may tilt by less than pi / 2
 
-    in world axes at the frame's origin, but for the last rows of ``axis`` and ``roll``. For the rotation,
-    J_ang v = -gain e turns R R_target' about its own axis, so de/dt = -gain e exactly although J_ang is not de/dq.
+    All in world axes at the frame's origin, but for the last rows of ``axis`` and ``roll``. What the frame moves by at
+    second order within a tick is made up for, up to 1e-3 of ``stack.length`` per second; what cannot be is in
+    ``step.lost``, and the tick is ``relaxed`` (docs/reach.md).
 
     Attributes:
         frame: name of the frame.
@@ -52,10 +53,16 @@ class Hold(Constraint):
             quaternion x, y, z, w, will do. Default: the pose at the first step.
         gain: how fast drift decays [1/s], to stay below 1/dt; 0 leaves it as it is.
 
-    It cannot hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose, are
-    dependent, and with drift left they may contradict. A frame that moves when it becomes held cannot stop faster than
-    ``JointLimits`` lets it; actuator and position limits come first. It holds velocities and a geometric pose,
-    not contact forces.
+    What it cannot do: hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose,
+    are dependent, and with drift they may contradict. A frame that moves when it becomes held stops as fast as
+    ``JointLimits`` lets it. It is geometry, without contact forces, friction or slip. The held pose is fixed in the
+    world.
+
+    Example:
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> stack.add(wbc.tasks.Hold("left_sole_link"), name="left foot")
+        >>> stack.add(wbc.tasks.Hold("right_sole_link", "position"), name="right foot")
     """
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD

@@ -29,29 +29,34 @@ class JointCoupling(Task):
 
         e_k = sum_i c_ki q_i - target_k                                    [rad, or m for rows of sliding joints]
 
-    An unbounded joint is known up to whole turns, so a row that has one is the angle in (-pi, pi] that is equal to e_k
-    up to whole turns, and its unbounded joints must have whole coefficients: write 2 a - 3 b for a gear of 2/3. The
-    other joints of that row may have any coefficient, and are read as angles, too.
+    An unbounded joint is known up to whole turns, so a row that has one is the angle in (-pi, pi] that equals e_k up
+    to whole turns, and its unbounded joints must have whole coefficients: write 2 a - 3 b for a gear of 2/3. Bounded
+    joints in such a row may have any coefficient.
+
+    A row has the unit of its first joint, and its label is the relation: ``2 wheel - 3 motor``. Coefficients carry the
+    unit that the others lack: 0.005 m/rad of a screw.
+
+    Attributes:
+        coefficients: joint name -> coefficient, or a sequence of such, one a row.
+        target: first value of the input: one number for all rows or one a row; None: its sum at the first step.
+        weights: one number >= 0 a row, None: 1 each.
 
     Inputs:
         target: one number a row. Default: ``target`` of the constructor, 0 where nothing is said; ``target=None``:
             where the sum is at the first step.
         feedforward: its rate. Default 0.
 
+    What it cannot do: hold exactly: it is a task with a weight (what the mechanism itself couples is held by
+    ``Mechanism``). Turns are not counted: a gear of 2/3 between two unbounded joints has three positions that satisfy
+    it, and the nearest is taken. Joints of several degrees of freedom are refused.
+
     Example:
-        >>> JointCoupling({"left_elbow": 1, "right_elbow": -1})                    # keep them equal
-        >>> JointCoupling([{"wheel": 2, "motor": -3}, {"lift": 1, "screw": -0.005}])
-
-    A row has the unit of its first joint; coefficients carry what the others lack (0.005 m/rad of a screw).
-
-    What it cannot do: it is a task, with a weight. What the mechanism itself couples (``robot.couplings``) is held
-    exactly by ``Mechanism``. Rows that contradict each other are served in the least-squares sense. At an error of half
-    a turn, a row with an unbounded joint may turn either way.
-
-    Attributes:
-        coefficients: joint name -> coefficient, or a sequence of such, one a row.
-        target: first value of the input: one number for all rows or one a row; None: see above.
-        weights: one number >= 0 a row, None: 1 each.
+        >>> import wbc
+        >>> robot = wbc.robots.load("talos", shapes="none")
+        >>> stack = wbc.Stack(robot, dt=0.002)
+        >>> stack.add(wbc.tasks.JointCoupling({"arm_left_4_joint": 1, "arm_right_4_joint": -1}), name="elbows")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["elbows"].target = [0.1]
 
     Raises:
         ShapeError, NotFiniteError, UnknownNameError: no relation, a joint that does not exist or has several degrees of

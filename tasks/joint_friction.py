@@ -28,20 +28,23 @@ class JointFriction(Load):
     with the measured velocity v. Without it a joint that is commanded by torque lags by what its gear takes. Only a
     stack that commands torques can have it.
 
+    Attributes:
+        viscous: first value of the input, one number or one a motor; None: ``damping`` of the description.
+        coulomb: the same; None: ``friction`` of the description.
+        slow: first value of the input.
+
     Inputs:
         viscous: one number a joint of ``robot.dof_names`` that has a motor [N m s/rad, N s/m].
         coulomb: the same [N m, N].
         slow: speed up to which friction grows with speed, as tanh does [rad/s, m/s].
 
+    What it cannot do: overcome stiction: a joint at rest has no direction, and the first move has an error of
+    ``coulomb``. Friction that depends on load or temperature is not in it.
+
     Example:
-        >>> JointFriction(viscous=0.1, coulomb=0.5)
-
-    What it cannot do: a joint at rest takes no side, so stiction is not overcome before it moves.
-
-    Attributes:
-        viscous: first value of the input, one number or one a motor; None: ``damping`` of the description.
-        coulomb: the same; None: ``friction`` of the description.
-        slow: first value of the input.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.002).add(wbc.tasks.Posture())
+        >>> stack.add(wbc.tasks.JointFriction(viscous=0.1, coulomb=0.5)).add(wbc.tasks.TorqueLimits())
 
     Raises:
         ShapeError, NotFiniteError, RangeError, BoundsError: on construction or in :meth:`validate`.

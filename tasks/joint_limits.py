@@ -35,21 +35,18 @@ class JointLimits(Constraint):
         actuator  [-s V, s V] cut with [v0 - A dt, v0 + A dt]
         position  -b(q - q_lower - margin) <= v <= b(q_upper - margin - q)             [rad/s, m/s]
 
-    b(d) is the braking bound (:func:`wbc.tasks.braking.braking_bound`) at distance d >= 0 and
-    b(d) = -min(return_rate |d|, b(|d|)) outside; v0 is the velocity that accelerations are counted from; V and A
-    are ``robot.limits.velocity`` and ``.acceleration``; s is ``velocity_scale``. Units rad/s, m/s for sliding joints.
+    The braking bound at distance d >= 0 is the largest speed from which the joint can still stop on the limit by
+    braking at A over ticks of any length (proofs, and the bound with ``shortest_dt``: tasks/braking.py):
 
-    The interval is never empty. Where the actuator limits exclude each other (v0 above s V by more than A dt) it is
-    the acceleration end nearest to [-s V, s V]; where the position bound asks for more than the actuators can do,
-    it is the actuator end nearest to it. From a viable state (v0 allowed last tick, limits unchanged) neither happens
-    and the position limit is not passed, whatever is commanded and however dt varies (at or above ``shortest_dt``
-    where that is given). From outside the joint brakes at A, then returns at ``return_rate`` times the violation
-    at least, and the violation does not grow again.
+        b(d) = 2 d / (dt + sqrt(dt^2 + 2 d / A)),      outside: b(d) = -min(return_rate |d|, b(|d|))
 
-    Joints that follow others have one interval with their leaders, so that these do not contradict each other either:
-    :meth:`wbc.robot.Robot.coupled`.
+    v0 is the velocity that accelerations are counted from (that given to ``step``, else the last command); V and A are
+    ``robot.limits.velocity`` and ``.acceleration``; s is ``velocity_scale``. A joint that follows others has one
+    interval with its leaders. In stacks that command accelerations or torques these are bounds on the acceleration.
 
-    A stack that commands accelerations has the same limits as bounds on these: :mod:`wbc.tasks.stopping`.
+    Where limits exclude each other actuators come first, acceleration before velocity. From a viable state (v0^2 / (2
+    A) <= d, limits unchanged) that does not happen and the position limit is not passed, whatever is commanded and
+    however dt varies. From outside the joint brakes at A, then returns, and the violation does not grow again.
 
     Attributes:
         position, velocity, acceleration: which limits to keep. Without ``acceleration`` the joint may stop at once,
@@ -64,10 +61,17 @@ class JointLimits(Constraint):
         velocity_scale: s, from 0 to 1, shrinks the velocity limits.
         return_rate: slowest return from outside [1/s]; 0: none is asked for.
 
-    It cannot keep the limit when v0 is not the velocity that the joint has, when the robot starts too fast too
-    close to a limit, or when the description gives no acceleration limit and the real joint has one.
-    Degrees of freedom whose rate is not that of one coordinate (floating bases, ball joints, unbounded joints)
-    have no position limit. Torque limits are no concern of it.
+    What it cannot do: keep the limit when v0 is not the velocity that the joint has, or when the robot starts too fast
+    too close to it. The promise ``shortest_dt`` is not checked: where it is broken the limit is passed. Without an
+    acceleration limit A is infinite and the joint may stop at once. Degrees of freedom whose rate is not that of one
+    coordinate (floating and planar bases, ball joints, unbounded joints) have no position limit. Whether the motors
+    have the torque for A is not considered.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.JointLimits(margin=0.02), name="limits")
     """
 
     stands_in_world: ClassVar[bool] = False

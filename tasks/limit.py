@@ -29,12 +29,18 @@ class Limit(Constraint):
         h = (e - lower, upper - e) >= 0                                     [the unit of each row]
 
     e is exactly the error that the task declares, with the task's inputs: with a target of zero it is the quantity
-    itself, with the default target its change since the first step. Where the task fades a row by a factor f because
-    its error is singular, the margins fade, too, to a constant c whose derivative is zero:
+    itself, with the default target its change since the first step. Rows: ``label.lower`` of each selected row, then
+    ``label.upper``. Where the task fades a row by a factor f because its error is singular, the margins fade, too:
 
         h = (f (e - lower) + (1 - f) c,  f (upper - e) + (1 - f) c),
 
-    c = (upper - lower) / 2, or 1 where there is no other limit.
+    c = (upper - lower) / 2, or 1 where there is no other limit. At f = 0 the limit is off, and ``Step.faded`` says so.
+    Gain and weights of the task have no effect.
+
+    Attributes:
+        task: any task whose rows are the derivative of its error; also one of your own, or an ``Expression``.
+        lower, upper: first values of the inputs; one number serves all rows. None: no rows of this limit.
+        only: labels of the task's rows that are limited, in this order; None: all.
 
     Inputs:
         those of the task, and
@@ -42,18 +48,21 @@ class Limit(Constraint):
             refused; ``controller["..."].set(lower=..., upper=...)`` moves both.
         lower_rate, upper_rate: their rates [unit/s]. Default 0.
 
+    What it cannot do: limit a velocity: tasks with a Jacobian of their own are refused. An error that wraps jumps by a
+    turn opposite to its target: keep both bounds away from there, and give both. Three rows of a position are a box,
+    not a length.
+
     Example:
-        >>> Limit(CenterOfMass(), lower=(-0.05, -0.03), upper=(0.05, 0.03), only=("x", "y"))     # about where it is
-
-    What it cannot do: limit a velocity (``Damping`` and other tasks that give their own rows are refused). An error
-    that wraps, such as an angle, jumps by a turn opposite to its target: keep lower and upper away from there, and give
-    both. Gain and weights of the task mean nothing here. A tick is linear: the quantity may pass a limit by its
-    curvature over one tick.
-
-    Attributes:
-        task: any task whose rows are the derivative of its error; also one of your own, or an ``Expression``.
-        lower, upper: first values of the inputs; one number serves all rows. None: no rows of this limit.
-        only: labels of the task's rows that are limited, in this order; None: all.
+        >>> import wbc
+        >>> from wbc.tasks import CenterOfMass, Elbow, Limit
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(Limit(CenterOfMass(), lower=-0.05, upper=0.05, only=("x", "y")), name="balance")
+        >>> stack.add(Limit(Elbow("panda_link4"), lower=0.3, only="z"), name="elbow up")
+        >>> stack.add(wbc.tasks.JointLimits())
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["elbow up"].target = (0.0, 0.0, 0.0)        # the height itself, not its change
 
     Raises:
         ShapeError: no task, a task on velocities, or numbers that do not fit its rows. BoundsError: lower > upper.

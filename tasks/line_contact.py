@@ -31,6 +31,13 @@ class LineContact(Pressing, Contact):
 
     mu = friction / sqrt(2), so that the pyramids are within Coulomb's cones.
 
+    Attributes:
+        frame: name of the frame.
+        half_length: X [m].
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+
     Inputs:
         target: pose in the world [m, rad]. Default: the pose at the first step.
         gain: how fast drift decays [1/s]. Default 10.
@@ -38,18 +45,15 @@ class LineContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
+    What it cannot do: follow the surface: the frame's z axis is the normal, so where the frame turns about the edge
+    its cone turns with it. It does not know whether the surface is there.
+
     Example:
-        >>> LineContact("left_sole_link", half_length=0.05)
-
-    What it cannot do: the frame's z axis is taken for the normal, so the turn about the edge should stay small, or the
-    cone turns with the frame.
-
-    Attributes:
-        frame: name of the frame.
-        half_length: X [m].
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> stack.add(wbc.tasks.SurfaceContact("left_sole_link", half_lengths=(0.1, 0.06)), name="left foot")
+        >>> stack.add(wbc.tasks.LineContact("right_sole_link", half_length=0.1), name="right edge")
+        >>> stack.add(wbc.tasks.CenterOfMass()).add(wbc.tasks.Posture())
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

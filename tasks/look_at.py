@@ -31,26 +31,13 @@ class LookAt(Task):
 
     theta n is the rotation vector of the shortest turn that takes the line of sight d to the axis, F = (b1, b2) two
     unit vectors fixed in the frame and perpendicular to a. The rows are those of the angular velocity across the axis
-    less that of the line of sight, which turns when the target, the camera or the reference moves:
+    less that of the line of sight, so theta falls exactly like exp(-gain t); the turn about the axis and the distance
+    r are free:
 
         F' R' (w - d x dd/dt) = -gain e,         d x dd/dt = d x (dt/dt - dc/dt) / r.
 
-    Hence theta falls exactly like exp(-gain t); the turn about the axis and the distance r are free. Along e the rows
-    agree with the derivative of e: e' J v is the rate of theta^2 / 2. From theta = pi (the target exactly behind, to
-    within 1e-9 rad) it turns about ``around``.
-
-    The weight fades where the target comes to the camera, which has no direction there: 1 from r = ``width`` L on, 0
-    below a tenth of that, twice differentiable between; L is the robot's characteristic length.
-
-    Inputs:
-        target: t, 3 numbers in the reference [m]. Default: the point on the axis at L from c, at the first step.
-        feedforward: rate of t in the axes of the reference [m/s]. Default 0.
-
-    Example:
-        >>> LookAt("head_camera", axis=(0, 0, 1), relative_to="gripper_left")     # watch what the hand does
-
-    What it cannot do: it sees no obstacle in the line of sight, keeps no distance (use Distance) and no horizon (a
-    second AxisAlign does). A target that passes close by asks for fast turns, speed over r, until it fades.
+    From theta = pi (to within 1e-9 rad) it turns about ``around``. The weight fades where the target comes to the
+    camera: 1 from r = ``width`` L on, 0 below a tenth of that; L is the robot's characteristic length.
 
     Attributes:
         frame: name of the frame that carries the camera.
@@ -60,6 +47,23 @@ class LookAt(Task):
         around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
             that follows the one nearest to ``axis`` (x, y for a z axis).
         width: distance below which the rows fade, as a part of the robot's characteristic length.
+
+    Inputs:
+        target: t, 3 numbers in the reference [m]. Default: the point on the axis at L from c, at the first step.
+        feedforward: rate of t in the axes of the reference [m/s]. Default 0.
+
+    What it cannot do: see an obstacle in the line of sight, limit the angle (``GazeCone``), or keep a distance
+    (``Distance``) or a horizon (a second ``AxisAlign``). A target that passes close by asks for a turn at its speed
+    over r, until the rows fade.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("talos")
+        >>> stack = wbc.Stack(robot, dt=0.002)
+        >>> camera = wbc.tasks.LookAt("rgbd_rgb_optical_frame", axis=(0, 0, 1), relative_to="gripper_left_base_link")
+        >>> stack.add(camera, name="watch the hand")
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["watch the hand"].target = (0, 0, 0)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -39,27 +39,13 @@ class Manipulability(Task):
         w = sqrt(det(J J' + floor^2 I))   = prod_i sqrt(s_i^2 + floor^2),  floor = 1e-4
 
     J is the Jacobian of the frame as seen from ``relative_to``, its rows in metres divided by ``length``, and s_i are
-    its singular values: w is Yoshikawa's measure of manipulability (1985) as a pure number, up to a constant the volume
-    of the velocities that joint velocities of norm 1 can give the frame. The floor under every singular value keeps w
-    and its gradient finite everywhere; it changes w by less than sum_i floor^2 / (2 s_i^2) of itself (5e-5 for one s_i
-    of 0.01). In a singular configuration the gradient is zero, as w has its least value there.
+    its singular values: w is Yoshikawa's measure (1985) as a pure number. An arm of a metre has w of some 0.1 for
+    positions, 2 to 3 for orientations and 0.05 for poses; ``value(robot, q)`` gives it. Only the joints between
+    ``relative_to`` and the frame count: measure an arm from the body that it is mounted on.
 
-    Inputs:
-        target: what w shall be, > 0; a target above what the arm can reach drives w to a maximum. Default: the present
-            w, see :meth:`value`.
-        feedforward: its rate [1/s]. Default 0.
-
-    Example:
-        >>> Manipulability("gripper_left_base_link", relative_to="torso_2_link", kind="position")
-
-    Only the joints between ``relative_to`` and the frame count. From the world the base of a mobile robot counts, too,
-    and makes w large whatever the arm does: measure an arm from the body that it is mounted on.
-
-    The log form asks for a rate of w in proportion to w: equal shares in equal times, slow next to a singular
-    configuration. The linear form asks for more there, and more speed.
-
-    What it cannot do: find the best configuration. It climbs w, which has several maxima, and leaves a singular
-    configuration only when something else has moved the arm out of it. It measures velocities without joint limits.
+    Both forms have the same maxima; the log form is slow next to a singular configuration. A target beyond reach
+    drives w to a maximum, where it rests. To keep w above a bound use ``Limit(task, lower=...)`` with the task's
+    target at 1e-4 to the number of rows.
 
     Attributes:
         frame: frame of the hand.
@@ -69,6 +55,27 @@ class Manipulability(Task):
         relative_to: frame that the motion is seen from; ``"world"`` or a frame of the robot.
         form: ``linear`` or ``log``.
         length: what rows in metres are divided by [m]; None: ``robot.characteristic_length``.
+
+    Inputs:
+        target: what w shall be, > 0; a target above what the arm can reach drives w to a maximum. Default: the present
+            w, see :meth:`value`.
+        feedforward: its rate [1/s]. Default 0.
+
+    What it cannot do: find the best configuration: it climbs w, which has several maxima. In a singular configuration
+    the gradient is zero, so something else must move the arm out of it. It measures velocities without joint limits.
+    An arm that is singular everywhere is refused; choose rows with ``along``.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda", shapes="none")
+        >>> agile = wbc.tasks.Manipulability("panda_hand_tcp", kind="position")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(agile, name="agile", weight=1e-3)
+        >>> stack.add(wbc.tasks.Posture(), name="posture", weight=1e-5)
+        >>> controller = stack.compile(backend="vm")
+        >>> step = controller.step(robot.neutral)
+        >>> controller["agile"].target = 2 * agile.value(robot, robot.neutral)
 
     Raises:
         UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError: on construction or in :meth:`validate`.

@@ -28,15 +28,23 @@ class Mechanism(Constraint):
         undriven      v_i = 0          (a differential-drive base sideways; what no motor moves)      [m/s or rad/s]
         loop          de/dq v = -e / dt, as fast as 0.1 lengths or rad/s allow, and e(q (+) v dt) = 0 to 1e-10 of them
 
-    The right side of a mimic row brings back a configuration that does not fit, that of a loop one that is open. What e
-    bends by within a tick is made up for, see docs/reach.md. It is added under the name ``mechanism`` where
-    ``robot.couplings``, ``robot.locked_dofs`` or ``robot.loops`` is not empty.
+    It is added to every stack under the name ``mechanism`` where ``robot.couplings`` (mimic joints of the description
+    that were not locked when the robot was loaded), ``robot.locked_dofs`` or ``robot.loops`` is not empty. The right
+    side of a mimic row brings back a configuration that does not fit, within the joint limits, that of a loop one that
+    is open. What e bends by within a tick is made up for, see docs/reach.md.
 
     Inputs:
         gain: how fast a configuration that does not fit its couplings is brought back [1/s].
 
-    It cannot couple joints without a plain coordinate (unbounded joints are coupled in velocity only). Loops are kept
-    by stacks that command velocities alone.
+    What it cannot do: couple unbounded joints in position (they are coupled in velocity only), keep loops in stacks
+    that command accelerations or torques, or know couplings that the robot does not state: gears, tendons.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("tiago_no_hand", lock=(), shapes="none")
+        >>> stack = wbc.Stack(robot, dt=0.01)
+        >>> stack.add(wbc.tasks.EndEffector("base_link"), name="base")
+        >>> assert [entry.name for entry in stack.entries] == ["mechanism", "base"]
     """
 
     stands_in_world: ClassVar[bool] = False

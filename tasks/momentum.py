@@ -32,30 +32,31 @@ class Momentum(Task):
 
         A(q) v = target + gain lag                                         [kg m/s; kg m^2/s]
 
-    A is the centroidal momentum matrix (Orin, Goswami and Lee, Autonomous Robots 35, 2013). The rows command a velocity
-    and have no error of their own: angular momentum is the derivative of no function of q. ``lag`` states by how much
-    the time integral of the momentum is behind, and is worked off at ``gain``; for the linear rows it is the mass times
-    the way that the centre of mass is behind. With lag = 0, the default, gain has no effect. The error is e = -lag.
+    A is the centroidal momentum matrix (Orin, Goswami and Lee, Autonomous Robots 35, 2013). Angular momentum is the
+    derivative of no function of q, so the rows have no error of their own: ``lag`` states by how much the time
+    integral of the momentum is behind, and is worked off at ``gain``; the reported error is -lag. A linear row is
+    weighed by 1 / (m L)^2 and an angular one by 1 / I^2, with m the mass of all moving links, L the robot's
+    characteristic length and I the mean principal inertia about the centre of mass at ``robot.neutral``.
 
-    Rows count alike: a linear row is weighed by 1 / (m L)^2 and an angular one by 1 / I^2, with m the mass of all
-    moving links, L the robot's characteristic length and I the mean principal inertia about the centre of mass at
-    ``robot.neutral``. So a linear row counts as the velocity of the centre of mass does in CenterOfMass, and an angular
-    one as the mean angular velocity of the robot.
+    Attributes:
+        kind: which rows: ``both`` (6), ``linear`` (3) or ``angular`` (3).
+        weights: one number >= 0 a row, multiplies the weights above; None: 1 each.
 
     Inputs:
         target: momentum, linear [kg m/s] and angular [kg m^2/s], or the part that ``kind`` says. Default 0.
         lag: what its time integral lacks [kg m; kg m^2]. Default 0.
 
+    What it cannot do: change physics: a robot that floats freely keeps its momentum whatever is commanded. It holds no
+    position, so the centre of mass drifts (``CenterOfMass`` holds it). Rotors of motors (armature) and payloads that
+    the description does not have are not seen.
+
     Example:
-        >>> Momentum("angular")                                # swing the arms so that the feet need no twist
-
-    What it cannot do: it is a task, no law of physics: a robot that floats freely keeps its momentum whatever is
-    commanded (make that a constraint of your own where it matters). It holds no position, so the centre of mass drifts
-    (CenterOfMass holds it). Rotors of motors (armature) and payloads that the description does not have are not seen.
-
-    Attributes:
-        kind: which rows: ``both`` (6), ``linear`` (3) or ``angular`` (3).
-        weights: one number >= 0 a row, multiplies the weights above; None: 1 each.
+        >>> import wbc
+        >>> robot = wbc.robots.load("talos")
+        >>> stack = wbc.Stack(robot, dt=0.002)
+        >>> stack.add(wbc.tasks.Hold("left_sole_link"), name="left foot")
+        >>> stack.add(wbc.tasks.EndEffector("gripper_left_base_link"), name="hand")
+        >>> stack.add(wbc.tasks.Momentum("angular"), name="calm", weight=0.1)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`; a

@@ -34,18 +34,31 @@ class Obstacle(Constraint):
 
         h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
-    A pair has rows of its own in every tick, which are expressions, or is sensed, or both:
+    A pair of shapes has rows of its own in every tick, or is *sensed*: measured before every tick, with ``closest``
+    rows in all for the pairs that need one (see ``SelfCollision``). By shape of the link (down) and of the obstacle
+    (across):
 
-        sphere with sphere, capsule, box, cylinder; capsule with capsule      one row, either may be the link
-        any with half-space      sphere 1, capsule 2, cylinder 2, box 8, hull of n <= 12 vertices n, of up to 64: 1
-        capsule with box, cylinder      2, for the capsule's ends; sensed, too
-        all others, meshes       sensed: ``closest`` rows in all for the nearest pairs, chosen before every tick
+                   sphere   capsule        box            cylinder       hull     half-space
+        sphere     1        1              1              1              sensed   1
+        capsule    1        5              2 and sensed   2 and sensed   sensed   2, ends
+        box        1        2 and sensed   sensed         sensed         sensed   8, corners
+        cylinder   1        2 and sensed   sensed         sensed         sensed   2, lowest points of the rims
+        hull       sensed   sensed         sensed         sensed         sensed   vertices to 12; 1 to 64; else sensed
+
+    A half-space has the points with z <= 0 of its frame. A mesh is a list of its convex parts. Rows of shape i are
+    ``link[i]`` with a suffix where there are several, sensed rows ``closest[k]``; ``controller.pairs(name)`` says
+    which pairs they were about.
+
+    Choose ``margin`` to cover the curvature of a point's path over one tick, at most (1/2) rho w^2 dt^2 for a point
+    within rho of joint axes that turn at w in all: some millimetres at 10 ms on an arm at full speed, more for boxes
+    and hulls, whose nearest points jump when they rock. From an overlap the rows push apart at -rate h at least; where
+    the joints cannot follow, the step is ``relaxed``.
 
     Attributes:
         shape: a shape of :mod:`wbc.shapes`, or several :class:`wbc.shapes.Convex`, the parts of a mesh.
         links: link frames whose ``robot.shapes`` keep clear; None: all that have shapes and can move.
         margin: initial value of the input [m].
-        pose: initial value of the input; None: the identity. Set one of them before the first step.
+        pose: initial value of the input; None: the identity.
         closest: how many of the sensed pairs have rows at a time; no more than there are such pairs. A pair without one
             is checked at the command, see :class:`wbc.tasks.SelfCollision`.
         corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
@@ -53,20 +66,24 @@ class Obstacle(Constraint):
     Inputs:
         pose: of the obstacle in the world [m, rad]. Set it here or in the declaration before the first step.
         velocity: twist of the obstacle: linear [m/s], angular [rad/s]; world axes, at its origin. Default 0.
-        margin: what is kept between the shapes, >= 0 [m].
+        margin: what is kept between the shapes [m].
 
-    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of h over one tick. The
-    distance of convex shapes is convex in their relative position, which only helps; what remains is the curvature
-    of the point's path, at most (1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all. From an
-    overlap (h < 0) the rows push apart at -rate h at least.
-
-    It cannot see what the link shapes do not cover, nor contacts between two ticks of a fast obstacle (speed times dt
-    must stay well below the sizes involved), nor plan a detour: a robot may stop in front of the obstacle. Where a
-    distance has no direction (one shape's centre in the middle of the other) one is declared, see
-    :mod:`wbc.tasks._gap`. Where an obstacle comes faster than the joints may move, actuator limits come first.
+    What it cannot do: see what the link shapes do not cover. An obstacle that crosses a link within a tick is not
+    seen, so speed times dt must stay well below the sizes. A link that hardly moves may have no direction out. A link
+    inside two parts of a mesh that push in opposite directions stays there.
 
     Example:
-        >>> Obstacle(Box((0.6, 0.4, 0.02)), margin=0.02, pose=table)
+        >>> import numpy as np
+        >>> import pinocchio as pin
+        >>> import wbc
+        >>> from wbc.shapes import Box, Convex, HalfSpace, Sphere
+        >>> stack = wbc.Stack(wbc.robots.load("ur5"), dt=0.005)
+        >>> stack.add(wbc.tasks.Obstacle(Sphere(0.1), margin=0.02), name="ball")
+        >>> stack.add(wbc.tasks.Obstacle(HalfSpace(), links=["wrist_3_link"], pose=pin.SE3.Identity()), name="floor")
+        >>> table = pin.SE3(np.eye(3), np.array([0.9, 0.0, 0.2]))
+        >>> stack.add(wbc.tasks.Obstacle(Box((0.8, 1.2, 0.04)), margin=0.01, pose=table), name="table")
+        >>> wedge = Convex(np.array([[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0.2, 0.2, 0], [0, 0, 0.1], [0, 0.2, 0.1]]))
+        >>> stack.add(wbc.tasks.Obstacle([wedge], pose=table), name="wedge")
 
     Raises:
         ShapeError, RangeError, NotFiniteError, RotationError, DuplicateNameError: on construction.

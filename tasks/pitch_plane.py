@@ -21,44 +21,21 @@ class PitchPlane(PlaneItem, Task):
         e = wrap(psi - target)                 the angle psi of three points, or of the plane across an axis    [rad]
         alpha = feedforward + gain target      the rate alpha of the plane across an axis                       [rad/s]
 
-    With points s, e, w of the three frames and u = (w - s) / |w - s|:
+    s, e, w are the points of the three frames, u = (w - s) / |w - s|, and wrap is to (-pi, pi].
 
-    **Three-point form**, ``PitchPlane(shoulder, elbow, wrist, reference=)``: the error [rad] is
-
-        e = wrap(psi - target),    psi = atan2(b(u).(e - s), a(u).(e - s)),    wrap to (-pi, pi],
-
-    where a(u), b(u) are the stereographic reference directions of :class:`wbc.tasks.PlaneReference` (Elias and
-    Wen, arXiv:2307.13122). psi counts right-handed about u.
+    **Three-point form**, ``PitchPlane(shoulder, elbow, wrist, reference=)``: psi = atan2(b(u).(e - s), a(u).(e - s)),
+    right-handed about u, with the stereographic directions a(u), b(u) of :class:`wbc.tasks.PlaneReference` (Elias and
+    Wen, arXiv:2307.13122).
 
     **Axis form**, ``PitchPlane(shoulder, elbow, wrist, axis=joint)``, for arms whose pitch axes are parallel and
-    offset along each other: the plane is perpendicular to the joint's axis y, the line is r = (w - s) - y (y.(w - s)),
-    the common normal of the shoulder and wrist pitch axes, and the row is the rate
+    offset: the plane is perpendicular to the joint's axis y, the line is r = (w - s) - y (y.(w - s)), and alpha = (r /
+    |r|).omega is the rate of the body that carries the joint, relative to ``base`` (E. Dupuis, PhD thesis, McGill
+    2001, eqs. 4.5-4.7, 4.38). alpha is not the derivative of any angle: nothing is held without drift, and ``target``
+    is counted from where the plane is now. **With** ``reference=`` the row is the angle of the same plane, with u x y
+    in place of e - s, and can be held.
 
-        alpha = (r / |r|).omega [rad/s],    alpha = feedforward + gain target,
-
-    omega being the angular velocity relative to ``base`` of the body that carries the joint (E. Dupuis, PhD thesis,
-    McGill 2001, eqs. 4.5-4.7, 4.38). alpha is not the derivative of any angle, its integral depends on the path;
-    so ``feedforward`` [rad/s] commands the rate and ``target`` [rad] (default 0) is counted from where the plane
-    is now: error = -target.
-
-    **Axis form with** ``reference=``: the angle of that same plane, e = wrap(psi - target) with the plane direction
-    u x y in place of e - s, u = r / |r|. Its exact rate is
-
-        d psi / dt = alpha + p.(u x du/dt) / (1 + p.u),    p the pole,
-
-    so both agree wherever the line keeps its direction, and only this form can be held without drift.
-
-    Singular sets: |w - s| = 0 (axis form: r = 0, pitch axes coaxial); the elbow on the line (three-point form
-    only: straight or folded arm); u = -pole (angles only). The row's weight is multiplied by a factor that is 1 outside
-    the widths below, falls in a twice differentiable way and is 0 below a tenth of them; a row with a factor
-    below 1 is reported as faded.
-
-    It cannot: hold an angle on a singular set; tell psi from psi + 2 pi (no turns are counted); approach a target
-    exactly opposite, e = pi, in a defined sense of rotation; act on an arm whose frames move rigidly together.
-
-    Inputs:
-        target: psi [rad]; in the axis form without ``reference`` an angle from wherever the plane is now, default 0.
-        feedforward: rate of the target, or of the plane [rad/s]. Default 0.
+    Rows fade, and are reported as faded, near |w - s| = 0 (axis form: r = 0), where the elbow is on the line
+    (three-point form), and near u = -pole (angles): from the widths below to a tenth of them.
 
     Attributes:
         shoulder, elbow, wrist: frames whose origins (plus offsets) are s, e, w. In the axis form the elbow only
@@ -70,6 +47,30 @@ class PitchPlane(PlaneItem, Task):
         line_width: |w - s| (axis form |r|) at which fading begins, as a part of the arm's length.
         elbow_width: distance of the elbow from the line at which fading begins, as a part of the arm's length.
         reference_width: angle between u and -pole at which fading begins [rad].
+
+    Inputs:
+        target: psi [rad]; in the axis form without ``reference`` an angle from wherever the plane is now, default 0.
+        feedforward: rate of the target, or of the plane [rad/s]. Default 0.
+
+    What it cannot do: hold an angle on a singular set; count turns; choose a sense of rotation for a target exactly
+    opposite; or control the line itself (a hand task does). With alpha as the seventh row of a seven-joint arm some
+    states are singular although the hand's Jacobian is not. On a Panda the origin of ``panda_link4`` crosses the line
+    at q4 = -0.467 rad, where the three-point plane flips; take ``panda_link3`` or ``axis="panda_joint4"``.
+
+    Example:
+        >>> import wbc
+        >>> from wbc.tasks import EndEffector, PitchPlane, PlaneReference
+        >>> robot = wbc.robots.load("panda")
+        >>> arm = "panda_link2", "panda_link3", "panda_link6"
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(PitchPlane(*arm), name="plane", weight=0.1)  # angle of three points
+        >>> stack.add(PitchPlane(*arm, axis="panda_joint4"), name="rate", weight=0)  # rate of turning
+        >>> reference = PlaneReference(pole=(1, 0, 0), direction=(0, 0, 1))  # 0 is "elbow up"
+        >>> angle = PitchPlane(*arm, axis="panda_joint4", reference=reference)  # angle of that plane
+        >>> stack.add(angle, name="angle", weight=0)
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["plane"].target = 0.3
 
     Raises:
         UnknownNameError, RangeError, ShapeError, NotFiniteError: a bad field.

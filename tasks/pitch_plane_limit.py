@@ -21,22 +21,27 @@ class PitchPlaneLimit(PlaneItem, Constraint):
 
         h = (c + f wrap(psi - m),  c - f wrap(psi - m)) >= 0                                           [rad]
 
-    psi is the angle of :class:`wbc.tasks.PitchPlane`: of three points, or of the plane perpendicular to ``axis``
-    (with ``PlaneReference()`` if no ``reference`` is given, because a limit needs an angle); m = (lower + upper) / 2
-    is the middle, c = (upper - lower) / 2 the half range and f the fading factor of PitchPlane.
-
-    Where f = 1 that is psi - lower and upper - psi, by the shorter turn. Towards a singular set f falls
-    smoothly to 0 and both margins to the constant c, whose derivative is zero: the limit is switched off there by
-    margins that stay differentiable, so v = 0 keeps meeting the rows of any state that meets h >= 0. An arm that
-    turned its plane beyond a bound inside the faded zone cannot leave the zone until the plane is back.
-
-    It cannot: guard the plane inside the faded zones; count turns; know the shorter turn back where psi is opposite to
-    the middle (there the two rows swap roles, and the plane may go on beyond it); promise a gap 2 pi -
-    (upper - lower) smaller than the plane's turn in one tick.
+    psi and the fading factor f are those of :class:`wbc.tasks.PitchPlane`; the axis form uses ``PlaneReference()`` if
+    no ``reference`` is given. m = (lower + upper) / 2 and c = (upper - lower) / 2. Where f = 1 the margins are psi -
+    lower and upper - psi. Towards a singular set they go smoothly to c, which switches the limit off. ``Limit`` of a
+    ``PitchPlane`` does the same with bounds that can be set at run time.
 
     Attributes:
         lower, upper: bounds of psi [rad], lower < upper < lower + 2 pi; (3, 4) is a range that contains pi.
         others: as in :class:`wbc.tasks.PitchPlane`.
+
+    What it cannot do: guard the plane inside the faded zones; count turns; know the shorter turn back where psi is
+    opposite to the middle (there the two rows swap roles); keep a gap 2 pi - (upper - lower) smaller than the plane's
+    turn in one tick.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> plane = wbc.tasks.PitchPlaneLimit("panda_link2", "panda_link3", "panda_link6", lower=-0.5, upper=1.0)
+        >>> stack.add(plane, name="plane")
+        >>> stack.add(wbc.tasks.JointLimits())
 
     Raises:
         BoundsError: lower >= upper.

@@ -16,14 +16,22 @@ from wbc.tasks.base import Row, Values
 
 @dataclass(frozen=True)
 class PointContact(Pressing, Contact):
-    """The origin of a frame does not move, J v = -gain e as for ``Hold`` with ``kind="position"``, by a force f in the
-    axes of the frame, whose z axis is the normal of the surface, out of it and towards the robot:
+    """A point on a surface does not move, J v = -gain e as for ``Hold`` with ``kind="position"``. Its force f, in the
+    axes of the frame, whose z axis is the normal of the surface, towards the robot, keeps
 
         least <= f_z <= most,      d_k' f <= cos(pi / edges) friction f_z,      k = 1 ... edges      [N]
 
     d_k are unit vectors across z, evenly spread from x on. This is the largest pyramid with ``edges`` faces inside of
-    Coulomb's cone |(f_x, f_y)| <= friction f_z: what it allows is allowed, and it leaves out at most the share
-    1 - cos(pi / edges) of a tangential force, 29 % for 4 and 8 % for 8 edges.
+    Coulomb's cone |(f_x, f_y)| <= friction f_z; it leaves out at most the share 1 - cos(pi / edges) of a tangential
+    force, 29 % for 4 and 8 % for 8 edges. For the foot of a quadruped or a finger tip. Compiled for velocities it is a
+    ``Hold`` of a position; for torques (docs/torque.md) its force stays within the pyramid.
+
+    Attributes:
+        frame: name of the frame; z is the normal, from the surface to the robot.
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+        edges: faces of the pyramid, 4 or more.
 
     Inputs:
         target: position in the world, 3 numbers [m], or a pose. Default: where it is at the first step.
@@ -32,18 +40,15 @@ class PointContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
+    What it cannot do: slide, roll or bear a torque. It does not know whether the ground is there. z of the frame is
+    the normal: a foot whose frame turns with the leg needs a frame of its own, along the ground.
+
     Example:
-        >>> PointContact("LF_FOOT", friction=0.7)
-
-    What it cannot do: it does not roll, and no torque acts at the point. Whether the surface is there is not its
-    concern.
-
-    Attributes:
-        frame: name of the frame; z is the normal, from the surface to the robot.
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
-        edges: faces of the pyramid, 4 or more.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("anymal_c"), dt=0.002)
+        >>> for leg in ("LF", "RF", "LH", "RH"):
+        ...     stack.add(wbc.tasks.PointContact(f"{leg}_FOOT", friction=0.7), name=f"{leg} foot")
+        >>> stack.add(wbc.tasks.Posture())
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

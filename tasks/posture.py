@@ -31,23 +31,29 @@ class Posture(Task):
     revolute or prismatic joint that is q - target; for an unbounded joint the angle in (-pi, pi]; for a
     floating base the logarithm of the relative pose (linear; angular, in base axes).
 
+    Attributes:
+        joints: names of joints, in the order of the rows; None: every joint but a moving base.
+        weights: one number >= 0 a row, None: 1 each.
+        start: the target until one is set: ``"first"``, the configuration of the first step, or ``"neutral"``, the
+            robot's own.
+
     Inputs:
         target: a configuration, nq numbers, or those of the chosen joints alone, in their order.
             Default: see ``start``.
         feedforward: velocity of the target in its tangent space, nv numbers, or those of the chosen joints
             [rad/s, m/s]. Default 0.
 
+    What it cannot do: know limits: a target outside them is aimed at, and ``JointLimits`` stops the joint there. Turns
+    are not counted. With a weight it is a compromise that shifts the other tasks by about its weight over theirs; at a
+    later level it is not.
+
     Example:
-        >>> Posture(joints=("panda_joint1", "panda_joint3"), weights=(1.0, 0.2))
-
-    What it cannot do: an unbounded joint, or the rotation of a base, half a turn from the target has two equally
-    short ways, and noise may choose the other. It knows nothing of limits: a target outside them is aimed at.
-
-    Attributes:
-        joints: names of joints, in the order of the rows; None: every joint but a moving base.
-        weights: one number >= 0 a row, None: 1 each.
-        start: the target until one is set: ``"first"``, the configuration of the first step, or ``"neutral"``, the
-            robot's own.
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.Posture(start="neutral"), name="posture", weight=1e-3)
+        >>> stack.add(wbc.tasks.Posture(("panda_joint1", "panda_joint3"), weights=(1, 0.2)), name="front", weight=1e-3)
 
     Raises:
         UnknownNameError, DuplicateNameError, ShapeError, NotFiniteError, RangeError: on construction or in

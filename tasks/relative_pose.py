@@ -31,14 +31,20 @@ class RelativePose(Task):
               R_x' R_a phi ]           c_b = p_b + R_b R_t' (at - p_t)         [m]
                                        phi = log3(R_a' R_b R_t')               [rad]
 
-    c_a and c_b are one point of the object as either hand holds it: they are the same point when the grasp is as
-    wanted. R_x are the axes of the rows, by default midway between the object as a holds it and as b holds it,
-    R_x = R_a exp(phi / 2). In these axes neither hand is preferred: with frames exchanged and target and point written
-    from the other hand, e becomes -R_t' e. Translation of the point and rotation about it are decoupled: the position
-    row turns nothing, and the rotation rows leave the point where it is.
+    c_a and c_b are one point of the object as either hand holds it: they coincide when the grasp is as wanted. R_x are
+    the axes of the rows, by default midway, R_x = R_a exp(phi / 2), so that neither hand is preferred. The gap decays
+    on a straight line and the rotation about one axis through the point, each without disturbing the other.
 
-    ``kind="position"`` is a ball joint at the point, with the hands free to turn about it; ``"orientation"`` lets the
-    hands slide against each other without turning.
+    ``kind="position"`` is a ball joint at the point; ``"orientation"`` lets the hands slide without turning. Where the
+    object goes is for other tasks: give it a frame on each hand and send both to the same pose, as in the example. For
+    a hand that works on what the other hand holds ``EndEffector(b, relative_to=a)`` is cheaper.
+
+    Attributes:
+        frame_a, frame_b: names of the two frames.
+        kind: which rows: ``pose`` (6), ``position`` (3) or ``orientation`` (3).
+        at: first value of the input.
+        axes: ``"midway"``, ``"world"`` or a frame's name: along which axes rows and weights are counted.
+        weights: one number >= 0 a row, None: 1 each.
 
     Inputs:
         target: pose of b as seen from a; for every kind, since the point needs it. Default: the present one.
@@ -46,19 +52,24 @@ class RelativePose(Task):
         at: the point, 3 numbers in a's frame [m]. Default: ``at`` of the constructor; without it the middle between
             both frames at the first step.
 
+    What it cannot do: squeeze: it is a task with a weight and knows no forces. While the target moves, the point
+    stands still in a's frame, not in b's.
+
     Example:
-        >>> RelativePose("left_gripper", "right_gripper", at=(0.0, -0.2, 0.0))     # where the cup stands on the tray
-
-    What it cannot do: it is a task, with a weight; it knows no forces, so it does not squeeze. It says nothing about
-    where the object goes: see the page for two tasks that move it. At a relative rotation error of exactly pi the
-    direction of turning is ambiguous, and midway axes jump there.
-
-    Attributes:
-        frame_a, frame_b: names of the two frames.
-        kind: which rows: ``pose`` (6), ``position`` (3) or ``orientation`` (3).
-        at: first value of the input, or None.
-        axes: ``"midway"``, ``"world"`` or a frame's name: along which axes rows and weights are counted.
-        weights: one number >= 0 a row, None: 1 each.
+        >>> import numpy as np
+        >>> import pinocchio as pin
+        >>> import wbc
+        >>> robot = wbc.robots.load("talos", shapes="none")
+        >>> data = robot.model.createData()
+        >>> pin.framesForwardKinematics(robot.model, data, robot.neutral)
+        >>> hands = [data.oMf[robot.model.getFrameId(robot.frames[f"{side}_hand"])] for side in ("left", "right")]
+        >>> box = pin.SE3(np.eye(3), (hands[0].translation + hands[1].translation) / 2)
+        >>> robot = robot.with_frame("box_left", robot.frames["left_hand"], hands[0].actInv(box))
+        >>> robot = robot.with_frame("box_right", robot.frames["right_hand"], hands[1].actInv(box))
+        >>> stack = wbc.Stack(robot, dt=0.002)
+        >>> stack.add(wbc.tasks.RelativePose("box_left", "box_right", at=(0, 0, 0)), name="grasp", weight=100)
+        >>> stack.add(wbc.tasks.EndEffector("box_left"), name="left")
+        >>> stack.add(wbc.tasks.EndEffector("box_right"), name="right")
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError: on construction or in :meth:`validate`.

@@ -18,8 +18,8 @@ Rating = float | tuple[float, ...] | None
 
 @dataclass(frozen=True)
 class RigidGrasp(Contact):
-    """A frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``, held by a wrench of six components
-    w = (f; m), in the axes of the frame and about its origin, within a box:
+    """A gripper holds on: its frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``. Its wrench
+    w = (f; m), in the axes of the frame and about its origin, keeps within a box:
 
         -force <= f <= force  [N],      -torque <= m <= torque  [N m]
 
@@ -27,22 +27,26 @@ class RigidGrasp(Contact):
     J a + (dJ/dt) v = -rate (J v + gain e) - gain J v, so that drift decays with both rates, and for torques w
     is a variable of the optimisation. docs/torque.md.
 
+    Attributes:
+        frame: name of the frame.
+        force: first value of the input: one number for all axes or three; None: no limit.
+        torque: the same.
+
     Inputs:
         target: pose in the world [m, rad]. Default: the pose at the first step.
         gain: how fast drift decays [1/s]. Default 10.
         force: what the gripper bears along each axis [N].
         torque: what it bears about each axis [N m].
 
+    What it cannot do: have a rating that couples forces and torques: give a box inside of it. ``enabled = False``
+    opens it at once: raise the weight of the task ``"<grasp> force"`` before, so that the load has gone.
+
     Example:
-        >>> RigidGrasp("arm1_hand", force=200.0, torque=40.0)
-
-    What it cannot do: a gripper whose rating couples forces and torques is a box inside of that, or an Expression of
-    its own. It does not close or open anything: ``enabled = False`` is a hand that holds nothing, and bears nothing.
-
-    Attributes:
-        frame: name of the frame.
-        force: first value of the input: one number for all axes or three; None: no limit.
-        torque: the same for torques.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> hand = wbc.tasks.RigidGrasp("gripper_left_base_link", force=200.0, torque=(20.0, 20.0, 10.0))
+        >>> stack.add(hand, name="hand")
+        >>> stack.add(wbc.tasks.Posture())
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

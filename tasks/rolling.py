@@ -65,35 +65,40 @@ class Rolling(Constraint):
         wheel with rollers  (cos(roller) t + sin(roller) s)'u = 0         along the roller's axis      [m/s]
         on a floating base  n'u = -gain n'(c - o)                the wheel stays on the ground         [m/s]
 
-    n is the normal of the ground and o its origin; a the wheel's axis, p its centre; in the plane of the wheel the
-    direction closest to n is d = n - a (a'n), made a unit vector, and
+    n is the normal of the ground and o its origin; a the wheel's axis, p its centre; d is the direction in the plane
+    of the wheel closest to n, and
 
         c = p - radius d   the point of contact,     t = a x d   where it rolls to,     s = n x t   sideways.
 
-    J_c is the Jacobian of the point of the wheel that is at c: it has the columns of the base, of whatever carries or
-    steers the wheel, and of the wheel's joint. A roller turns freely about its axis, so it holds only along it.
+    Limits of the wheels' joints limit the base through these rows. Leave wheels and base out of ``Posture``, which
+    would drive the robot back to where its wheels were.
+
+    Attributes:
+        wheels: one ``Wheel(joint, radius, roller)`` or several: a revolute joint with its origin in the wheel's centre,
+            the distance from there to the ground [m], and None for a plain wheel, else the angle from t to the axis of
+            the roller that touches the ground, about n [rad]: 0 for omni wheels, +-pi/4 for mecanum (minus front left
+            and rear right where wheels turn forwards to go forwards).
+        contact: rows that keep wheels on the ground; None: on a floating base only, as others cannot leave it.
+        gain: of the rows of contact [1/s].
 
     Inputs:
         ground: pose of the ground, its z axis the normal. Default: the z axis of the world, the origin at the
             height of the first wheel's contact at the first step. Only the axis counts without rows of contact.
         gain: of the rows of contact, if there are any [1/s].
 
+    What it cannot do: resolve rows that contradict each other: four plain wheels that are not steered only go
+    straight. A robot that skids in turns is loaded with ``base="differential"`` and has rollers with ``roller=0``.
+    Rows that repeat each other are dropped. Slip that has happened is not undone. It knows no friction, load or steep
+    slope, and wheels are thin. For a wheel that lies flat (|d| below 1e-6 before it is made a unit vector) the rows
+    fade to zero.
+
     Example:
-        >>> Rolling([Wheel("wheel_left_joint", 0.0985), Wheel("wheel_right_joint", 0.0985)])
-
-    Order of sacrifice: as ``Hold``, after the actuators and joint positions and before margins and tasks. Velocity and
-    acceleration limits of the wheels' joints limit the base through these rows.
-
-    What it cannot do: rows that repeat each other are dropped (the sideways rows of two wheels on one axle), but those
-    that contradict each other leave no motion: four plain wheels that cannot be steered only go straight. For a robot
-    that skids in turns declare rollers with ``roller=0`` and leave the sideways motion to ``base="differential"``.
-    There is no position to return to: slip that has happened is not undone. It knows no friction limit. For a wheel
-    that lies flat (|d| before it is made a unit vector, below 1e-6) the rows fade to zero.
-
-    Attributes:
-        wheels: one :class:`Wheel` or several.
-        contact: rows that keep wheels on the ground; None: on a floating base only, as others cannot leave it.
-        gain: first value of the input.
+        >>> import wbc
+        >>> robot = wbc.robots.load("tiago_no_hand", lock=(), shapes="none")
+        >>> stack = wbc.Stack(robot, dt=0.01)
+        >>> stack.add(wbc.tasks.Rolling([wbc.tasks.Wheel(f"wheel_{side}_joint", 0.0985) for side in ("left", "right")]))
+        >>> stack.add(wbc.tasks.EndEffector("base_link"), name="base")
+        >>> stack.add(wbc.tasks.JointLimits())
 
     Raises:
         ShapeError, NotFiniteError: no wheels, bad numbers. DuplicateNameError: a joint twice.

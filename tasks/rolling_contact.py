@@ -41,6 +41,14 @@ class RollingContact(Pressing, Contact):
     with mu = friction / sqrt(2), so that the pyramid is within Coulomb's cone: at most 29 % of a tangential force is
     left out. ``step.forces`` has (f_x, f_y, f_z).
 
+    Attributes:
+        frame: name of a frame of the wheel with its origin in the centre.
+        radius: from the centre to the ground [m].
+        axis: axis of the wheel in the axes of the frame, about which it rolls forwards.
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+
     Inputs:
         target: pose of the ground in the world, of which the plane counts: its origin, and z out of the ground [m,
             rad]. Default: level ground under the wheel at the first step.
@@ -49,20 +57,15 @@ class RollingContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
+    What it cannot do: have rollers (``Rolling`` has their motion), rolling resistance, or the torque by which a wide
+    wheel resists turning on the spot. How two wheels on one axle share the sideways force is what the tasks of their
+    forces say. A wheel that lies flat (axis within 1e-6 of the normal) has no rolling direction; its rows fade.
+
     Example:
-        >>> RollingContact("wheel_left_link", radius=0.0985, axis=(0, 0, 1))
-
-    What it cannot do: rollers (omni and mecanum wheels), rolling resistance, the torque by which a wide wheel resists
-    turning on the spot. Two wheels on one axle resist the same sideways motion: how they share that force is what the
-    tasks of their forces say.
-
-    Attributes:
-        frame: name of a frame of the wheel with its origin in the centre.
-        radius: from the centre to the ground [m].
-        axis: axis of the wheel in the axes of the frame, about which it rolls forwards.
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("tiago", base="floating", lock=()), dt=0.002)
+        >>> stack.add(wbc.tasks.RollingContact("wheel_left_link", radius=0.0985, axis=(0, 0, 1)), name="left wheel")
+        >>> stack.add(wbc.tasks.Posture(), name="posture", weight=1e-2)
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`: a frame that

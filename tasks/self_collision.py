@@ -56,17 +56,18 @@ class SelfCollision(Constraint):
 
         h = (signed distance between a shape of one link and a shape of another) - margin >= 0     [m]
 
-    Pairs of shapes have rows of their own in every tick, which are expressions (sphere with sphere, capsule, box,
-    cylinder; capsule with capsule), or are sensed: ``closest`` rows in all, for those that need them. A capsule with a
-    box or a cylinder has two rows for its ends and is sensed, too. A row moves only the joints between its two links.
+    Which pairs have rows of their own and which are sensed is as for an ``Obstacle``. A row moves only the joints
+    between its two links, and is called ``link[i] other[k]``, or ``closest[k]``; ``controller.pairs(name)`` says which
+    pairs those were about.
 
-    A sensed pair without a row is checked at the command of every tick. Where it closes faster than its row would let
-    it, it takes the row of one that does not push, and the command is found again: rows are missing only where more
-    than ``closest`` pairs push at once, and then the tick brakes and the log says so.
+    The ``closest`` rows are for the pairs that push, then for the nearest. Every sensed pair without a row is checked
+    at the command; where it closes too fast it gets a row, and the command is found again. Where more than ``closest``
+    pairs push at once (up to 11 on a humanoid with shapes on all links) the tick brakes (``braked``) and the log says
+    so.
 
-    A pair of shapes that no posture brings as far apart as twice the margin keeps half of the most that one does; pairs
-    that overlap in all postures are left out. Both are found by a search when the item is added; the log names pairs
-    that keep less than the margin, with the distances found.
+    A pair of shapes that no posture brings as far apart as twice the margin keeps half of the most that one does;
+    pairs that overlap in all postures are left out. Both are searched when the item is added, and logged with their
+    distances. From an overlap the rows push apart at -rate h at least.
 
     Attributes:
         pairs: pairs of links; None: ``robot.self_pairs``, and where that is None all pairs of links with shapes that
@@ -80,15 +81,17 @@ class SelfCollision(Constraint):
     Inputs:
         margin: what is kept between the shapes, >= 0 [m].
 
-    The rows hold dh/dt >= -rate h, hence h(t + dt) >= (1 - rate dt) h up to the curvature of the links' paths over one
-    tick. From an overlap (h < 0) they push apart at -rate h at least; where limits do not let them, the step says
-    ``relaxed``.
-
-    It cannot see what the link shapes do not cover. Nearest points of parallel capsules, of faces and of edges jump,
-    and the gradient with them; see :mod:`wbc.tasks._gap` and :mod:`wbc.proximity.corners`.
+    What it cannot do: see what the link shapes do not cover. With fewer rows than sensed pairs that push at once the
+    tick brakes, or leaves pairs within their margins opening too slowly; the log says either once. A ``margin`` that
+    is raised while running is kept in full only by pairs that postures bring farther apart than twice the declared
+    one.
 
     Example:
-        >>> SelfCollision([("left_wrist", "right_wrist"), ("left_wrist", "torso")], margin=0.02)
+        >>> import wbc
+        >>> panda = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(panda, dt=0.005)
+        >>> pairs = [("panda_link2", "panda_hand"), ("panda_link0", "panda_hand")]
+        >>> stack.add(wbc.tasks.SelfCollision(pairs, margin=0.01), name="fold")
 
     Raises:
         ShapeError, RangeError, NotFiniteError, UnknownNameError, DuplicateNameError: on construction.

@@ -26,6 +26,13 @@ class SlidingContact(Pressing, Contact):
     The wrench has one number, f >= 0. Unlike the other contacts it leaves the motion in the plane free: tasks say
     where the frame goes, and the task ``"<contact> force"`` with how many newtons it presses.
 
+    Attributes:
+        frame: name of the frame.
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
+        slow: first value of the input.
+
     Inputs:
         target: pose in the world, of which the plane counts: its origin, and z out of the surface [m, rad]. Default:
             the pose of the frame at the first step.
@@ -35,18 +42,18 @@ class SlidingContact(Pressing, Contact):
         most: largest normal force [N].
         slow: speed up to which friction grows with speed [m/s].
 
+    What it cannot do: stick: friction is that of sliding, against the measured velocity; below ``slow`` it is less
+    than it may be, and at rest 0 (a point that sticks is a ``PointContact``). The target's plane stands still, or in a
+    ``MovingFrame``; it does not follow a curved surface by itself.
+
     Example:
-        >>> SlidingContact("panda_hand_tcp", friction=0.3)
-
-    What it cannot do: s is the measured velocity; below ``slow`` friction is less than it may be, and stiction is
-    another contact.
-
-    Attributes:
-        frame: name of the frame.
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
-        slow: first value of the input.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.002)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> stack.add(wbc.tasks.SlidingContact("panda_hand_tcp", friction=0.3), name="wiper")
+        >>> controller = stack.compile(command="torque")
+        >>> controller["wiper force"].target = [10.0]    # presses with 10 N
+        >>> controller["wiper force"].weight = 10.0
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -28,21 +28,35 @@ class SupportRegion(Constraint):
         h_i = offset_i - n_i' c >= 0        [m]
 
     ``wbc.support.region`` computes planes for the contacts of a stack, with their friction and, if wished, the torque
-    limits. In a stack that commands accelerations or torques the rows keep dh/dt + rate h at or above 0: with ``rate``
-    = omega of the pendulum, n_i'(c + (dc/dt) / omega) <= offset_i, so the capture point stays within as well.
+    limits, in some milliseconds, beside the ticks (docs/torque.md). In a stack that commands accelerations or torques
+    the rows keep dh/dt + rate h at or above 0: with ``rate`` = omega of the pendulum, n_i'(c + (dc/dt) / omega) <=
+    offset_i, so the capture point stays within as well.
+
+    Attributes:
+        planes: how many at most, 3 or more.
 
     Inputs:
         normals: unit vectors n_i in the world, outwards, one after the other; zero: no plane.
         offsets: how far each plane is from the origin of the world along its normal [m].
 
+    What it cannot do: update itself: the region is that of the contacts when it was computed, and with torque limits
+    that of the configuration. It is about rest; what accelerates the centre of mass is for the cones of the contacts
+    to bear. Planes that leave no point between them make rows give way, by name.
+
     Example:
-        >>> SupportRegion(planes=12)
-
-    What it cannot do: the region is that of the contacts when it was computed, and with torque limits that of the
-    configuration. It is about rest; what accelerates the centre of mass is for the cones of the contacts to bear.
-
-    Attributes:
-        planes: how many at most, 3 or more.
+        >>> import wbc
+        >>> from wbc.support import region
+        >>> robot = wbc.robots.load("talos")
+        >>> stack = wbc.Stack(robot, dt=0.002)
+        >>> for side in ("left", "right"):
+        ...     foot = wbc.tasks.SurfaceContact(f"{side}_sole_link", half_lengths=(0.1, 0.06))
+        ...     stack.add(foot, name=f"{side} foot")
+        >>> stack.add(wbc.tasks.TorqueLimits()).add(wbc.tasks.Posture())
+        >>> stack.add(wbc.tasks.SupportRegion(planes=12), name="balance")
+        >>> controller = stack.compile(command="torque", backend="vm")
+        >>> controller.reset(robot.neutral)
+        >>> controller["balance"].set(**region(controller, robot.neutral).planes(12, inset=0.01))
+        >>> controller["balance"].rate = 3.5              # omega: the capture point stays within as well
 
     Raises:
         RangeError: fewer planes; in :meth:`validate`: a robot without mass.

@@ -15,9 +15,9 @@ from wbc.tasks.base import Row, Values
 
 @dataclass(frozen=True)
 class SurfaceContact(Pressing, Contact):
-    """A frame does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``, by the wrench w = (f; m) of a
-    rectangle of half lengths X and Y about the frame's origin, in the axes of the frame, whose z axis is the normal of
-    the surface, out of it and towards the robot:
+    """A rectangle on a surface does not move, J v = -gain e as for ``Hold`` with ``kind="pose"``. Its half lengths are
+    X and Y about the origin, z is the normal of the surface, towards the robot, and its wrench w = (f; m), in the
+    axes of the frame, keeps
 
         least <= f_z <= most,   |f_x| <= mu f_z,   |f_y| <= mu f_z                               [N]
         |m_x| <= Y f_z,   |m_y| <= X f_z                the centre of pressure is within it      [N m]
@@ -27,7 +27,15 @@ class SurfaceContact(Pressing, Contact):
         m_max = +mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|,      mu = friction / sqrt(2)
 
     These are exactly the wrenches of forces at the four corners within friction pyramids (Caron, Pham and Nakamura,
-    ICRA 2015, equations 10 to 13), which are within Coulomb's cones: at most 29 % of a tangential force is left out.
+    ICRA 2015), which are within Coulomb's cones: at most 29 % of a tangential force is left out. For a flat foot or a
+    palm. Compiled for velocities it is a ``Hold``; the wrench counts for torques (docs/torque.md).
+
+    Attributes:
+        frame: name of the frame; z is the normal, from the surface to the robot.
+        half_lengths: X and Y, half of the rectangle's sides along x and y [m].
+        friction: first value of the input.
+        least: first value of the input.
+        most: first value of the input; infinite for none.
 
     Inputs:
         target: pose in the world [m, rad]. Default: the pose at the first step.
@@ -36,18 +44,16 @@ class SurfaceContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
+    What it cannot do: roll over an edge or toes (``LineContact``). The rectangle is centred on the frame's origin. It
+    does not know whether the ground is there, flat or soft.
+
     Example:
-        >>> SurfaceContact("left_sole_link", half_lengths=(0.1, 0.05), friction=0.6)
-
-    What it cannot do: edges and toes that roll are other contacts. Whether the surface is there, and flat, is not its
-    concern.
-
-    Attributes:
-        frame: name of the frame; z is the normal, from the surface to the robot.
-        half_lengths: X and Y, half of the rectangle's sides along x and y [m].
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> for side in ("left", "right"):
+        ...     foot = wbc.tasks.SurfaceContact(f"{side}_sole_link", half_lengths=(0.1, 0.06), friction=0.6)
+        ...     stack.add(foot, name=f"{side} foot")
+        >>> stack.add(wbc.tasks.CenterOfMass())
 
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.

@@ -38,19 +38,23 @@ class TorqueLimits(Constraint):
     are within both, and says how many N m are missing. After a reset the last torque is not known: the first tick is
     free.
 
+    Attributes:
+        joints: names of the joints to limit; None: all whose limit is finite.
+        slew: first value of the input, one number or one a row; None: torques may change at once.
+
     Inputs:
         scale: shrinks the limits, from 0 to 1.
         slew: with ``slew``, one number a row [N m/s, N/s].
         last: with ``slew``, tau0, read-only; 1e30: not known [N m, N].
 
+    What it cannot do: know limits that fall with speed, or the friction of gears (``JointFriction``). Where no torque
+    within the limits carries the robot, what is held gives way, and the step says by how much.
+
     Example:
-        >>> TorqueLimits()
-
-    What it cannot do: limits that depend on speed, and friction of gears, are not in it.
-
-    Attributes:
-        joints: names of the joints to limit; None: all whose limit is finite.
-        slew: first value of the input, one number or one a row; None: torques may change at once.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("panda"), dt=0.001)
+        >>> stack.add(wbc.tasks.TorqueLimits(), name="motors")
+        >>> stack.add(wbc.tasks.Posture())
 
     Raises:
         UnknownNameError, DuplicateNameError: an unknown joint, or one twice. ShapeError, NotFiniteError, RangeError,

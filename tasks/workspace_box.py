@@ -26,25 +26,32 @@ class WorkspaceBox(Constraint):
 
         h = (x - lower, upper - x) >= 0,    x = R_b' (p + R offset - p_b)      [m]
 
-    Three rows a bound: ``x.lower``, ``y.lower``, ``z.lower``, ``x.upper``, ``y.upper``, ``z.upper``.
-
-    Inputs:
-        lower, upper: three numbers each in the axes of the reference [m]; -inf in ``lower`` and inf in ``upper`` are no
-            limit. lower > upper is refused; ``controller["box"].set(lower=..., upper=...)`` moves both.
-        lower_rate, upper_rate: velocities of the walls [m/s]. Default 0.
-
-    Example:
-        >>> WorkspaceBox("panda_hand", lower=(0.2, -0.4, 0.05), upper=(0.7, 0.4, float("inf")))
-
-    What it cannot do: it guards one point, not the body around it (``Obstacle`` with link shapes does). A tick is
-    linear: the point may pass a wall by its path's curvature over one tick. A wall that comes faster than the joints
-    may move is passed: actuator limits come first.
+    An infinite bound costs a row and never binds; equal bounds are an equality.
 
     Attributes:
         frame: name of the frame that carries the point.
         lower, upper: first values of the inputs; one number serves all three axes. None: no rows of this bound.
         relative_to: reference frame b, ``"world"``, a frame of the robot or a moving frame; the box is fixed to it.
         offset: the point in ``frame`` [m].
+
+    Inputs:
+        lower, upper: three numbers each in the axes of the reference [m]; -inf in ``lower`` and inf in ``upper`` are no
+            limit. lower > upper is refused; ``controller["box"].set(lower=..., upper=...)`` moves both.
+        lower_rate, upper_rate: velocities of the walls [m/s]. Default 0.
+
+    What it cannot do: guard the body around the point (``Obstacle`` does), or have walls in other directions than the
+    axes of the reference (``WorkspacePolyhedron`` has).
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("panda")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+        >>> cell = wbc.tasks.WorkspaceBox("panda_hand_tcp", lower=(0.2, -0.4, 0.05), upper=(0.7, 0.4, float("inf")))
+        >>> stack.add(cell, name="cell")
+        >>> stack.add(wbc.tasks.JointLimits())
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["cell"].set(lower=(0.3, -0.2, 0.1), upper=(0.6, 0.2, 0.8))
 
     Raises:
         BoundsError: lower > upper. UnknownNameError, ShapeError, NotFiniteError: a bad field.

@@ -30,21 +30,9 @@ class WorkspacePolyhedron(Constraint):
 
         h_i = n_i' x - d_i >= 0,    x = R_W' (R_b' (p + R offset - p_b) - p_W)        [m]
 
-    That is a polyhedron in H-representation, bounded or not. (R_W, p_W) is the input ``pose``, given in a reference
-    frame b. One row a plane: ``plane[0]``, ``plane[1]``, ...
-
-    Inputs:
-        offsets: k numbers d_i [m], the distance of each plane from the origin of W along its normal; -inf: no plane.
-        offsets_rate: their rates [m/s]. Default 0.
-        pose: of W in the reference frame. Default: the field, or the identity.
-        velocity: twist of W (linear m/s; angular rad/s) in the axes of the reference, at the origin of W. Default 0.
-
-    Example:
-        >>> WorkspacePolyhedron("tool0", normals=[(0, 0, 1), (-1, 0, 0)], offsets=[0.1, -0.8])   # above, and before
-
-    What it cannot do: it guards one point, not the body around it (``Obstacle`` with link shapes does). It is
-    convex: a region with a re-entrant corner needs a planner. Planes that leave no point between them are not refused:
-    the rows then give way, see ``Step.relaxed``. Over one tick the point may pass a plane by the curvature of its path.
+    That is a polyhedron in H-representation, bounded or not; one row a plane. (R_W, p_W) is the input ``pose``, given
+    in a reference frame b. Normals are in the compiled code, offsets and the pose are inputs. A row a'x >= b is the
+    normal a and the offset b / |a|.
 
     Attributes:
         frame: name of the frame that carries the point.
@@ -53,6 +41,28 @@ class WorkspacePolyhedron(Constraint):
         relative_to: reference frame b, ``"world"``, a frame of the robot or a moving frame.
         offset: the point in ``frame`` [m].
         pose: first value of the input; None: the identity.
+
+    Inputs:
+        offsets: k numbers d_i [m], the distance of each plane from the origin of W along its normal; -inf: no plane.
+        offsets_rate: their rates [m/s]. Default 0.
+        pose: of W in the reference frame.
+        velocity: twist of W (linear m/s; angular rad/s) in the axes of the reference, at the origin of W. Default 0.
+
+    What it cannot do: guard the body around the point (``Obstacle`` with half-spaces does), or have a re-entrant
+    corner: it is convex. Planes that leave no point between them are not refused: the rows then give way, see
+    ``Step.relaxed``.
+
+    Example:
+        >>> import wbc
+        >>> robot = wbc.robots.load("ur5")
+        >>> stack = wbc.Stack(robot, dt=0.005)
+        >>> stack.add(wbc.tasks.EndEffector("tool0"), name="tool")
+        >>> normals = [(0, 0, 1), (-1, 0, 0), (0, 1, 1)]
+        >>> planes = wbc.tasks.WorkspacePolyhedron("tool0", normals=normals, offsets=[0.1, -1.2, -0.5])
+        >>> stack.add(planes, name="cell")
+        >>> stack.add(wbc.tasks.JointLimits())
+        >>> controller = stack.compile(backend="vm")
+        >>> controller["cell"].offsets_rate = [0.05, 0.0, 0.0]
 
     Raises:
         RangeError: a normal without length, or no joint moves the frame against the reference.

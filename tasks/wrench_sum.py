@@ -29,18 +29,25 @@ class WrenchSum(Constraint):
     harder than that takes, as the tasks of their forces ask for the least sum of squares. With ``soft=`` it is a task
     with a price. Only a stack that commands torques can have it.
 
+    Attributes:
+        contacts: names of contacts of the stack.
+
     Inputs:
         target: force and moment on the robot [N, N m]. Default 0.
         point: about which moments are taken, in the world [m]. Default: the origin.
 
+    What it cannot do: know the body that the contacts are with: its weight, and what accelerates it, are in
+    ``target``, and a body that swings freely between hands is not in the dynamics. A contact that is not enabled
+    counts as 0.
+
     Example:
-        >>> WrenchSum(("left palm", "right palm"))
-
-    What it cannot do: it knows nothing of the body that the contacts are with; its weight, and what accelerates it, are
-    in ``target``. A contact that is not enabled counts as 0.
-
-    Attributes:
-        contacts: names of contacts of the stack.
+        >>> import wbc
+        >>> stack = wbc.Stack(wbc.robots.load("talos"), dt=0.002)
+        >>> for side in ("left", "right"):
+        ...     foot = wbc.tasks.SurfaceContact(f"{side}_sole_link", half_lengths=(0.1, 0.06))
+        ...     stack.add(foot, name=f"{side} foot")
+        >>> stack.add(wbc.tasks.WrenchSum(("left foot", "right foot")), name="sum")
+        >>> stack.add(wbc.tasks.Posture())
 
     Raises:
         ShapeError, DuplicateNameError: on construction. UnknownNameError: no such contact, when the stack is compiled.

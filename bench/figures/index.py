@@ -61,14 +61,6 @@ def walk_view(part: str, sheet: Callable[[Any], Sheet]) -> View:
     return lambda data: store.shown(vars(sheet(data["parts"][part])))
 
 
-def law_view(number: int) -> View:
-    """A table of the laws of motion under its title."""
-    return lambda data: f"**{data['tables'][number]['title']}**\n\n{store.shown(data['tables'][number])}"
-
-
-#: Tables of bench/time_laws.json in their order
-LAWS = ("random", "small", "suite", "torques", "states", "straight", "walls", "ticks", "along")
-
 #: Parts of the trials that are in their file
 MEASURED = frozenset(store.read(store.FOLDER / "trials.json")["parts"])
 
@@ -80,10 +72,6 @@ _ALL = (
     Figure(
         "ik", (*TICK, "wbc/ik", "bench/ik/chains.py", "bench/ik/contenders.py"), 6.0, ("make", "bench-ik"),
         "bench/ik.json", {"chains": ik.summary},
-    ),
-    Figure(
-        "time_laws", ("wbc/trajectory",), 25.0, ("make", "bench-time-laws"),
-        "bench/time_laws.json", {name: law_view(k) for k, name in enumerate(LAWS)},
     ),
     Figure(
         "walk", (*WALK, "bench/walk"), 20.0,
@@ -104,8 +92,6 @@ _ALL = (
         # The mode of one arm is shown once its trials have been measured
         {part: walk_view(part, functools.partial(trial_sheet, part)) for part in TRIALS if part in MEASURED},
     ),
-    Figure("soak", (*TICK, "bench/soak"), 20.0),
-    Figure("analysis", ("wbc/analysis",), 2.0),
     Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
@@ -116,31 +102,25 @@ _ALL = (
     Figure("identification", ("wbc/identification",), 2.0),
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/identification", "examples/mujoco_humanoid.py",
                               "examples/mujoco_quadruped.py"), 3.0),
-    Figure("examples", (*TICK, "wbc/proximity", "examples"), 1.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
-    Figure("policy", (*TICK, "wbc/record", "wbc/explain"), 0.5),
-    Figure("programs", ("examples", "bench/programs"), 4.0),
-    Figure("reach", (*TICK, "tests/calm"), 0.5),
+    Figure("policy", TICK, 0.5),
+    Figure("programs", ("examples", "bench/programs"), 0.1),
     Figure("relative_motion", ("wbc/published/relative_motion", "wbc/symbolic/taylor.py"), 0.2),
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),
     Figure("viewer", ("wbc/viewer",), 3.0),
     Figure("viewer_soak", ("wbc/viewer",), 61.0, ("python", "-m", "bench.viewer_soak")),
     Figure("servos", (*TICK, "wbc/servo", "wbc/simulation/mujoco_plant.py", "bench/servo_arm.xml"), 2.0),
-    Figure("shapes", ("wbc/robot",), 0.5),
     Figure("soft", TICK, 1.0),
-    Figure("solvers", (*TICK, "bench/conditioning.py"), 2.0),
-    Figure("symbolic", ("wbc/symbolic",), 0.2),
+    Figure("solvers", (*TICK, "bench/qp"), 1.0),
     Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
     Figure("plant_steps", ("wbc/simulation", "robots/walker_masses.py", "robots/data"), 1.0),
     Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
-    Figure("tick_profile", TICK, 1.5),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
-    Figure("formulations", (*TICK, "bench/measured/torques.py"), 0.2),
     Figure("two_ended", WALK, 0.5),
     Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip

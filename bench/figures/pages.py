@@ -10,9 +10,9 @@ from bench.pool import ROOT
 
 #: ``<!-- figures NAME PART -->`` ... ``<!-- end -->``
 BLOCK = re.compile(r"<!-- figures (\S+) (\S+) -->\n.*?<!-- end -->\n", flags=re.DOTALL)
-#: Parts of a page that are no prose and no table of its own: blocks of figures and declarations, code
+#: Parts of a page that are no prose and no table of its own: blocks of figures, code
 APART = re.compile(
-    r"<!-- (?:figures|declared)[^\n]*-->\n.*?<!-- end -->\n|^```.*?^```$|(?:^ {4}[^\n]*\n)+", re.DOTALL | re.MULTILINE
+    r"<!-- figures[^\n]*-->\n.*?<!-- end -->\n|^```.*?^```$|(?:^ {4}[^\n]*\n)+", re.DOTALL | re.MULTILINE
 )
 #: ``<!-- by FILE ... -->`` before a table: whose numbers these are, tests that hold them or the file that states them
 BY = re.compile(r"<!-- by ([^\n]*?) -->\n")

@@ -20,21 +20,12 @@ ROBOTS = {"panda": "Panda", "g1": "G1, pelvis fixed"}
 
 
 def parts() -> dict[str, Sheet | str]:
-    """A table with a row a backend, and how many times as long the two without a compiler take."""
+    """A table with a row a backend."""
     found = {name: _times(wbc.robots.load(name, base="fixed")) for name in ROBOTS}
     rows = [(f"`{b}`", what, *(us(found[name][b]) for name in ROBOTS)) for b, what in BACKENDS.items()]
-    ratios = {b: sorted(times[b] / times["native"] for times in found.values()) for b in ("vm", "python")}
-    shared, numpy = (f"{_rough(least)} to {_rough(most)}" for least, most in ratios.values())
     return {
         "ticks": Sheet("", ("backend", "what runs", *(f"tick of a {name} [us]" for name in ROBOTS.values())), rows),
-        "factors": f"Compared with `native`, a tick takes {shared} times as long in the shared library, and {numpy} "
-        "times in numpy.",
     }
-
-
-def _rough(ratio: float) -> str:
-    """Two figures: more of them change from run to run."""
-    return f"{float(f'{ratio:.2g}'):g}"
 
 
 def _times(robot: Robot) -> dict[str, float]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from bench.measured.examples import said
+from bench.pool import ROOT
 from bench.sheet import Sheet
 from wbc.motion_control.comparison import Compared, Condition, Scenario, compare, scenario_of, standard_conditions
 from wbc.robots import load
@@ -20,6 +23,14 @@ def parts() -> dict[str, Sheet | str]:
         "humanoid": f"```text\n{said('mujoco_humanoid')}\n```",
         "quadruped": f"```text\n{said('mujoco_quadruped')}\n```",
     }
+
+
+def said(name: str) -> str:
+    """What an example prints in a folder of its own, without the name of its picture."""
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, str(ROOT / "examples" / f"{name}.py")]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    return "\n".join(line for line in done.stdout.splitlines() if not line.endswith(".png"))
 
 
 def _off(one: Compared) -> str:

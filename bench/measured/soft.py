@@ -1,4 +1,4 @@
-"""What soft rows and scaled tasks cost on a Panda, and what a scaled hand does."""
+"""The direction that a scaled hand of a Panda keeps."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from bench.measured.ticks import median_us
-from bench.sheet import Sheet, us
-from wbc.api import Controller, Stack
+from bench.sheet import Sheet
+from wbc.api import Stack
 from wbc.tasks import EndEffector, JointLimits, Posture
 
 TIP, DT = "panda_hand_tcp", 0.005
 START = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
-COUNTS, PRICES = (10, 50, 150), (None, 10.0, 1e6)
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Planes around a hand by number and price; scaled tasks by cost; the direction that they keep."""
-    return {"planes": planes(), "scaled": scaled(), "line": line()}
+    """A table."""
+    return {"line": line()}
 
 
 def tip(q: np.ndarray) -> pin.SE3:
@@ -27,52 +25,6 @@ def tip(q: np.ndarray) -> pin.SE3:
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
     return pin.SE3(data.oMf[model.getFrameId(TIP)])
-
-
-def planes() -> Sheet:
-    """Random half-spaces around the hand, most of them far, some violated."""
-    rows = []
-    for count in COUNTS:
-        cells = [us(median_us(among_planes(count, price), START)) for price in PRICES]
-        rows.append((f"{count}", *cells))
-    return Sheet(
-        "", ("planes around the hand of a Panda: one tick, median [us]", "hard", "price 10", "price 10^6"), rows
-    )
-
-
-def among_planes(count: int, price: float | None) -> Controller:
-    """A hand with a posture, and a polyhedron of so many sides."""
-    rng = np.random.default_rng(0)
-    normals = rng.normal(size=(count, 3))
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    offsets = normals @ tip(START).translation - rng.uniform(0.05, 0.3, count)
-    stack = Stack(wbc.robots.load("panda"), DT)
-    stack.add(EndEffector(TIP), name="hand").add(Posture(), name="posture", weight=1e-3).add(JointLimits())
-    item = wbc.tasks.WorkspacePolyhedron(TIP, normals=tuple(map(tuple, normals)), offsets=tuple(offsets))
-    stack.add(item, name="planes", **({} if price is None else {"soft": price}))
-    return moving(stack.compile())
-
-
-def moving(controller: Controller) -> Controller:
-    """With a target that is not reached, so that rows and limits matter."""
-    controller.reset(START)
-    hand = controller["hand"]
-    hand.target = tip(START).translation + 0.1 if np.shape(hand.target) == (3,) else tip(START + 0.2)
-    return controller
-
-
-def scaled() -> Sheet:
-    """A hand, its direction kept or not, with its posture at the same level or below."""
-    rows = []
-    for kind, label in (("position", "position of the hand"), ("pose", "pose of the hand")):
-        cells = []
-        for option, level in ((False, 0), (True, 0), (True, 1)):
-            stack = Stack(wbc.robots.load("panda"), DT)
-            stack.add(EndEffector(TIP, kind=kind), name="hand", scaled=option)
-            stack.add(Posture(), name="posture", weight=1e-3, level=level).add(JointLimits())
-            cells.append(us(median_us(moving(stack.compile()), START)))
-        rows.append((label, *cells))
-    return Sheet("", ("one tick, median [us]", "plain", "scaled", "scaled, posture at the level below"), rows)
 
 
 def line() -> Sheet:

@@ -16,7 +16,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from bench.figures.index import write_blocks
 from bench.figures.store import stamp
 from bench.harness import machine
 from bench.pool import ROOT
@@ -163,8 +162,6 @@ def main(given: list[str] | None = None) -> None:
     for note in about:
         console.print(note, markup=False, highlight=False)
     write(chosen.output, parts, about, interrupted, begun)
-    if chosen.output == ROOT / "bench" and not interrupted:
-        write_blocks()
     console.print(f"Written to {chosen.output / 'time_laws.md'}", markup=False, highlight=False)
 
 

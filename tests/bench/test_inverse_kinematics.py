@@ -58,7 +58,7 @@ def test_a_small_run_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixt
     # 99.88 less twice the root of 99.88 * 0.12 / 30
     assert "| Panda | 7 | wbc | 30 | 100.00 | 0.00 | 99.88 | 98.62 | yes |" in page
     assert "Ctrl-C" not in page
-    assert tables.summary(results).startswith("| chain | joints | solved [%] | +- [%] |")
+    assert tables.summary(results).startswith("| chain | joints | solved [%] | TRAC-IK published [%] |")
 
 
 def test_an_interrupted_run_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,9 +44,9 @@ def test_every_row_is_measured_and_shown_by_tests_that_exist() -> None:
         if isinstance(node, ast.FunctionDef)
     }
     for row in (*rows("Cases"), *rows("What print has wrong")):
-        assert len(row) == 5
+        assert len(row) == 4
         assert all(row), row
-        named = re.findall(r"`([^`]+)`", row[4])
+        named = re.findall(r"`([^`]+)`", row[3])
         assert set(named) <= there, row[0]
         assert bool(named) == (row[0] != PAGE_NUMBER), row[0]
 
@@ -55,7 +55,7 @@ def test_tests_of_a_case_are_in_its_row() -> None:
     """A test that is named after a case is not left out of the page."""
     by_case: dict[str, str] = {}
     for row in rows("Cases"):
-        by_case[row[0]] = by_case.get(row[0], "") + row[4]
+        by_case[row[0]] = by_case.get(row[0], "") + row[3]
     for file in (*HERE.glob("test_task_constraint_*.py"), HERE / "test_rank_analysis.py"):
         for number, name in re.findall(r"^def (?=test_a(\d+)_)(\w+)", file.read_text(), re.M):
             assert name in by_case[f"A{number}"] or name in PAGE.split("## What print has wrong")[1], name

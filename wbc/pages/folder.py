@@ -6,17 +6,38 @@ import re
 from pathlib import Path
 
 from wbc.pages import docstring, example, section
-from wbc.pages.docstring import PageError
 from wbc.tasks.base import Item, Task, registry
 
-BEGIN, END = "<!-- declared -->", "<!-- end -->"
-MARKED = re.compile(f"{re.escape(BEGIN)}\n.*?{re.escape(END)}\n", flags=re.DOTALL)
 INDEX = "README.md"
+#: A page of this project that a docstring names, with a heading of it
+PAGE = re.compile(r"\bdocs/(\w+\.md)((?:#[\w-]+)?)")
 #: What stands above the tables of the index
 HEAD = """# Tasks and constraints
 
-A page an item. The part of a page that stands between marks is made from the declaration by `make docs`, and so is this
-list; a test fails where it is stale. [Your own tasks](expression.md) have the same rights.
+A page an item, made from its docstring by `make docs`. [Your own tasks](expression.md) have the same rights.
+
+## Every item
+
+A task gives rows J v + de/dt = -gain e, met in the least-squares sense, with J = de/dq. A constraint gives margins
+h >= 0, kept by dh/dq v + dh/dt >= -rate h, rows lower <= A v <= upper, equalities A v = b, or bounds of v. Where they
+cannot all hold, those of the highest
+[order of sacrifice](../controller.md#when-rows-cannot-all-hold-the-order-of-sacrifice) give way first.
+
+A tick is linear and looks one tick ahead. A margin may be passed by the curvature of a point's path, at most
+(1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all; what moves faster than the joints can is
+lost, as actuator limits come first; going round something is for a planner. At an error of half a turn both senses of
+rotation are as short, and noise may choose.
+
+Fields are given when the item is declared. An input can also be set afterwards, `controller["name"].field = value`,
+from the next tick on. A bad value raises a typed error of `wbc.errors` that names it, and changes nothing. All have
+
+| Input | Of | Meaning |
+|---|---|---|
+| `gain` [1/s] | tasks | >= 0; the error decays like exp(-gain t) where nothing hinders it |
+| `weight` | tasks | >= 0; of all rows, against other tasks; first value: that of `stack.add` |
+| `rate` [1/s] | margins | above 0, at most 1/dt; h decays no faster than exp(-rate t) |
+| `enabled` | all | False: as if the item were not there |
+| `mask` | all | one number a row: times a task's row weight, >= 0; 1 on, 0 off for a constraint |
 """
 
 
@@ -30,56 +51,58 @@ def page_name(cls: type[Item]) -> str:
     return f"{cls.__module__.rsplit('.', 1)[-1]}.md"
 
 
-def made(cls: type[Item], folder: Path) -> str:
-    """The page of a class as it should be: its own text, with the declared part made anew.
+def made(cls: type[Item]) -> str:
+    """The page of a class, with links to the items and pages that it names.
 
     Raises:
-        PageError: there is no page, it has no marks or no example, or the docstring lacks something.
+        PageError: the docstring lacks something.
     """
-    file = folder / page_name(cls)
-    if not file.is_file():
-        raise PageError("page", str(file), f"{cls.__name__} has no page; write one, with {BEGIN} and {END} in it")
-    text = file.read_text(encoding="utf-8")
-    if len(MARKED.findall(text)) != 1:
-        raise PageError("page", str(file), f"expected lines {BEGIN} and {END}, once each")
-    part = section.declared(cls, *example.find(cls, page_name(cls), text))
-    return MARKED.sub(lambda _: f"{BEGIN}\n\n{part}\n\n{END}\n", text)
+    text = docstring.read(cls)
+    part = section.page(cls, text, *example.find(cls, text.example))
+    pages = {name: page_name(other) for name, other in shipped().items() if other is not cls}
+    names = re.compile(rf"(?<!\[)`({'|'.join(pages)})`")
+
+    def linked(line: str) -> str:
+        return PAGE.sub(r"[\1](../\1\2)", names.sub(lambda m: f"[{m[0]}]({pages[m[1]]})", line))
+
+    before, code, after = re.split(r"(```python\n.*?```\n)", part, flags=re.DOTALL)
+    return docstring.prose(before, linked) + code + docstring.prose(after, linked) + "\n"
 
 
 def index() -> str:
     """The list of all items, a line each."""
-    tables = []
+    lists = []
     for title, wanted in (("Tasks", True), ("Constraints", False)):
-        rows = [
-            f"| [{name}]({page_name(cls)}) | {docstring.read(cls).summary.replace('|', chr(92) + '|')} |"
+        lines = [
+            f"- [{name}]({page_name(cls)}): {docstring.read(cls).summary}"
             for name, cls in shipped().items()
             if issubclass(cls, Task) is wanted
         ]
-        tables.append("\n".join([f"## {title}\n", "| | |", "|---|---|", *rows]))
-    return HEAD + "\n" + "\n\n".join(tables) + "\n"
+        lists.append("\n".join([f"## {title}\n", *lines]))
+    return HEAD + "\n" + "\n\n".join(lists) + "\n"
 
 
 def stale(folder: Path) -> list[str]:
     """Names of the files that differ from what :func:`update` would write."""
-    return [name for name, text in _wanted(folder).items() if not _same(folder / name, text)]
+    return [name for name, text in _wanted().items() if not _same(folder / name, text)]
 
 
 def update(folder: Path) -> list[str]:
-    """Write the declared parts and the index; returns the names of the files that changed.
+    """Write the pages and the index; returns the names of the files that changed.
 
     Raises:
         PageError: see :func:`made`; nothing is written.
     """
     changed = []
-    for name, text in _wanted(folder).items():
+    for name, text in _wanted().items():
         if not _same(folder / name, text):
             (folder / name).write_text(text, encoding="utf-8")
             changed.append(name)
     return changed
 
 
-def _wanted(folder: Path) -> dict[str, str]:
-    return {page_name(cls): made(cls, folder) for cls in shipped().values()} | {INDEX: index()}
+def _wanted() -> dict[str, str]:
+    return {page_name(cls): made(cls) for cls in shipped().values()} | {INDEX: index()}
 
 
 def _same(file: Path, text: str) -> bool:

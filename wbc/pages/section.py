@@ -1,4 +1,4 @@
-"""The declared part of a page: formula, fields, run-time inputs and rows, as Markdown."""
+"""A page: formula, fields and run-time inputs, rows, text, example and limits, as Markdown."""
 
 from __future__ import annotations
 
@@ -6,22 +6,21 @@ import inspect
 import itertools
 import math
 import re
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from wbc.pages import docstring
 from wbc.pages.docstring import Docstring, PageError
 from wbc.stack.declaration import Declaration, Entry
-from wbc.stack.layout import Block, Layout
+from wbc.stack.layout import Block, Layout, Slot
 from wbc.tasks.base import Constraint, Input, Item, Task
 
 #: Letters that a list of rows may take; of a longer one only the first and the last are named
-LISTED = 120
+LISTED = 60
 #: Types of fields as a reader would say them, the longer names first
 TYPES = {
     "tuple[float, float, float]": "3 numbers",
+    "tuple[float, float]": "2 numbers",
     "tuple[float, ...]": "numbers",
     "tuple[Triple, ...]": "rows of 3 numbers",
     "tuple[str, ...]": "names",
@@ -45,63 +44,89 @@ TYPES = {
 #: Where a text on an input says its first value; the column of defaults has it then
 DEFAULT = re.compile(r"[.;]? Default:? ((?:[^.]|\.(?=\S))*)\.?")
 STATED = re.compile(r"-?\d+(?:\.\d+)?")
-#: Inputs that every item has, or every one of a form
-COMMON = {
-    "gain": "the error decays like exp(-gain t) where nothing hinders it",
-    "rate": "h decays no faster than exp(-rate t)",
-    "weight": "of all rows, against those of other tasks",
-    "enabled": "False: as if it were not there",
-}
-MASK = {"task": "one number a row, multiplies its weight", "other": "one number a row: 1 on, 0 off"}
-#: What a constraint is made of, by form
-FORMS = {
-    "margins": "h >= 0 is kept by dh/dq v + dh/dt >= -rate h",
-    "rows": "lower <= A v <= upper",
-    "bounds": "lower <= v <= upper",
-}
-ORDER = ("actuator limits", "joint positions", "holds", "margins", "soft")
+#: Inputs that the index of the pages explains
+COMMON = ("gain", "rate", "weight", "enabled", "mask")
+#: What a field says that is the first value of an input of its name
+FIRST = re.compile(r"(?:(?:first|initial) values? of the inputs?(?: `\w+`)?(?: \[[^]]*\])?|the same)[;:,.]? ?")
+#: Words up to which a text is repeated
+SHORT = 3
 
 
-def declared(cls: type[Item], stack: Declaration, entry: Entry) -> str:
-    """The section for a class; rows and defaults are those of an item in a stack.
+def page(cls: type[Item], text: Docstring, stack: Declaration, entry: Entry) -> str:
+    """The page of a class; rows and defaults are those of an item in a stack.
 
     Raises:
-        PageError: the docstring lacks a formula, a field or an input.
+        PageError: the docstring lacks a field, an input, an example or what the item cannot do.
     """
-    text = docstring.read(cls)
+    if not text.cannot:
+        raise PageError(f"{cls.__name__}.__doc__", "", "no paragraph that begins with 'What it cannot do: '")
     block = Layout(stack).blocks[entry.name]
-    parts = [text.opening, _kind(entry.item, block), _fields(cls, text), _inputs(cls, text, block), _rows(stack, block)]
+    parts = [
+        f"# {cls.__name__}",
+        text.opening,
+        text.text,
+        _names(cls, text, block),
+        _every(entry.item, block, text),
+        f"```python\n{text.example}\n```",
+        f"## What it cannot do\n\n{text.cannot}",
+    ]
     return "\n\n".join(part for part in parts if part)
 
 
-def _kind(item: Item, block: Block) -> str:
-    if isinstance(item, Task):
-        rows = "J v + de/dt = -gain e, in the least-squares sense"
-        derived = type(item).jacobian is Task.jacobian
-        return f"A task: {rows}, {'J = de/dq' if derived else 'with rows J that the class states itself'}."
-    assert isinstance(item, Constraint)
-    rows = "equalities on v" if item.equality and block.form == "rows" else FORMS[block.form]
-    return f"A constraint: {rows}. In the order of sacrifice it stands with {ORDER[item.order]}, {item.order} of 4."
-
-
-def _fields(cls: type[Item], text: Docstring) -> str:
-    rows: list[tuple[tuple[str, ...], list[str]]] = []
+def _names(cls: type[Item], text: Docstring, block: Block) -> str:
+    """A list of fields and run-time inputs, one entry for what is both; what several share is said once."""
+    slots = {name: slot for name, slot in block.slots.items() if not slot.input.sensed}
+    entries: list[tuple[tuple[str, str], list[str]]] = []
+    said: dict[str, str] = {}
     for name, parameter in inspect.signature(cls).parameters.items():
         meaning = text.attributes.get(name, "")
         if name == "gain" and issubclass(cls, Task):
             assert not meaning
-            meaning = f"first value of the input `gain` [1/s]; None: {cls.default_gain:g}"
+            continue
         if not meaning:
             raise PageError(f"{cls.__name__}.__doc__", name, "no text for this field under Attributes")
+        kind, meaning = _type(str(parameter.annotation)), _without_stop(meaning)
+        if name in slots:
+            kind, _, told = _input(cls, text, slots.pop(name), said)
+            first = _once(FIRST.sub("", meaning, count=1), name, said)
+            meaning = "; ".join([told, first] if told and first and not told.startswith(first) else [told or first])
         required = parameter.default is inspect.Parameter.empty
-        default = "required" if required else _default(parameter.default)
-        row = (_type(str(parameter.annotation)), default, _without_stop(meaning))
+        about = (kind if required else f"{kind}, default {_default(parameter.default)}", meaning)
         # Fields that a docstring describes together stay together
-        if rows and rows[-1][0] == row:
-            rows[-1][1].append(f"`{name}`")
+        if entries and entries[-1][0] == about:
+            entries[-1][1].append(name)
         else:
-            rows.append((row, [f"`{name}`"]))
-    return _table(("Field", "Type", "Default", "Meaning"), [(", ".join(names), *row) for row, names in rows])
+            entries.append((about, [name]))
+    for name, slot in slots.items():
+        if name not in COMMON or name in text.inputs:
+            kind, default, meaning = _input(cls, text, slot, said)
+            entries.append(((f"{kind}, default {default}", meaning), [name]))
+    lines = [f"- {', '.join(f'`{name}`' for name in names)} ({kind}): {meaning}" for (kind, meaning), names in entries]
+    return "\n".join(line if line.endswith(".") else f"{line}." for line in lines)
+
+
+def _once(meaning: str, name: str, said: dict[str, str]) -> str:
+    """The text, or the name that has it already."""
+    if len(meaning.split()) > SHORT and said.setdefault(meaning, name) != name:
+        return f"as `{said[meaning]}`"
+    return meaning
+
+
+def _every(item: Item, block: Block, text: Docstring) -> str:
+    """What the item is, what is measured, and the rows."""
+    if isinstance(item, Task):
+        kind = "A task" if type(item).jacobian is Task.jacobian else "A task with a Jacobian of its own"
+    else:
+        assert isinstance(item, Constraint)
+        form = "equalities" if item.equality and block.form == "rows" else block.form
+        kind = f"A constraint: {form}, order of sacrifice {item.order}"
+    own = [name for name in ("gain", "rate") if name in block.slots and name not in text.inputs]
+    first = "".join(f", `{name}` {_number(block.slots[name].input)} 1/s" for name in own)
+    out = f"{kind}{first}; see [every item](README.md#every-item)."
+    if sensed := [slot.input for slot in block.slots.values() if slot.input.sensed]:
+        names = ", ".join(f"`{one.name}`" for one in sensed)
+        out += f" Read-only, measured before every tick: {names}."
+    return f"{out} {_rows(block)}".strip()
 
 
 def _type(annotation: str) -> str:
@@ -125,46 +150,33 @@ def _without_stop(text: str) -> str:
     return text if text.endswith("..") else text.removesuffix(".")
 
 
-def _inputs(cls: type[Item], text: Docstring, block: Block) -> str:
-    rows = []
-    sensed = [slot.input for slot in block.slots.values() if slot.input.sensed]
-    for name, slot in block.slots.items():
-        if slot.input.sensed:
-            continue
-        common = name in COMMON and name not in text.inputs
-        meaning = COMMON[name] if common else text.inputs.get(name, text.other_inputs)
-        if not meaning:
-            raise PageError(f"{cls.__name__}.__doc__", name, "no text for this input under Inputs")
-        meaning, default = _first_value(cls, slot.input, meaning)
-        rate = f"`{slot.input.rate}`" if slot.input.rate else "-"
-        numbers = f"{slot.size}" if slot.input.kind == "vector" else f"{slot.input.kind} ({slot.size})"
-        limits = "above 0, at most 1/dt" if common and name == "rate" else _range(slot.input)
-        rows.append((f"`{name}`", numbers, slot.input.unit or "1", default, limits, rate, meaning))
-    task = block.form == "task"
-    if task:
-        rows.append(("`weight`", "1", "1", "that of `stack.add`", ">= 0", "-", COMMON["weight"]))
-    rows.append(("`enabled`", "flag", "-", "True", "-", "-", COMMON["enabled"]))
-    limits, meaning = (">= 0", MASK["task"]) if task else ("0 or 1", MASK["other"])
-    rows.append(("`mask`", f"{len(block.rows)}", "1", "1", limits, "-", meaning))
-    out = _table(("Input", "Numbers", "Unit", "Default", "Range", "Its rate", "Meaning"), rows)
-    if sensed:
-        names = ", ".join(f"`{d.name}`" for d in sensed)
-        out += f"\n\nMeasured before every tick and only read: {names} of {sensed[0].size} rows."
-    return out
+def _input(cls: type[Item], text: Docstring, slot: Slot, told: dict[str, str]) -> tuple[str, str, str]:
+    """(numbers and unit, default, meaning)."""
+    declared = slot.input
+    meaning = text.inputs.get(declared.name, "" if declared.name in COMMON else text.other_inputs)
+    if not meaning and declared.name not in COMMON:
+        raise PageError(f"{cls.__name__}.__doc__", declared.name, "no text for this input under Inputs")
+    meaning, default = _first_value(cls, declared, meaning)
+    rate = f"its rate is `{declared.rate}`" if declared.rate else ""
+    meaning = _once(meaning.replace(f" [{declared.unit}]", ""), declared.name, told)
+    limits = _range(declared)
+    said = "; ".join(part for part in (meaning, "" if limits in meaning else limits, rate) if part)
+    numbers = ("number" if slot.size == 1 else f"{slot.size} numbers") if declared.kind == "vector" else declared.kind
+    return f"input: {numbers} [{declared.unit or '1'}]", default, said
 
 
 def _first_value(cls: type[Item], declared: Input, meaning: str) -> tuple[str, str]:
     """(meaning without its words on the default, default)."""
     said = DEFAULT.search(meaning)
-    rest = _without_stop(DEFAULT.sub("", meaning))
+    rest = _without_stop(". ".join(part.strip() for part in DEFAULT.split(meaning)[::2] if part.strip()))
     number = _number(declared)
     if said and STATED.fullmatch(said.group(1)) and float(said.group(1)) != float(number or "nan"):
         reason = f"the docstring says that its default is {said.group(1)}, and it is {number or declared.default}"
         raise PageError(f"{cls.__name__}.__doc__", declared.name, reason)
-    if declared.name in inspect.signature(cls).parameters:
-        return _without_stop(meaning), f"field `{declared.name}`"
+    if declared.name in inspect.signature(cls).parameters and not issubclass(cls, Task):
+        return _without_stop(meaning), ""
     if declared.default is None:
-        return rest, said.group(1) if said else "at the first step"
+        return rest, said.group(1) if said else "what it is at the first step"
     return rest, number if number or said is None else said.group(1)
 
 
@@ -192,23 +204,17 @@ def _range(declared: Input) -> str:
         words.append(f"{declared.infinite:g}: no limit")
     if declared.direction:
         words.append("not 0, made a unit vector")
-    return ", ".join(words) or "-"
+    return ", ".join(words)
 
 
-def _rows(stack: Declaration, block: Block) -> str:
+def _rows(block: Block) -> str:
     rows = block.rows
-    count = f"{len(rows)} rows" if len(rows) > 1 else "One row"
-    where = f"{count} for `{block.entry.name}` of the example below, on {stack.robot.name}"
+    if not rows:
+        return ""
+    where = f"{len(rows)} rows in the example" if len(rows) > 1 else "Row"
     if len(rows) > 2 and sum(len(row.label) + 4 for row in rows) > LISTED:
         return f"{where}: `{rows[0].label}` [{rows[0].unit}] to `{rows[-1].label}` [{rows[-1].unit}]."
     groups = []
     for unit, group in itertools.groupby(rows, key=lambda row: row.unit):
         groups.append(f"{', '.join(f'`{row.label}`' for row in group)} [{unit}]")
     return f"{where}: {'; '.join(groups)}."
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    if not rows:
-        return ""
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)

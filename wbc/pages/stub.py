@@ -22,7 +22,6 @@ from typing import Any, overload
 
 from wbc.controller.handle import Handle
 from wbc.stack.declaration import Declaration
-from wbc.tasks.base import Item
 '''
 TAIL = """    @overload
     def __getitem__(self, item: Item) -> Any: ...
@@ -58,7 +57,7 @@ def text() -> str:
     kinds = {name: cls for name, cls in kinds.items() if not docstring.inputs_of(cls)[1]}
     owned = {name: values(cls) for name, cls in kinds.items()}
     every = {value: of for own in owned.values() for value, of in own.items()}
-    imports = [f"from {cls.__module__} import {name}" for name, cls in kinds.items()]
+    imports = [f"from {cls.__module__} import {name}" for name, cls in {**kinds, "Item": Item}.items()]
     classes = [_declared(f"{name}Handle", own) for name, own in owned.items()]
     overloads = [("str", "NamedHandle"), *((name, f"{name}Handle") for name in kinds)]
     getters = [
