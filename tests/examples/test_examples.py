@@ -137,6 +137,13 @@ def test_a_quadruped_stands_on_three_feet() -> None:
     check_picture(text)
 
 
+def test_an_ankle_keeps_its_loops() -> None:
+    text = output("closed_loops")
+    assert number("at most # degrees off", text) < 3.0
+    assert number("loops open by at most # m", text) < 1e-9
+    check_picture(text)
+
+
 def test_a_humanoid_is_pushed() -> None:
     text = output("mujoco_humanoid")
     assert number("hand # mm", text) < 5.0
