@@ -27,9 +27,9 @@ MODEL = f"""<mujoco model="ankle"><compiler angle="radian"/><worldbody><body nam
     <equality><connect name="left" body1="left_rod" body2="foot" anchor="0 0 -0.25"/>
     <connect name="right" body1="right_rod" body2="foot" anchor="0 0 -0.25"/></equality></mujoco>"""
 
-robot = wbc.robots.load(MODEL).with_limits(velocity={"left_motor": 2.0, "right_motor": 2.0})
+robot = wbc.robots.load(MODEL, shapes="exact").with_limits(velocity={"left_motor": 2.0, "right_motor": 2.0})
 stack = wbc.Stack(robot, dt=DT)
-stack.add(wbc.tasks.EndEffector("foot", kind="orientation", gain=20.0), name="foot")
+stack.add(wbc.tasks.EndEffector("foot", kind="orientation", gain=50.0), name="foot")
 stack.add(wbc.tasks.Posture(), name="posture", weight=1e-4).add(wbc.tasks.JointLimits())
 controller, q, rows = stack.compile(), robot.neutral, []
 motors = [robot.position_index[robot.dofs(name).start] for name in ("left_motor", "right_motor")]
