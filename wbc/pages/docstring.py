@@ -102,7 +102,7 @@ def _end_of_formula(lines: list[str]) -> int:
     inside = False
     for k, line in enumerate(lines):
         if HEADING.fullmatch(line):
-            return 0
+            return k if inside else 0
         if line.startswith("    "):
             inside = True
         elif inside and line:
