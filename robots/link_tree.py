@@ -31,6 +31,7 @@ class Link:
         joint: its name; "" for a weld.
         lower, upper: limits [rad or m]. velocity, acceleration: largest [per s, s^2].
         axis: unit vector in the frame of ``placement``. sliding: along it, not about it.
+        effort: largest [N m or N]. inertia: of the link, in its frame; None: it weighs nothing.
     """
 
     name: str
@@ -43,6 +44,8 @@ class Link:
     acceleration: float = 0.0
     axis: tuple[float, float, float] = Z
     sliding: bool = False
+    effort: float = np.inf
+    inertia: pin.Inertia | None = None
 
 
 def build_model(name: str, root: str, links: Iterable[Link], floating: bool = True) -> pin.Model:
@@ -63,11 +66,15 @@ def build_model(name: str, root: str, links: Iterable[Link], floating: bool = Tr
         if not link.joint:
             frame = pin.Frame(link.name, below.parentJoint, frames[link.parent], local, pin.FrameType.BODY)
             frames[link.name] = model.addFrame(frame)
+            if link.inertia is not None:
+                model.appendBodyToJoint(below.parentJoint, link.inertia, local)
             continue
-        numbers = [np.array([x]) for x in (np.inf, link.velocity, link.lower, link.upper)]
+        numbers = [np.array([x]) for x in (link.effort, link.velocity, link.lower, link.upper)]
         index = model.addJoint(below.parentJoint, _joint(link), local, link.joint, *numbers)
         above = model.addJointFrame(index, frames[link.parent])
         frames[link.name] = model.addFrame(pin.Frame(link.name, index, above, pin.SE3.Identity(), pin.FrameType.BODY))
+        if link.inertia is not None:
+            model.appendBodyToJoint(index, link.inertia, pin.SE3.Identity())
     return model
 
 
@@ -101,7 +108,7 @@ def urdf_text(robot: Robot, root: str, links: Iterable[Link]) -> str:
     tree = ElementTree.Element("robot", name=robot.name)
     _add_link(tree, root, robot.shapes)
     for link in links:
-        _add_link(tree, link.name, robot.shapes)
+        _add_inertia(_add_link(tree, link.name, robot.shapes), link.inertia)
         kind = ("prismatic" if link.sliding else "revolute") if link.joint else "fixed"
         joint = ElementTree.SubElement(tree, "joint", name=link.joint or f"{link.name}_weld", type=kind)
         ElementTree.SubElement(joint, "parent", link=link.parent)
@@ -109,13 +116,16 @@ def urdf_text(robot: Robot, root: str, links: Iterable[Link]) -> str:
         _add_origin(joint, link.placement)
         if link.joint:
             ElementTree.SubElement(joint, "axis", xyz=" ".join(f"{x:g}" for x in link.axis))
-            limits = {"lower": link.lower, "upper": link.upper, "velocity": link.velocity, "effort": 0.0}
+            effort = link.effort if link.effort < np.inf else 0.0
+            limits = {"lower": link.lower, "upper": link.upper, "velocity": link.velocity, "effort": effort}
             ElementTree.SubElement(joint, "limit", {k: repr(float(v)) for k, v in limits.items()})
     ElementTree.indent(tree)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(tree, encoding="unicode") + "\n"
 
 
-def _add_link(tree: ElementTree.Element, name: str, shapes: Mapping[str, tuple[PlacedShape, ...]]) -> None:
+def _add_link(
+    tree: ElementTree.Element, name: str, shapes: Mapping[str, tuple[PlacedShape, ...]]
+) -> ElementTree.Element:
     link = ElementTree.SubElement(tree, "link", name=name)
     for placed in shapes.get(name, ()):
         for kind in ("visual", "collision"):
@@ -124,6 +134,22 @@ def _add_link(tree: ElementTree.Element, name: str, shapes: Mapping[str, tuple[P
                 _add_origin(body, placement)
                 geometry = ElementTree.SubElement(body, "geometry")
                 ElementTree.SubElement(geometry, tag, {k: repr(v) for k, v in numbers.items()})
+    return link
+
+
+def _add_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> None:
+    if inertia is None:
+        return
+    body = ElementTree.SubElement(link, "inertial")
+    _add_origin(body, pin.SE3(np.eye(3), inertia.lever))
+    ElementTree.SubElement(body, "mass", value=repr(float(inertia.mass)))
+    of = {
+        f"i{a}{b}": repr(float(inertia.inertia[i, j]))
+        for i, a in enumerate("xyz")
+        for j, b in enumerate("xyz")
+        if i <= j
+    }
+    ElementTree.SubElement(body, "inertia", of)
 
 
 def _primitives(placed: PlacedShape) -> list[tuple[pin.SE3, str, dict[str, float]]]:

@@ -46,7 +46,7 @@ def test_short_blocks_run(page: str) -> None:
 #: Page -> what is shorter here than there
 SHORTER = {
     "torque": {},
-    "motion_control": {", 2.0)": ", 0.05)"},
+    "motion_control": {"0.001, 2.0)": "0.001, 0.05)"},
     "walking_two_ended": {'"6", gait': '"3", gait'},
     "walking_planner": {
         "(13, 18)": "(13, 8)",

@@ -1,15 +1,15 @@
-"""The published arm, its task and its controllers, and today's beside them; what the linearised controller costs."""
+"""The published arm, its task and its controllers, and today's beside them."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 
 from bench.sheet import Sheet
+from wbc.errors import RangeError
 from wbc.motion_control.comparison import Condition, compare
+from wbc.motion_control.trial import AWAY
 from wbc.published.newton_euler import (
     Adaptive,
     DecoupledArm,
@@ -17,21 +17,18 @@ from wbc.published.newton_euler import (
     Drive,
     Linearised,
     Nominal,
-    discretised,
-    gain,
-    rigid,
+    Rigid,
     simulate,
 )
-from wbc.published.newton_euler.comparison import published_scenario
+from wbc.published.newton_euler.comparison import PUBLISHED, published_scenario
 from wbc.published.newton_euler.control import Controller
-from wbc.published.newton_euler.counts import operations
 from wbc.published.newton_euler.simulation import PLANTS
-from wbc.published.newton_euler.three_link import MOTOR, arm, task, tip
+from wbc.published.newton_euler.three_link import ELECTRIC, HYDRAULIC, MOTOR, arm, task, tip
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Tracking on the three plants; with a payload; with noise and heavier links; cost of a step."""
-    return {"tracking": _tracking(), "payload": _payload(), "faults": _faults(), "cost": _cost()}
+    """Tracking on the three plants; on other motors; with a payload that nobody knows of."""
+    return {"tracking": _tracking(), "drives": _drives(), "payload": _payload()}
 
 
 def _tracking() -> Sheet:
@@ -40,7 +37,7 @@ def _tracking() -> Sheet:
         "nominal torque": lambda: Nominal(chosen, motion),
         "1 linearised": lambda: Linearised(chosen, motion, 0.01),
         "2 decoupled": lambda: DecoupledTwo(motion, 0.01),
-        "2 on all joints": lambda: DecoupledArm(rigid(chosen.model), motion, 0.01),
+        "2 on all joints": lambda: DecoupledArm(Rigid(chosen.model), motion, 0.01),
         "3 adaptive": lambda: Adaptive(chosen, motion, 0.01),
     }
     scenario = published_scenario()
@@ -54,13 +51,28 @@ def _tracking() -> Sheet:
             off = max(np.linalg.norm(tip(q) - tip(motion(t)[0])) for q, t in zip(run.q, run.times, strict=True))
             cells.append(f"{1e3 * off:.3g}")
             if plant == "torque":
-                more = [f"{error:.2g}" for error in run.largest] + [
-                    f"{u:.3g}" if u > 1e-9 else "0" for u in run.perturbation
-                ]
+                more = [f"{error:.2g}" for error in run.largest]
         rows.append((*cells, *more))
-    heads = ("controller", "listing [mm]", "torque [mm]", "motor [mm]", "joint 1 [rad]", "joint 2 [rad]", "joint 3 [m]",
-             "u1 [N m]", "u2 [N m]", "u3 [N]")  # fmt: skip
+    heads = ("controller", "listing [mm]", "torque [mm]", "motor [mm]", "joint 1 [rad]", "joint 2 [rad]", "joint 3 [m]")
     return Sheet("", heads, rows)
+
+
+def _drives() -> Sheet:
+    """Largest distance of the tip [mm] on motors of second and of third order."""
+    chosen, motion, scenario, rows = arm(), task(), published_scenario(), []
+    for name in (*PUBLISHED, "computed torque", "one-step optimum"):
+        cells = [name]
+        for motor in (MOTOR, ELECTRIC, HYDRAULIC):
+            law = scenario.controllers[name](scenario.robot, motion, 0.01)
+            try:
+                run = simulate(chosen.model, law, motion, plant="motor", drive=Drive([motor] * 3))
+            except RangeError:
+                cells.append("ran away")
+                continue
+            off = max(np.linalg.norm(tip(q) - tip(motion(t)[0])) for q, t in zip(run.q, run.times, strict=True))
+            cells.append(f"{1e3 * off:.3g}" if off < AWAY else "ran away")
+        rows.append(tuple(cells))
+    return Sheet("", ("controller", "as printed [mm]", "with inductance [mm]", "hydraulic [mm]"), rows)
 
 
 def _payload() -> Sheet:
@@ -75,52 +87,4 @@ def _payload() -> Sheet:
         rows.append((*cells, f"{other.microseconds:.0f}", mass))
     heads = ("controller", "100 Hz [mm]", "at the end [mm]", "1 kHz [mm]", "at the end [mm]", "a command [us]",
              "payload learned [kg]")  # fmt: skip
-    return Sheet("", heads, rows)
-
-
-def _faults() -> Sheet:
-    """Largest distance of the tip [mm]; no payload."""
-    columns, scenario = [], published_scenario()
-    for fault in ({"noise": 1e-5}, {"heavier": 1.2}):
-        for rate in (100.0, 1000.0):
-            found = compare(scenario, Condition(**fault, rate=rate))
-            columns.append(["ran away" if one.trial.away else f"{1e3 * one.largest:.3g}" for one in found])
-    heads = ("controller", "noise, 100 Hz [mm]", "noise, 1 kHz [mm]", "heavier, 100 Hz [mm]", "heavier, 1 kHz [mm]")
-    return Sheet("", heads, list(zip(scenario.names(), *columns, strict=True)))
-
-
-def _cost() -> Sheet:
-    """One step of controller 1 with Pinocchio's derivatives, beside the operations that the thesis counts."""
-    rows = []
-    for n in (3, 6, 7):
-        model = pin.Model()
-        rng = np.random.default_rng(n)
-        for i in range(n):
-            joint = pin.JointModelRevoluteUnaligned(*np.eye(3)[i % 3])
-            place = pin.SE3(np.eye(3), rng.normal(size=3) * 0.3)
-            model.appendBodyToJoint(
-                model.addJoint(i, joint, place, f"j{i}"), pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity()
-            )
-        data, Q, R = model.createData(), 1e5 * np.eye(2 * n), 0.01 * np.eye(n)
-        q, v, a = rng.normal(size=(3, n))
-        spent = []
-        for _ in range(300):
-            start = time.perf_counter()
-            by_q, by_v, M = pin.computeRNEADerivatives(model, data, q, v, a)
-            H = np.triu(M) + np.triu(M, 1).T
-            inverse, zero = np.linalg.inv(H), np.zeros((n, n))
-            A = np.block([[zero, np.eye(n)], [-inverse @ by_q, -inverse @ by_v]])
-            Phi, E = discretised(A, 1e-3)
-            _ = data.tau - gain(Phi, E[:, n:] @ inverse, Q, R) @ np.concatenate([q, v])
-            spent.append(time.perf_counter() - start)
-        counts = [f"{number}" for name in ("linearised", "adaptive") for number in operations(name, n)]
-        rows.append((f"{n}", *counts, f"{1e6 * float(np.median(spent)):.0f}"))
-    heads = (
-        "links",
-        "controller 1: x, /",
-        "+, -",
-        "controller 3: x, /",
-        "+, -",
-        "controller 1, today [us]",
-    )
     return Sheet("", heads, rows)

@@ -16,10 +16,10 @@ from wbc.published.newton_euler import (
     Linearised,
     Link,
     Nominal,
+    Rigid,
     Run,
     discretised,
     linear_model,
-    rigid,
     simulate,
 )
 from wbc.published.newton_euler.three_link import MOTOR, arm, task, tip
@@ -72,7 +72,7 @@ def controller(name: str) -> Nominal | Linearised | Adaptive | DecoupledArm | De
         return Adaptive(ARM, TASK, DT)
     if name == "decoupled two":
         return DecoupledTwo(TASK, DT)
-    return DecoupledArm(rigid(referee()), TASK, 0.0 if name == "forward" else DT, forward=name == "forward")
+    return DecoupledArm(Rigid(referee()), TASK, 0.0 if name == "forward" else DT, forward=name == "forward")
 
 
 @cache

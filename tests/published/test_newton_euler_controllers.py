@@ -46,11 +46,11 @@ from wbc.published.newton_euler import (
     Motor,
     Nominal,
     OneStep,
+    Rigid,
     discretised,
     equations,
     gain,
     linear_model,
-    rigid,
     simulate,
 )
 from wbc.published.newton_euler.counts import operations, printed_total
@@ -297,7 +297,7 @@ def test_goal_the_best_of_the_thesis_at_its_own_rate() -> None:
 
 def decoupled_errors(preview: float, forward: bool = False) -> Array:
     """With a preview that ends where the line ends; of one that goes on the last figure is the 0.00497 of 100 Hz."""
-    law = DecoupledArm(rigid(referee()), lambda time: TASK(min(time, 1.0)), preview, forward=forward)
+    law = DecoupledArm(Rigid(referee()), lambda time: TASK(min(time, 1.0)), preview, forward=forward)
     return simulate(referee(), law, TASK, dt=1e-3, steps=1000, substeps=1).largest
 
 
@@ -538,7 +538,7 @@ LINK = (2.0, np.array([0.1, 0.1, 0.1]), np.eye(3)[2], np.eye(3)[2], np.ones(3), 
         ("gear", lambda: Motor(MOTOR.A, MOTOR.b, MOTOR.f, 0.0)),
         ("dt", lambda: discretised(MOTOR.A, 1.0)),
         ("dt", lambda: discretised(MOTOR.A, 0.0)),
-        ("poles", lambda: DecoupledArm(rigid(referee()), TASK, DT, (-100.0, 1.0))),
+        ("poles", lambda: DecoupledArm(Rigid(referee()), TASK, DT, (-100.0, 1.0))),
         ("poles", lambda: DecoupledTwo(TASK, DT, (-100.0,))),
         ("rho", lambda: Estimator(np.zeros((2, 3)), rho=1.1)),
         ("Q", lambda: OneStep(3, -Q)),
@@ -570,4 +570,4 @@ def test_more_bad_input() -> None:
     with pytest.raises(RangeError, match="decouple"):
         law.input(np.zeros(2), np.zeros(1))
     with pytest.raises(RangeError, match="ran away"):
-        simulate(referee(), DecoupledArm(rigid(referee()), TASK, DT, (-2000.0, -2000.0)), TASK, steps=100)
+        simulate(referee(), DecoupledArm(Rigid(referee()), TASK, DT, (-2000.0, -2000.0)), TASK, steps=100)

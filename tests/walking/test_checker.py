@@ -23,6 +23,7 @@ from wbc.errors import RobotFileError, ShapeError, StructureFileError, UnknownNa
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.walking import Obstacle, PlaneSurface, Structure, save_structure
 from wbc.walking.checker import Report, Rules, check_run, check_walk
+from wbc.walking.checker.clock_and_joints import FAST, SPIN_FAST
 from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog, WalkLogError
 
 Walk = tuple[WalkLog, Structure]
@@ -89,7 +90,7 @@ def test_an_honest_walk_passes(urdf: Path, roll: str | int, tilt: float) -> None
 def test_the_report_is_a_table_of_all_checks(urdf: Path, walk: Walk) -> None:
     good, bad = (check_walk(log, urdf, walk[1], FEW) for log in (walk[0], changed(walk[0], "v", (7, 3), 9.0)))
     assert str(good).splitlines()[0].startswith("the walk holds: 191 ticks, 381 samples, 1.90 s")
-    assert str(bad).splitlines()[0].startswith("2 of 33 checks are violated")
+    assert str(bad).splitlines()[0].startswith("2 of 35 checks are violated")
     line = next(line for line in str(bad).splitlines() if "joint rate / limit" in line)
     assert line.split() == ["joint", "rate", "/", "limit", "2.262", "1", "0.070", "arm1_joint4", "1"]
     lines = str(good).splitlines()
@@ -254,6 +255,24 @@ def other_rate(log: WalkLog) -> WalkLog:
     return changed(log, "v", (MIDDLE, 4), log.v[MIDDLE, 4] + 1e-3)
 
 
+def asked(log: WalkLog, speed: float, turn_rate: float) -> WalkLog:
+    return replace(log, meta={**log.meta, "request": {"kind": "path", "speed": speed, "turn_rate": turn_rate}})
+
+
+def asked_slower(log: WalkLog) -> WalkLog:
+    """The body goes at up to 99 mm/s."""
+    return asked(log, 0.08, 0.05)
+
+
+def asked_to_turn_slower(log: WalkLog) -> WalkLog:
+    """The logged body turns at 0.05 rad/s."""
+    poses = [pin.XYZQUATToSE3(pose) for pose in log.pose_body_in_structure]
+    turned = [pin.SE3(pose.rotation @ pin.exp3(np.array([0, 0, 0.05 * t])), pose.translation)
+              for t, pose in zip(log.t, poses, strict=True)]  # fmt: skip
+    spun = changed(log, "pose_body_in_structure", slice(None), [pin.SE3ToXYZQUAT(pose) for pose in turned])
+    return asked(spun, 0.2, 0.02)
+
+
 def other_twist(log: WalkLog) -> WalkLog:
     return replace(log, twist_body=1.3 * log.twist_body)
 
@@ -298,6 +317,8 @@ FAULTS: list[tuple[Callable[[WalkLog], WalkLog], set[str], str, str]] = [
     (full_turn, {"joint beyond its limit"}, "joint beyond its limit", "arm1_joint6"),
     (other_rate, {"joint step less rate x dt"}, "joint step less rate x dt", "arm1_joint5"),
     (other_twist, {"twist speed"}, "twist speed", "body"),
+    (asked_slower, {FAST}, FAST, "body"),
+    (asked_to_turn_slower, {SPIN_FAST}, SPIN_FAST, "body"),
     (other_turn, {"twist turn rate"}, "twist turn rate", "body"),
     (move_hold, {"table of holds"}, "table of holds", "hold ahead"),
     (rename_hold, {"table of holds"}, "table of holds", "hold nowhere"),
@@ -305,6 +326,12 @@ FAULTS: list[tuple[Callable[[WalkLog], WalkLog], set[str], str, str]] = [
     (hold_nothing, {"hand state"}, "hand state", "arm3: closed to closed at no hold"),
     (change_hold, {"hand state", OFF}, "hand state", "arm2: closed to closed at hold ahead"),
 ]
+
+
+def test_a_walk_as_fast_as_was_asked_passes(urdf: Path, walk: Walk) -> None:
+    report = check_walk(asked(walk[0], 0.099, 0.01), urdf, walk[1], FEW)
+    assert report.ok, str(report)
+    assert abs(report[FAST].worst) < 0.001
 
 
 @pytest.mark.parametrize(("fault", "expected", "kind", "where"), FAULTS, ids=[fault[0].__name__ for fault in FAULTS])

@@ -136,7 +136,7 @@ def grips_at(cells: Cells, *of_arms: list[np.ndarray]) -> CellGrips:
 
 
 def graph_of(cells: Cells, grips: CellGrips, arms: int, pace: float = 0.05) -> CellGraph:
-    return CellGraph(cells, grips, arms, lambda change: route._seconds(change, pace))
+    return CellGraph(cells, grips, arms, lambda change: route._seconds(change, pace, 0.1))
 
 
 def test_a_body_goes_on_where_its_arms_have_a_grip_at_both_cells(machine: Walker, structure: Structure) -> None:

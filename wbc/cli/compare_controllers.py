@@ -1,4 +1,4 @@
-"""``wbc compare-controllers``: published controllers of an arm, and today's on any robot, beside each other."""
+"""``wbc compare-controllers``: published controllers and today's on the published arm or any robot, side by side."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def compare_controllers(
 ) -> None:
     """Controllers of torques beside each other, on the published arm or on any robot.
 
-    Without a robot: the published three-link arm on its line of 0.58 m in 1 s, with the three published controllers.
-    With one: all its joints swing for 2 s. Without --payload, --heavier, --noise and --rate: as modelled, with half the
-    mass of the last link, or a tenth of the robot's, at the tip, with links 1.2 times heavier, with noise of 1e-5; each
-    at 100 Hz and at 1 kHz. See docs/motion_control.md.
+    Without a robot: the published three-link arm on its line of 0.58 m in 1 s. With one: all its joints swing for 2 s.
+    The published controllers need a fixed base. Without --payload, --heavier, --noise and --rate: as modelled, with
+    half the mass of the last link, or a tenth of the robot's, at the tip, with links 1.2 times heavier, with noise of
+    1e-5; each at 100 Hz and at 1 kHz. See docs/motion_control.md.
 
     Example: [bold]wbc compare-controllers ur5 --payload 3 --rate 1000[/bold]
     """
@@ -67,11 +67,10 @@ def compare_controllers(
         Condition,
         compare,
         save_plot,
-        scenario_of,
         standard_conditions,
     )
     from wbc.motion_control.trial import PLANTS, loaded
-    from wbc.published.newton_euler.comparison import published_scenario
+    from wbc.published.newton_euler.comparison import published_scenario, scenario_with_published
 
     validation.one_of("plant", plant, PLANTS)
     if robot is None:
@@ -82,7 +81,7 @@ def compare_controllers(
             model = machine.model.copy()
             model.gravity.linear = np.array([0.0, 0.0, -validation.scalar("gravity", gravity, unit="m/s^2")])
             machine = replace(machine, model=model)
-        scenario = scenario_of(machine)
+        scenario = scenario_with_published(machine)
     given = {"payload": payload, "heavier": heavier, "noise": noise, "rate": rate}
     chosen = {name: value for name, value in given.items() if value is not None}
     conditions = (Condition(**chosen),) if chosen else standard_conditions(scenario.payload)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
+    from wbc.motion_control.actuators import Actuator, ActuatorSizing, Bound
     from wbc.motion_control.adaptive import AdaptiveControl
     from wbc.motion_control.computed_torque import ComputedTorque
     from wbc.motion_control.impedance import Impedance
@@ -18,7 +19,10 @@ else:
     __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
+    "Actuator",
+    "ActuatorSizing",
     "AdaptiveControl",
+    "Bound",
     "ComputedTorque",
     "Impedance",
     "Motion",

@@ -28,6 +28,8 @@ FASTEST = 100.0
 PAYLOAD, HEAVIER, NOISE = 0.1, 1.2, 1e-5
 #: Of :func:`swing`: parts of ranges and of limits of speed that it uses; half the range of unbounded joints [rad, m]
 RANGE, SPEED, FREE = 0.35, 0.4, 1.0
+#: The same where a joint has not the effort: amplitudes are made so many times smaller, unless holding takes more
+SMALLER, SPARE = 0.7, 0.9
 
 
 def poles(dt: float) -> float:
@@ -171,7 +173,8 @@ def swing(robot: Robot, seconds: float, seed: int = 0) -> Motion:
 
         q_i(t) = middle_i + a_i b(t) sin(w_i t + p_i),   b(t) = sin^2(pi t / seconds)
 
-    It goes on at rest. The middle is the robot's neutral configuration, moved into the range.
+    It goes on at rest. The middle is the robot's neutral configuration, moved into the range; on a fixed base
+    amplitudes are as small as limits of effort need.
     """
     limits, base = robot.limits, robot.base_nv
     random, n = np.random.default_rng(seed), robot.nv - base
@@ -202,7 +205,20 @@ def swing(robot: Robot, seconds: float, seed: int = 0) -> Motion:
         q = pin.integrate(robot.model, middle, np.concatenate([still, x]))
         return np.asarray(q), np.concatenate([still, dx]), np.concatenate([still, ddx])
 
+    while not base and _overloads(robot, motion, seconds):
+        amplitude *= SMALLER
     return motion
+
+
+def _overloads(robot: Robot, motion: Motion, seconds: float) -> bool:
+    """Whether a joint needs more than its effort for a motion, that could stand still there with some to spare."""
+    model, data, still, limit = robot.model, robot.model.createData(), np.zeros(robot.nv), robot.limits.effort
+    for t in np.linspace(0.0, seconds, 41):
+        q, v, a = motion(t)
+        needed, held = (np.abs(pin.rnea(model, data, q, *rates)) for rates in ((v, a), (still, still)))
+        if ((needed > limit) & (held < SPARE * limit)).any():
+            return True
+    return False
 
 
 def scenario_of(robot: Robot, seconds: float = 2.0) -> Scenario:

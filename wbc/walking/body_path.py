@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle, grid_pose
 SPACING = 0.05
 #: Rotations this far apart [rad] count as a metre and a half; for paths that only turn
 TURN_RADIUS = 1.5
+#: Of detours from a path that stands still [m/s, rad/s]
+SLOWEST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,8 @@ class BodyPath:
     Attributes:
         poses: ``[samples, 4, 4]`` [m].
         spacing: u from one sample to the next [s].
+        speed, turn_rate: largest that were asked for, which bound detours as well [m/s, rad/s]; 0: the largest that the
+            path has itself, one by :data:`TURN_RADIUS` out of the other where it has only that.
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no poses. RangeError: spacing not positive.
@@ -38,6 +42,8 @@ class BodyPath:
 
     poses: Array
     spacing: float = SPACING
+    speed: float = 0.0
+    turn_rate: float = 0.0
     _steps: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -52,6 +58,27 @@ class BodyPath:
         object.__setattr__(self, "poses", poses)
         spacing = validation.scalar("BodyPath.spacing", self.spacing, low=0.0, open_low=True, unit="s")
         object.__setattr__(self, "spacing", spacing)
+        if not (self.speed and self.turn_rate):
+            ahead, turned = self.largest_rates()
+            for name, rate in (
+                ("speed", max(ahead, TURN_RADIUS * turned)),
+                ("turn_rate", max(turned, ahead / TURN_RADIUS)),
+            ):
+                object.__setattr__(self, name, getattr(self, name) or rate or SLOWEST)
+
+    def largest_rates(self) -> tuple[float, float]:
+        """Largest speed of the origin and largest turn rate from sample to sample [m/s, rad/s]."""
+        turn = np.swapaxes(self.poses[:-1, :3, :3], 1, 2) @ self.poses[1:, :3, :3]
+        half = np.sqrt(np.clip(3.0 - np.trace(turn, axis1=1, axis2=2), 0.0, 4.0) / 4.0)
+        moved = np.linalg.norm(np.diff(self.poses[:, :3, 3], axis=0), axis=1)
+        return float(moved.max()) / self.spacing, float(2.0 * np.arcsin(half).max()) / self.spacing
+
+    def slower(self, times: int) -> BodyPath:
+        """The same poses at so many times lower rates, with so many times as many samples."""
+        places = np.arange((len(self) - 1) * times + 1) * (self.spacing / times)
+        poses = np.array([self.at(u)[0].homogeneous for u in places])
+        poses[::times] = self.poses
+        return replace(self, poses=poses, speed=self.speed / times, turn_rate=self.turn_rate / times)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -109,7 +136,7 @@ class BodyPath:
 
     def moved(self, pose: pin.SE3) -> BodyPath:
         """The same path on a structure that was moved by ``pose``."""
-        return BodyPath(pose.homogeneous @ self.poses, self.spacing)
+        return replace(self, poses=pose.homogeneous @ self.poses)
 
 
 def standing_path(pose: Any, duration: float = 1.0) -> BodyPath:
@@ -140,7 +167,7 @@ def straight_path(poses: Sequence[Any], speed: float, turn_rate: float = 0.05) -
         count = int(np.ceil(time / SPACING - 1e-9))
         parts = np.arange(1, count + 1) / max(count, 1)
         out += [(first * pin.exp6(step * part)).homogeneous[None] for part in parts]
-    return BodyPath(np.concatenate(out))
+    return BodyPath(np.concatenate(out), speed=speed, turn_rate=turn_rate)
 
 
 def grid_path(
@@ -178,7 +205,7 @@ def grid_path(
         count = int(np.ceil(max(length / speed, abs(step[2]) / turn_rate) / SPACING - 1e-9))
         grid.append(first + step * (np.arange(1, count + 1) / max(count, 1))[:, None])
     poses = np.array([grid_pose(t, a, radius, heading).homogeneous for t, a, heading in np.concatenate(grid)])
-    return BodyPath(poses if pose is None else pose.homogeneous @ poses)
+    return BodyPath(poses if pose is None else pose.homogeneous @ poses, speed=speed, turn_rate=turn_rate)
 
 
 def _rates(speed: float, turn_rate: float) -> tuple[float, float]:

@@ -37,7 +37,7 @@ Mode = Annotated[
     ),
 ]
 Speed = Annotated[
-    float, typer.Option(help="Of the body's origin in the structure's frame, in m/s.", rich_help_panel=_SCENE)
+    float, typer.Option(help="Largest of the body's origin in the structure's frame, in m/s.", rich_help_panel=_SCENE)
 ]
 TurnRate = Annotated[float, typer.Option(help="Largest rate of turning, in rad/s.", rich_help_panel=_SCENE)]
 From = Annotated[

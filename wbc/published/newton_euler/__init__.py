@@ -9,9 +9,10 @@ from __future__ import annotations
 from wbc.published.newton_euler.actuators import Drive, Motor, discretised
 from wbc.published.newton_euler.control import Adaptive, Estimator, Linearised, Nominal, OneStep, gain
 from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo, Decoupling
+from wbc.published.newton_euler.dynamics import Dynamics, Rigid
 from wbc.published.newton_euler.links import Arm, Link
 from wbc.published.newton_euler.recursion import Equations, External, LinearModel, equations, linear_model
-from wbc.published.newton_euler.simulation import Run, rigid, simulate
+from wbc.published.newton_euler.simulation import Run, simulate
 
 __all__ = [
     "Adaptive",
@@ -20,6 +21,7 @@ __all__ = [
     "DecoupledTwo",
     "Decoupling",
     "Drive",
+    "Dynamics",
     "Equations",
     "Estimator",
     "External",
@@ -29,11 +31,11 @@ __all__ = [
     "Motor",
     "Nominal",
     "OneStep",
+    "Rigid",
     "Run",
     "discretised",
     "equations",
     "gain",
     "linear_model",
-    "rigid",
     "simulate",
 ]

@@ -17,8 +17,8 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError, SolverError
 from wbc.published.newton_euler.actuators import discretised
+from wbc.published.newton_euler.dynamics import Dynamics, dynamics_of, measured
 from wbc.published.newton_euler.links import Arm
-from wbc.published.newton_euler.recursion import equations, linear_model
 from wbc.published.newton_euler.three_link import Motion
 from wbc.qp import QP, make_solver
 from wbc.validation import Array
@@ -34,15 +34,6 @@ class Controller(Protocol):
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n] at a time [s] and the measured positions and velocities, [n] each."""
-
-
-def measured(q: Array, v: Array, n: int) -> tuple[Array, Array]:
-    """Positions and velocities as they were measured, [n] each.
-
-    Raises:
-        ShapeError, NotFiniteError, RangeError: they are no such numbers.
-    """
-    return validation.ordinary_array("q", q, (n,)), validation.ordinary_array("v", v, (n,))
 
 
 def gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
@@ -83,14 +74,14 @@ class OneStep:
 class Nominal:
     """No feedback: the torques of the desired motion (5.10)."""
 
-    def __init__(self, arm: Arm, motion: Motion) -> None:
-        self.arm, self.motion = arm, motion
+    def __init__(self, arm: Arm | Dynamics, motion: Motion) -> None:
+        self.arm, self.motion = dynamics_of(arm), motion
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
-        measured(q, v, self.arm.n)
+        measured(self.arm, q, v)
         qd, vd, ad = self.motion(time)
-        return equations(self.arm, qd, vd).torque(ad)
+        return self.arm.equations(qd, vd).torque(ad)
 
 
 class Linearised:
@@ -101,22 +92,28 @@ class Linearised:
     """
 
     def __init__(
-        self, arm: Arm, motion: Motion, dt: float, optimum: OneStep | None = None, limits: Array | None = None
+        self,
+        arm: Arm | Dynamics,
+        motion: Motion,
+        dt: float,
+        optimum: OneStep | None = None,
+        limits: Array | None = None,
     ) -> None:
-        self.arm, self.motion, self.dt = arm, motion, validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
-        self.optimum = optimum or OneStep(arm.n)
-        self.limits = None if limits is None else validation.ordinary_array("limits", limits, (arm.n,))
+        self.arm, self.motion = dynamics_of(arm), motion
+        self.dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+        self.optimum = optimum or OneStep(self.arm.n)
+        self.limits = None if limits is None else validation.ordinary_array("limits", limits, (self.arm.n,))
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
-        q, v = measured(q, v, self.arm.n)
+        q, v = measured(self.arm, q, v)
         qd, vd, ad = self.motion(time)
-        model = linear_model(self.arm, qd, vd, ad)
+        model = self.arm.linear_model(qd, vd, ad)
         A, B = model.system
         Phi, E = discretised(A, self.dt)
         nominal = model.torque(ad)
         bounds = None if self.limits is None else (-self.limits - nominal, self.limits - nominal)
-        return nominal + self.optimum(Phi, E @ B, np.concatenate([q - qd, v - vd]), bounds)
+        return nominal + self.optimum(Phi, E @ B, np.concatenate([self.arm.error(q, qd), v - vd]), bounds)
 
 
 class Estimator:
@@ -159,7 +156,7 @@ class Adaptive:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: Arm | Dynamics,
         motion: Motion,
         dt: float,
         optimum: OneStep | None = None,
@@ -167,10 +164,10 @@ class Adaptive:
         rho: float = 0.85,
         start: float = 1e6,
     ) -> None:
-        self.arm, self.motion, self.nominal = arm, motion, Nominal(arm, motion)
-        self.optimum = optimum or OneStep(arm.n)
+        self.arm, self.motion, self.nominal = dynamics_of(arm), motion, Nominal(arm, motion)
+        self.optimum = optimum or OneStep(self.arm.n)
         if theta is None:
-            A, B = linear_model(arm, *motion(0.0)).system
+            A, B = self.arm.linear_model(*motion(0.0)).system
             Phi, E = discretised(A, dt)
             theta = np.hstack([Phi, E @ B])
         self.estimator = Estimator(theta, rho, start)
@@ -178,9 +175,9 @@ class Adaptive:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
-        q, v = measured(q, v, self.arm.n)
+        q, v = measured(self.arm, q, v)
         qd, vd, _ = self.motion(time)
-        x, n = np.concatenate([q - qd, v - vd]), self.arm.n
+        x, n = np.concatenate([self.arm.error(q, qd), v - vd]), self.arm.n
         if self._last is not None:
             self.estimator.update(self._last, x)
         theta = self.estimator.theta

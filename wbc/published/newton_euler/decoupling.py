@@ -10,15 +10,15 @@ G = D*^-1 diag(a_0). Source: chapter 5 after Freund (6.16 to 6.52).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.published.newton_euler.control import measured
-from wbc.published.newton_euler.recursion import Equations
+from wbc.published.newton_euler.dynamics import Dynamics, dynamics_of, measured
+from wbc.published.newton_euler.links import Arm
 from wbc.published.newton_euler.three_link import Motion, closed_form
 from wbc.validation import Array
 
@@ -85,23 +85,23 @@ class DecoupledArm:
 
     def __init__(
         self,
-        equations: Callable[[Array, Array], Equations],
+        arm: Arm | Dynamics,
         motion: Motion,
         preview: float,
         poles: Sequence[complex] = POLES,
         *,
         forward: bool = False,
     ) -> None:
-        self.equations, self.motion, self.forward = equations, motion, forward
+        self.arm, self.motion, self.forward = dynamics_of(arm), motion, forward
         self.preview = validation.scalar("preview", preview, low=0.0, unit="s")
         self.a = characteristic("poles", poles, 2)
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [n]."""
-        q, v = measured(q, v, len(q))
+        q, v = measured(self.arm, q, v)
         qd, vd, ad = self.motion(time + self.preview)
-        wanted = self.a[0] * (qd - q) - self.a[1] * v
-        return self.equations(q, v).torque(wanted + self.a[1] * vd + ad if self.forward else wanted)
+        wanted = -self.a[0] * self.arm.error(q, qd) - self.a[1] * v
+        return self.arm.equations(q, v).torque(wanted + self.a[1] * vd + ad if self.forward else wanted)
 
 
 class DecoupledTwo:
@@ -114,7 +114,7 @@ class DecoupledTwo:
 
     def command(self, time: float, q: Array, v: Array) -> Array:
         """Torques [3] (6.50 to 6.52)."""
-        q, v = measured(q, v, 3)
+        q, v = validation.ordinary_array("q", q, (3,)), validation.ordinary_array("v", v, (3,))
         qd = self.motion(time + self.preview)[0]
         c, d = closed_form(q, v)
         return np.concatenate([[0.0], -(c + self.a[1] * v[1:] + self.a[0] * (q[1:] - qd[1:])) / d])

@@ -17,7 +17,7 @@ from wbc import validation
 from wbc.errors import RangeError
 from wbc.published.newton_euler.actuators import Drive, discretised
 from wbc.published.newton_euler.control import Controller
-from wbc.published.newton_euler.recursion import Equations
+from wbc.published.newton_euler.dynamics import Rigid
 from wbc.published.newton_euler.three_link import Motion
 from wbc.validation import Array
 
@@ -25,7 +25,9 @@ from wbc.validation import Array
 PLANTS = ("listing", "torque", "motor")
 #: Steps of the fourth-order integrator in one step of the controller
 SUBSTEPS = 20
-Acceleration = Callable[[Array, Array], Array]
+#: The rule is stable for steps below this, divided by the fastest pole of the motors
+STABLE = 2.5
+Rate = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +37,7 @@ class Run:
     Attributes:
         times: [steps + 1] [s]. q, v: positions and velocities [steps + 1, n]. errors: desired less actual positions
             [steps + 1, n]. nominal: torques for the desired motion, torques: those that acted, [steps, n].
-        voltages: [steps, n] [V], zero for the plant ``torque``.
+        voltages: inputs of the motors [steps, n] [V, or openings of valves], zero for the plant ``torque``.
     """
 
     times: Array
@@ -55,16 +57,6 @@ class Run:
     def perturbation(self) -> Array:
         """Largest torque besides the nominal one, of each joint [n]."""
         return np.asarray(np.abs(self.torques - self.nominal).max(axis=0))
-
-
-def rigid(model: pin.Model) -> Callable[[Array, Array], Equations]:
-    """H and h of a ``pin.Model``, by Pinocchio."""
-    data = model.createData()
-
-    def equations(q: Array, v: Array) -> Equations:
-        return Equations(np.array(pin.crba(model, data, q)), np.array(pin.nonLinearEffects(model, data, q, v)))
-
-    return equations
 
 
 def simulate(
@@ -89,19 +81,26 @@ def simulate(
             their differences over a step.
 
     Raises:
-        UnknownNameError: no such plant. RangeError: a plant without drive; the arm ran away.
+        UnknownNameError: no such plant. RangeError: a plant without drive; motors that are too fast for ``substeps``,
+            which says how many they need; the arm ran away.
     """
     validation.one_of("plant", plant, PLANTS)
     validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
     validation.integer("substeps", substeps, low=1)
     if drive is None and plant != "torque":
         raise RangeError("drive", drive, f"the plant {plant!r} needs motors")
-    exact, data = rigid(model), model.createData()
-    q, v, _ = motion(0.0)
+    if drive is not None and plant == "motor":
+        least = int(np.ceil(dt * np.abs(np.linalg.eigvals(drive.system[0])).max() / STABLE))
+        if substeps < least:
+            raise RangeError("substeps", substeps, f"too few for these motors: expected at least {least}")
+    exact, data = Rigid(model), model.createData()
+    q, v, a = motion(0.0)
     q = q if offset is None else q + validation.ordinary_array("offset", offset, q.shape)
     validation.scalar("noise", noise, low=0.0)
     random = np.random.default_rng(validation.integer("seed", seed))
-    seen, rate = q, v
+    seen, rate, z = q, v, np.zeros(0)
+    if drive is not None:
+        z = drive.steady(exact.equations(q, v), q, v, exact.equations(q, v).torque(a))
     logged: list[tuple[Array, ...]] = []
     for k in range(validation.integer("steps", steps, low=1)):
         qd, vd, ad = motion(k * dt)
@@ -114,14 +113,15 @@ def simulate(
         voltage = np.zeros_like(torque)
         if drive is not None:
             at = (qd, vd) if plant == "listing" else (seen, rate)
-            voltage = drive.voltage(exact(*at), seen, rate, torque)
+            voltage = drive.voltage(exact.equations(*at), seen, rate, torque, z, dt)
         logged.append((q, v, qd - q, np.array(pin.rnea(model, data, qd, vd, ad)), torque, voltage))
-        if plant == "torque":
-            q, v = _advanced(_moved(model, data, torque), q, v, dt, substeps)
-        elif drive is not None and plant == "motor":
-            q, v = _advanced(_driven(drive, exact, voltage), q, v, dt, substeps)
-        elif drive is not None:
-            q, v = _as_listed(drive, q, v, voltage, torque, dt)
+        if drive is not None and plant == "listing":
+            q, v, z = _as_listed(drive, drive.state(q, v, z), voltage, torque, dt)
+        else:
+            moves = _moved(model, data, torque)
+            if drive is not None and plant == "motor":
+                moves = _driven(drive, exact, voltage)
+            q, v, z = np.split(_advanced(moves, np.concatenate([q, v, z]), dt, substeps), [len(q), 2 * len(q)])
         if not np.abs(np.concatenate([q, v])).max() < validation.LARGEST:
             raise RangeError("dt", dt, f"the arm ran away after {k * dt:.3g} s: the step is too coarse for these gains")
     columns = [np.array(column, dtype=np.float64) for column in zip(*logged, strict=True)]
@@ -130,42 +130,45 @@ def simulate(
     return Run(np.linspace(0.0, steps * dt, steps + 1), positions, velocities, errors, *columns[3:])
 
 
-def _advanced(acceleration: Acceleration, q: Array, v: Array, dt: float, substeps: int) -> tuple[Array, Array]:
+def _advanced(rate: Rate, y: Array, dt: float, substeps: int) -> Array:
     """One step by Runge and Kutta's fourth-order rule."""
     h = dt / substeps
     for _ in range(substeps):
-        a1 = acceleration(q, v)
-        a2 = acceleration(q + h / 2 * v, v + h / 2 * a1)
-        a3 = acceleration(q + h / 2 * v + h * h / 4 * a1, v + h / 2 * a2)
-        a4 = acceleration(q + h * v + h * h / 2 * a2, v + h * a3)
-        q = q + h * v + h * h / 6 * (a1 + a2 + a3)
-        v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-    return q, v
+        r1 = rate(y)
+        r2 = rate(y + h / 2 * r1)
+        r3 = rate(y + h / 2 * r2)
+        y = y + h / 6 * (r1 + 2 * r2 + 2 * r3 + rate(y + h * r3))
+    return y
 
 
-def _moved(model: pin.Model, data: pin.Data, torque: Array) -> Acceleration:
-    def acceleration(q: Array, v: Array) -> Array:
-        return np.array(pin.aba(model, data, q, v, torque))
+def _moved(model: pin.Model, data: pin.Data, torque: Array) -> Rate:
+    n = len(torque)
 
-    return acceleration
+    def rate(y: Array) -> Array:
+        q, v = y[:n], y[n : 2 * n]
+        return np.concatenate([v, pin.aba(model, data, q, v, torque), 0.0 * y[2 * n :]])
+
+    return rate
 
 
-def _driven(drive: Drive, exact: Callable[[Array, Array], Equations], voltage: Array) -> Acceleration:
-    """(I - T F H) q'' = T (A x + B u + F h): arm and motors under a voltage."""
+def _driven(drive: Drive, exact: Rigid, voltage: Array) -> Rate:
+    """(I - T F H) q'' = T (A x + B u + F h), z' by the motors' rows: arm and motors under a voltage."""
     A, B, F, T = drive.system
-    TA, TBu, TF, one = T @ A, T @ B @ voltage, T @ F, np.eye(len(voltage))
+    TF, Bu, one, n = T @ F, B @ voltage, np.eye(len(voltage)), len(voltage)
 
-    def acceleration(q: Array, v: Array) -> Array:
-        model = exact(q, v)
-        return np.asarray(np.linalg.solve(one - TF @ model.H, TA @ drive.state(q, v) + TBu + TF @ model.h))
+    def rate(y: Array) -> Array:
+        q, v, z = y[:n], y[n : 2 * n], y[2 * n :]
+        model = exact.equations(q, v)
+        alone = A @ drive.state(q, v, z) + Bu
+        a = np.asarray(np.linalg.solve(one - TF @ model.H, T @ alone + TF @ model.h), dtype=np.float64)
+        return np.concatenate([v, a, (alone + F @ model.torque(a))[drive.inner]])
 
-    return acceleration
+    return rate
 
 
-def _as_listed(drive: Drive, q: Array, v: Array, voltage: Array, torque: Array, dt: float) -> tuple[Array, Array]:
+def _as_listed(drive: Drive, x: Array, voltage: Array, torque: Array, dt: float) -> tuple[Array, Array, Array]:
     """The motors alone, with the torque that was asked for as their load (4.9)."""
     A, B, F, _ = drive.system
     Phi, E = discretised(A, dt, 36)
-    x = (Phi @ drive.state(q, v) + E @ (B @ voltage + F @ torque)).reshape(-1, 2)
-    gears = np.array([motor.gear for motor in drive.motors])
-    return x[:, 0] / gears, x[:, 1] / gears
+    x = Phi @ x + E @ (B @ voltage + F @ torque)
+    return x[drive.angles] / drive.gears, x[drive.angles + 1] / drive.gears, x[drive.inner]

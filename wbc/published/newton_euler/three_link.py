@@ -22,7 +22,15 @@ GRAVITY, SHOULDER = 9.80621, 0.1524
 BASE = np.array([0.0, 0.1, -0.1])
 #: From joint 3's origin, which is the tip, to the centre of mass of link 3 [m]
 BEHIND = 0.6447
+#: The motor of all joints, as printed: second order
 MOTOR = Motor(np.array([[0.0, 1.0], [0.0, -46.4]]), np.array([0.0, 88.6]), np.array([0.0, -29.0]))
+#: Of that motor: constant [V s/rad] and resistance [ohm] of a rotor of 1/29 kg m^2, 1 / f
+CONSTANT = 46.4 / 88.6
+RESISTANCE = 29.0 * CONSTANT / 88.6
+#: The same motor with the inductance of its armature, which is not printed: current follows within 2 ms
+ELECTRIC = Motor.third_order(CONSTANT, RESISTANCE, 0.002 * RESISTANCE, 1.0 / 29.0)
+#: A hydraulic one, none is printed: 31 cm^3 a turn, 0.1 l of oil of 1.4 GPa, at most 0.1 l/s through the valve
+HYDRAULIC = Motor.third_order(5e-6, 1e-12, 1e-4 / (4 * 1.4e9), 1.0 / 29.0, inflow=1e-4)
 State = tuple[Array, Array, Array]
 #: A motion: q, q' and q'', [n] each, at a time [s]
 Motion = Callable[[float], State]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from wbc.validation import Array
@@ -15,6 +17,7 @@ from wbc.walking.log.log import WalkLog
 #: A step of time below this [s] is none
 LEAST_STEP = 1e-12
 HARD = "joint acceleration / limit"
+FAST, SPIN_FAST = "body's speed beyond what was asked", "body's turn rate beyond what was asked"
 JUMP, SPIN_JUMP = "jump of the body's velocity", "jump of the body's turn rate"
 
 
@@ -29,6 +32,8 @@ def declare(tally: Tally, rules: Rules) -> None:
     tally.declare(HARD, 1.0 + rules.acceleration)
     tally.declare("twist speed", rules.twist_speed, "m/s")
     tally.declare("twist turn rate", rules.twist_rate, "rad/s")
+    tally.declare(FAST, rules.asked_speed, "m/s")
+    tally.declare(SPIN_FAST, rules.asked_rate, "rad/s")
     tally.declare(JUMP, rules.jump_speed, "m/s")
     tally.declare(SPIN_JUMP, rules.jump_rate, "rad/s")
 
@@ -76,7 +81,7 @@ def check_positions(samples: Samples, log: WalkLog, urdf: Urdf, tally: Tally) ->
 
 
 def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
-    """Means of the logged twist over a window against the body's motion in it."""
+    """Means over a window of the body's motion against what was asked for, and of the logged twist against that."""
     rotation, position = rotations(log.pose_body_in_structure[:, 3:]), log.pose_body_in_structure[:, :3]
     window = min(max(round(rules.twist_window / log.dt), 1), len(log) - 1)
     gaps = np.diff(log.t)[:, None]
@@ -88,6 +93,11 @@ def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
 
     span = np.maximum(log.t[window:] - log.t[:-window], 1e-12)
     moved = position[window:] - position[:-window]
+    asked = log.meta.get("request")
+    if isinstance(asked, Mapping) and asked.get("kind") == "path" and not asked.get("plan"):
+        turned = turns_between(rotation[:-window], rotation[window:]) / span
+        tally.add(FAST, np.linalg.norm(moved, axis=1) / span - asked["speed"], log.t, lambda _: "body")
+        tally.add(SPIN_FAST, turned - asked["turn_rate"], log.t, lambda _: "body")
     tally.add("twist speed", np.linalg.norm(sums(slice(0, 3)) - moved, axis=1) / span, log.t, lambda _: "body")
     # exp(sum of w dt) R[k] against R[k + w]: to second order in the turn, which is small within a window
     turn, angle = sums(slice(3, 6)), np.linalg.norm(sums(slice(3, 6)), axis=1)

@@ -26,6 +26,7 @@ class Rules:
         rounding: by which a joint's steps may miss its logged rate times dt [rad].
         drift_distance, drift_angle: by which the offset of a closed hand may grow again.
         twist_speed, twist_rate: of the logged twist against the body's motion, means over ``twist_window``.
+        asked_speed, asked_rate: by which the body may exceed what a path's request asks for, means over the same.
         acceleration: of a joint beyond its limit, relative. accelerations: limits by joint, which no URDF has
             [rad/s^2]; a joint without one is not checked.
         jump_speed, jump_rate: by which the body's velocity may change from tick to tick.
@@ -55,6 +56,8 @@ class Rules:
     twist_speed: float = 0.01
     twist_rate: float = radians(1.0)
     twist_window: float = 0.1
+    asked_speed: float = 0.01
+    asked_rate: float = radians(1.0)
     acceleration: float = 0.01
     accelerations: Mapping[str, float] = field(default_factory=dict)
     jump_speed: float = 0.02

@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.errors import StructureFileError, WbcError
 from wbc.walking.body_path import BodyPath
 from wbc.walking.log.body_paths import path_of, way_of
-from wbc.walking.planner.grips.table import Grips
+from wbc.walking.planner.grips.table import RATE, Grips
 from wbc.walking.planner.swings.law import SwingLaw
 
 
@@ -80,6 +80,8 @@ class Plan:
             controller, not in files.
         separating: ids of the holds at which it ends if it is not complete.
         laws: of the swings, one a re-grasp; for the controller, not in files.
+        limits: what ends the grips at which it ends if it is not complete, as of :attr:`Grips.reasons`; not in files.
+        note: why the path is slower than was asked for; "" where it is not; not in files.
     """
 
     path: BodyPath
@@ -92,6 +94,14 @@ class Plan:
     chain: tuple[tuple[int, ...], ...] = field(default=(), repr=False)
     separating: tuple[str, ...] = ()
     laws: tuple[SwingLaw, ...] = field(default=(), repr=False)
+    limits: tuple[str, ...] = ()
+    note: str = ""
+
+    @property
+    def too_slow(self) -> str:
+        """The first joint whose rate ends a grip at which the plan ends, where nothing else does; else ""."""
+        slow = [limit.removesuffix(RATE) for limit in self.limits if limit.endswith(RATE)]
+        return slow[0] if slow and len(slow) == len(self.limits) else ""
 
     @property
     def delay(self) -> float:

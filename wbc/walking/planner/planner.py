@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -17,11 +18,12 @@ from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.around import NONE_MET, Around, around
-from wbc.walking.planner.detours.beside import Search, plan_beside
+from wbc.walking.planner.detours.beside import ROUTE, Search, plan_beside
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.slices import Allowance, Slices, counted, drained
+from wbc.walking.planner.slower import SLOWER, check_stance, plan_slower
 from wbc.walking.planner.sound import sound_slices
 from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
@@ -63,8 +65,9 @@ def plan_walk(
         width: stances stored for each number of re-grasps; None: all, which finds the fewest.
         time_budget: [s]; after it what is found is returned or refused.
         partial: return a plan that does not lead to the end instead of refusing.
-        detour: where the body cannot follow the path, look for a detour: lower, turned, beside it, see
-            :mod:`wbc.walking.planner.detours`; the plan's path says what was found.
+        detour: where the body cannot follow the path, go slower where only joints are too slow for it, else look for
+            a detour: lower, turned, beside it, see :mod:`wbc.walking.planner.detours`; the plan's path says what was
+            found.
 
     Raises:
         UnknownNameError: another arm, hold or objective. ShapeError: a walker that is no body with PUMA arms.
@@ -78,19 +81,43 @@ def plan_walk(
     )
     # Where a detour is looked for, the widest searches come last
     narrow = [(delay, width) for delay in (DELAYS if objective == "velocity" else DELAYS[-1:])] if detour else ()
-    plan = drained(search(path, beginning, objective=objective, tries=narrow))
-    if not plan.complete and detour:
 
-        def begin(way: BodyPath, wide: int | None, work: Allowance | None) -> Plan:
-            tries = [(DELAYS[-1], wide)]
-            return drained(search(way, beginning, objective="destination", tries=tries, allowance=work))
+    def begin(way: BodyPath, wide: int | None, work: Allowance | None) -> Plan:
+        tries = [(DELAYS[-1], wide)]
+        return drained(search(way, beginning, objective="destination", tries=tries, allowance=work))
 
-        def go_on(begun: Plan, kept: int, wide: int | None, work: Allowance | None) -> Plan:
-            return drained(rest_of(walker, search, begun, kept, tries=[(DELAYS[-1], wide)], allowance=work))
+    def go_on(begun: Plan, kept: int, wide: int | None, work: Allowance | None) -> Plan:
+        return drained(rest_of(walker, search, begun, kept, tries=[(DELAYS[-1], wide)], allowance=work))
 
+    plan, refused = None, None
+    try:
+        plan = drained(search(path, beginning, objective=objective, tries=narrow))
+        if plan.complete or (partial and not detour):
+            return plan
+    except NoPlanError as error:
+        refused = error
+    try:
+        check_stance(walker, structure, path.poses[0], "beginning", beginning)
+        check_stance(walker, structure, path.poses[-1], "end")
+    except NoPlanError as error:
+        if plan is None or not partial:
+            raise
+        return replace(plan, reason=f"{error}; {plan.reason}", separating=error.separating)
+    # Where it can stand at the beginning and yet no stance lasts, something soon ends all of them
+    joint = "a joint" if plan is None else plan.too_slow
+    late = deadline is not None and time.perf_counter() > deadline
+    slower = None if late or not joint else plan_slower(path, joint, lambda way: begin(way, width, Allowance(ROUTE)))
+    if slower is not None and detour:
+        return slower
+    if plan is None:
+        assert refused is not None
+        reason = f"the body can stand at its beginning, but not go on, not even {max(SLOWER)} times slower: {refused}"
+        raise NoPlanError("plan", structure.name, reason, separating=refused.separating)
+    if detour:
         plan = plan_beside(walker, structure, path, plan, Search(begin, go_on, width, deadline))
     if not plan.complete and not partial:
-        raise NoPlanError("plan", structure.name, plan.reason, separating=plan.separating)
+        reason = f"{plan.reason}; {slower.note}" if slower is not None else plan.reason
+        raise NoPlanError("plan", structure.name, reason, separating=plan.separating)
     return plan
 
 
@@ -229,8 +256,9 @@ def plan_found(
                 _roll(structure, grips, move.target),
             )
         )
-    reason, separating = "", list[str]()
+    reason, separating, limits = "", list[str](), list[str]()
     if not found.complete:
+        limits = [grips.reasons[grips.ends[g]] for g in found.blocking]
         causes = [
             f"{walker.arms[grips.arm[g]].name} on {ids[grips.hold[g]]}: {grips.reasons[grips.ends[g]]}"
             for g in found.blocking
@@ -243,4 +271,5 @@ def plan_found(
     start = tuple(ids[grips.hold[g]] for g in found.start)
     used = tuple(map(tuple, chain))
     reached = found.reached * spacing
-    return Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating), laws)
+    plan = Plan(path, start, tuple(steps), found.complete, reached, reason, grips, used, tuple(separating), laws)
+    return replace(plan, limits=tuple(limits))

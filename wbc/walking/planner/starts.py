@@ -24,6 +24,8 @@ from wbc.walking.planner.stances.search import PAIRS, StanceSearch
 #: Holds that hands begin on, postures that they have, and holds that they must not begin on, by arm
 Beginning = tuple[Mapping[str, str], Mapping[str, Array], Mapping[str, Collection[str]]]
 NOTHING: Beginning = ({}, {}, {})
+#: Where on a path stances are looked for
+BEGINNING = "beginning"
 #: Grips of an arm that a start may have, and stances that a search begins with; the same of a thorough one
 STARTS, ALL_STARTS = (10, 24), (24, 200)
 #: Stances of more arms than this are grown arm by arm, from so many that last longest
@@ -47,7 +49,7 @@ def holding_of(walker: Walker, structure: Structure, beginning: Beginning) -> Ho
 
 
 def grips_at_first(
-    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, beginning: Beginning
+    walker: Walker, structure: Structure, path: BodyPath, grips: Grips, beginning: Beginning, where: str = BEGINNING
 ) -> list[list[int]]:
     """Of each arm the grips that it may begin with, those that last longest first.
 
@@ -73,23 +75,23 @@ def grips_at_first(
                 raise NoPlanError(
                     f"start.{name}",
                     start[name],
-                    "the arm cannot hold it at the beginning of the path",
+                    f"the arm cannot hold it at the {where} of the path",
                     separating=[start[name]],
                 )
         mine = [g for g in mine if structure.ids[grips.hold[g]] not in avoid.get(name, ())]
         mine.sort(key=lambda g: (-int(grips.last[g]), int(grips.hold[g]), int(grips.branch[g])))
         if not mine:
-            reason = why_no_grip(walker, structure, path, k)
+            reason = why_no_grip(walker, structure, path, k, where)
             raise NoPlanError("plan", name, reason, separating=_at_first(structure, grips))
         choices.append(mine)
-    few = _too_few(structure, grips, names, choices)
+    few = _too_few(structure, grips, names, choices, where)
     if few:
         raise NoPlanError("plan", structure.name, few, separating=_at_first(structure, grips))
     return choices
 
 
-def why_no_grip(walker: Walker, structure: Structure, path: BodyPath, arm: int) -> str:
-    """Why an arm has no grip at the beginning of a path."""
+def why_no_grip(walker: Walker, structure: Structure, path: BodyPath, arm: int, where: str) -> str:
+    """Why an arm has no grip at the first sample of a path."""
     there, margins = around(walker, structure), walker.margins
     frames = path.poses[:1] @ walker.arms[arm].base.homogeneous
     near = near_holds(there.limb, structure, frames)
@@ -97,12 +99,14 @@ def why_no_grip(walker: Walker, structure: Structure, path: BodyPath, arm: int) 
     rows, branch = np.nonzero(found.within(margins.held_angle))
     met = there.postures(arm, frames[found.pose[rows]], found.q[rows, branch], found.hold[rows])
     if not len(met) or (met == NONE_MET).all():
-        return "no hold is in reach at the beginning of the path"
+        return f"no hold is in reach at the {where} of the path"
     name = there.names[int(np.bincount(met[met != NONE_MET]).argmax())]
-    return f"{name} is in the way of every hold that it reaches at the beginning of the path"
+    return f"{name} is in the way of every hold that it reaches at the {where} of the path"
 
 
-def _too_few(structure: Structure, grips: Grips, names: Sequence[str], choices: Sequence[Sequence[int]]) -> str:
+def _too_few(
+    structure: Structure, grips: Grips, names: Sequence[str], choices: Sequence[Sequence[int]], where: str
+) -> str:
     """That some hands reach fewer holds than they are; "" where they do not."""
     reached = [{int(grips.hold[g]) for g in mine} for mine in choices]
     for count in range(2, len(names) + 1):
@@ -110,7 +114,7 @@ def _too_few(structure: Structure, grips: Grips, names: Sequence[str], choices: 
             union = set().union(*(reached[k] for k in some))
             if len(union) < count:
                 holds, arms = ", ".join(structure.ids[k] for k in sorted(union)), ", ".join(names[k] for k in some)
-                return f"at the beginning of the path the hands of {arms} reach no more holds than {holds}"
+                return f"at the {where} of the path the hands of {arms} reach no more holds than {holds}"
     return ""
 
 
@@ -128,17 +132,18 @@ def stance_slices(
     beginning: Beginning,
     sample: int = 0,
     most: tuple[int, int] = STARTS,
+    where: str = BEGINNING,
 ) -> Slices[list[tuple[int, ...]]]:
     """Grips, one an arm, that hold from the beginning of the path to beyond a sample, those that last longest first.
 
     Args:
-        most: grips of an arm that are looked at, and stances.
+        most: grips of an arm that are looked at, and stances. where: of the path they are, for messages.
 
     Raises:
         UnknownNameError: another arm or hold. NoPlanError: there are none.
     """
     grips = search.grips
-    choices = [mine[: most[0]] for mine in grips_at_first(walker, structure, search.path, grips, beginning)]
+    choices = [mine[: most[0]] for mine in grips_at_first(walker, structure, search.path, grips, beginning, where)]
     pairs = [(a, b) for one, other in combinations(choices, 2) for a, b in product(one, other)]
     for begin in range(0, len(pairs), PAIRS):
         search.conflicts.prepare(pairs[begin : begin + PAIRS])
@@ -155,7 +160,7 @@ def stance_slices(
         raise NoPlanError(
             "plan",
             structure.name,
-            _why_no_stance(walker, structure, search, [mine[0] for mine in choices], sample),
+            _why_no_stance(walker, structure, search, [mine[0] for mine in choices], sample, where),
             separating=_at_first(structure, grips),
         )
     return [stance for _, _, stance in found[: most[1]]]
@@ -207,7 +212,7 @@ def _lasting(grips: Grips, search: StanceSearch[Any], some: Ints, others: Ints) 
 
 
 def _why_no_stance(
-    walker: Walker, structure: Structure, search: StanceSearch[Any], stance: Sequence[int], sample: int
+    walker: Walker, structure: Structure, search: StanceSearch[Any], stance: Sequence[int], sample: int, where: str
 ) -> str:
     """Why the stance that would last longest does not last to beyond a sample."""
     grips, spacing = search.grips, search.path.spacing
@@ -220,10 +225,8 @@ def _why_no_stance(
     for (i, a), (j, b) in combinations(enumerate(stance), 2):
         when = search.conflicts.first_conflict(a, b, 0)
         if when <= sample:
-            return (
-                f"no stance is possible at the beginning: {names[i]} and {names[j]} would come too near to each other"
-            )
-    return "no stance is possible at the beginning"
+            return f"no stance is possible at the {where}: {names[i]} and {names[j]} would come too near to each other"
+    return f"no stance is possible at the {where}"
 
 
 def _at_first(structure: Structure, grips: Grips) -> list[str]:

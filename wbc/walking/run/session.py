@@ -178,7 +178,9 @@ def perform(
         reason = f"{error}{_hint(mode)}"
         return replace(run, reason=reason, plan_time=clock() - begin, more=mode.remarks())
     reason = plan.reason if plan.complete else f"{plan.reason}{_hint(mode)}"
-    run = replace(run, path=plan.path, plan=plan, reason=reason, plan_time=clock() - begin, more=mode.remarks())
+    slower = (Figure("slower", "slower than asked", plan.note, plan.note),) if plan.note else ()
+    more = (*mode.remarks(), *slower)
+    run = replace(run, path=plan.path, plan=plan, reason=reason, plan_time=clock() - begin, more=more)
     if folder is not None:
         write_whole(folder / PLAN, plan.save)
     if not plan.complete:

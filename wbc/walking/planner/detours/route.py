@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, pi
 
@@ -24,13 +24,10 @@ from wbc.walking.planner.detours.cells import ALONG, BESIDE, NARROW, WIDE, Cells
 from wbc.walking.planner.plan import Plan
 from wbc.walking.planner.slices import Allowance
 
-#: How fast the body goes down [m/s] and turns [rad/s]
-DOWN_SPEED, TURN_SPEED = 0.05, 0.1
+#: How fast the body goes down at most, whatever is asked for [m/s]
+DOWN_SPEED = 0.05
 #: Half of the time over which its velocity changes [s]
 CORNER = 0.3
-#: Least speed beside the path [m/s]
-SLOW = 0.01
-
 #: How many detours of a mesh are tried, each away from where plans along those before ended
 VARIATIONS = 16
 #: Detours that take so many times as long as the path, and so much longer [s], come after those among other cells
@@ -133,9 +130,9 @@ def _variations(
     """Detours of one mesh: the quickest one, then such as keep away from where plans ended. Returns whether there are
     some among its cells, but the body touches something between them on each.
     """
-    cells, pace = cells_about(path, structure, mesh), _pace(path)
+    cells = cells_about(path, structure, mesh)
     grips = cell_grips(walker, structure, cells)
-    graph = CellGraph(cells, grips, len(walker.arms), partial(_seconds, pace=pace))
+    graph = CellGraph(cells, grips, len(walker.arms), partial(_seconds, speed=path.speed, turn_rate=path.turn_rate))
     if allowance is not None:
         allowance.left -= len(grips.cell) / ROWS
     beside = f"up to {mesh.beside * mesh.side:.2f} m beside the path"
@@ -189,17 +186,21 @@ def _clear(there: Around, graph: CellGraph, path: BodyPath) -> tuple[list[int], 
 
 
 def as_path(cells: Cells, chain: list[int], path: BodyPath) -> tuple[BodyPath, Ints]:
-    """The path over a chain of cells, as fast as the given one along it, and its samples at the cells."""
+    """The path over a chain of cells, as fast as the given one along it and never faster than was asked for, and its
+    samples at the cells.
+    """
     off = cells.offsets(np.array(chain))
     poses = [pin.SE3(cells.frames[cell]) for cell in chain]
     out = [poses[0].homogeneous[None]]
-    pace = _pace(path)
     for (one, other), (first, last) in zip(itertools.pairwise(off), itertools.pairwise(poses), strict=True):
-        seconds = float(_seconds(other - one, pace))
-        count = max(ceil(seconds / path.spacing - 1e-9), 1)
         step = pin.log6(first.actInv(last))
+        usual = float(_seconds(other - one, path.speed, path.turn_rate))
+        ahead, turned = float(np.linalg.norm(step.linear)), float(np.linalg.norm(step.angular))
+        seconds = max(usual, ahead / path.speed, turned / path.turn_rate)
+        count = max(ceil(seconds / path.spacing - 1e-9), 1)
         out.append(np.array([(first * pin.exp6(step * (k / count))).homogeneous for k in range(1, count + 1)]))
-    whole = BodyPath(_rounded(np.concatenate(out), round(CORNER / path.spacing)), path.spacing)
+    rounded = _rounded(np.concatenate(out), round(CORNER / path.spacing))
+    whole = replace(path, poses=rounded)
     return whole, np.cumsum([len(part) for part in out]) - 1
 
 
@@ -217,15 +218,10 @@ def _rounded(poses: Array, most: int) -> Array:
     return out
 
 
-def _pace(path: BodyPath) -> float:
-    """Mean speed of a path's origin [m/s]; of one that only turns :data:`SLOW`."""
-    length = float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=1).sum())
-    return max(length / path.duration, SLOW)
-
-
-def _seconds(change: Array, pace: float) -> Array:
-    """How long the body takes for changes of its offsets from the path ``[..., 4]`` [s]."""
+def _seconds(change: Array, speed: float, turn_rate: float) -> Array:
+    """How long the body takes at least for changes of its offsets from the path ``[..., 4]``, at such rates [s]."""
     time, side, lower, turned = np.moveaxis(np.abs(change), -1, 0)
     turned = np.minimum(turned, 2.0 * pi - turned)
-    out: Array = np.maximum(np.hypot(time, side / pace), np.maximum(lower / DOWN_SPEED, turned / TURN_SPEED))
+    down = lower / min(speed, DOWN_SPEED)
+    out: Array = np.maximum(np.hypot(time, side / speed), np.maximum(down, turned / turn_rate))
     return out

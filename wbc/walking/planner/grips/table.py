@@ -27,6 +27,8 @@ NONE_HOLD: Holding = {}
 
 #: Reason of a grip that lasts as long as the path
 END = "end of the path"
+#: Reasons of grips that end as a joint would have to turn too fast end with this
+RATE = " rate"
 #: Postures of a slice
 ROWS = 12000
 #: A grip of fewer samples is none
@@ -36,7 +38,7 @@ SHORTEST = 3
 def reasons_of(limit_names: Sequence[str], joints: int, met: Sequence[str] = ()) -> tuple[str, ...]:
     """What may end a grip of a limb; ``met``: names of what may be in its way."""
     ways = (f"{name} is in the way" for name in met)
-    return (*limit_names, "reach", *(f"joint {k} rate" for k in range(1, joints + 1)), END, *ways)
+    return (*limit_names, "reach", *(f"joint {k}{RATE}" for k in range(1, joints + 1)), END, *ways)
 
 
 @dataclass(frozen=True, eq=False)
