@@ -29,6 +29,9 @@ ROTATION_TOLERANCE = 1e-6
 #: Numbers beyond these have products that overflow, or vanish, in what is computed from them
 LARGEST, SMALLEST = 1e60, 1e-60
 
+#: Arrays of fewer numbers are checked by one sum
+SMALL = 1000
+
 #: A vector whose entries are all smaller than this has no direction.
 LEAST_DIRECTION = 1e-12
 
@@ -100,6 +103,12 @@ def scalar(
 
 def ordinary_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
     """:func:`real_array` of numbers whose products are numbers: finite ones are at most 1e60 in size."""
+    # The usual first: a small array of numbers whose squares add up to a number, which no NaN does
+    usual = type(value) is np.ndarray and value.dtype == np.float64 and value.size < SMALL
+    if usual and shape in (None, value.shape):  # noqa: SIM102 (the usual first)
+        if np.vdot(value, value) < LARGEST:
+            copied: Array = value.copy("K")
+            return copied
     out = real_array(field, value, shape, finite=finite)
     large = np.abs(out) > LARGEST
     if not finite:

@@ -20,22 +20,22 @@ from wbc.resolvers.fsp import best, blocked, joint_row, orthogonal, parametric, 
 
 #: Calls of a batch; of every timing the least median of so many batches, as other work on the machine only adds
 CALLS, BATCHES = 40, 5
-
+#: Rounds, in each of which every way of a size has its calls in turn, so that all have the same machine
+ROUNDS = 60
 
 STEPS = {
     "full_space": "`FullSpace().resolve`, two obstacles and three limits",
-    "full_space_free": "the same without constraints",
     "orthogonal": "orthogonal space, then the closed form, the same constraints",
-    "orthogonal_free": "the same without constraints",
     "blocked": "blocked columns, then the closed form, the same constraints",
-    "blocked_free": "the same without constraints",
     "two_steps": "blocked columns in two steps, three limits",
     "pseudo_inverse": "`PseudoInverse().resolve`, without constraints",
 }
-GENERATORS = ("joints", "vectors", "orthogonal [us], cond G", "exchange", "exhaustive")
 #: FSP over the pseudo-inverse for runs without constraints, user time: the quotients of the report's three trajectories
 PRINTED = {"3x10": "1.7 to 1.8", "3x7": "1.4 to 1.7", "6x7": "1.7 to 1.9", "6x10": "2.3 to 3.6"}
-SIZES = ("task", "printed", "FSP by blocks / pseudo-inverse", "FSP by a factorisation", "`FullSpace`")
+SIZES = (
+    "task", "pseudo-inverse [us]", "printed: FSP / pseudo-inverse", "FSP by blocks", "FSP by a factorisation",
+    "`FullSpace` / numpy's SVD",
+)  # fmt: skip
 #: Constraints act in so many steps -> seconds of the pseudo-inverse, of one shot, of two steps, as printed for AIRARM
 AIRARM = {"none": (10.0, 19.7, 19.9), "80 %": (10.0, 19.7, 30.9), "all": (10.0, 19.7, 36.0)}
 CONSTRAINED = (
@@ -46,44 +46,37 @@ CONSTRAINED = (
     "measured",
 )
 OBSTACLES = (
-    "method", "done", "least clearance [mm]", "beyond the limit [mrad]", "miss at the end [mm]", "longest step [rad]",
-    "a step [ms]",
+    "method", "done", "least clearance [mm]", "way of the joints [rad]", "beyond the limit [mrad]",
+    "miss at the end [mm]", "longest step [rad]", "a step [ms]",
 )  # fmt: skip
 
 
 def parts() -> dict[str, Sheet | str]:
     """All of it."""
-    return shown(steps(), generators(), sizes(), constrained(), obstacles(), paths())
+    return shown(steps(), sizes(), constrained(), obstacles(), paths())
 
 
 def shown(
     step: dict[str, float],
-    spaces: list[dict[str, float]],
     size: list[tuple[str, ...]],
     share: list[tuple[str, ...]],
     past: list[dict[str, Any]],
     whole: dict[str, Any],
 ) -> dict[str, Sheet | str]:
     """Tables of the numbers."""
-    costs = [
-        (f"{row['joints']}", f"{row['vectors']}", *(f"{row[n]:.0f}, {row[f'{n}_condition']:.0e}" for n in made))
-        for made in [("orthogonal", "exchange", "exhaustive")]
-        for row in spaces
-    ]
     obstacle = []
     for one in past:
         lengths = (f"{1e3 * one[key]:.{digits}f}" for key, digits in (("clearance", 1), ("beyond", 1), ("miss", 3)))
         times = f"{one['step']:.3f}", f"{one['milliseconds']:.1f}"
-        obstacle.append((one["method"], "yes" if one["done"] else "no", *lengths, *times))
+        first, *rest = lengths
+        obstacle.append((one["method"], "yes" if one["done"] else "no", first, f"{one['way']:.3f}", *rest, *times))
     done = [(name, f"{done} of {whole['paths']}") for name, done in whole["done"].items()]
     return {
         "steps": Sheet("", ("step of 3 x 10", "us"), [(STEPS[k], f"{v:.0f}") for k, v in step.items()]),
-        "generators": Sheet("", GENERATORS, costs),
         "sizes": Sheet("", SIZES, size),
         "constrained": Sheet("", CONSTRAINED, share),
         "obstacles": Sheet("", OBSTACLES, obstacle),
         "paths": Sheet("", ("way of resolution", "paths done"), done),
-        "path": f"One path as a whole: {whole['seconds']:.2f} s.",
     }
 
 
@@ -99,25 +92,6 @@ def microseconds(call: Callable[[], Any], calls: int = CALLS) -> float:
             spent.append(time.perf_counter() - began)
         medians.append(1e6 * float(np.median(spent)))
     return min(medians)
-
-
-def generators(numbers: tuple[int, ...] = (4, 7, 10, 15, 20)) -> list[dict[str, float]]:
-    """Time and conditioning of the spaces of random tasks of 3 rows, over the number of joints."""
-    rng, out = np.random.default_rng(0), []
-    for joints in numbers:
-        J, x = rng.normal(size=(3, joints)), rng.normal(size=3)
-        row: dict[str, float] = {"joints": joints, "vectors": joints - 2}
-        for name, make, calls in (
-            ("orthogonal", orthogonal, CALLS),
-            ("exchange", blocked, CALLS),
-            ("exhaustive", lambda J, x: blocked(J, x, search="exhaustive"), 2),
-        ):
-            row[name] = microseconds(lambda make=make, J=J, x=x: make(J, x), calls)
-            space = make(J, x)
-            assert space.span == joints - 2
-            row[f"{name}_condition"] = space.condition()
-        out.append(row)
-    return out
 
 
 def steps() -> dict[str, float]:
@@ -137,47 +111,63 @@ def steps() -> dict[str, float]:
         A[0], A[1] = normal @ near[0], normal @ near[1]
         return resolver.resolve(RateProblem(J, x, A, values))
 
-    def spaces(make: Callable[..., Any], constrained: bool) -> Any:
-        if not constrained:
-            return best(make(J, x, free=True))
+    def spaces(make: Callable[..., Any]) -> Any:
         rows = [point_row(f"sphere {k}", near[k], normal, values[k]) for k in range(2)]
         rows += [joint_row(f"joint {k}", k, 10, value) for k, value in zip((0, 2, 5), values[2:], strict=True)]
         return best(make(J, x, free=True), rows=rows)
 
     def two_steps() -> Any:
-        spaces(blocked, False)
+        best(blocked(J, x, free=True))
         rows = [joint_row(f"joint {k}", k, 10, value) for k, value in zip((0, 2, 5), values[2:], strict=True)]
         space = blocked(J, x, free=True)
         return space.at(parametric(space, rows, null=True))
 
-    same = [spaces(make, True).v for make in (orthogonal, blocked)]
+    same = [spaces(make).v for make in (orthogonal, blocked)]
     assert max(np.abs(v - fused()).max() for v in same) < 1e-9
     return {
         "full_space": microseconds(fused),
-        "full_space_free": microseconds(lambda: resolver.resolve(RateProblem(J, x))),
-        "orthogonal": microseconds(lambda: spaces(orthogonal, True)),
-        "orthogonal_free": microseconds(lambda: spaces(orthogonal, False)),
-        "blocked": microseconds(lambda: spaces(blocked, True)),
-        "blocked_free": microseconds(lambda: spaces(blocked, False)),
+        "orthogonal": microseconds(lambda: spaces(orthogonal)),
+        "blocked": microseconds(lambda: spaces(blocked)),
         "two_steps": microseconds(two_steps),
         "pseudo_inverse": microseconds(lambda: plain.resolve(RateProblem(J, x))),
     }
 
 
 def sizes() -> list[tuple[str, ...]]:
-    """Steps of HERMIES-III along trajectory 1 without constraints, from the Jacobian on, by size of the task."""
+    """A step of HERMIES-III without constraints, from the Jacobian on: shares of processor time by size of the task."""
     out = []
     for size, printed in PRINTED.items():
         rows, joints = map(int, size.split("x"))
         machine = hermies("none" if joints == 7 else "holonomic")
         q = np.concatenate((np.radians([10, 150, 20, 30, -15, 60, 25]), [0.1, 0.2, 0.3]))[:joints]
         J, x = machine.jacobian(q)[:rows], np.array([0.001, -0.003, -0.004, 0.01, 0.02, -0.01])[:rows]
-        plain = microseconds(lambda J=J, x=x: PseudoInverse().resolve(RateProblem(J, x)))
-        ways: list[Callable[..., Any]] = [lambda J, x, make=make: best(make(J, x)) for make in (blocked, orthogonal)]
-        ways.append(lambda J, x: FullSpace().resolve(RateProblem(J, x)))
-        spent = [microseconds(lambda way=way, J=J, x=x: way(J, x)) for way in ways]
-        out.append((size, printed, *(f"{one / plain:.1f}" for one in spent)))
+        inverse, whole = PseudoInverse(), FullSpace()
+        spent = processor_time(
+            {
+                "inverse": lambda J=J, x=x, inverse=inverse: inverse.resolve(RateProblem(J, x)),
+                "blocked": lambda J=J, x=x: best(blocked(J, x)),
+                "orthogonal": lambda J=J, x=x: best(orthogonal(J, x)),
+                "whole": lambda J=J, x=x, whole=whole: whole.resolve(RateProblem(J, x)),
+                "svd": lambda J=J: np.linalg.svd(J, full_matrices=False),
+            }
+        )
+        plain = spent["inverse"]
+        shares = (spent["blocked"] / plain, spent["orthogonal"] / plain, spent["whole"] / spent["svd"])
+        out.append((size, f"{plain:.0f}", printed, *(f"{share:.2f}" for share in shares)))
     return out
+
+
+def processor_time(ways: dict[str, Callable[[], Any]]) -> dict[str, float]:
+    """Median processor time of a call of each way [us], all in turn in one process."""
+    spent: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(ROUNDS):
+        for name, way in ways.items():
+            way()
+            began = time.process_time_ns()
+            for _ in range(CALLS):
+                way()
+            spent[name].append(1e-3 * (time.process_time_ns() - began) / CALLS)
+    return {name: float(np.median(times)) for name, times in spent.items()}
 
 
 def constrained() -> list[tuple[str, ...]]:
@@ -219,7 +209,7 @@ def obstacles() -> list[dict[str, Any]]:
         "FSP, one shot, as published": Settings(),
         "FSP, two steps, as published": Settings(two_step=True),
         "FSP, ahead": Settings(ahead=True, generator="orthogonal", margin=0.005),
-        "stack": Settings(resolver="stack", margin=0.002),
+        "stack": Settings(resolver="stack", margin=0.005),
     }
     out = []
     for name, settings in ways.items():
@@ -230,6 +220,7 @@ def obstacles() -> list[dict[str, Any]]:
                 "method": name,
                 "done": past.code == 0 and within.code == 0,
                 "clearance": float(past.clearance.min()),
+                "way": float(np.linalg.norm(np.diff(past.q, axis=0), axis=1).sum()),
                 "beyond": float((within.q - upper).max()),
                 "miss": float(max(past.errors[-1], within.errors[-1])),
                 "step": float(np.abs(np.diff(past.q, axis=0)).max()),
@@ -255,7 +246,6 @@ def paths(count: int = 100) -> dict[str, Any]:
         "whole, any start, the branch may change": {"anywhere": True, "change": 1.0},
     }
     done = {"step by step": 0} | dict.fromkeys(ways, 0)
-    seconds = []
     for seed in range(count):
         rng = np.random.default_rng(seed)
         first, last = rng.uniform(-1.9, 1.9, (2, 3))
@@ -263,11 +253,9 @@ def paths(count: int = 100) -> dict[str, Any]:
         targets = [ends[0] + k * (ends[1] - ends[0]) for k in np.linspace(0, 1, 12)]
         done["step by step"] += not explorer.step_by_step({"tip": targets}, first, step=0.6)[1]
         for name, way in ways.items():
-            began = time.perf_counter()
             try:
                 explorer.along({"tip": targets}, first, step=0.6, nodes=24, **way)
                 done[name] += 1
             except InfeasibleError:
                 pass
-            seconds.append(time.perf_counter() - began)
-    return {"paths": count, "done": done, "seconds": float(np.median(seconds))}
+    return {"paths": count, "done": done}

@@ -62,6 +62,68 @@ def test_a_line_and_a_jacobian(tmp_path: Path) -> None:
     assert "FSP_data:3" in RUN.invoke(app, ["ikor", "--jacobian", str(data)]).output
 
 
+def test_a_planar_arm_goes_round_a_polygon_on_an_arc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film, "MOST", 2)
+    (tmp_path / "polygon_data").write_text("0.45 0.35 0.6 0.35 0.6 0.55\n")
+    files = ["--polygons", str(tmp_path / "polygon_data"), "--out", str(tmp_path / "run"), "--film", "gif"]
+    way = [
+        "--robot",
+        "planar",
+        "--rows",
+        "x,y,yaw",
+        "--arc",
+        "0,0,40,20",
+        "--method",
+        "2",
+        "--ahead",
+        "--margin",
+        "0.01",
+    ]
+    done = RUN.invoke(app, ["ikor", *way, *files])
+    assert done.exit_code == 0, done.output
+    figures = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (figures["stop"], 0.01 < figures["clearance"] < 0.2) == ("all points done", True)
+    assert 0.0 < figures["median_step_ms"] <= figures["longest_step_ms"]
+    assert (tmp_path / "run" / "polygon_data").read_text() == "0.45 0.35 0.6 0.35 0.6 0.55\n"
+    assert (tmp_path / "run" / "film.gif").stat().st_size > 3000
+
+
+def test_a_line_between_poses_by_weights_and_a_criterion(tmp_path: Path) -> None:
+    runs = {}
+    for name, more in {
+        "plain": [],
+        "heavy": ["--weights", "1,1,1,9,1,1,1"],
+        "calm": ["--criterion", "acceleration"],
+    }.items():
+        ends = ["--from", "-0.7,-0.3,0.5", "--line", "-0.8,-0.2,0.6,30,10,0", *more]
+        done = RUN.invoke(app, ["ikor", *ends, "--rows", "x,y,z", "--out", str(tmp_path / name)])
+        assert done.exit_code == 0, done.output
+        runs[name] = np.loadtxt(tmp_path / name / "CheezyAngles")
+    same = [run[0] for run in runs.values()]
+    np.testing.assert_array_equal(same[0], same[1])
+    assert np.ptp(runs["heavy"][:, 3]) < 0.5 * np.ptp(runs["plain"][:, 3])
+    # Before the first step it stood, and the least change is the least step
+    apart = np.abs(runs["calm"] - runs["plain"]).max(axis=1)
+    assert (apart[1] < 1e-8, apart[-1] > 0.1) == (True, True)
+
+
+def test_switches_and_a_course_beyond_the_published_length(tmp_path: Path) -> None:
+    points, out = tmp_path / "TrajectoryPts", tmp_path / "run"
+    rows = "\n".join(f"{-1.49 + 1e-4 * k} -0.356 {0.935 - 1e-4 * k}" for k in range(1, 1101))
+    points.write_text(f"0 180 0 0 0 90 0 0 0 0\n1100\n{rows}\n")
+    way = ["ikor", "--base", "holonomic", "--trajectory", str(points)]
+    done = RUN.invoke(app, [*way, "--out", str(tmp_path / "short")])
+    assert done.exit_code == 1
+    assert "100 points left out" in done.output
+    switches = ["--switch", "300:platform=off,orientation=on", "--switch", "600:platform=on"]
+    done = RUN.invoke(app, [*way, "--max-points", "2000", *switches, "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    q = np.loadtxt(out / "CheezyAngles")
+    assert len(q) == 1101
+    still = np.abs(np.diff(q[:, 7:], axis=0)).max(axis=1) == 0.0
+    np.testing.assert_array_equal(np.flatnonzero(still), np.arange(299, 599))
+
+
 def test_an_operators_rates_and_a_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(film, "MOST", 2)
     rates, out = tmp_path / "rates.csv", tmp_path / "run"
@@ -146,6 +208,14 @@ def test_explore_panda(tmp_path: Path) -> None:
     assert curve.shape[1] == 7
     assert (tmp_path / "self_motion.png").stat().st_size > 5000
     assert (tmp_path / "law.npz").exists()
+    kept = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    again = RUN.invoke(app, ["explore", "panda", "--at", at, "--seeds", "0", "--out", str(tmp_path)])
+    assert (again.exit_code, "--force" in again.output) == (2, True)
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == kept
+    # Forced, nothing is left of the run before
+    done = RUN.invoke(app, ["explore", "panda", "--at", at, "--seeds", "0", "--out", str(tmp_path), "--force"])
+    assert done.exit_code == 0, done.output
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["self_motion.npz", "self_motion.png", "summary.json"]
 
 
 @pytest.mark.parametrize(
@@ -162,6 +232,16 @@ def test_explore_panda(tmp_path: Path) -> None:
         (["ikor", "--case", "1", "--base", "car"], "belong to a trajectory"),
         (["ikor", "--line", "-0.8,-0.3,0.6", "--film", "mov"], "gif"),
         (["ikor", "--case", "1", "--resolver", "stack"], "consistent"),
+        (["ikor", "--case", "1", "--weights", "1"], "belong to a trajectory"),
+        (["ikor", "--from", "1,2,3"], "expected a line"),
+        (["ikor", "--line", "1,2,3", "--from", "1,2"], "X,Y,Z"),
+        (["ikor", "--arc", "1,2"], "X,Y,DEGREES"),
+        (["ikor", "--line", "1,2,3", "--weights", "1,2"], "shape (7,)"),
+        (["ikor", "--line", "1,2,3", "--weights", "1,1,1,0,1,1,1"], "above 0"),
+        (["ikor", "--line", "1,2,3", "--criterion", "torqe"], "torque"),
+        (["ikor", "--line", "1,2,3", "--switch", "4"], "POINT:"),
+        (["ikor", "--line", "1,2,3", "--switch", "4:base=off"], "platform"),
+        (["ikor", "--line", "1,2,3", "--switch", "4:platform=of"], "off"),
         (["explore", "panda", "--to", "1,2"], "X,Y,Z"),
         (["ikor", "--trajectory", "no_such_file"], "no_such_file"),
         (["ikor", "--robot", "hermes", "--trajectory", "x"], "hermes"),

@@ -36,7 +36,7 @@ FLOORS = {
     "wbc.analysis": 4,
     "wbc.stack": 4,
     "wbc.qp": 5,
-    "wbc.resolvers": 5,
+    "wbc.resolvers": 2,
     "wbc.tick": 6,
     "wbc.explain": 7,
     "wbc.controller": 8,
@@ -81,7 +81,7 @@ WALKING = {
     "report": 7,
 }
 #: Parts that may import only the listed floors, whatever stands below them
-ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0}}
+ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0, 1}}
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
 NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.repeats import repeats
 from tests.resolvers.given_rows import stack_rates
 from wbc.errors import InfeasibleError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.native import toolchain
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
 from wbc.resolvers.fsp import (
     Consistency,
@@ -19,6 +21,7 @@ from wbc.resolvers.fsp import (
     SolutionSpace,
     best,
     blocked,
+    compiled,
     joint_row,
     least_acceleration,
     least_power,
@@ -79,6 +82,50 @@ def test_both_generators_span_the_same_space(kind: str, seed: int) -> None:
     for k, block in enumerate(pinned.blocks[: pinned.span - pinned.completed]):
         assert len(block) == J.shape[1] - len(pinned.idle) - pinned.rank
         assert not pinned.vectors[k][[*block, *pinned.idle]].any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_compiled_and_numpy_are_the_same(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spaces, with joints held and free, rates that contradict each other, any layout; best rates by any criterion."""
+    assert compiled.library() is not None
+    for seed in range(repeats(40)):
+        J, x = system(kind, seed)
+        rng, m = np.random.default_rng(seed), J.shape[1]
+        J = (J, np.asfortranarray(J), J[:, ::-1])[seed % 3]
+        x = x + (rng.normal(size=len(x)) * np.abs(x).max() if seed % 5 == 0 else 0.0)
+        held = np.flatnonzero(rng.random(m) < 0.15) if seed % 2 else ()
+        root, r = rng.normal(size=(m, m)), rng.normal(size=m)
+        H = (None, np.exp(r), root @ root.T + np.eye(m))[rng.integers(3)]
+        criterion = Criterion(H, r if seed % 2 else None)
+        rows = [EqualityRow(f"row {k}", rng.integers(-1, 2, m), rng.normal()) for k in range(rng.integers(5))]
+        for make in (orthogonal, blocked):
+            found = []
+            for most in (compiled.MOST, 0):
+                monkeypatch.setattr(compiled, "MOST", most)
+                try:
+                    space = make(J, x, held=held, free=bool(seed % 4), project=seed % 10 > 0)
+                except WbcError as error:
+                    found.append((type(error), None, None))
+                    continue
+                state = space.rank, space.idle, space.span, space.status, pytest.approx(space.missed, abs=1e-9)
+                found.append((state, space, best(space, criterion, rows, in_order=True)))
+            monkeypatch.undo()
+            (one, space, v), (other, numpys, u) = found
+            assert one == other
+            if space is None:
+                continue
+            for g in numpys.vectors:
+                assert space.coordinates(g)[1] < 1e-7 * max(np.linalg.norm(g), 1e-12)
+            assert (v.kept, v.redundant, v.left_out) == (u.kept, u.redundant, u.left_out)
+            np.testing.assert_allclose(v.v, u.v, rtol=0, atol=1e-7 * max(1.0, np.abs(u.v).max()))
+
+
+def test_without_a_compiler_numpy_does_it(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr(toolchain, "compiler", lambda: None)
+    monkeypatch.setattr(compiled, "_loaded", compiled._loaded.__wrapped__)
+    J, x = system("plain", 3)
+    np.testing.assert_allclose(best(blocked(J, x)).v, np.linalg.pinv(J) @ x, atol=1e-9)
+    assert "made by numpy" in caplog.text
 
 
 @settings(max_examples=25)

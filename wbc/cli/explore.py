@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from wbc.cli import options
+from wbc.cli.folders import filled, run_folder
 
 At = Annotated[str, typer.Option(help="Joint coordinates with commas, in rad and m. Default: neutral.")]
 Kind = Annotated[str, typer.Option(help="What the frame holds: position, orientation or pose.")]
@@ -20,7 +21,8 @@ Points = Annotated[int, typer.Option(help="Targets on the way there.", min=2)]
 Anywhere = Annotated[bool, typer.Option("--anywhere", help="On the way there, start on any branch.")]
 Change = Annotated[float | None, typer.Option(help="What a change of branch on the way costs, in rad^2.")]
 Apart = Annotated[bool, typer.Option("--self-collision", help="Links stay apart from each other, too.")]
-Out = Annotated[Path, typer.Option(help="Folder for picture, curves and figures.")]
+Out = Annotated[Path | None, typer.Option(help="Folder for picture, curves and figures. Default: runs/explore-TIME.")]
+WRITTEN = ("self_motion.*", "law.npz", "summary.json")
 
 
 def explore(
@@ -39,7 +41,8 @@ def explore(
     anywhere: Anywhere = False,
     change: Change = None,
     margin: options.Margin = 0.02,
-    out: Out = Path("runs/explore"),
+    out: Out = None,
+    force: options.Force = False,
 ) -> None:
     """Show all rates that serve a frame, the self-motion of the arm there, and its best configuration.
 
@@ -60,6 +63,7 @@ def explore(
     from wbc.tasks.frames import frame_pose
 
     machine = robots.load(robot)
+    folder = run_folder(out, "explore", WRITTEN, force, clear=False, made=False)
     name = machine.check_frame("frame", frame) if frame else tip_frame(machine, None)
     q = np.array(configuration_of(machine, at))
     stack = Stack(machine, dt=0.01)
@@ -83,7 +87,6 @@ def explore(
         cells = [*(v[k] for v in found.optima.values()), found.lower[k], found.upper[k]]
         table.add_row(joint, *(f"{x:.4f}" for x in cells))
     console().print(table)
-    out.mkdir(parents=True, exist_ok=True)
     figures: dict[str, Any] = {"robot": machine.name, "frame": name, "kind": kind, "rank": found.space.rank,
                                "self_motions": found.space.span - 1}  # fmt: skip
     if found.space.span > 1:
@@ -102,15 +105,17 @@ def explore(
                               "windows": p.windows} for p in pieces]  # fmt: skip
         figures["best"] = {"q": best.tolist(), "share": room}
         curves: dict[str, Any] = {f"piece{k}": p.q for k, p in enumerate(pieces, 1)}
-        np.savez_compressed(out / "self_motion.npz", **curves)
-        save_pieces(machine, pieces, out / "self_motion.png", best)
+    with filled(folder, WRITTEN) as fresh:
+        if found.space.span > 1:
+            np.savez_compressed(fresh / "self_motion.npz", **curves)
+            save_pieces(machine, pieces, fresh / "self_motion.png", best)
+        _write(fresh, figures)
     if end is not None:
         pose = frame_pose(machine, name, q)
         places = [pose.translation + s * (end - pose.translation) for s in np.linspace(0.0, 1.0, points)]
         targets = places if kind == "position" else [pin.SE3(pose.rotation, place) for place in places]
         path = explorer.along({"hand": targets}, q, anywhere=anywhere, change=change)
         law = path.law(np.minimum(machine.limits.velocity, 10.0), np.minimum(machine.limits.acceleration, 10.0))
-        law.save(out / "law.npz")
         _, stopped = explorer.step_by_step({"hand": targets}, q)
         console().print(
             f"along: {path.nodes} configurations compared, {len(path.changes)} changes, {law.duration:.3f} s; "
@@ -118,5 +123,11 @@ def explore(
         )
         figures["along"] = {"cost": path.cost, "nodes": path.nodes, "changes": path.changes, "duration": law.duration,
                             "step_by_step": stopped}  # fmt: skip
-    (out / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")
-    console().print(str(out))
+        with filled(folder) as fresh:
+            law.save(fresh / "law.npz")
+            _write(fresh, figures)
+    console().print(str(folder))
+
+
+def _write(folder: Path, figures: dict[str, Any]) -> None:
+    (folder / "summary.json").write_text(json.dumps(figures, indent=1) + "\n")

@@ -35,14 +35,16 @@ class RateProblem:
             raise ShapeError("task", self.task, "expected a matrix, rows by joints")
         put(self, "task", task)
         put(self, "wanted", validation.ordinary_array("wanted", self.wanted, (task.shape[0],)))
-        second = (
-            np.zeros((0, task.shape[1])) if self.second is None else validation.ordinary_array("second", self.second)
-        )
+        second = np.zeros((0, task.shape[1]))
+        if self.second is not None:
+            second = validation.ordinary_array("second", self.second)
         if second.ndim != 2 or second.shape[1] != task.shape[1]:
             raise ShapeError("second", self.second, f"expected a matrix with {task.shape[1]} columns")
         put(self, "second", second)
-        rates: Any = np.zeros(second.shape[0]) if self.second_rates is None else self.second_rates
-        put(self, "second_rates", validation.ordinary_array("second_rates", rates, (second.shape[0],)))
+        rates = np.zeros(len(second))
+        if self.second_rates is not None:
+            rates = validation.ordinary_array("second_rates", self.second_rates, rates.shape)
+        put(self, "second_rates", rates)
 
     @property
     def joints(self) -> int:

@@ -10,9 +10,9 @@ from wbc.published.ikor.cases import case, differences, printed
 from wbc.published.ikor.driver import Code, Driver, Run, Stop
 from wbc.published.ikor.files import IkorFileError
 from wbc.published.ikor.legacy import legacy_hermies
-from wbc.published.ikor.lines import Trajectory, line_to, straight
+from wbc.published.ikor.lines import Trajectory, arc_from, line_to, posed, straight
 from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar, without_platform
-from wbc.published.ikor.settings import Method, Settings
+from wbc.published.ikor.settings import Method, Settings, Switch
 
 __all__ = [
     "ArmMachine",
@@ -23,8 +23,10 @@ __all__ = [
     "Run",
     "Settings",
     "Stop",
+    "Switch",
     "Trajectory",
     "airarm",
+    "arc_from",
     "case",
     "differences",
     "hermies",
@@ -32,6 +34,7 @@ __all__ = [
     "line_to",
     "machine_of",
     "planar",
+    "posed",
     "printed",
     "straight",
     "without_platform",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import enum
 import math
 import time
@@ -15,12 +16,15 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import RangeError, WbcError
 from wbc.published.ikor.avoidance import broken, gaps
+from wbc.published.ikor.criteria import step_criterion
 from wbc.published.ikor.lines import GIMBAL, Trajectory, euler_angles, rotation_of, turned
 from wbc.published.ikor.machines import STEERING, WHEEL_BASE, ArmMachine
+from wbc.published.ikor.polygons import convex_parts
 from wbc.published.ikor.settings import AXES, Settings
 from wbc.published.ikor.stack_steps import StackSteps
 from wbc.resolvers import PseudoInverse, RateProblem
 from wbc.resolvers.fsp import Criterion, EqualityRow, Optimum, SolutionSpace, best, blocked, orthogonal
+from wbc.resolvers.fsp.compiled import library
 from wbc.validation import Array
 
 #: Steps that a loop back goes back by, and holds its joint beyond the step that was too long
@@ -100,16 +104,48 @@ class Driver:
         WbcError: settings that the machine cannot have.
     """
 
-    def __init__(self, machine: ArmMachine, settings: Settings | None = None, spheres: Any = ()) -> None:
+    def __init__(
+        self, machine: ArmMachine, settings: Settings | None = None, spheres: Any = (), polygons: Sequence[Any] = ()
+    ) -> None:
         self.machine, self.settings = machine, settings or Settings()
         spheres = validation.ordinary_array("spheres", np.asarray(spheres, dtype=float).reshape(-1, 4))
         self.spheres = spheres[spheres[:, 3] > 0.0]
-        weight = None if (machine.weights == 1.0).all() else machine.weights**2
-        self.criterion = self.settings.criterion or Criterion(weight)
-        self.criterion.check(machine.joints)
+        self.polygons = [convex_parts(polygon) for polygon in polygons]
+        if polygons and not machine.flat:
+            raise RangeError("polygons", machine.name, "expected a planar arm; other arms have spheres as obstacles")
+        # Compiled now, so that it is no step's time
+        library()
+        # The step before, and columns that a switch holds at rest
+        self.last, self.still = np.zeros(machine.joints), tuple[int, ...]()
+        self._criterion(machine.home).check(machine.joints)
         if self.settings.plain and machine.base == "car":
             raise RangeError("base", machine.base, "a pseudo-inverse takes no bound of a steering angle; take FSP")
-        self._stack = StackSteps(machine, self.settings, self.spheres) if self.settings.resolver == "stack" else None
+        stacked = self.settings.resolver == "stack"
+        if polygons and (stacked or self.settings.plain):
+            raise RangeError("resolver", self.settings.resolver, "polygons are obstacles of FSP alone")
+        self._stack = StackSteps(machine, self.settings, self.spheres) if stacked else None
+        self._phases = self._switched()
+
+    def _criterion(self, q: Array) -> Criterion:
+        chosen = self.settings.criterion
+        return step_criterion(self.machine, chosen, q, self.last) if isinstance(chosen, str) else chosen
+
+    def _switched(self) -> list[tuple[int, Driver]]:
+        """(point from which on, driver) in their order."""
+        platform = tuple(range(self.machine.joints - 3, self.machine.joints))
+        out = [(1, self)]
+        for switch in sorted(self.settings.switches, key=lambda one: one.point):
+            before = out[-1][1]
+            driver, rows = copy.copy(before), before.settings.rows
+            if switch.orientation is not None:
+                rows = tuple(r for r in rows if r not in AXES[3:]) + (AXES[3:] if switch.orientation else ())
+            if switch.platform is not None:
+                if self.machine.base == "none":
+                    raise RangeError("switch", switch.point, "there is no platform; choose a base")
+                driver.still = () if switch.platform else platform
+            driver.settings = replace(before.settings, rows=rows)
+            out.append((switch.point, driver))
+        return out
 
     def run(self, trajectory: Trajectory) -> Run:
         """The whole trajectory; what stops it earlier, Ctrl-C too, is said in the answer."""
@@ -138,8 +174,10 @@ class Driver:
         for k in range(len(log.steps), last):
             began, q = time.perf_counter(), log.path[-1]
             before = None if self.settings.feedback or not k else aims[k - 1]
-            v, found = self.step(q, *aims[k], held, before)
-            self._done(log, q, v, found, aims[k], began)
+            driver = next(driver for first, driver in reversed(self._phases) if first <= k + 1)
+            driver.last = q - log.path[-2] if k else 0.0 * q
+            v, found = driver.step(q, *aims[k], held, before)
+            driver._done(log, q, v, found, aims[k], began)
 
     def _loop_back(self, log: _Log, aims: list[tuple[Array, Array]], k: int, last: int, joint: int) -> bool:
         """From step k on to another, or back by :data:`BACK` steps and on with a joint at rest: what misses less."""
@@ -169,9 +207,11 @@ class Driver:
         """
         if self._stack is not None:
             raise RangeError("resolver", "stack", "an operator drives by FSP or the pseudo-inverse")
+        if self.settings.switches:
+            raise RangeError("switches", len(self.settings.switches), "an operator's rates switch by their pair")
         pairs = PAIRS if self.machine.base != "none" else {"tool": PAIRS["tool"]}
-        oriented = Driver(self.machine, replace(self.settings, rows=AXES), self.spheres)
-        placed = Driver(self.machine, replace(self.settings, rows=AXES[:3]), self.spheres)
+        oriented, placed = copy.copy(self), copy.copy(self)
+        oriented.settings, placed.settings = (replace(self.settings, rows=rows) for rows in (AXES, AXES[:3]))
         q = self.machine.checked("start", self.machine.home if start is None else start).copy()
         log, active, rates, began = _Log([q]), "tool", np.zeros(6), time.perf_counter()
         place, rotation = self.machine.place(q)
@@ -191,6 +231,7 @@ class Driver:
                     names, axes = ("platform x", "platform y", "platform turn"), np.eye(3, len(q), len(q) - 3)
                     driver, euler = placed, euler_angles(self.machine.place(q)[1])
                     rows = tuple(EqualityRow(*row) for row in zip(names, axes, rates[3:] * dt, strict=True))
+                driver.last = q - log.path[-2] if log.steps else 0.0 * q
                 v, found = driver.step(q, point, euler, commanded=rows)
             except StopIteration:
                 return log.run(Stop.DONE)
@@ -219,26 +260,28 @@ class Driver:
             v = self._stack.step(q, point, rotation_of(euler))
             return v, Optimum(v, np.zeros(0), self._stack.binding)
         J, x = self.task(q, point, euler, before)
+        J[:, self.still] = 0.0
+        criterion = self._criterion(q)
         if settings.damping:
             x = J @ np.linalg.solve(J.T @ J + settings.damping**2 * np.eye(len(q)), J.T @ x)
         rows = [*(EqualityRow("wheels", row, 0.0) for row in machine.slide(q)), *commanded]
         if settings.plain:
             whole = RateProblem(np.vstack((J, *(r.a for r in rows))), np.concatenate((x, [r.value for r in rows])))
-            v = PseudoInverse(self.criterion.weight).resolve(whole)
+            whole.task[:, self.still] = 0.0
+            v = PseudoInverse(criterion.weight).resolve(whole)
             found = Optimum(v, np.zeros(0))
         else:
             space = self._space(J, x, held)
             acts = not (settings.two_step or settings.ahead)
-            now = broken(machine, settings, q, still, self.spheres) if acts else []
-            found = self._best(space, q, [*rows, *now])
+            now = broken(machine, settings, q, still, self.spheres, self.polygons) if acts else []
+            found = self._best(space, criterion, q, [*rows, *now])
             after = q + found.v
-            late = broken(machine, settings, after, still, self.spheres) if settings.two_step else []
-            if late:
+            if settings.two_step and (late := broken(machine, settings, after, still, self.spheres, self.polygons)):
                 # The vectors of the same rates, of which the second step takes the self-motions
                 space = self._space(self.task(after, point, euler, None)[0], x, held, project=True)
                 space = replace(space, x=0.0 * x, vectors=np.vstack((still, space.directions)))
                 rest = [EqualityRow(row.name, row.a, 0.0) for row in rows]
-                second = best(space, Criterion(self.criterion.weight), [*rest, *late], in_order=True)
+                second = best(space, Criterion(criterion.weight), [*rest, *late], in_order=True)
                 found = replace(second, v=found.v + second.v)
         return found.v * min(1.0, settings.step_limit / max(float(np.abs(found.v).max()), 1e-300)), found
 
@@ -270,20 +313,22 @@ class Driver:
         """The columns after a step, which goes to the log."""
         after = q + v
         miss = float(np.abs(self.task(after, *aim, None)[1]).max())
-        clear = min((gap.size for gap in gaps(self.machine, after, self.spheres)), default=math.inf)
+        near = gaps(self.machine, after, self.spheres, polygons=self.polygons)
+        clear = min((gap.size for gap in near), default=math.inf)
         norm, seconds = math.degrees(1.0) ** 2 * float(v @ v), time.perf_counter() - began
         log.steps.append((norm, miss, clear, seconds, found.kept, found.left_out))
         log.path.append(after)
         return after
 
     def _space(self, J: Array, x: Array, held: Sequence[int], project: bool = False) -> SolutionSpace:
+        project, held = project or bool(held), (*held, *self.still)
         if self.settings.generator == "blocked":
-            return blocked(J, x, held=held, project=project or bool(held))
-        return orthogonal(J, x, held=held, free=True, project=project or bool(held))
+            return blocked(J, x, held=held, project=project)
+        return orthogonal(J, x, held=held, free=True, project=project)
 
-    def _best(self, space: SolutionSpace, q: Array, rows: list[EqualityRow]) -> Optimum:
+    def _best(self, space: SolutionSpace, criterion: Criterion, q: Array, rows: list[EqualityRow]) -> Optimum:
         """In one shot; ahead, constraints that a step would break act on it, the first broken first."""
-        found = best(space, self.criterion, rows, in_order=True)
+        found = best(space, criterion, rows, in_order=True)
         if self.machine.base == "car":
             # The front wheels are turned first, to where the step without them would go, as far as they go
             ahead, most = np.array([math.cos(q[-1]), math.sin(q[-1]), 0.0]), math.tan(STEERING) / WHEEL_BASE
@@ -291,15 +336,15 @@ class Driver:
             bend = float(np.clip(found.v[-1] / speed, -most, most)) if abs(speed) > 1e-12 else 0.0
             row = np.concatenate((np.zeros(len(q) - 3), [-bend * ahead[0], -bend * ahead[1], 1.0]))
             rows = [*rows[:1], EqualityRow("steering", row, 0.0), *rows[1:]]
-            found = best(space, self.criterion, rows, in_order=True)
+            found = best(space, criterion, rows, in_order=True)
         for _ in range(space.span if self.settings.ahead else 0):
             names = {row.name for row in rows}
-            worst = broken(self.machine, self.settings, q, found.v, self.spheres)
+            worst = broken(self.machine, self.settings, q, found.v, self.spheres, self.polygons)
             more = [row for row in worst if row.name not in names]
             if not more:
                 break
             rows = [*rows, more[0]]
-            found = best(space, self.criterion, rows, in_order=True)
+            found = best(space, criterion, rows, in_order=True)
         return found
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import pathlib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,9 +18,10 @@ from wbc import robots, validation
 from wbc.errors import WbcError
 from wbc.published.ikor.lines import Trajectory
 from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar
+from wbc.published.ikor.polygons import convex_parts
 from wbc.validation import Array
 
-#: Points of a trajectory beyond these are dropped
+#: Points of a trajectory beyond these are dropped, as published, where no other number is asked for
 MAX_POINTS = 1000
 #: What numbers and counts look like: no other digits or separators, which Python would take
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -82,8 +83,9 @@ class _Lines:
         return IkorFileError(f"{self.path.name}:{line}", value, reason)
 
 
-def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Trajectory:
+def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None, most: int = MAX_POINTS) -> Trajectory:
     """``TrajectoryPts``: initial joints, number of points, a point a line; ``EulerAngles``: yaw, pitch, roll a line.
+    Points beyond ``most`` are left out, and counted.
 
     Raises:
         IkorFileError: a bad line, by number and value.
@@ -98,8 +100,8 @@ def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None) -> Traje
         lines = _Lines(angles)
         euler = np.radians([lines.numbers(3, f"yaw, pitch, roll {k + 1}") for k in range(len(points))]).reshape(-1, 3)
         lines.end()
-        euler = euler[:MAX_POINTS]
-    return Trajectory(start, points[:MAX_POINTS], euler, max(0, len(points) - MAX_POINTS))
+        euler = euler[:most]
+    return Trajectory(start, points[:most], euler, max(0, len(points) - most))
 
 
 def write_trajectory(file: Any, machine: ArmMachine, trajectory: Trajectory, angles: Any = None) -> None:
@@ -131,6 +133,31 @@ def read_spheres(file: Any) -> Array:
 def write_spheres(file: Any, spheres: Array) -> None:
     """The same back."""
     _write(file, spheres)
+
+
+def read_polygons(file: Any) -> list[Array]:
+    """``polygon_data``: x and y of the corners of a polygon a line, three or more, in order [k, 2] each.
+
+    Raises:
+        IkorFileError: a bad line.
+    """
+    lines, out = _Lines(file), list[Array]()
+    while lines.left:
+        line, words = lines.left[0]
+        what = "a polygon: x, y of three corners or more"
+        if len(words) < 6 or len(words) % 2:
+            raise lines.error(line, " ".join(words), f"expected {what}")
+        out.append(lines.numbers(len(words), what).reshape(-1, 2))
+        try:
+            convex_parts(out[-1])
+        except WbcError as error:
+            raise lines.error(line, " ".join(words), str(error)) from None
+    return out
+
+
+def write_polygons(file: Any, polygons: Sequence[Array]) -> None:
+    """The same back."""
+    _write(file, [corners.ravel() for corners in polygons])
 
 
 def read_angles(file: Any, machine: ArmMachine) -> Array:

@@ -1,8 +1,9 @@
-"""A run as a film: links, platform, spheres and the way of the tool, and the norm of each step beside them."""
+"""A run as a film: links, platform, obstacles and the way of the tool, and the norm of each step beside them."""
 
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ MOST, RATE = 40, 10
 SUFFIXES = (".gif", ".html")
 
 
-def save_film(machine: ArmMachine, run: Run, spheres: Array, file: Any) -> pathlib.Path:
+def save_film(machine: ArmMachine, run: Run, spheres: Array, file: Any, polygons: Sequence[Array] = ()) -> pathlib.Path:
     """``.gif``, or ``.html``: a page that plays, steps and scrubs.
 
     Raises:
@@ -30,7 +31,8 @@ def save_film(machine: ArmMachine, run: Run, spheres: Array, file: Any) -> pathl
     validation.integer("steps", len(run.norms), 1)
     shown = np.unique(np.linspace(0, len(run.norms), MOST).round().astype(int))
     points = np.array([machine.points(q) for q in run.q])
-    corners = np.vstack((points.reshape(-1, 3), *(spheres[:, :3] + s * spheres[:, 3:] for s in (-1, 1))))
+    loops = [np.column_stack((np.vstack((loop, loop[:1])), np.zeros(len(loop) + 1))) for loop in polygons]
+    corners = np.vstack((points.reshape(-1, 3), *(spheres[:, :3] + s * spheres[:, 3:] for s in (-1, 1)), *loops))
     middle, half = 0.5 * (corners.max(axis=0) + corners.min(axis=0)), 0.55 * np.ptp(corners, axis=0).max()
     with style.pyplot() as plt:
         figure = plt.figure(figsize=(9.0, 4.4))
@@ -44,6 +46,8 @@ def save_film(machine: ArmMachine, run: Run, spheres: Array, file: Any) -> pathl
         for *centre, radius in spheres:
             x, y, z = (c + radius * b for c, b in zip(centre, ball, strict=True))
             scene.plot_wireframe(x, y, z, color=style.ORANGE, lw=0.8)
+        for loop in loops:
+            scene.plot(*loop.T, color=style.ORANGE, lw=1.5)
         trace, links = (scene.plot([], [], [], **looks)[0] for looks in (
             {"color": style.GREY, "lw": 1.0}, {"color": style.BLUE, "lw": 3.0, "marker": "o", "ms": 4}))  # fmt: skip
         plate = scene.plot([], [], [], color="black", lw=1.5)[0]

@@ -10,11 +10,15 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.errors import RangeError
 from wbc.published.ikor.machines import ArmMachine
 from wbc.validation import Array
 
 #: Of a line that is created: [m], [rad], as the published program shows them
 INCREMENTS = 0.01, math.radians(1.0)
+#: Configurations that a pose is searched from beside home, steps from each, longest of them [rad or m], miss at the end
+#: [m, rad]
+SEARCHES, STEPS, LONGEST, REACHED = 40, 100, 0.3, 1e-10
 #: Smallest cosine of the pitch at which yaw and roll are told apart
 GIMBAL = 1e-6
 
@@ -50,8 +54,8 @@ def straight(machine: ArmMachine, step: Any, count: int, start: Any = None, turn
 
 
 def line_to(machine: ArmMachine, point: Any, euler: Any = None, start: Any = None) -> Trajectory:
-    """A line from where the tool is to a point [m], turning to yaw, pitch, roll [rad] on the way, in equal steps of at
-    most :data:`INCREMENTS`.
+    """A line from where the tool is at the start, see :func:`posed`, to a point [m], turning to yaw, pitch, roll [rad]
+    on the way, in equal steps of at most :data:`INCREMENTS`.
 
     Raises:
         ShapeError, NotFiniteError: no point or angles.
@@ -62,6 +66,51 @@ def line_to(machine: ArmMachine, point: Any, euler: Any = None, start: Any = Non
         turn = turned(validation.ordinary_array("euler", euler, (3,)) - euler_angles(rotation))
     count = max(1, math.ceil(max(np.linalg.norm(way) / INCREMENTS[0], np.abs(turn).max() / INCREMENTS[1]) - 1e-9))
     return straight(machine, way / count, count, start, turn / count)
+
+
+def arc_from(machine: ArmMachine, centre: Any, angle: float, turn: float = 0.0, start: Any = None) -> Trajectory:
+    """A circle's arc from where the tool is, round a centre [m] in the plane of x and y, to the left by an angle [rad];
+    the yaw turns by ``turn`` [rad] on the way. Equal steps of at most :data:`INCREMENTS`.
+
+    Raises:
+        ShapeError, NotFiniteError: no centre or angle. RangeError: the tool is at the centre.
+    """
+    q = machine.home if start is None else machine.checked("start", start)
+    place, rotation = machine.place(q)
+    off = place[:2] - validation.ordinary_array("centre", centre, (2,))
+    radius, angle, turn = float(np.hypot(*off)), validation.scalar("angle", angle), validation.scalar("turn", turn)
+    if radius == 0.0:
+        raise RangeError("centre", centre, "the tool is there: expected a centre away from it")
+    count = max(1, math.ceil(max(radius * abs(angle) / INCREMENTS[0], abs(turn) / INCREMENTS[1]) - 1e-9))
+    shares = np.arange(1, count + 1) / count
+    c, s = np.cos(angle * shares), np.sin(angle * shares)
+    points = np.tile(place, (count, 1))
+    points[:, 0] += c * off[0] - s * off[1] - off[0]
+    points[:, 1] += s * off[0] + c * off[1] - off[1]
+    return Trajectory(q, points, euler_angles(rotation) + shares[:, None] * [turn, 0.0, 0.0])
+
+
+def posed(machine: ArmMachine, point: Any, euler: Any = None) -> Array:
+    """Columns within their limits with the tool at a point [m] and, if they are given, at yaw, pitch, roll [rad]: by
+    damped steps from home, else from random configurations of a fixed seed.
+
+    Raises:
+        ShapeError, NotFiniteError: no point or angles. RangeError: none is found.
+    """
+    goal, rows = validation.ordinary_array("from", point, (3,)), slice(3 if euler is None else 6)
+    turned_to = np.eye(3) if euler is None else rotation_of(validation.ordinary_array("from", euler, (3,)))
+    rng = np.random.default_rng(0)
+    reach = np.clip(machine.lower, -math.pi, None), np.clip(machine.upper, None, math.pi)
+    for q in [machine.home.copy(), *(rng.uniform(*reach) for _ in range(SEARCHES))]:
+        for _ in range(STEPS):
+            place, rotation = machine.place(q)
+            x = np.concatenate((goal - place, pin.log3(turned_to @ rotation.T)))[rows]
+            if np.abs(x).max() < REACHED and (q >= machine.lower).all() and (q <= machine.upper).all():
+                return q
+            J = machine.jacobian(q)[rows]
+            v = J.T @ np.linalg.solve(J @ J.T + max(1e-12, 0.1 * float(x @ x)) * np.eye(len(x)), x)
+            q = np.clip(q + v * min(1.0, LONGEST / max(float(np.abs(v).max()), 1e-300)), machine.lower, machine.upper)
+    raise RangeError("from", goal.tolist(), "no configuration within the limits is found with the tool there")
 
 
 def euler_angles(rotation: Array) -> Array:

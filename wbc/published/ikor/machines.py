@@ -75,6 +75,13 @@ class ArmMachine:
         """M."""
         return int(self.spread.shape[1])
 
+    @cached_property
+    def flat(self) -> bool:
+        """Whether the tool stays in a plane of x and y, whatever the joints do; the platform is no arm."""
+        rng = np.random.default_rng(0)
+        tilts = [np.abs(self.jacobian(rng.uniform(-1.0, 1.0, self.joints))[2:5]).max() for _ in range(3)]
+        return self.base == "none" and max(tilts) < 1e-12
+
     def checked(self, field: str, q: Any) -> Array:
         """A configuration of the columns.
 

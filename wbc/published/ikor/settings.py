@@ -15,6 +15,13 @@ from wbc.resolvers.fsp import Criterion
 AXES = ("x", "y", "z", "yaw", "pitch", "roll")
 
 
+#: What is least of a step: its norm; the change from the step before; of the robot's masses the kinetic energy, torques
+#: and power, with steps of :data:`DT` [s]
+CRITERIA = ("norm", "acceleration", "energy", "torque", "power")
+#: A step lasts so long where its time matters [s]
+DT = 0.1
+
+
 class Method(enum.IntEnum):
     """The published codes."""
 
@@ -23,6 +30,23 @@ class Method(enum.IntEnum):
     OBSTACLES = 2
     BOTH = 3
     FSP = 4
+
+
+@dataclass(frozen=True)
+class Switch:
+    """From a point on, counted from 1: ``orientation`` on or off, all three angles; ``platform`` in motion or at rest;
+    None: as before.
+
+    Raises:
+        RangeError: no such point.
+    """
+
+    point: int
+    orientation: bool | None = None
+    platform: bool | None = None
+
+    def __post_init__(self) -> None:
+        validation.integer("switch", self.point, 1)
 
 
 @dataclass(frozen=True)
@@ -43,7 +67,8 @@ class Settings:
         loop_back: where a step would be longer than the limit, some steps are taken back and tried again with the
             joint held that moved most.
         feedback: the target less where the tool is; else less where it should have been.
-        criterion: of FSP's steps, in place of the least norm by the machine's weights.
+        criterion: of FSP's steps, in place of the least norm by the machine's weights; or one of :data:`CRITERIA`.
+        switches: what changes on the way, in the order of their points.
     """
 
     method: Method = Method.FSP
@@ -58,7 +83,8 @@ class Settings:
     step_limit: float = math.inf
     loop_back: bool = False
     feedback: bool = True
-    criterion: Criterion | None = None
+    criterion: Criterion | str = "norm"
+    switches: tuple[Switch, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "method", _method(self.method))
@@ -71,7 +97,9 @@ class Settings:
         validation.one_of("generator", self.generator, ("blocked", "orthogonal"))
         for name in ("margin", "damping"):
             validation.scalar(name, getattr(self, name), low=0.0)
-        if self.criterion is not None and (self.resolver != "fsp" or self.plain):
+        if isinstance(self.criterion, str):
+            validation.one_of("criterion", self.criterion, CRITERIA)
+        if self.criterion != "norm" and (self.resolver != "fsp" or self.plain):
             raise RangeError("criterion", self.resolver, "only FSP takes a criterion of its own")
         if not self.step_limit > 0.0:
             raise RangeError("step_limit", self.step_limit, "expected a length above 0")

@@ -14,13 +14,13 @@ from wbc.api import Stack
 from wbc.errors import InfeasibleError, RangeError
 from wbc.published.ikor.legacy import LegacyHermies
 from wbc.published.ikor.machines import ArmMachine
-from wbc.published.ikor.settings import Settings
+from wbc.published.ikor.settings import DT, Settings
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.tasks.base import Constraint, Row, Rows, SacrificeOrder
 from wbc.validation import Array
 
-#: A step lasts so long [s]; links are capsules of this radius [m]
-DT, RADIUS = 0.1, 1e-6
+#: Links are capsules of this radius [m]
+RADIUS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,8 @@ class StackSteps:
             raise RangeError("base", machine.base, "a stack takes a holonomic or differential platform")
         if settings.loop_back:
             raise RangeError("loop_back", True, "a stack keeps the limit of its steps and needs no loop back")
+        if settings.switches:
+            raise RangeError("switches", len(settings.switches), "a stack keeps its rows and joints")
         self.machine, self.pose = machine, bool(angles)
         self.binding: tuple[str, ...] = ()
         robot = machine.robot

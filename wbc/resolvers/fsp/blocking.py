@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 from typing import Any
@@ -12,14 +13,17 @@ import numpy as np
 from scipy.linalg import lapack, qr
 
 from wbc import validation
+from wbc.resolvers.fsp.compiled import NONE, Generated, generated
 from wbc.resolvers.fsp.space import (
     RANK,
+    Consistency,
     SolutionSpace,
     checked_held,
     checked_system,
     consistency,
+    idle_joints,
+    moving_columns,
     row_scales,
-    split_columns,
 )
 from wbc.validation import Array
 
@@ -67,27 +71,47 @@ def blocked(
     """
     J, x = checked_system(J, x)
     validation.one_of("search", search, SEARCHES)
-    idle, active = split_columns(J, checked_held(held, J.shape[1]), False)
+    still = checked_held(held, J.shape[1])
+    quick = generated("wbc_blocked", J, x, still, False) if search == "exchange" else None
+    made, blocks, completed = (quick, _first_blocks(quick), 0) if quick else _searched(J, x, still, search)
+    idle = idle_joints(made, J.shape)
+    status, missed, reached = consistency(J, x, made, project)
+    if status is Consistency.INCONSISTENT:
+        return replace(blocked(J, reached, held=still, free=free, search=search), status=status, missed=missed)
+    vectors, loose = made.vectors, [k for k in idle if free and k not in still]
+    if loose:
+        vectors = np.vstack((vectors, np.tile(vectors[0], (len(loose), 1))))
+        vectors[range(made.vectors.shape[0], len(vectors)), loose] = float(np.abs(vectors[0]).max()) or 1.0
+        idle = tuple(k for k in idle if k not in loose)
+    rows = tuple(sorted(made.order[: made.rank]))
+    return SolutionSpace(J, reached, vectors, rows, idle, status, missed, blocks, completed + len(loose))
+
+
+def _first_blocks(made: Generated) -> tuple[tuple[int, ...], ...]:
+    """Joints at rest in each vector, as one column after another changes places with one of the first block."""
+    rest = made.active[made.rank :]
+    others = (sorted([*rest[:k], *rest[k + 1 :], joint]) for k, joint in enumerate(made.leaving))
+    return tuple(map(tuple, (sorted(rest), *others)))
+
+
+def _searched(J: Array, x: Array, held: tuple[int, ...], search: str) -> tuple[Generated, Any, int]:
+    """The space, its blocks, and how many vectors are none: in numpy, for all that the first block does not show."""
+    active = moving_columns(J, held, False)
+    if not active:
+        return NONE, (), 0
     A = J[:, active]
     rows = _independent(A)
-    first, columns = _first_block(A[rows], x[rows])
-    status, missed, reached = consistency(A, x, first, len(rows), project)
-    finder = _Search(A[rows], reached[rows])
+    columns = _first_block(A[rows], x[rows])[1]
+    finder = _Search(A[rows], x[rows])
     if len(columns) < A.shape[1]:
         finder.exhaust() if search == "exhaustive" else finder.exchange(columns)
     else:
         finder.take(columns)
     completed = finder.complete()
-    loose = [k for k in idle if k not in set(held)] if free else []
-    vectors = np.zeros((len(finder.found) + len(loose), J.shape[1]))
-    vectors[: len(finder.found), active] = finder.found
-    for k, joint in enumerate(loose, len(finder.found)):
-        vectors[k] = vectors[0]
-        vectors[k, joint] = float(np.abs(vectors[0]).max()) or 1.0
+    vectors = np.zeros((len(finder.found), J.shape[1]))
+    vectors[:, active] = finder.found
     blocks = tuple(tuple(active[k] for k in b) for b in finder.blocks)
-    rest = tuple(k for k in idle if k not in loose)
-    count = completed + len(loose)
-    return SolutionSpace(J, reached, vectors, tuple(rows), rest, status, missed, blocks, count)
+    return Generated(vectors, len(rows), rows, active, []), blocks, completed
 
 
 class _Search:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lapack
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError, ShapeError
+from wbc.resolvers.fsp.compiled import library
 from wbc.resolvers.fsp.criteria import Criterion
 from wbc.resolvers.fsp.space import NOISE, RANK, SolutionSpace
 from wbc.validation import Array
@@ -107,38 +107,25 @@ def best(
         ShapeError: a criterion or constraint about other joints.
     """
     m = space.J.shape[1]
-    if criterion is not PLAIN:
-        criterion.check(m)
-    g, D = space.vectors[0], space.directions
-    start = -g if criterion.reference is None else criterion.reference - g
-    if not len(D):
-        kept, redundant, out = _independent(D, g, rows, in_order)
-        return Optimum(g, np.ones(1), kept, redundant, out)
-    weighted = criterion.times(D)
-    # M = L L' of the quadratic in z; then y = L' z has the plain norm
-    L, failed = lapack.dpotrf(weighted @ D.T, lower=1)
-    if failed:
-        raise RangeError("vectors", space.vectors, "the vectors of the space are dependent")
-    # By the inverse: small triangular systems of many right sides wake all threads of the library
-    back = np.tril(lapack.dtrtri(L, lower=1)[0])
-    y, E = back @ (weighted @ start), back @ D
-    names: tuple[tuple[str, ...], ...] = ((), (), ())
-    if rows:
-        if any(len(row.a) != m for row in rows):
-            raise ShapeError("rows", [len(row.a) for row in rows], f"expected {m} numbers in each")
-        A = np.array([row.a for row in rows])
-        C, wanted = A @ E.T, np.array([row.value for row in rows]) - A @ g
-        solved = _regular(C, wanted - C @ y, A, E)
-        if solved is None:
-            names = _independent(E, g, rows, in_order)
-            some = [k for k, row in enumerate(rows) if row.name in names[0]]
-            solved = _regular(C[some], (wanted - C @ y)[some], A[some], E)
-            assert solved is not None
-        else:
-            names = tuple(row.name for row in rows), (), ()
-        y = y + solved
-    z = y @ back
-    return Optimum(g + z @ D, np.concatenate(([1.0 - z.sum()], z)), *names)
+    criterion.check(m)
+    if any(len(row.a) != m for row in rows):
+        raise ShapeError("rows", [len(row.a) for row in rows], f"expected {m} numbers in each")
+    # In u = L' v, H = L L', the criterion is the plain distance
+    V, A = (
+        criterion.scaled(np.asarray(space.vectors, dtype=np.float64)),
+        criterion.unscaled(np.array([row.a for row in rows]).reshape(-1, m)),
+    )
+    r = np.zeros(m) if criterion.reference is None else criterion.scaled(criterion.reference)
+    values = np.array([row.value for row in rows], dtype=np.float64)
+    t = _coordinates(V, r, A, values)
+    names: tuple[tuple[str, ...], ...] = (tuple(row.name for row in rows), (), ())
+    if t is None:
+        Q = np.linalg.qr((V[1:] - V[0]).T)[0]
+        names = _independent(A, Q, space.vectors[0], rows, in_order)
+        some = [k for k, row in enumerate(rows) if row.name in names[0]]
+        t = _coordinates(V, r, A[some], values[some])
+        assert t is not None
+    return Optimum(t @ space.vectors, t, *names)
 
 
 def one_shot(J: Array, x: Array, A: Array, values: Array, criterion: Criterion = PLAIN) -> Array | None:
@@ -146,32 +133,48 @@ def one_shot(J: Array, x: Array, A: Array, values: Array, criterion: Criterion =
 
     With u = L' (v - r), H = L L', it is the least |u| with [J; A] L'^-1 u = [x; values] - [J; A] r.
     """
-    F, b = np.concatenate((J, A)), np.concatenate((x, values))
-    k, n = F.shape
-    if k > n:
+    J, x, A, values = (np.asarray(one, dtype=np.float64) for one in (J, x, A, values))
+    r = criterion.reference
+    if r is not None:
+        x, values = x - J @ r, values - A @ r
+    if criterion.weight is not None:
+        J, A = criterion.unscaled(J), criterion.unscaled(A)
+    (n, m), p = J.shape, len(A)
+    if functions := library(n + p + m):
+        u = np.empty(m)
+        found = None if functions.wbc_least(J, x, A, values, u, n, p, m) else u
+    else:
+        F = np.concatenate((J, A))
+        found = _least(F, np.concatenate((x, values)), np.sqrt((F * F).sum(axis=1)))
+    if found is None:
         return None
-    if criterion.reference is not None:
-        b = b - F @ criterion.reference
-    root = None
-    if criterion.weight is not None and criterion.weight.ndim == 1:
-        root = np.sqrt(criterion.weight)
-        F = F / root
-    elif criterion.weight is not None:
-        root = np.linalg.cholesky(criterion.weight)
-        F = F @ np.linalg.inv(root).T
-    u = _least(F, b, np.sqrt((F * F).sum(axis=1)))
-    if u is None:
-        return None
-    if root is not None:
-        u = u / root if root.ndim == 1 else lapack.dtrtrs(root, u, lower=1, trans=1)[0]
-    return np.asarray(u if criterion.reference is None else u + criterion.reference)
+    u = criterion.unscaled(found, back=True)
+    return np.asarray(u if r is None else u + r)
 
 
-def _regular(C: Array, off: Array, A: Array, E: Array) -> Array | None:
-    """The least y with C y = off, None where rows of C are dependent."""
-    if len(C) > C.shape[1]:
-        return None
-    return _least(C, off, np.sqrt((A * A).sum(axis=1) * (E * E).sum(axis=0).max()))
+def _coordinates(V: Array, r: Array, A: Array, values: Array) -> Array | None:
+    """t of a space's [K, m] point nearest to r with A v = values; None where rows of A are dependent in the space.
+
+    Raises:
+        RangeError: the vectors are dependent.
+    """
+    (K, m), p = V.shape, len(A)
+    t = np.empty(K)
+    if functions := library(K + p + m):
+        failed = functions.wbc_coordinates(V, r, A, values, t, K, p, m)
+    else:
+        D = V[1:] - V[0]
+        Q, R = np.linalg.qr(D.T)
+        failed = 2 * bool(m + 1 < K or (np.abs(R.diagonal()) <= RANK * np.sqrt((D * D).sum(axis=1))).any())
+        y = Q.T @ (r - V[0])
+        more = _least(A @ Q, values - A @ (V[0] + Q @ y), np.sqrt((A * A).sum(axis=1)))
+        failed = failed or more is None
+        if more is not None and not failed:
+            t[1:] = np.linalg.solve(R, y + more)
+            t[0] = 1.0 - t[1:].sum()
+    if failed == 2:
+        raise RangeError("vectors", V, "the vectors of the space are dependent")
+    return None if failed else t
 
 
 def _least(C: Array, off: Array, sizes: Array) -> Array | None:
@@ -179,18 +182,16 @@ def _least(C: Array, off: Array, sizes: Array) -> Array | None:
     k, n = C.shape
     if not k:
         return np.zeros(n)
-    factors, tau, _, _ = lapack.dgeqrf(C.T)
-    if (np.abs(factors.diagonal()) <= np.maximum(RANK * sizes, NOISE * sizes.max())).any():
+    Q, R = np.linalg.qr(C.T)
+    if k > n or (np.abs(R.diagonal()) <= np.maximum(RANK * sizes, NOISE * sizes.max())).any():
         return None
-    y = np.zeros((n, 1))
-    y[:k, 0] = lapack.dtrtrs(factors[:k], off, trans=1)[0]
-    return np.asarray(lapack.dormqr("L", "N", factors, tau, y, max(1, 64 * n))[0][:, 0])
+    return np.asarray(Q @ np.linalg.solve(R.T, off))
 
 
 def _independent(
-    E: Array, g: Array, rows: Sequence[EqualityRow], in_order: bool
+    A: Array, Q: Array, g: Array, rows: Sequence[EqualityRow], in_order: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Names of rows that decide, that follow from earlier ones, and that contradict them.
+    """Names of rows that decide, that follow from earlier ones, and that contradict them; Q: basis of the self-motions.
 
     Raises:
         InfeasibleError: one does, and nothing shall be left out.
@@ -198,11 +199,9 @@ def _independent(
     kept: list[str] = []
     redundant: list[str] = []
     out: list[str] = []
-    axes, values, mixes = np.zeros((0, len(E))), np.zeros(0), np.zeros((0, len(rows)))
-    reach = np.sqrt((E * E).sum(axis=0).max(initial=0.0))
+    axes, values, mixes = np.zeros((0, Q.shape[1])), np.zeros(0), np.zeros((0, len(rows)))
     for k, row in enumerate(rows):
-        c = E @ row.a
-        size = float(np.linalg.norm(row.a)) * (reach or 1.0)
+        c, size = A[k] @ Q, float(np.linalg.norm(A[k]))
         value, mix = row.value - float(row.a @ g), np.eye(len(rows))[k]
         for _ in range(2):
             along = axes @ c

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,26 @@ class Criterion:
         if self.weight is None:
             return v
         return np.asarray(v * self.weight if self.weight.ndim == 1 else v @ self.weight)
+
+    @cached_property
+    def root(self) -> Array:
+        """L of H = L L', or its diagonal."""
+        H = np.ones(1) if self.weight is None else self.weight
+        return np.asarray(np.sqrt(H) if H.ndim == 1 else np.linalg.cholesky(H))
+
+    def scaled(self, v: Array) -> Array:
+        """L' v, or that of rates in rows."""
+        if self.weight is None:
+            return v
+        return np.asarray(v * self.root if self.root.ndim == 1 else v @ self.root)
+
+    def unscaled(self, a: Array, back: bool = False) -> Array:
+        """L^-1 a of rows that act on rates, in rows; ``back``: L'^-1 u, the rates of scaled ones."""
+        if self.weight is None:
+            return a
+        if self.root.ndim == 1:
+            return np.asarray(a / self.root)
+        return np.asarray(np.linalg.solve(self.root.T if back else self.root, a.T).T)
 
     def check(self, joints: int) -> None:
         """Whether it is about so many joints.

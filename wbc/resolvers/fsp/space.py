@@ -9,10 +9,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import qr
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError, ShapeError
+from wbc.resolvers.fsp.compiled import NONE, Generated, generated
 from wbc.validation import Array
 
 #: A row is dependent where less than this share of it is left after the others
@@ -125,43 +126,40 @@ def orthogonal(J: Any, x: Any, *, held: Iterable[int] = (), free: bool = False, 
         ShapeError, NotFiniteError: bad input.
     """
     J, x = checked_system(J, x)
-    return _orthogonal(J, x, checked_held(held, J.shape[1]), free, project)
-
-
-def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool, project: bool) -> SolutionSpace:
-    """The same without checks."""
-    idle, active = split_columns(J, held, free)
-    A = J if len(active) == J.shape[1] else J[:, active]
-    n, m = A.shape
-    scale = row_scales(A)
-    factors, pivots, tau, _, _ = lapack.dgeqp3((A * scale[:, None]).T)
-    diagonal = np.abs(factors.diagonal())
-    rank = int((diagonal > RANK * diagonal[0]).sum()) if diagonal[0] > 0.0 else 0
-    order = pivots - 1
-    chosen = order[:rank]
-    R = factors[:rank, :rank]
-    Q = np.zeros((m, m), order="F")
-    Q[:, : min(n, m)] = factors[:, : min(n, m)]
-    Q = lapack.dorgqr(Q, tau)[0]
-    along, _ = lapack.dtrtrs(R, (scale * x)[chosen], trans=1) if rank else (np.zeros(0), 0)
-    vectors = np.zeros((m - rank + 1, J.shape[1]))
-    vectors[:, active] = Q[:, :rank] @ along
-    vectors[1:, active] += Q[:, rank:].T
-    status, missed, reached = consistency(A, x, vectors[0, active], rank, project)
+    still = checked_held(held, J.shape[1])
+    made = generated("wbc_orthogonal", J, x, still, free) or _orthogonal(J, x, still, free)
+    idle = idle_joints(made, J.shape)
+    status, missed, reached = consistency(J, x, made, project)
     if status is Consistency.INCONSISTENT:
-        again = _orthogonal(J, reached, held, free, False)
-        return SolutionSpace(J, reached, again.vectors, again.rows, idle, status, missed)
-    return SolutionSpace(J, x, vectors, tuple(sorted(chosen.tolist())), idle, status, missed)
+        made = generated("wbc_orthogonal", J, reached, still, free) or _orthogonal(J, reached, still, free)
+    rows = tuple(sorted(made.order[: made.rank]))
+    return SolutionSpace(J, reached, made.vectors, rows, idle, status, missed)
 
 
-def consistency(J: Array, x: Array, v: Array, rank: int, project: bool) -> tuple[Consistency, float, Array]:
-    """(status, what is missed, rates that can be had) of a task with a candidate solution; J: of joints that move.
+def _orthogonal(J: Array, x: Array, held: tuple[int, ...], free: bool) -> Generated:
+    """By LAPACK."""
+    active = moving_columns(J, held, free)
+    if not active:
+        return NONE
+    scale = row_scales(J[:, active])
+    Q, R, order = qr((J[:, active] * scale[:, None]).T, pivoting=True, check_finite=False)
+    diagonal = np.abs(R.diagonal())
+    rank = int((diagonal > RANK * diagonal[0]).sum())
+    vectors = np.zeros((len(active) - rank + 1, J.shape[1]))
+    vectors[:, active] = Q[:, :rank] @ np.linalg.solve(R[:rank, :rank].T, (scale * x)[order[:rank]])
+    vectors[1:, active] += Q[:, rank:].T
+    return Generated(vectors, rank, order.tolist(), active, [])
+
+
+def consistency(J: Array, x: Array, made: Generated, project: bool) -> tuple[Consistency, float, Array]:
+    """(status, what is missed, rates that can be had) of a task with its space.
 
     Raises:
         InfeasibleError: it is inconsistent and nothing shall be projected.
     """
-    if rank == len(J):
+    if made.rank == len(J):
         return Consistency.FULL, 0.0, x
+    J, v = J[:, made.active], made.vectors[0, made.active]
     off = np.abs(J @ v - x)
     # Each row against its own size, for rows in mm and in rad stand side by side; what moves most counts for all
     scales = row_scales(J)
@@ -210,19 +208,26 @@ def row_scales(J: Array) -> Array:
     return np.asarray(1.0 / norms)
 
 
-def split_columns(J: Array, held: tuple[int, ...], free: bool) -> tuple[tuple[int, ...], list[int]]:
-    """(idle joints, the others): those held, and, if they are not free, columns of zeros to working precision.
-
-    Raises:
-        RangeError: none is left.
+def moving_columns(J: Array, held: tuple[int, ...], free: bool) -> list[int]:
+    """Joints that are not held, and, if they are not free, whose columns are not zero to working precision; none where
+    no column moves.
     """
     sizes = (np.abs(J) * row_scales(J)[:, None]).max(axis=0)
     zero = sizes <= IDLE * sizes.max()
     still = np.zeros_like(zero) if free else zero.copy()
     still[list(held)] = True
-    if (still | zero).all():
-        raise RangeError("J", J.shape, "no joint moves the task: every column is zero or held")
-    return tuple(np.flatnonzero(still).tolist()), np.flatnonzero(~still).tolist()
+    return [] if (still | zero).all() else np.flatnonzero(~still).tolist()
+
+
+def idle_joints(made: Generated, shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Joints that no vector moves.
+
+    Raises:
+        RangeError: none is left that does.
+    """
+    if not made.active:
+        raise RangeError("J", shape, "no joint moves the task: every column is zero or held")
+    return tuple(sorted(set(range(shape[1])).difference(made.active)))
 
 
 def _gram(vectors: Array, weight: Array | None) -> Array:
