@@ -207,12 +207,3 @@ def random_configuration(robot: Robot, rng: np.random.Generator) -> np.ndarray:
             lower, upper = robot.limits.position_lower[i], robot.limits.position_upper[i]
             q[k] = rng.uniform(max(lower, -3.0), min(upper, 3.0))
     return q
-
-
-def numeric_jacobian(robot: Robot, q: np.ndarray, value: Any, step: float = 1e-4) -> np.ndarray:
-    """Derivative along the tangent space by a central difference of fourth order, rows x nv."""
-    columns = []
-    for direction in np.eye(robot.nv):
-        at = [value(pin.integrate(robot.model, q, k * step * direction)) for k in (-2, -1, 1, 2)]
-        columns.append((at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step))
-    return np.column_stack(columns)

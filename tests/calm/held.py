@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc.robots
+from tests.random_robots import Drawn, random_model
 from wbc.api import Stack
 from wbc.robot import Robot
 from wbc.tasks import EndEffector, Hold, JointLimits, Posture
@@ -40,27 +41,20 @@ class Run:
     said: bool = True
 
 
+#: A trunk with limbs whose joints turn, most of them about an axis of their own
+TREE = Drawn(
+    pin.JointModelFreeFlyer,
+    limbs=(2, 4),
+    joints=(3, 6),
+    kinds={"aligned": 0.63, "turning": 0.27, "sliding": 0.1},
+    mass=(0.5, 2.0),
+)
+
+
 def tree(rng: np.random.Generator) -> tuple[Robot, str, tuple[str, ...]]:
-    """A trunk with two to four limbs of three to six joints of random axes: the robot, its trunk, the limbs' tips."""
-    model = pin.Model()
-    trunk = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
-    tips = []
-    for limb in range(int(rng.integers(2, 5))):
-        joint, place = trunk, pin.SE3(np.eye(3), rng.uniform(-0.3, 0.3, 3))
-        for k in range(int(rng.integers(3, 7))):
-            axis = np.eye(3)[rng.integers(3)] if rng.random() < 0.7 else rng.normal(size=3)
-            kind = pin.JointModelRevoluteUnaligned if rng.random() < 0.9 else pin.JointModelPrismaticUnaligned
-            joint = model.addJoint(joint, kind(axis / np.linalg.norm(axis)), place, f"l{limb}j{k}")
-            place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -rng.uniform(0.05, 0.4)]))
-        tips.append(f"tip{limb}")
-        model.addFrame(pin.Frame(tips[-1], joint, place, pin.FrameType.OP_FRAME))
-    model.addFrame(pin.Frame("trunk", trunk, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    for joint in range(1, model.njoints):
-        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), 0.01 * np.eye(3)), pin.SE3.Identity())
-    model.upperPositionLimit[7:] = rng.uniform(0.5, 3.0, model.nq - 7)
-    model.lowerPositionLimit[7:] = -rng.uniform(0.5, 3.0, model.nq - 7)
-    model.velocityLimit[:] = np.concatenate((np.full(6, np.inf), rng.uniform(3.0, 30.0, model.nv - 6)))
-    return wbc.robots.load(model), "trunk", tuple(tips)
+    """A robot, its trunk, and the tips of its limbs."""
+    robot = wbc.robots.load(random_model(rng, TREE))
+    return robot, "trunk", tuple(name for name in robot.frame_names if name.endswith("_tip"))
 
 
 def begin(robot: Robot, rng: np.random.Generator) -> Array:

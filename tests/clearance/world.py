@@ -8,23 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 # isort: split
-import coal
 
+from tests.distances import coal_distance
+from tests.random_robots import Drawn, random_model, random_pose
 from wbc.clearance import Motion, Tree
-from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Box, Capsule, Convex, Cylinder, Solid, Sphere
 from wbc.validation import Array
-
-
-def unit(rng: np.random.Generator, count: int) -> Array:
-    """A random direction."""
-    x = rng.normal(size=count)
-    return np.asarray(x / np.linalg.norm(x))
-
-
-def random_pose(rng: np.random.Generator, far: float) -> pin.SE3:
-    """Anywhere."""
-    return pin.SE3(pin.Quaternion(*unit(rng, 4)).matrix(), far * rng.normal(size=3))
 
 
 def solids(rng: np.random.Generator) -> list[Solid]:
@@ -42,12 +31,7 @@ def solids(rng: np.random.Generator) -> list[Solid]:
 
 def judged(a: Solid, at: pin.SE3, b: Solid, there: pin.SE3) -> float:
     """The signed distance that Coal finds [m]."""
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    request.gjk_tolerance, request.epa_tolerance = 1e-9, 1e-8
-    made = [geometry_of(shape) for shape in (a, b)]
-    poses = [pose * one.offset for pose, one in zip((at, there), made, strict=True)]
-    places = [coal.Transform3s(pose.rotation, pose.translation) for pose in poses]
-    return float(coal.distance(made[0].geometry, places[0], made[1].geometry, places[1], request, result))
+    return coal_distance(a, at, b, there, 1e-9)
 
 
 def numbers(pose: pin.SE3) -> Array:
@@ -66,18 +50,10 @@ def still(pose: pin.SE3) -> Motion:
 
 
 def random_arms(rng: np.random.Generator, arms: int = 2, joints: int = 4) -> pin.Model:
-    """Arms of turning and sliding joints on one base, links "a0" to "b3"."""
-    model = pin.Model()
-    kinds = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ, pin.JointModelPX, pin.JointModelRUBZ)
-    for arm in range(arms):
-        parent = 0
-        for k in range(joints):
-            axis = unit(rng, 3)
-            kind = [*(made() for made in kinds), pin.JointModelRevoluteUnaligned(axis)][int(rng.integers(6))]
-            name = f"{'abcdef'[arm]}{k}"
-            parent = model.addJoint(parent, kind, random_pose(rng, 0.3), name)
-            model.addFrame(pin.Frame(f"{name}_link", parent, random_pose(rng, 0.1), pin.FrameType.BODY))
-    return model
+    """Arms of turning and sliding joints on one base, links "a0_link" to "b3_link"."""
+    kinds = {"aligned": 3.0, "turning": 1.0, "sliding": 1.0, "endless": 1.0}
+    drawn = Drawn(limbs=(arms, arms), joints=(joints, joints), kinds=kinds, far=(0.1, 0.8), turned=True, reach=None)
+    return random_model(rng, drawn)
 
 
 def configuration(model: pin.Model, scalars: Array) -> Array:

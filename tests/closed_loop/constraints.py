@@ -9,7 +9,6 @@ for a point within rho of the axes of joints that turn at w = sum |v_i| in all, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,8 @@ import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Gaps, length, wrap
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import STARTS, anywhere, near
+from tests.closed_loop.machines import STARTS, anywhere, machine, near
+from tests.random_robots import unit
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape, Sphere
@@ -44,7 +44,6 @@ SPEED = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
 LOWER, UPPER = -0.5, 1.0
 
 Figures = dict[str, float]
-Declare = Callable[[Any, Frames, Robot], Item]
 
 
 def hold_frame(robot: Robot, f: Frames) -> tuple[str, str]:
@@ -58,35 +57,26 @@ def fixed_joint(f: Frames) -> str:
     return f.axis
 
 
-DECLARED: dict[str, tuple[type, Declare]] = {
-    "limits": (JointLimits, lambda cls, f, robot: cls()),
-    "ball": (Obstacle, lambda cls, f, robot: cls(BALL, margin=MARGIN)),
-    "wall": (Obstacle, lambda cls, f, robot: cls(WALL, margin=MARGIN)),
-    "speed, own axes": (
-        FrameVelocityLimit,
-        lambda cls, f, robot: cls(f.tip, linear=tuple(SPEED[:3]), angular=tuple(SPEED[3:]), axes=f.tip),
-    ),
-    "speed from a moving frame": (
-        FrameVelocityLimit,
-        lambda cls, f, robot: cls(f.tip, linear=tuple(SPEED[:3]), angular=tuple(SPEED[3:]), relative_to=f.plane[0]),
-    ),
-    "hold": (Hold, lambda cls, f, robot: cls(*hold_frame(robot, f))),
-    "fixed": (Fixed, lambda cls, f, robot: cls(fixed_joint(f))),
-    "plane limit": (PitchPlaneLimit, lambda cls, f, robot: cls(*f.plane, lower=LOWER, upper=UPPER)),
-}
-
-
-def constraint_items(name: str, robot: Robot, mutations: dict[str, Any] | None = None) -> dict[str, Item]:
-    """Every constraint under test by name, some of them of mutated classes, and tasks that pull against them."""
-    f, other = FRAMES[name], mutations or {}
-    items = {key: declare(other.get(key, cls), f, robot) for key, (cls, declare) in DECLARED.items()}
-    return items | {
+def build(name: str) -> Loop:
+    """The stack of every constraint under test, and of tasks that pull against them."""
+    robot, f = machine(name), FRAMES[name]
+    linear, angular = tuple(SPEED[:3]), tuple(SPEED[3:])
+    items: dict[str, Item] = {
+        "limits": JointLimits(),
+        "ball": Obstacle(BALL, margin=MARGIN),
+        "wall": Obstacle(WALL, margin=MARGIN),
+        "speed, own axes": FrameVelocityLimit(f.tip, linear=linear, angular=angular, axes=f.tip),
+        "speed from a moving frame": FrameVelocityLimit(f.tip, linear=linear, angular=angular, relative_to=f.plane[0]),
+        "hold": Hold(*hold_frame(robot, f)),
+        "fixed": Fixed(fixed_joint(f)),
+        "plane limit": PitchPlaneLimit(*f.plane, lower=LOWER, upper=UPPER),
         "reach": EndEffector(f.tip, kind="position"),
         "pose": EndEffector(f.tip),
         "swing": PitchPlane(*f.plane),
         "rest": Posture(joints=robot.joint_names),
         "caps": JointLimits(acceleration=False),
     }
+    return Loop(robot, items, DT, name)
 
 
 def bend(loop: Loop, v: Array, spin: float = 0.0) -> float:
@@ -94,11 +84,6 @@ def bend(loop: Loop, v: Array, spin: float = 0.0) -> float:
     slide = length(v[:3]) if loop.robot.base == "floating" else 0.0
     turn = float(np.abs(v[3:] if loop.robot.base == "floating" else v).sum()) + spin
     return 0.5 * (RHO * turn * turn + turn * slide) * loop.dt**2
-
-
-def random_unit(rng: np.random.Generator) -> Array:
-    vector = rng.normal(size=3)
-    return vector / length(vector)
 
 
 def obstacle(loop: Loop, name: str, moving: bool, seed: int = 11) -> Figures:
@@ -148,7 +133,7 @@ def outside(loop: Loop, shape: Any, gaps: Gaps, rng: np.random.Generator) -> tup
     for _ in range(1000):
         q = anywhere(loop.robot, rng)
         shoulder, tip = (p.translation for p in loop.eyes.poses(q, loop.frames.plane[0], loop.frames.tip))
-        inward = (tip - shoulder) / length(tip - shoulder) + 0.3 * random_unit(rng)
+        inward = (tip - shoulder) / length(tip - shoulder) + 0.3 * unit(rng)
         inward /= length(inward)
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), -inward).matrix()
         pose = pin.SE3(turn, tip + (0.2 + BALL.radius * isinstance(shape, Sphere)) * inward)
@@ -166,7 +151,7 @@ def frame_speed(loop: Loop, name: str, seed: int = 12) -> Figures:
     for _ in range(STARTS):
         q = anywhere(loop.robot, rng)
         here = eyes.pose(q, f.tip)
-        loop["pose"].target = pin.SE3(pin.exp3(random_unit(rng)) @ here.rotation, here.translation + random_unit(rng))
+        loop["pose"].target = pin.SE3(pin.exp3(unit(rng)) @ here.rotation, here.translation + unit(rng))
         run = loop.run(q, 20)
         figures["unsolved"] += run.unsolved
         speeds = []
@@ -261,7 +246,7 @@ def fixed(loop: Loop, name: str = "fixed", seed: int = 14) -> Figures:
     for start in range(STARTS):
         q, v = anywhere(loop.robot, rng), np.zeros(model.nv)
         here = loop.eyes.pose(q, f.tip).translation
-        loop["reach"].target = here + 0.1 * random_unit(rng)
+        loop["reach"].target = here + 0.1 * unit(rng)
         v[k] = rng.uniform(-1.0, 1.0) * (start % 2)
         run = loop.run(q, 30, v=v)
         figures["unsolved"] += run.unsolved

@@ -10,14 +10,14 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Eyes, wrap
-from tests.closed_loop.loop import Loop, backend_of
+from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import machine
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
-from tests.tasks.items_coordination import single_joints
+from tests.rates import single_joints
 from tests.tasks.robots import FRAMES
 from wbc.robot import Robot
-from wbc.tasks import Item, JointCoupling
+from wbc.tasks import JointCoupling
 
 
 def relations(names: tuple[str, ...]) -> list[dict[str, float]]:
@@ -65,7 +65,7 @@ def fits(eyes: Eyes, f: Any, q: Array) -> bool:
 SUBJECTS: dict[str, Subject] = {
     "gear": Subject(
         JointCoupling,
-        lambda cls, f, robot: cls(relations(single_joints(robot))),
+        lambda f, robot: JointCoupling(relations(single_joints(robot))),
         sums,
         lacking,
         reach=0.15,
@@ -74,8 +74,7 @@ SUBJECTS: dict[str, Subject] = {
 }
 
 
-def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
+def build(name: str) -> Loop:
     """The coupling alone."""
-    other, s = mutations or {}, SUBJECTS["gear"]
-    items: dict[str, Item] = {"gear": s.declare(other.get("gear", s.cls), FRAMES[name], machine(name))}
-    return Loop(machine(name), items, DT, name, backend_of(mutations))
+    items = {key: s.declare(FRAMES[name], machine(name)) for key, s in SUBJECTS.items()}
+    return Loop(machine(name), items, DT, name)

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, Eyes
-from tests.closed_loop.loop import Loop, backend_of
+from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import anywhere, machine
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
-from wbc.tasks import Item, Manipulability
+from wbc.tasks import Manipulability
 
 #: What rows in metres are divided by [m], and the floor under singular values that the class states
 LENGTH, FLOOR = 0.3, 1e-4
@@ -62,7 +62,7 @@ def subject(kind: str, form: str) -> Subject:
 
     return Subject(
         Manipulability,
-        lambda cls, f, robot: cls(f.tip, kind=kind, relative_to=mount(robot), form=form, length=LENGTH),
+        lambda f, robot: Manipulability(f.tip, kind=kind, relative_to=mount(robot), form=form, length=LENGTH),
         value,
         error,
         usable=lambda eyes, f, q: singular_values(eyes, f, q, kind)[-1] > 0.15,
@@ -76,11 +76,10 @@ SUBJECTS: dict[str, Subject] = {
 }
 
 
-def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
+def build(name: str) -> Loop:
     """Both forms, each with its own rows."""
-    other, robot = mutations or {}, machine(name)
-    items: dict[str, Item] = {key: s.declare(other.get(key, s.cls), FRAMES[name], robot) for key, s in SUBJECTS.items()}
-    return Loop(robot, items, DT, name, backend_of(mutations))
+    items = {key: s.declare(FRAMES[name], machine(name)) for key, s in SUBJECTS.items()}
+    return Loop(machine(name), items, DT, name)
 
 
 def climb(loop: Loop, name: str, seed: int = 41, count: int = 8, ticks: int = 400) -> Figures:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from tests.constraints.test_obstacle import coal_shape
+from tests.distances import coal_shape
 from wbc.robot import Robot
 from wbc.shapes import PlacedShape
 

@@ -84,8 +84,8 @@ def turned(eyes: Eyes, f: Hands, q: Array, target: pin.SE3) -> Array:
 
 
 def subject(kind: str, error: Any) -> Subject:
-    def declare(cls: Any, f: Any, robot: Robot) -> Item:
-        return cls(f.left, f.right, kind=kind, at=AT)
+    def declare(f: Any, robot: Robot) -> Item:
+        return RelativePose(f.left, f.right, kind=kind, at=AT)
 
     measure: Any = seen
     return Subject(RelativePose, declare, measure, error)
@@ -103,9 +103,7 @@ def robot(name: str) -> Robot:
     return wbc.robots.load(name, shapes="none")
 
 
-def build(name: str, mutations: dict[str, Any] | None = None) -> Loop:
-    """Every form of the task, some of mutated classes."""
-    other = mutations or {}
+def build(name: str) -> Loop:
+    """Every form of the task."""
     f: Any = FRAMES[name]
-    items = {key: s.declare(other.get(key, s.cls), f, robot(name)) for key, s in SUBJECTS.items()}
-    return HandsLoop(robot(name), items, DT, name)
+    return HandsLoop(robot(name), {key: s.declare(f, robot(name)) for key, s in SUBJECTS.items()}, DT, name)

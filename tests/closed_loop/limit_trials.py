@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from tests.closed_loop.constraints import bend, random_unit
+from tests.closed_loop.constraints import bend
 from tests.closed_loop.eyes import Array, Eyes, cross, length
 from tests.closed_loop.loop import Loop
+from tests.random_robots import unit
 from tests.tasks.robots import Frames
 
 POINT = (0.1, -0.2, 0.05)
@@ -156,7 +157,7 @@ def axis_cone(reference: Callable[[Frames], str]) -> Maker:
             return np.array(base.rotation.T @ own.rotation @ AXIS)
 
         first = seen(q)
-        aside = cross(first, random_unit(rng))
+        aside = cross(first, unit(rng))
         center = pin.exp3(rng.uniform(0.0, 0.3) * aside / length(aside)) @ first
         theta, beyond = angle(first, center), angle(seen(goal), center)
         if beyond - theta < CHANGE:
@@ -189,7 +190,7 @@ def gaze(frame: Callable[[Frames], str], carrier: Callable[[Frames], str]) -> Ma
 
     def trial(loop: Loop, q: Array, goal: Array, rng: np.random.Generator, moving: bool) -> Trial | None:
         eyes, f = loop.eyes, loop.frames
-        aside = cross(AXIS, random_unit(rng))
+        aside = cross(AXIS, unit(rng))
         ahead = pin.exp3(rng.uniform(0.0, 0.3) * aside / length(aside)) @ AXIS * rng.uniform(0.5, 1.0)
         camera, holder = eyes.poses(q, frame(f), carrier(f))
         place = holder.actInv(camera.act(np.array(POINT) + ahead))

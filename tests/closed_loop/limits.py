@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from tests.closed_loop.eyes import Array, Eyes, length
 from tests.closed_loop.limit_trials import AXIS, NORMALS, POINT, Maker, Trial, axis_cone, gaze, point, sided, walls
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import anywhere, near
+from tests.closed_loop.machines import anywhere, machine, near
 from tests.repeats import repeats
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
@@ -42,7 +41,7 @@ class Guard:
     """A constraint, how it is declared, and its trials."""
 
     cls: type[Constraint]
-    declare: Callable[[Any, Frames, Robot], Item]
+    declare: Callable[[Frames, Robot], Item]
     trial: Maker
 
 
@@ -64,56 +63,56 @@ def plane_bend(loop: Loop, before: Array, after: Array, v: Array) -> float:
 GUARDS: dict[str, Guard] = {
     "box": Guard(
         WorkspaceBox,
-        lambda cls, f, robot: cls(f.tip, lower=-5.0, upper=5.0, offset=POINT),
+        lambda f, robot: WorkspaceBox(f.tip, lower=-5.0, upper=5.0, offset=POINT),
         sided(lambda eyes, f, q: point(eyes, q, f.tip, POINT, "world")),
     ),
     "box on a moving frame": Guard(
         WorkspaceBox,
-        lambda cls, f, robot: cls(f.tip, lower=-5.0, upper=5.0, relative_to=f.base, offset=POINT),
+        lambda f, robot: WorkspaceBox(f.tip, lower=-5.0, upper=5.0, relative_to=f.base, offset=POINT),
         sided(lambda eyes, f, q: point(eyes, q, f.tip, POINT, f.base)),
     ),
-    "walls": Guard(WorkspacePolyhedron, lambda cls, f, robot: cls(f.tip, NORMALS, offset=POINT), walls),
-    "cone": Guard(AxisCone, lambda cls, f, robot: cls(f.tip, 1.0, axis=tuple(AXIS)), axis_cone(lambda f: "world")),
+    "walls": Guard(WorkspacePolyhedron, lambda f, robot: WorkspacePolyhedron(f.tip, NORMALS, offset=POINT), walls),
+    "cone": Guard(AxisCone, lambda f, robot: AxisCone(f.tip, 1.0, axis=tuple(AXIS)), axis_cone(lambda f: "world")),
     "cone on a moving frame": Guard(
         AxisCone,
-        lambda cls, f, robot: cls(f.tip, 1.0, axis=tuple(AXIS), relative_to=f.base),
+        lambda f, robot: AxisCone(f.tip, 1.0, axis=tuple(AXIS), relative_to=f.base),
         axis_cone(lambda f: f.base),
     ),
     "view": Guard(
         GazeCone,
-        lambda cls, f, robot: cls(f.tip, 1.0, axis=tuple(AXIS), apex=POINT),
+        lambda f, robot: GazeCone(f.tip, 1.0, axis=tuple(AXIS), apex=POINT),
         gaze(lambda f: f.tip, lambda f: "world"),
     ),
     "view of a moving frame": Guard(
         GazeCone,
-        lambda cls, f, robot: cls(f.base, 1.0, axis=tuple(AXIS), apex=POINT, point_frame=f.tip),
+        lambda f, robot: GazeCone(f.base, 1.0, axis=tuple(AXIS), apex=POINT, point_frame=f.tip),
         gaze(lambda f: f.base, lambda f: f.tip),
     ),
     "limit of a place": Guard(
         Limit,
-        lambda cls, f, robot: cls(
+        lambda f, robot: Limit(
             EndEffector(f.tip, kind="position", relative_to=f.base), lower=-5.0, upper=5.0, only=("z", "x")
         ),
         sided(lambda eyes, f, q: point(eyes, q, f.tip, (0, 0, 0), f.base)[[2, 0]], target=np.zeros(3)),
     ),
     "limit of an elbow": Guard(
         Limit,
-        lambda cls, f, robot: cls(Elbow(f.middle, offset=POINT), lower=-5.0, upper=5.0),
+        lambda f, robot: Limit(Elbow(f.middle, offset=POINT), lower=-5.0, upper=5.0),
         sided(lambda eyes, f, q: point(eyes, q, f.middle, POINT, "world"), aimed=True),
     ),
     "limit of a mass": Guard(
         Limit,
-        lambda cls, f, robot: cls(CenterOfMass(), lower=-5.0, upper=5.0),
+        lambda f, robot: Limit(CenterOfMass(), lower=-5.0, upper=5.0),
         sided(lambda eyes, f, q: eyes.center_of_mass(q), aimed=True),
     ),
     "limit of a distance": Guard(
         Limit,
-        lambda cls, f, robot: cls(Distance(f.tip, f.base, offset=POINT), lower=-5.0),
+        lambda f, robot: Limit(Distance(f.tip, f.base, offset=POINT), lower=-5.0),
         sided(distance, upper=False, target=0.0),
     ),
     "limit of a plane": Guard(
         Limit,
-        lambda cls, f, robot: cls(PitchPlane(*f.plane), lower=-1.0, upper=1.0),
+        lambda f, robot: Limit(PitchPlane(*f.plane), lower=-1.0, upper=1.0),
         sided(
             lambda eyes, f, q: np.array([eyes.plane_angle(q, f.plane)]),
             plane_bend,
@@ -125,11 +124,12 @@ GUARDS: dict[str, Guard] = {
 }
 
 
-def limit_items(name: str, robot: Robot, mutations: dict[str, Any] | None = None) -> dict[str, Item]:
-    """Every guard's item, some of mutated classes, the posture task that pulls, and limits of velocity."""
-    f, other = FRAMES[name], mutations or {}
-    items = {key: guard.declare(other.get(key, guard.cls), f, robot) for key, guard in GUARDS.items()}
-    return items | {"rest": Posture(joints=robot.joint_names), "caps": JointLimits(acceleration=False)}
+def build(name: str) -> Loop:
+    """Every guard's item, the posture task that pulls, and limits of velocity."""
+    robot = machine(name)
+    items = {key: guard.declare(FRAMES[name], robot) for key, guard in GUARDS.items()}
+    items |= {"rest": Posture(joints=robot.joint_names), "caps": JointLimits(acceleration=False)}
+    return Loop(robot, items, DT, name)
 
 
 def check(loop: Loop, name: str, seed: int = 31, starts: int = repeats(12)) -> Figures:

@@ -27,11 +27,6 @@ class Run:
     unsolved: int
 
 
-def backend_of(mutations: object) -> str:
-    """Wrong formulas are noticed within a few starts, sooner than C code is compiled."""
-    return "vm" if mutations else "auto"
-
-
 class Loop:
     """One compiled stack; each check switches on the items that it is about."""
 

@@ -25,11 +25,11 @@ def coupled(name: str) -> Robot:
     return wbc.robots.load(name, shapes="none") if name == "tiago" else wbc.robots.load(name, shapes="none", lock=())
 
 
-def build(name: str, backend: str = "auto") -> Loop:
+def build(name: str) -> Loop:
     """A posture task for all joints; the mechanism's rows are in every stack."""
     robot = coupled(name)
     assert robot.couplings or robot.locked_dofs
-    return Loop(robot, {"rest": Posture(joints=robot.joint_names)}, DT, name, backend)
+    return Loop(robot, {"rest": Posture(joints=robot.joint_names)}, DT, name)
 
 
 def mechanism(loop: Loop, seed: int = 21) -> dict[str, float]:

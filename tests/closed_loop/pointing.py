@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache, partial
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop import tasks
 from tests.closed_loop.eyes import Array, Eyes, cross, length
-from tests.closed_loop.loop import Loop, backend_of
+from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import FEWER, STARTS, anywhere, machine
 from tests.closed_loop.subjects import Subject
 from tests.closed_loop.tasks import DT, GAIN, TICKS, Figures
@@ -78,7 +74,7 @@ def base_of(f: Frames, moving: bool) -> str:
 def align_subject(moving: bool) -> Subject:
     return Subject(
         AxisAlign,
-        lambda cls, f, robot: cls(f.tip, AXIS, relative_to=base_of(f, moving), around=AROUND),
+        lambda f, robot: AxisAlign(f.tip, AXIS, relative_to=base_of(f, moving), around=AROUND),
         lambda eyes, f, q: axis_seen(eyes, f, q, base_of(f, moving)),
         lambda eyes, f, q, t: across(t).T @ shortest(t, axis_seen(eyes, f, q, base_of(f, moving))),
     )
@@ -87,7 +83,7 @@ def align_subject(moving: bool) -> Subject:
 def sight_subject(moving: bool) -> Subject:
     return Subject(
         LookAt,
-        lambda cls, f, robot: cls(f.tip, AXIS, OFFSET, relative_to=base_of(f, moving), around=AROUND),
+        lambda f, robot: LookAt(f.tip, AXIS, OFFSET, relative_to=base_of(f, moving), around=AROUND),
         lambda eyes, f, q: ahead(eyes, f, q, base_of(f, moving)),
         lambda eyes, f, q, t: sight_error(eyes, f, q, base_of(f, moving), t),
     )
@@ -96,8 +92,8 @@ def sight_subject(moving: bool) -> Subject:
 def distance_subject(moving: bool) -> Subject:
     return Subject(
         Distance,
-        lambda cls, f, robot: (
-            cls(f.tip, f.base, offset=OFFSET) if moving else cls(f.tip, offset=OFFSET, point=tuple(CENTER))
+        lambda f, robot: (
+            Distance(f.tip, f.base, offset=OFFSET) if moving else Distance(f.tip, offset=OFFSET, point=tuple(CENTER))
         ),
         lambda eyes, f, q: gap(eyes, f, q, base_of(f, moving)),
         lambda eyes, f, q, t: np.array([gap(eyes, f, q, base_of(f, moving)) - t]),
@@ -112,6 +108,9 @@ SUBJECTS: dict[str, Subject] = {
     "distance from a point": distance_subject(moving=False),
     "distance of frames": distance_subject(moving=True),
 }
+
+#: Subjects whose error falls in size alone
+SIZES = [name for name, s in SUBJECTS.items() if s.cls in (LookAt, Distance)]
 
 MOMENTA: dict[str, tuple[str, slice]] = {
     "momentum": ("both", slice(0, 6)),
@@ -245,42 +244,9 @@ def momentum(loop: Loop, name: str, seed: int = 8) -> Figures:
     return worst
 
 
-@dataclass(frozen=True, eq=False)
-class Check:
-    """Of one item: its name in the stack, and what to run."""
-
-    item: str
-    run: Callable[[Loop], Figures]
-
-
-def _decay(name: str) -> Callable[[Loop], Figures]:
-    sizes = SUBJECTS[name].cls in (LookAt, Distance)
-    return partial(size_decay, name=name) if sizes else partial(tasks.decay, name=name, subjects=SUBJECTS)
-
-
-CHECKS: dict[str, Check] = {
-    **{f"{name}: decay": Check(name, _decay(name)) for name in SUBJECTS},
-    **{f"{name}: tracking": Check(name, partial(tasks.tracking, name=name, subjects=SUBJECTS)) for name in SUBJECTS},
-    "axis: opposite": Check("axis", opposite),
-    "distance from a moving point": Check("distance from a point", moving_point),
-    **{name: Check(name, partial(momentum, name=name)) for name in MOMENTA},
-}
-
-#: What is under test here
-CLASSES = {AxisAlign, LookAt, Distance, Momentum}
-
-
-def build(robot_name: str, mutations: dict[str, Any] | None = None) -> Loop:
-    """The stack of all these items, some of mutated classes."""
-    robot, other = machine(robot_name), mutations or {}
-    items: dict[str, Item] = {
-        name: s.declare(other.get(name, s.cls), FRAMES[robot_name], robot) for name, s in SUBJECTS.items()
-    }
-    items |= {name: other.get(name, Momentum)(kind) for name, (kind, _) in MOMENTA.items()}
-    return Loop(robot, items, DT, robot_name, backend_of(mutations))
-
-
-@cache
-def pointing_loop(robot_name: str) -> Loop:
-    """The compiled stack on a robot, kept for a test process."""
-    return build(robot_name)
+def build(name: str) -> Loop:
+    """The stack of all these items."""
+    robot = machine(name)
+    items: dict[str, Item] = {key: s.declare(FRAMES[name], robot) for key, s in SUBJECTS.items()}
+    items |= {key: Momentum(kind) for key, (kind, _) in MOMENTA.items()}
+    return Loop(robot, items, DT, name)

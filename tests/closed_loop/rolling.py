@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, length
-from tests.closed_loop.loop import Loop, backend_of
+from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import STARTS
-from tests.tasks.items_coordination import contact, slip
+from tests.rates import slip, touching
 from tests.wheels import Vehicle, vehicle
 from wbc.tasks import EndEffector, JointLimits, Posture, Rolling
 
@@ -19,16 +19,16 @@ DT, TICKS, GAIN = 0.02, 25, 10.0
 Figures = dict[str, float]
 
 
-def build(name: str, cls: type[Rolling] = Rolling) -> Loop:
+def build(name: str) -> Loop:
     """The rolling rows, a task on the base, and a posture that pulls every joint, wheels as well."""
     known = vehicle(name)
     items = {
-        "rolling": cls(known.wheels, gain=GAIN),
+        "rolling": Rolling(known.wheels, gain=GAIN),
         "base": EndEffector(known.base),
         "rest": Posture(joints=known.robot.joint_names),
         "caps": JointLimits(acceleration=False),
     }
-    return Loop(known.robot, items, DT, name, backend_of(cls is not Rolling))
+    return Loop(known.robot, items, DT, name)
 
 
 def start(known: Vehicle, rng: np.random.Generator, reach: float) -> Array:
@@ -45,12 +45,12 @@ def start(known: Vehicle, rng: np.random.Generator, reach: float) -> Array:
     return q
 
 
-def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
+def roll(loop: Loop, seed: int = 31) -> Figures:
     """While the base and all joints are pulled elsewhere, the point of each wheel that touches the ground stands still
     along what holds it, and wheels of legs come down to the ground by 1 - gain dt a tick, but for a thousandth of the
     robot's length a second that may be lost.
     """
-    known, rng = vehicle(name), np.random.default_rng(seed)
+    known, rng = vehicle(loop.known), np.random.default_rng(seed)
     legs = known.robot.base == "floating"
     wheels = [known.robot.dofs(wheel.joint).start for wheel in known.wheels]
     keys = ("slip", "fall", "left", "astray", "too fast", "unsolved")
@@ -66,7 +66,7 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
         loop["rest"].target = goal
         ground = pin.SE3.Identity()
         if legs:
-            ground.translation[2] = np.mean([contact(known.robot, w, ground, q)[0][2] for w in known.wheels])
+            ground.translation[2] = np.mean([touching(known.robot, w, ground, q)[0][2] for w in known.wheels])
         loop["rolling"].ground = ground
         run = loop.run(q, TICKS)
         figures["unsolved"] += run.unsolved
@@ -74,7 +74,7 @@ def roll(loop: Loop, name: str, seed: int = 31) -> Figures:
         for before, v in zip(run.q[:-1:4], speeds[::4], strict=True):
             figures["slip"] = max(figures["slip"], slips(known, ground, before, v))
         if legs:
-            h = np.array([[contact(known.robot, w, ground, q)[0][2] for w in known.wheels] for q in run.q])
+            h = np.array([[touching(known.robot, w, ground, q)[0][2] for w in known.wheels] for q in run.q])
             h -= ground.translation[2]
             fall = np.abs(np.diff(h, axis=0) / DT + GAIN * h[:-1]) / known.robot.characteristic_length
             figures["fall"] = max(figures["fall"], float(fall.max()))
@@ -101,7 +101,7 @@ def slips(known: Vehicle, ground: pin.SE3, q: Array, v: Array) -> float:
     """Largest slip of a contact along what holds it [m/s]."""
     slipped, up = 0.0, np.array([0.0, 0.0, 1.0])
     for wheel in known.wheels:
-        _, forwards = contact(known.robot, wheel, ground, q)
+        _, forwards = touching(known.robot, wheel, ground, q)
         moved = slip(known.robot, wheel, ground, q, v)
         if wheel.roller is None:
             slipped = max(slipped, length(moved[:2]))

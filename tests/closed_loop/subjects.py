@@ -40,7 +40,7 @@ class Subject:
 
     Attributes:
         cls: its class.
-        declare: the item, from its class (or a mutation of it), frames and robot.
+        declare: the item, from frames and robot.
         measure: the task's quantity at a configuration, as a target would be written.
         error: what the quantity at a configuration lacks, in coordinates that the class says decay independently.
         reach: how far targets are from starts in every degree of freedom [rad, m].
@@ -50,7 +50,7 @@ class Subject:
     """
 
     cls: type[Task]
-    declare: Callable[[Any, Frames, Robot], Item]
+    declare: Callable[[Frames, Robot], Item]
     measure: Callable[[Eyes, Frames, Array], Any]
     error: Callable[[Eyes, Frames, Array, Any], Array]
     reach: float = 0.25
@@ -85,9 +85,9 @@ def height_and_distance(eyes: Eyes, f: Frames, q: Array) -> Array:
     return np.array([tip[2] - 0.3 * middle[1], np.linalg.norm(tip - base)])
 
 
-def declare_expression(cls: Any, f: Frames, robot: Robot) -> Item:
+def declare_expression(f: Frames, robot: Robot) -> Item:
     """Height of the tip less a part of the elbow's y, and distance of the tip from the base frame."""
-    return cls(
+    return Expression(
         lambda kin, p: (
             ca.vertcat(
                 kin.position(f.tip)[2] - 0.3 * kin.position(f.middle)[1],
@@ -107,8 +107,8 @@ def plane_subject(axis: bool) -> Subject:
     def joint(f: Frames) -> str | None:
         return f.axis if axis else None
 
-    def declare(cls: Any, f: Frames, robot: Robot) -> Item:
-        return cls(*f.plane, axis=f.axis, reference=PlaneReference()) if axis else cls(*f.plane)
+    def declare(f: Frames, robot: Robot) -> Item:
+        return PitchPlane(*f.plane, axis=f.axis, reference=PlaneReference()) if axis else PitchPlane(*f.plane)
 
     return Subject(
         PitchPlane,
@@ -122,37 +122,37 @@ def plane_subject(axis: bool) -> Subject:
 SUBJECTS: dict[str, Subject] = {
     "hand": Subject(
         EndEffector,
-        lambda cls, f, robot: cls(f.tip),
+        lambda f, robot: EndEffector(f.tip),
         lambda eyes, f, q: eyes.pose(q, f.tip),
         pose_error,
     ),
     "hand, turn about z free, own axes": Subject(
         EndEffector,
-        lambda cls, f, robot: cls(f.tip, axes="frame", weights=FREE_Z),
+        lambda f, robot: EndEffector(f.tip, axes="frame", weights=FREE_Z),
         lambda eyes, f, q: eyes.pose(q, f.tip),
         own_axes_error,
     ),
     "hand's place from a moving frame": Subject(
         EndEffector,
-        lambda cls, f, robot: cls(f.tip, kind="position", relative_to=f.base),
+        lambda f, robot: EndEffector(f.tip, kind="position", relative_to=f.base),
         lambda eyes, f, q: np.array(seen_from_base(eyes, f, q).translation),
         lambda eyes, f, q, target: seen_from_base(eyes, f, q).translation - target,
     ),
     "hand's turn from a moving frame": Subject(
         EndEffector,
-        lambda cls, f, robot: cls(f.tip, kind="orientation", relative_to=f.base),
+        lambda f, robot: EndEffector(f.tip, kind="orientation", relative_to=f.base),
         lambda eyes, f, q: seen_from_base(eyes, f, q).rotation.copy(),
         lambda eyes, f, q, target: pin.log3(seen_from_base(eyes, f, q).rotation @ target.T),
     ),
     "elbow": Subject(
         Elbow,
-        lambda cls, f, robot: cls(f.middle, offset=POINT),
+        lambda f, robot: Elbow(f.middle, offset=POINT),
         elbow_point,
         lambda eyes, f, q, target: elbow_point(eyes, f, q) - target,
     ),
     "elbow, own axes": Subject(
         Elbow,
-        lambda cls, f, robot: cls(f.middle, offset=POINT, axes="frame"),
+        lambda f, robot: Elbow(f.middle, offset=POINT, axes="frame"),
         elbow_point,
         lambda eyes, f, q, target: eyes.pose(q, f.middle).rotation.T @ (elbow_point(eyes, f, q) - target),
     ),
@@ -160,14 +160,14 @@ SUBJECTS: dict[str, Subject] = {
     "plane across an axis": plane_subject(axis=True),
     "posture": Subject(
         Posture,
-        lambda cls, f, robot: cls(joints=robot.joint_names),
+        lambda f, robot: Posture(joints=robot.joint_names),
         lambda eyes, f, q: q.copy(),
         lambda eyes, f, q, target: np.array(pin.difference(eyes.model, target, q)),
         reach=0.6,
     ),
     "centre of mass": Subject(
         CenterOfMass,
-        lambda cls, f, robot: cls(),
+        lambda f, robot: CenterOfMass(),
         lambda eyes, f, q: eyes.center_of_mass(q),
         lambda eyes, f, q, target: eyes.center_of_mass(q) - target,
     ),
@@ -186,24 +186,14 @@ def damping_weights(robot: Robot) -> Array:
     return 0.1 * np.arange(1, robot.nv + 1)
 
 
-def declare_damping(cls: Any, f: Frames, robot: Robot) -> Item:
-    return cls(weights=damping_weights(robot))
-
-
-def declare_plane_rate(cls: Any, f: Frames, robot: Robot) -> Item:
-    return cls(*f.plane, axis=f.axis)
-
-
-#: Tasks that command a velocity and have no error that decays
-RATES: dict[str, tuple[type[Task], Callable[[Any, Frames, Robot], Item]]] = {
-    "damping": (Damping, declare_damping),
-    "rate of the plane": (PitchPlane, declare_plane_rate),
-}
-
-
-def task_items(name: str, robot: Robot, mutations: dict[str, Any] | None = None) -> dict[str, Item]:
-    """Every task under test by name, some of mutated classes; "rest", a posture to rest in, and joint limits."""
-    classes = {key: (s.cls, s.declare) for key, s in SUBJECTS.items()} | RATES
-    other = mutations or {}
-    items = {key: declare(other.get(key, cls), FRAMES[name], robot) for key, (cls, declare) in classes.items()}
-    return items | {"rest": Posture(), "limits": JointLimits()}
+def task_items(name: str, robot: Robot) -> dict[str, Item]:
+    """Every task under test by name; damping and a plane's rate, which have no error that decays; "rest", a posture to
+    rest in, and joint limits.
+    """
+    f = FRAMES[name]
+    return {key: s.declare(f, robot) for key, s in SUBJECTS.items()} | {
+        "damping": Damping(weights=damping_weights(robot)),
+        "rate of the plane": PitchPlane(*f.plane, axis=f.axis),
+        "rest": Posture(),
+        "limits": JointLimits(),
+    }

@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from tests.closed_loop.eyes import Array, length
 from tests.closed_loop.loop import Loop
-from tests.closed_loop.machines import FEWER, STARTS, anywhere, near
-from tests.closed_loop.subjects import SUBJECTS, Subject, damping_weights
+from tests.closed_loop.machines import FEWER, STARTS, anywhere, machine, near
+from tests.closed_loop.subjects import SUBJECTS, Subject, damping_weights, task_items
 from wbc.tasks import Posture
 
 DT, GAIN, TICKS = 0.02, 5.0, 110
@@ -21,6 +21,11 @@ DT, GAIN, TICKS = 0.02, 5.0, 110
 LEAST_SINGULAR_VALUE = 0.1
 
 Figures = dict[str, float]
+
+
+def build(name: str) -> Loop:
+    """The stack of all tasks on a robot."""
+    return Loop(machine(name), task_items(name, machine(name)), DT, name)
 
 
 def slope(loop: Loop, subject: Subject, q: Array) -> Array:

@@ -7,7 +7,6 @@ import pytest
 
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
-from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.fixed import Fixed
 from wbc.tasks.joint_limits import JointLimits
@@ -64,16 +63,3 @@ def test_rows_and_order() -> None:
     bot = robot("talos")
     assert tuple(r.label for r in Fixed(bot.joint_names[0]).rows(bot)) == bot.dof_names
     assert Fixed.order == SacrificeOrder.HOLD
-
-
-def test_bad_declarations() -> None:
-    bot = robot("panda")
-    for bad in ((), None, (1, 2)):
-        with pytest.raises(ShapeError, match=r"Fixed\.joints"):
-            Fixed(bad)  # type: ignore[arg-type]
-    with pytest.raises(DuplicateNameError, match="panda_joint1"):
-        Fixed(["panda_joint1", "panda_joint1"])
-    with pytest.raises(ShapeError, match=r"Fixed\.acceleration"):
-        Fixed("panda_joint1", acceleration=2)
-    with pytest.raises(UnknownNameError, match="did you mean 'panda_joint1'"):
-        Fixed("panda_joint_1").validate(bot)

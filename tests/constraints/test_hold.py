@@ -6,40 +6,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.items import tip
-from tests.constraints.robots import NAMES, robot
+from tests.constraints.robots import robot
 from tests.evaluation import probe, random_configuration
 from wbc.api import Stack
-from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import NotFiniteError, ShapeError
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.hold import Hold
-
-ROWS = {"pose": slice(0, 6), "position": slice(0, 3), "orientation": slice(3, 6)}
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("kind", ROWS)
-def test_rows_against_pinocchio(name: str, kind: str) -> None:
-    bot, rng = robot(name), np.random.default_rng(21)
-    frame = tip(bot)
-    hold = probe(Hold(frame, kind), bot)
-    data, number = bot.model.createData(), bot.model.getFrameId(frame)
-    for _ in range(20):
-        q, gain = random_configuration(bot, rng), rng.uniform(0.0, 20.0)
-        target = pin.SE3(pin.exp3(rng.uniform(-1.5, 1.5, 3)), rng.uniform(-1, 1, 3))
-        jacobian = pin.computeFrameJacobian(bot.model, data, q, number, pin.LOCAL_WORLD_ALIGNED)
-        pin.framesForwardKinematics(bot.model, data, q)
-        here = data.oMf[number]
-        drift = np.concatenate([here.translation - target.translation, pin.log3(here.rotation @ target.rotation.T)])
-        matrix, lower, upper = hold(q, target=target, gain=gain)
-        assert matrix == pytest.approx(jacobian[ROWS[kind]], abs=1e-10)
-        assert lower == pytest.approx(-gain * drift[ROWS[kind]], abs=1e-9)
-        assert (lower == upper).all()
 
 
 def test_default_target_is_the_pose_of_the_first_step() -> None:
     bot = robot("talos")
-    item, q = Hold(tip(bot)), random_configuration(bot, np.random.default_rng(22))
+    item, q = Hold("gripper_left_base_link"), random_configuration(bot, np.random.default_rng(22))
     assert [i.default for i in item.inputs(bot) if i.name == "target"] == [None]
     _, lower, upper = probe(item, bot)(q, **item.initial(bot, q))
     assert lower == pytest.approx(np.zeros(6), abs=1e-12)
@@ -128,16 +105,3 @@ def test_the_part_of_a_pose_that_counts_is_a_target(kind: str) -> None:
     for targets in (parts[0], [parts[0]] * 3, [pose] * 3, pose, [whole[2], parts[0], whole[1]]):
         batch.set(hold=targets)
         assert np.round(batch.step(np.tile(q, (3, 1))).v, 9).tolist() == [list(v) for v in found] * 3
-
-
-def test_bad_declarations() -> None:
-    bot = robot("panda")
-    with pytest.raises(UnknownNameError, match=r"Hold\.kind"):
-        Hold("panda_hand", "positions")  # type: ignore[arg-type]
-    with pytest.raises(RangeError, match=r"Hold\.gain"):
-        Hold("panda_hand", gain=-1.0)
-    with pytest.raises(UnknownNameError, match="did you mean 'panda_hand'"):
-        Hold("panda_hnd").validate(bot)
-    for still in ("world", "panda_link0"):
-        with pytest.raises(RangeError, match="no joint moves"):
-            Hold(still).validate(bot)

@@ -9,7 +9,6 @@ import pytest
 
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
-from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.joint_limits import JointLimits
 
@@ -99,27 +98,6 @@ def test_a_row_for_every_degree_of_freedom(name: str) -> None:
     assert tuple(r.label for r in rows) == bot.dof_names
     assert {r.unit for r in rows} <= {"rad/s", "m/s"}
     assert JointLimits().order == SacrificeOrder.ACTUATOR
-
-
-def test_bad_declarations_name_the_field() -> None:
-    bot = robot("panda")
-    bad = [
-        (RangeError, "JointLimits.margin", {"margin": -0.1}),
-        (NotFiniteError, "JointLimits.margin", {"margin": np.nan}),
-        (RangeError, "JointLimits.shortest_dt", {"shortest_dt": 0.0}),
-        (RangeError, "JointLimits.return_rate", {"return_rate": -1.0}),
-        (ShapeError, "JointLimits.position", {"position": "yes"}),
-        (ShapeError, "JointLimits.joints", {"joints": ()}),
-        (DuplicateNameError, "JointLimits.joints", {"joints": ("panda_joint1", "panda_joint1")}),
-    ]
-    for error, field, arguments in bad:
-        with pytest.raises(error, match=field.replace(".", r"\.")):
-            JointLimits(**arguments)
-    with pytest.raises(UnknownNameError, match="did you mean 'panda_joint4'") as caught:
-        JointLimits(joints=["panda_joint44"]).validate(bot)
-    assert caught.value.choices[0] == "panda_joint4"
-    with pytest.raises(RangeError, match="panda_joint6"):
-        JointLimits(margin=1.9, joints=("panda_joint6",)).validate(bot)
 
 
 def test_declarations_are_frozen_and_plain_data() -> None:

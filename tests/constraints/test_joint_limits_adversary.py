@@ -11,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.repeats import repeats
-from wbc.tasks import joint_limits
-from wbc.tasks.braking import braking_bound
 from wbc.tasks.joint_limits import allowed_interval
 
 
@@ -237,20 +235,3 @@ def test_too_fast_is_braked_at_the_acceleration_limit() -> None:
         assert lower == upper == v - 10.0 * 0.005
         lower, upper = (float(e) for e in interval(-q, -v, 0.005, scale))
         assert lower == upper == -v + 10.0 * 0.005
-
-
-MUTATIONS = {
-    "textbook": lambda d, a, dt, s: d / dt if np.isinf(a) else ca.sqrt(2 * a * d),
-    "one tick late": lambda d, a, dt, s: braking_bound(d, a, dt, s) + (0.0 if np.isinf(a) else a * dt),
-    "acceleration forgotten": lambda d, a, dt, s: d / dt,
-}
-
-
-@pytest.mark.parametrize("name", MUTATIONS)
-def test_a_wrong_braking_formula_is_caught(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    joints = draw(np.random.default_rng(1), 25)
-    check(attack(joints, np.full(3000, 0.005), None, seed=2))
-    monkeypatch.setattr(joint_limits, "braking_bound", MUTATIONS[name])
-    worst = attack(joints, np.full(3000, 0.005), None, seed=2)
-    assert worst["crossed"] <= 0.0, "clipping keeps the interval whatever the formula"
-    assert worst["passed"] > 1e-6

@@ -2,47 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
 import wbc
 from tests.evaluation import numbers
-from tests.refusals import assert_refused
 from tests.stack import small
 from tests.tasks.robots import FRAMES, random_configuration, robot
-from wbc.errors import (
-    BoundsError,
-    DuplicateNameError,
-    NotFiniteError,
-    RangeError,
-    ShapeError,
-    UnknownNameError,
-    WbcError,
-)
 from wbc.stack.key import key
 from wbc.tasks import (
-    AxisAlign,
     CenterOfMass,
-    Damping,
     Elbow,
     EndEffector,
     Expression,
-    Input,
     Item,
     JointLimits,
     Limit,
-    Momentum,
     PitchPlane,
     PitchPlaneLimit,
     Posture,
 )
-from wbc.tasks.base import Row, Task
 
 HAND = "panda_hand"
 INF = np.inf
@@ -151,60 +133,6 @@ def test_step_reports_a_faded_limit() -> None:
 
 
 # What is refused
-
-
-@dataclass(frozen=True)
-class Below(Task):
-    """A user's task with an input that is called like one of a limit."""
-
-    def inputs(self, robot: object) -> tuple[Input, ...]:
-        return (Input("lower", default=0.0),)
-
-    def rows(self, robot: object) -> tuple[Row, ...]:
-        return (Row("a", "rad"),)
-
-    def error(self, robot: object, kin: Any, inputs: Any) -> ca.SX:
-        return kin.q[0] - inputs["lower"]
-
-
-def rate_of_plane() -> PitchPlane:
-    return PitchPlane("panda_link2", "panda_link4", "panda_link6", axis="panda_joint4")
-
-
-CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
-    "no task": (lambda: Limit(JointLimits(), lower=0.0), ShapeError, "Limit.task"),
-    "a name": (lambda: Limit("hand", lower=0.0), ShapeError, "expected a task"),
-    "a limit": (lambda: Limit(Limit(PLACE, lower=0.0), upper=1.0), ShapeError, "expected a task"),
-    "damping": (lambda: Limit(Damping(), upper=1.0), ShapeError, "its rows are velocities"),
-    "momentum": (lambda: Limit(Momentum(), upper=1.0), ShapeError, "its rows are velocities"),
-    "alignment": (lambda: Limit(AxisAlign(HAND), upper=1.0), ShapeError, "its rows are velocities"),
-    "rate of a plane": (lambda: Limit(rate_of_plane(), upper=1.0), ShapeError, "its rows are velocities"),
-    "bad task": (lambda: Limit(Elbow("panda_hnd"), upper=1.0), UnknownNameError, "Elbow.frame"),
-    "still task": (lambda: Limit(Elbow("panda_link0"), upper=1.0), RangeError, "no joint moves"),
-    "no limit": (lambda: Limit(PLACE), ShapeError, "a lower or an upper limit"),
-    "crossed": (lambda: Limit(PLACE, (0, 0, 1), 0.5), BoundsError, "above upper = 0.5 in entry 2"),
-    "counts differ": (lambda: Limit(PLACE, (0, 0, 1), (1, 2)), ShapeError, "lower has 3 numbers"),
-    "count": (lambda: Limit(PLACE, (0, 1)), ShapeError, "one number, or 3"),
-    "count of selected": (lambda: Limit(PLACE, (0, 1, 2), only=("x", "z")), ShapeError, "one number, or 2"),
-    "matrix": (lambda: Limit(PLACE, np.zeros((3, 1))), ShapeError, "Limit.lower"),
-    "empty": (lambda: Limit(PLACE, ()), ShapeError, "Limit.lower"),
-    "NaN": (lambda: Limit(PLACE, np.nan), NotFiniteError, "Limit.lower"),
-    "wrong infinity": (lambda: Limit(PLACE, upper=-INF), NotFiniteError, "Limit.upper"),
-    "row": (lambda: Limit(EndEffector(HAND), 0.0, only="rw"), UnknownNameError, "'rx'"),
-    "row twice": (lambda: Limit(PLACE, 0.0, only=("x", "x")), DuplicateNameError, "Limit.only"),
-    "rows type": (lambda: Limit(PLACE, 0.0, only=3), ShapeError, "Limit.only"),
-    "input's name": (lambda: Limit(Below(), 0.0), DuplicateNameError, "'lower'"),
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_bad_declaration(case: str) -> None:
-    make, error, text = CASES[case]
-    assert_refused(lambda: make().validate(robot("panda")), error, text)
-
-
-def test_a_name_is_free_where_that_side_is_left_out() -> None:
-    Limit(Below(), upper=1.0).validate(robot("panda"))
 
 
 # The cache

@@ -11,11 +11,11 @@ import numpy as np
 import pinocchio as pin
 
 # isort: split
-import coal
 import pytest
 
-from tests.constraints.test_obstacle import coal_distance, coal_pose, coal_shape, random_pose
+from tests.distances import coal_distance
 from tests.evaluation import numbers, probe, random_configuration
+from tests.random_robots import random_pose
 from tests.tasks.robots import robot as registered
 from tests.tasks.test_registry import check_derivatives
 from wbc.robot import Robot
@@ -79,9 +79,7 @@ def ball_gap(center: np.ndarray, radius: float, face: Box | Cylinder, pose: pin.
     """Distance of a ball to a box (by Coal) or to a cylinder."""
     if isinstance(face, Cylinder):
         return cylinder_gap(pose.actInv(center), radius, face)
-    request, ball = coal.DistanceRequest(), coal_pose(pin.SE3(np.eye(3), center))
-    request.enable_signed_distance = True
-    return coal.distance(coal.Sphere(radius), ball, coal_shape(face), coal_pose(pose), request, coal.DistanceResult())
+    return coal_distance(Sphere(radius), pin.SE3(np.eye(3), center), face, pose)
 
 
 class Ends(Obstacle):
@@ -110,12 +108,12 @@ def test_margins_are_those_of_coal(solid: Solid, other: Shape) -> None:
     bot, link = carrying(solid)
     item, rng = Obstacle(other), np.random.default_rng(21)
     clear, inside, outside = probe(item, bot), 0, 0
-    (_, _, placed), rows = item.pairs(bot)[0], len(item.rows(bot))
+    rows = len(item.rows(bot))
     for _ in range(60):
         q = random_configuration(bot, rng)
         pose = near(bot, q, link, rng)
         h = clear(q, pose=pose)[0]
-        truth = coal_distance(bot, q, link, placed, other, pose)
+        truth = coal_distance(solid, where(bot, q, link), other, pose)
         if Cylinder in (type(solid), type(other)) and Sphere in (type(solid), type(other)):
             # In a cylinder Coal's own iteration is off by millimetres
             here = where(bot, q, link)
@@ -147,7 +145,7 @@ def test_ends_of_a_capsule_against_faces(solid: Solid, other: Shape) -> None:
             truth = ball_gap(end, rod.radius, face, other_at)
             assert h[row] == pytest.approx(truth, abs=1e-9)
             touching += truth < 0
-        whole = coal_distance(bot, q, link, bot.shapes[link][0], other, pose)
+        whole = coal_distance(solid, here, other, pose)
         assert whole < 0 or h.min() > whole - 1e-6
     assert touching > 3
 

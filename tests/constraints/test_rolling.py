@@ -11,8 +11,8 @@ import pytest
 
 import wbc
 from tests.evaluation import numbers
+from tests.rates import touching
 from tests.refusals import assert_refused
-from tests.tasks.items_coordination import contact
 from tests.wheels import (
     CENTAURO_RADIUS,
     OMNI_ANGLES,
@@ -93,7 +93,7 @@ def test_ground_is_level_under_the_first_wheel_unless_it_is_set() -> None:
     q = pin.integrate(legs.robot.model, legs.robot.neutral, spread * rng.uniform(-1, 1, legs.robot.nv))
     ground = Rolling(legs.wheels).initial(legs.robot, q)["ground"]
     assert (ground.rotation == np.eye(3)).all()
-    assert ground.translation[2] == pytest.approx(contact(legs.robot, legs.wheels[0], ground, q)[0][2], abs=1e-12)
+    assert ground.translation[2] == pytest.approx(touching(legs.robot, legs.wheels[0], ground, q)[0][2], abs=1e-12)
     level, slope = (
         numbers(Rolling(legs.wheels), legs.robot)(q, {"gain": 0.0, "ground": pin.SE3(turn, np.zeros(3))})["matrix"]
         for turn in (np.eye(3), pin.exp3(np.array([0.2, 0.0, 0.0])))
@@ -200,5 +200,5 @@ def test_radius_of_the_legs_wheels_is_below_their_centres() -> None:
     pin.forwardKinematics(legs.robot.model, data, legs.robot.neutral)
     for wheel in legs.wheels:
         centre = data.oMi[legs.robot.model.getJointId(wheel.joint)].translation
-        point = contact(legs.robot, wheel, pin.SE3.Identity(), legs.robot.neutral)[0]
+        point = touching(legs.robot, wheel, pin.SE3.Identity(), legs.robot.neutral)[0]
         assert centre - point == pytest.approx([0.0, 0.0, CENTAURO_RADIUS], abs=1e-6)

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 import wbc
 from tests.constraints.robots import robot as limited_robot
+from tests.evaluation import sample
 from tests.tasks.robots import FRAMES, random_configuration
 from wbc.api import Controller, Stack
 from wbc.controller import core_of
@@ -28,7 +29,6 @@ from wbc.tasks import (
     Obstacle,
     Posture,
 )
-from wbc.tasks import inputs as run_time
 
 DT = 0.005
 NAMES = ("panda", "ur5", "kinova", "talos")
@@ -108,24 +108,6 @@ def humanoid(calm: bool = True) -> Stack:
     stack.add(Posture(), name="posture", weight=1e-3)
     stack.add(JointLimits(), name="limits")
     return stack
-
-
-def sample(bot: Robot, declared: Any, rng: np.random.Generator) -> Any:
-    """A value of an input: places within a metre, rates of order 1, any rotation."""
-    if declared.kind == "pose":
-        return pin.SE3(pin.exp3(rng.uniform(-2.0, 2.0, 3)), rng.uniform(-0.8, 0.8, 3))
-    if declared.kind == "rotation":
-        return pin.exp3(rng.uniform(-2.0, 2.0, 3))
-    if declared.kind == "configuration":
-        return random_configuration(bot, rng)
-    size = run_time.size(bot, declared)
-    if np.isfinite(declared.high):
-        numbers = rng.uniform(declared.low, declared.high, size)
-    elif declared.low >= 0.0:
-        numbers = rng.uniform(0.05, 1.5, size)
-    else:
-        numbers = rng.uniform(-0.8, 0.8, size)
-    return float(numbers[0]) if declared.size == 0 and declared.kind == "vector" else numbers
 
 
 def randomise(controller: Controller, rng: np.random.Generator) -> dict[str, dict[str, Any]]:

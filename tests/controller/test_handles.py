@@ -13,7 +13,7 @@ import pytest
 
 import wbc
 from tests.controller.stacks import robot
-from tests.tasks.items import FACTORIES
+from tests.items import ITEMS
 from wbc.controller.handle import UnknownValueError
 from wbc.errors import DuplicateNameError, UnknownNameError
 from wbc.pages import stub
@@ -59,7 +59,7 @@ WRONG = {8, 11, 13, 14, 16}
 def test_every_value_of_an_item_is_in_the_stub(name: str) -> None:
     known, seen = set(stub.values(registry()[name])), set[str]()
     bot = robot("panda")
-    for item, _ in FACTORIES[name](bot):
+    for item, _ in ITEMS[name](bot):
         stack = wbc.Stack(bot, 0.01)
         stack.add(item, name="it")
         slots = set(Layout(stack).blocks["it"].slots)

@@ -18,8 +18,8 @@ import pytest
 
 import wbc
 from tests.controller.stacks import controller, near_limits, randomise
+from tests.items import ITEMS
 from tests.stack import small
-from tests.tasks.items import FACTORIES
 from tests.tasks.robots import robot
 from wbc import Stack
 from wbc.errors import PicklingError
@@ -29,8 +29,6 @@ from wbc.stack.key import key
 from wbc.tasks import Expression, Item, Limit, Obstacle, Posture
 
 TOP = Path(__file__).parents[2]
-#: Held to be all of the registry by the walk over derivatives
-SHIPPED = sorted(FACTORIES)
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
 
 
@@ -47,10 +45,10 @@ def used(stack: Stack) -> Stack:
     return stack
 
 
-@pytest.mark.parametrize("class_name", SHIPPED)
+@pytest.mark.parametrize("class_name", ITEMS)
 def test_every_item_comes_out_as_it_went_in(class_name: str) -> None:
     machine = robot("panda")
-    for k, (item, _) in enumerate(FACTORIES[class_name](machine)):
+    for k, (item, _) in enumerate(ITEMS[class_name](machine)):
         stack = Stack(machine, 0.005)
         # a mechanism is in the stack already
         if class_name != "Mechanism":

@@ -7,19 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.constraints.items_forces import NO_VELOCITIES
-from tests.tasks.items import FACTORIES
+from tests.items import ITEMS, SWITCHED
 from tests.tasks.robots import random_configuration, robot
 from wbc import Controller, Stack
 from wbc.controller import core_of
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.robot import Robot
 from wbc.tasks import JointLimits, Posture
 
 DT = 0.005
-#: Held to be all of the registry by the walk over derivatives. A mechanism is in every stack of a robot that needs one.
-#: Limits of torques are no part of a stack that commands velocities: tests/torque
-SHIPPED = sorted(FACTORIES.keys() - {"Mechanism"} - NO_VELOCITIES)
 STATES = 3
 
 
@@ -32,7 +28,7 @@ def declared(class_name: str | None) -> Controller:
     """A posture and joint limits, and one item of the class."""
     stack = Stack(machine(), DT).add(Posture(), name="posture").add(JointLimits(), name="limits")
     if class_name is not None:
-        item, given = FACTORIES[class_name](machine())[0]
+        item, given = ITEMS[class_name](machine())[0]
         stack.add(item, name="it")
         out = stack.compile(backend="vm")
         out["it"].set(**given)
@@ -59,7 +55,7 @@ def is_as_without(one: Controller) -> None:
         assert not any(row.item == "it" for row in (*step.binding, *step.relaxed))
 
 
-@pytest.mark.parametrize("class_name", SHIPPED)
+@pytest.mark.parametrize("class_name", SWITCHED)
 def test_switched_off_is_not_declared(class_name: str) -> None:
     one = declared(class_name)
     one.reset(machine().neutral)
@@ -89,8 +85,8 @@ def test_switched_off_is_not_declared(class_name: str) -> None:
     assert np.allclose(np.frombuffer(one.step(*plain()[0][:2])._data), np.frombuffer(before), rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("class_name", SHIPPED)
-def test_bad_switches_change_nothing(class_name: str) -> None:
+@pytest.mark.parametrize("class_name", SWITCHED)
+def test_bad_values_and_switches_change_nothing(class_name: str) -> None:
     one = declared(class_name)
     it, rows = one["it"], len(core_of(one).layout.blocks["it"].rows)
     buffers = [getattr(core_of(one).tick, name) for name in ("weight", "enabled", "bound_enabled", "p")]
@@ -104,6 +100,16 @@ def test_bad_switches_change_nothing(class_name: str) -> None:
     ):
         with pytest.raises(kind, match=rf"^it\.{name}"):
             setattr(it, name, bad)
+    for slot in core_of(one).layout.blocks["it"].slots.values():
+        for bad in ("text", np.full(slot.size or 1, np.nan), np.zeros(slot.size + 11), None):
+            with pytest.raises((ShapeError, NotFiniteError), match=rf"^it\.{slot.input.name}"):
+                setattr(it, slot.input.name, bad)
+            with pytest.raises((ShapeError, NotFiniteError), match=rf"^it\.{slot.input.name}"):
+                it.set(**{slot.input.name: bad})
+        low = 0.0 if slot.input.direction else slot.input.low - 1.0
+        if np.isfinite(low):
+            with pytest.raises(RangeError, match=rf"^it\.{slot.input.name}"):
+                setattr(it, slot.input.name, np.full(slot.size, low) if slot.input.size else low)
     if core_of(one).layout.blocks["it"].form == "task":
         with pytest.raises(RangeError, match=r"^it\.weight"):
             it.weight = -1.0

@@ -17,10 +17,9 @@ import pytest
 
 import wbc
 from tests.closed_loop.machines import anywhere, near
-from tests.constraints.items_forces import NO_VELOCITIES
 from tests.evaluation import numbers, sample
+from tests.items import ITEMS, SWITCHED
 from tests.repeats import covering
-from tests.tasks.items import FACTORIES
 from tests.tasks.robots import FRAMES, robot
 from wbc.api import Controller
 from wbc.controller import Step, core_of
@@ -29,9 +28,6 @@ from wbc.tasks import Constraint, EndEffector, Item, JointLimits, Posture
 
 DT = 0.01
 ROBOTS = ("panda", "talos")
-
-#: A robot's own couplings are no item that one switches, and what is about torques is for stacks that command them
-CLASSES = sorted(FACTORIES.keys() - {"Mechanism"} - NO_VELOCITIES)
 
 #: Violations that are switched on [m, rad], and how far from there the configurations are that have none
 SHALLOW, DEEP, REACH = 0.01, 0.2, 0.6
@@ -88,7 +84,7 @@ class Motion:
 
 def simplest(name: str, machine: Robot) -> Item:
     """The declaration of a class that has the fewest rows: random values leave it feasible most often."""
-    return min((item for item, _ in FACTORIES[name](machine)), key=lambda item: len(item.rows(machine)))
+    return min((item for item, _ in ITEMS[name](machine)), key=lambda item: len(item.rows(machine)))
 
 
 @cache
@@ -97,7 +93,7 @@ def motion(name: str) -> Motion:
     speeds = np.where(np.isfinite(bare.limits.velocity), bare.limits.velocity, 1.0)
     machine = bare.with_limits(velocity=speeds, acceleration=10.0)
     stack = wbc.Stack(machine, DT)
-    for key in CLASSES:
+    for key in SWITCHED:
         stack.add(simplest(key, machine), name=key)
     stack.add(EndEffector(FRAMES[name].tip, kind="position", gain=3.0), name="reach")
     stack.add(Posture(gain=3.0), name="rest", weight=1e-2)
@@ -109,7 +105,7 @@ def scene(where: str, name: str) -> tuple[Motion, np.random.Generator]:
     return motion(where), np.random.default_rng(zlib.crc32(f"{name} {where}".encode()))
 
 
-@pytest.mark.parametrize(("name", "where"), covering(CLASSES, ROBOTS))
+@pytest.mark.parametrize(("name", "where"), covering(SWITCHED, ROBOTS))
 def test_switched_while_moving(name: str, where: str) -> None:
     """Random values, which may ask for the impossible, come and go as a whole and row by row."""
     moving, rng = scene(where, name)
@@ -135,7 +131,7 @@ def test_switched_while_moving(name: str, where: str) -> None:
 
 MARGINS = [
     name
-    for name in CLASSES
+    for name in SWITCHED
     if isinstance(item := simplest(name, robot("panda")), Constraint) and item.form == "margins"
 ]
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
 import wbc
-from tests.constraints.test_obstacle import coal_pose, coal_shape
+from tests.distances import coal_distance
 from wbc.api import Stack
 from wbc.controller import core_of
 from wbc.ik import Ending, InverseKinematics
@@ -227,10 +226,8 @@ def nearest(robot: Robot, q: Array, ball: pin.SE3) -> float:
     for link, shapes in robot.shapes.items():
         frame = robot.model.getFrameId(link)
         for placed in shapes if robot.model.frames[frame].parentJoint > 0 else ():
-            where = coal_pose(data.oMf[frame] * placed.placement)
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            found = coal.distance(coal_shape(placed.shape), where, coal.Sphere(0.15), coal_pose(ball), request, result)
-            least = min(least, found)
+            where = data.oMf[frame] * placed.placement
+            least = min(least, coal_distance(placed.shape, where, Sphere(0.15), ball))
     return least
 
 

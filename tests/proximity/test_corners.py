@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.distances import coal_distance
 from tests.evaluation import random_configuration
 from tests.models import Y, arm
-from tests.proximity.world import Referee, buffers, coal_shape, link_bodies, place, robot, set_pose, things
+from tests.proximity.world import Referee, buffers, link_bodies, place, robot, set_pose, things
 from wbc.errors import RangeError
 from wbc.proximity import FAR, Body, PairSensor
 from wbc.proximity.corners import HULL_CORNERS, corners_of, spread
@@ -43,12 +43,8 @@ def truths(referee: Referee, pair: tuple[Body, Body], q: np.ndarray, pose: pin.S
         ball = own.shape.radius if isinstance(own.shape, Capsule) else 0.0
         where, there = referee.pose(own, pose), referee.pose(other, pose)
         for corner in corners_of(own.shape, center):
-            at = coal.Transform3s(np.eye(3), where.act(corner + center))
-            tip, place_ = coal.Sphere(ball), coal.Transform3s(there.rotation, there.translation)
-            request = coal.DistanceRequest()
-            request.gjk_tolerance = 1e-10
-            result = coal.DistanceResult()
-            out.append(coal.distance(tip, at, coal_shape(other.shape), place_, request, result))
+            at = pin.SE3(np.eye(3), where.act(corner + center))
+            out.append(coal_distance(Sphere(ball), at, other.shape, there, 1e-10))
     return np.sort(np.array(out))
 
 

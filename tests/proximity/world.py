@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.constraints.robots import robot
+from tests.distances import coal_pose, coal_shape
 from wbc.proximity import OBSTACLE, Body, PairSensor
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
@@ -76,25 +77,6 @@ def set_pose(numbers: dict[str, np.ndarray], pose: pin.SE3) -> None:
     numbers["pose"][:] = np.r_[pose.rotation.ravel("F"), pose.translation]
 
 
-def coal_shape(shape: Shape) -> object:
-    if isinstance(shape, Convex):
-        points = coal.StdVec_Vec3s()
-        for point in shape.points:
-            points.append(point)
-        return coal.Convex.convexHull(points, True, "Qt")
-    if isinstance(shape, Box):
-        return coal.Box(np.array(shape.size))
-    if isinstance(shape, HalfSpace):
-        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-    return coal.Sphere(shape.radius) if isinstance(shape, Sphere) else _long(shape)
-
-
-def _long(shape: Shape) -> object:
-    assert isinstance(shape, (Capsule, Cylinder))
-    kind = coal.Capsule if isinstance(shape, Capsule) else coal.Cylinder
-    return kind(shape.radius, shape.length)
-
-
 class Referee:
     """Coal for each pair by itself, with frames by Pinocchio."""
 
@@ -122,7 +104,7 @@ class Referee:
         for body in pair:
             where = self.pose(body, pose)
             shape = self.shapes.setdefault(body, coal_shape(body.shape)) if body not in self.shapes else None
-            placed += [shape or self.shapes[body], coal.Transform3s(where.rotation, where.translation)]
+            placed += [shape or self.shapes[body], coal_pose(where)]
         result = coal.DistanceResult()
         value = coal.distance(*placed, self.request, result)
         return value, np.array(result.normal), result.getNearestPoint1(), result.getNearestPoint2()

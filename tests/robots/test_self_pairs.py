@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,6 +12,7 @@ from scipy.optimize import minimize
 
 import wbc.robots
 from tests import models
+from tests.distances import coal_distance
 from tests.robots.files import joints
 from wbc.errors import MissingShapeError, RangeError, RobotFileError, ShapeError
 from wbc.robot import Limits, Robot
@@ -102,14 +102,6 @@ def test_broad_and_narrow_phase_agree_with_coal_on_every_sample() -> None:
     )
     links, steps = Links(robot), draw(robot, 200, np.random.default_rng(0))
     scenes, data = links.place(steps), robot.model.createData()
-    request = coal.DistanceRequest()
-    request.enable_signed_distance = True
-    solids = {
-        Sphere: lambda s: coal.Sphere(s.radius),
-        Capsule: lambda s: coal.Capsule(s.radius, s.length),
-        Box: lambda s: coal.Box(*s.size),
-        Cylinder: lambda s: coal.Cylinder(s.radius, s.length),
-    }
     for first, second in itertools.combinations(robot.shapes, 2):
         bounds = scenes.bounds(first, second)
         for n, step in enumerate(steps):
@@ -117,11 +109,7 @@ def test_broad_and_narrow_phase_agree_with_coal_on_every_sample() -> None:
             least = np.inf
             for a, b in itertools.product(robot.shapes[first], robot.shapes[second]):
                 where = [data.oMf[robot.model.getFrameId(k)] * s.placement for k, s in ((first, a), (second, b))]
-                places = [coal.Transform3s(w.rotation, w.translation) for w in where]
-                pair = [solids[type(s.shape)](s.shape) for s in (a, b)]
-                least = min(
-                    least, coal.distance(pair[0], places[0], pair[1], places[1], request, coal.DistanceResult())
-                )
+                least = min(least, coal_distance(a.shape, where[0], b.shape, where[1]))
             assert scenes.distance(first, second, n) == pytest.approx(least, abs=1e-6)
             assert bounds[n] <= least + 1e-6
             if links.is_exact(first, second):

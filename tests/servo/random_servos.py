@@ -13,7 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.robot import Limits, Robot
+from tests.random_robots import Drawn, random_model
+from wbc.robot import Robot
 from wbc.servo import Following, Response, Servo
 
 ARMS = ("ur3", "ur5", "ur10", "panda", "kinova", "xarm7", "z1", None, None)
@@ -30,22 +31,10 @@ FELL = 5e3
 
 
 def chain(rng: np.random.Generator) -> Robot:
-    """Three to seven joints about axes at random, with masses."""
-    model, parent, place = pin.Model(), 0, pin.SE3.Identity()
-    count = int(rng.integers(3, 8))
-    for k in range(count):
-        axis = rng.normal(size=3)
-        joint = pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis))
-        parent = model.addJoint(parent, joint, place, f"joint{k}")
-        size, way = rng.uniform(0.1, 0.4), rng.normal(size=3)
-        way *= size / np.linalg.norm(way)
-        mass = rng.uniform(0.5, 4.0) * 0.8**k
-        inertia = pin.Inertia(mass, 0.5 * way, mass * size**2 / 8 * np.eye(3))
-        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        place = pin.SE3(np.eye(3), way)
-    model.addFrame(pin.Frame("tip", parent, 0, place, pin.FrameType.OP_FRAME))
-    wide = np.full(count, 3.0)
-    return Robot("chain", model, Limits(-wide, wide, wide, wide, np.full(count, np.inf)), neutral=np.zeros(count))
+    """Three to seven joints about axes at random, with masses, and limits of 3 rad and rad/s."""
+    return wbc.robots.load(random_model(rng, Drawn())).with_limits(
+        position_lower=-3.0, position_upper=3.0, velocity=3.0
+    )
 
 
 def drawn_robot(rng: np.random.Generator) -> Robot:

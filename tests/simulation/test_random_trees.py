@@ -13,6 +13,7 @@ import pytest
 
 import wbc.robots
 from bench.soak.torque_stacks import followed as obeying
+from tests.random_robots import Drawn, random_model
 from tests.refusals import assert_refused
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.robot import Coupling, Robot
@@ -32,21 +33,11 @@ Vector = np.ndarray
 
 
 def tree(rng: np.random.Generator, floating: bool) -> Robot:
-    """Branches of hinges and slides of any axis, with a payload on one of them."""
-    model, first = pin.Model(), pin.JointModelFreeFlyer() if floating else pin.JointModelRX()
-    chain = [model.addJoint(0, first, pin.SE3.Identity(), "base")]
-    for k in range(int(rng.integers(3, 7))):
-        axis = rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        kind = pin.JointModelPrismaticUnaligned if rng.random() < 0.3 else pin.JointModelRevoluteUnaligned
-        place = pin.SE3(pin.exp3(rng.normal(size=3)), 0.3 * rng.normal(size=3))
-        chain = chain[: 1 + int(rng.integers(len(chain)))]
-        chain.append(model.addJoint(chain[-1], kind(axis), place, f"j{k}"))
-        model.addFrame(pin.Frame(f"f{k}", chain[-1], place.inverse(), pin.FrameType.OP_FRAME))
-    for joint in range(1, model.njoints):
-        inertia = pin.Inertia(rng.uniform(0.2, 3.0), 0.1 * rng.normal(size=3), np.diag(rng.uniform(0.01, 0.02, 3)))
-        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    return wbc.robots.load(model)
+    """Limbs of hinges and slides of any axis, on a hinge or on nothing."""
+    base = pin.JointModelFreeFlyer if floating else pin.JointModelRX
+    kinds = {"turning": 0.7, "sliding": 0.3}
+    drawn = Drawn(base, limbs=(2, 3), joints=(1, 3), kinds=kinds, far=(0.1, 0.8), turned=True, reach=None)
+    return wbc.robots.load(random_model(rng, drawn))
 
 
 def followed(robot: Robot, rng: np.random.Generator) -> Robot:
@@ -93,7 +84,7 @@ def test_accelerations_agree(seed: int) -> None:
     """To 1e-9 where joints are free. MuJoCo's couplings are springs; Pinocchio's plant has them rigid."""
     rng = np.random.default_rng(seed)
     robot, payload = tree(rng, floating=seed % 2 == 0), load(rng)
-    plant = PinocchioPlant(robot, payloads={"f1": payload})
+    plant = PinocchioPlant(robot, payloads={"a0_link": payload})
     heavy = replace(robot, model=plant.model)
     q, v, tau = state(robot, rng)
     plant.reset(q, 0.0, v)
@@ -101,7 +92,7 @@ def test_accelerations_agree(seed: int) -> None:
     assert in_mujoco(heavy, q, v, tau) == pytest.approx(found, abs=1e-9 * np.abs(found).max())
 
     coupled = followed(robot, rng)
-    plant = PinocchioPlant(coupled, payloads={"f1": payload})
+    plant = PinocchioPlant(coupled, payloads={"a0_link": payload})
     q, v, tau = state(coupled, rng)
     plant.reset(q, 0.0, v)
     found, energy = plant.acceleration(tau), plant.energy
@@ -142,8 +133,8 @@ def test_grips_of_robots_with_joints_that_follow(kind: GripKind) -> None:
     found = []
     for plant in plants:
         plant.reset(q, 0.0, v)
-        plant.grasp("f2", robot.pose(q, "f2"), kind)
-        found.append((plant.state.v, plant.acceleration(tau), plant.wrenches["f2"]))
+        plant.grasp("b0_link", robot.pose(q, "b0_link"), kind)
+        found.append((plant.state.v, plant.acceleration(tau), plant.wrenches["b0_link"]))
     for one, other in zip(*found, strict=True):
         assert other == pytest.approx(one, abs=1e-6 * max(1.0, np.abs(one).max()))
 
@@ -151,14 +142,14 @@ def test_grips_of_robots_with_joints_that_follow(kind: GripKind) -> None:
     plant = PinocchioPlant(coupled)
     q, v, tau = state(coupled, rng)
     plant.reset(q, 0.0, v)
-    hold = coupled.pose(q, "f2")
-    plant.grasp("f2", hold, kind)
+    hold = coupled.pose(q, "b0_link")
+    plant.grasp("b0_link", hold, kind)
     plant.apply(Command(CommandKind.TORQUE, tau))
     plant.advance(0.02)
-    assert coupled.pose(plant.state.q, "f2").translation == pytest.approx(hold.translation, abs=1e-6)
+    assert coupled.pose(plant.state.q, "b0_link").translation == pytest.approx(hold.translation, abs=1e-6)
     q, v, a = plant.state.q, plant.state.v, plant.acceleration(tau)
-    data, frame = plant.model.createData(), plant.model.getFrameId("f2")
-    push = pin.computeFrameJacobian(plant.model, data, q, frame, pin.LOCAL).T @ plant.wrenches["f2"]
+    data, frame = plant.model.createData(), plant.model.getFrameId("b0_link")
+    push = pin.computeFrameJacobian(plant.model, data, q, frame, pin.LOCAL).T @ plant.wrenches["b0_link"]
     left = pin.rnea(plant.model, data, q, v, a) - tau - push
     assert np.abs(left).max() > 1e-3  # the gears carry something
     assert plant._dynamics._G.T @ left == pytest.approx(  # type: ignore[attr-defined]
@@ -193,14 +184,14 @@ def test_saved_states_go_on_to_the_same_bits(seed: int) -> None:
     for make, at, rate in (
         (lambda: PinocchioPlant(robot, motors=motors, encoders=encoders, seed=seed), q, v),
         (lambda: PinocchioPlant(coupled, motors=motors, encoders=encoders, seed=seed), *followers),
-        (lambda: GrippingMujocoPlant(robot, ["f0"], motors=motors, seed=seed), q, v),
-        (lambda: GrippingMujocoPlant(coupled, ["f0"], motors=motors, seed=seed), *followers),
+        (lambda: GrippingMujocoPlant(robot, ["a_tip"], motors=motors, seed=seed), q, v),
+        (lambda: GrippingMujocoPlant(coupled, ["a_tip"], motors=motors, seed=seed), *followers),
     ):
         ends = []
         for _ in range(2):
             plant = make()
             plant.reset(at, 0.0, rate)
-            plant.grasp("f0", robot.pose(at, "f0"), GripKind.POSITION)
+            plant.grasp("a_tip", robot.pose(at, "a_tip"), GripKind.POSITION)
             plant.apply(Command(CommandKind.TORQUE, tau))
             plant.advance(0.005)
             saved = plant.save()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +14,7 @@ import wbc.robots
 from tests.repeats import covering, repeats
 from tests.stack.millimetres import configuration, moved, scaled, velocity
 from tests.stack.small import arm
+from tests.tasks.robots import FRAMES
 from wbc.api import Controller, Stack
 from wbc.controller import Step
 from wbc.errors import ShapeError, UnknownNameError
@@ -20,17 +22,30 @@ from wbc.qp.problem import QP
 from wbc.qp.relax import Relaxation
 from wbc.robot import Robot
 from wbc.robots import DHRow, from_dh
-from wbc.shapes import Capsule, PlacedShape, Sphere
-from wbc.tasks import CenterOfMass, EndEffector, Expression, FrameVelocityLimit, JointLimits, Obstacle, Posture, Row
+from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
+from wbc.tasks import (
+    CenterOfMass,
+    Damping,
+    Elbow,
+    EndEffector,
+    Expression,
+    FrameVelocityLimit,
+    Hold,
+    JointLimits,
+    Obstacle,
+    PitchPlane,
+    Posture,
+    Row,
+)
 
 DT = 0.005
-STATES = repeats(60)
+STATES = repeats(40)
 RADIUS, MARGIN, SPEED = 0.08, 0.02, 0.25
 
 
 @cache
 def robot(name: str) -> Robot:
-    """An arm, a mobile manipulator with a sliding torso, an arm on a rail; with a ball and a rod on the tip."""
+    """An arm, a mobile manipulator with a sliding torso, a humanoid, an arm on a rail; a ball and a rod on the tip."""
     if name == "rail":
         rows = [DHRow(joint="prismatic", alpha=np.pi / 2, lower=-1.0, upper=1.0, velocity=0.8)]
         for a, alpha, d in ((0.1, -1.5, 0.3), (0.4, 0.2, 0.05), (0.0, 1.6, 0.1), (0.1, -1.6, 0.3), (0.0, 1.5, 0.1)):
@@ -43,26 +58,40 @@ def robot(name: str) -> Robot:
     slow = np.where(np.isfinite(bare.limits.velocity), bare.limits.velocity, 1.0)
     bare = bare.with_limits(velocity=slow, acceleration=100.0)
     tilt = pin.SE3(pin.exp3(np.array([0.4, 0.3, 0.1])), np.array([0.02, 0.0, -0.05]))
-    return bare.with_shapes(
-        {bare.frames["tip"]: [PlacedShape(Sphere(0.04), tilt), PlacedShape(Capsule(0.03, 0.1), tilt)]}
-    )
+    return bare.with_shapes({tip_of(bare): [PlacedShape(Sphere(0.04), tilt), PlacedShape(Capsule(0.03, 0.1), tilt)]})
+
+
+def tip_of(bot: Robot) -> str:
+    return FRAMES[bot.name].tip if bot.name in FRAMES else bot.frames["tip"]
+
+
+def middle_of(bot: Robot) -> str:
+    return FRAMES[bot.name].middle if bot.name in FRAMES else {"tiago": "arm_4_link", "rail": "link3"}[bot.name]
 
 
 def controller(bot: Robot, scale: float, backend: str) -> Controller:
     """Tasks in metres and radians against limits in both."""
-    tip = bot.frames["tip"]
+    tip = tip_of(bot)
     stack = Stack(bot, DT)
     stack.add(EndEffector(tip), name="hand")
     stack.add(CenterOfMass(), name="com", weight=0.1)
     stack.add(Posture(), name="posture", weight=1e-3)
+    stack.add(Elbow(middle_of(bot), offset=(0.1 * scale, 0.0, 0.05 * scale)), name="elbow", weight=0.01)
+    stack.add(Damping(), name="damping", weight=1e-4)
+    if bot.name in FRAMES:
+        stack.add(PitchPlane(*FRAMES[bot.name].plane), name="plane", weight=0.01)
+    stack.add(Hold(middle_of(bot), "position"), name="hold")
+    stack.add(Obstacle(HalfSpace()), name="floor")
     stack.add(Obstacle(Sphere(scale * RADIUS), margin=scale * MARGIN), name="ball")
     stack.add(FrameVelocityLimit(tip, linear=scale * SPEED, angular=1.0), name="speed")
     stack.add(JointLimits(), name="limits")
     return stack.compile(backend=backend)
 
 
-def state(bot: Robot, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """Configuration, measured velocity, targets of hand, mass and posture, pose and velocity of the ball; in metres."""
+def state(bot: Robot, rng: np.random.Generator) -> tuple[Any, ...]:
+    """Configuration, measured velocity, targets of hand, mass and posture, pose and velocity of the ball, pose of
+    the floor, all in metres, and whether the elbow is held.
+    """
     free = np.where(np.isfinite(bot.limits.position_lower), 0.0, 0.8)
     q = pin.integrate(bot.model, bot.neutral, free * rng.uniform(-1, 1, bot.nv))
     for i, k in enumerate(bot.position_index):
@@ -72,30 +101,38 @@ def state(bot: Robot, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
     v = np.where(np.array(bot.dof_names) == "root_joint.y", 0.0, rng.uniform(-0.05, 0.05, bot.nv))
     data = bot.model.createData()
     pin.framesForwardKinematics(bot.model, data, q)
-    tip = data.oMf[bot.model.getFrameId(bot.frames["tip"])]
+    tip = data.oMf[bot.model.getFrameId(tip_of(bot))]
     goal = pin.SE3(tip.rotation @ pin.exp3(rng.uniform(-0.6, 0.6, 3)), tip.translation + rng.uniform(-0.3, 0.3, 3))
     ahead = goal.translation - tip.translation  # in the way, and near enough to matter
     ball = tip.translation + (0.17 + 0.03 * rng.random()) * ahead / np.linalg.norm(ahead)
     mass = pin.centerOfMass(bot.model, data, q) + rng.uniform(-0.1, 0.1, 3)
     posture = pin.integrate(bot.model, q, 0.3 * rng.uniform(-1, 1, bot.nv))
-    return q, v, goal, mass, posture, pin.SE3(np.eye(3), ball), rng.uniform(-0.1, 0.1, 3)
+    floor = pin.SE3(pin.exp3(rng.normal(0.0, 0.1, 3)), np.array([0.0, 0.0, -2.0]))
+    drift, holds = rng.uniform(-0.1, 0.1, 3), rng.random() < 0.3
+    return q, v, goal, mass, posture, pin.SE3(np.eye(3), ball), drift, floor, holds
 
 
-def step(tick: Controller, bot: Robot, given: tuple[np.ndarray, ...], scale: float) -> Step:
+def step(tick: Controller, bot: Robot, given: tuple[Any, ...], scale: float) -> Step:
     """One tick at a state, all of its lengths times ``scale``."""
-    q, v, goal, mass, posture, ball, drift = given
+    q, v, goal, mass, posture, ball, drift, floor, holds = given
     tick.reset()
     tick["hand"].target = moved(goal, scale)
     tick["com"].target = scale * mass
     tick["posture"].target = configuration(bot, posture, scale)
-    tick["ball"].pose = moved(ball, scale)
+    tick["ball"].pose, tick["floor"].pose = moved(ball, scale), moved(floor, scale)
+    # held where it cannot stay
+    tick["hold"].target = pin.SE3(np.eye(3), scale * goal.translation)
+    tick["hold"].enabled = holds
     tick["ball"].velocity = np.concatenate([scale * drift, np.zeros(3)])
     return tick.step(configuration(bot, q, scale), velocity(bot, v, scale))
 
 
 @pytest.mark.parametrize(
     ("case", "scale"),
-    covering([("panda", "python"), ("tiago", "python"), ("rail", "python"), ("rail", "native")], [1000.0, 1e-3]),
+    covering(
+        [("panda", "python"), ("tiago", "python"), ("rail", "python"), ("talos", "python"), ("rail", "native")],
+        [1000.0, 1e-3],
+    ),
 )
 def test_units_change_no_answer(case: tuple[str, str], scale: float) -> None:
     name, backend = case

@@ -7,24 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pinocchio as pin
 
+from tests.random_robots import random_inertia, random_pose
+
 #: A unit axis that is no coordinate axis.
 SLANTED = np.array([0.48, -0.6, 0.64])
 #: A unit axis at a right angle to it.
 ACROSS = np.array([0.8, 0.0, -0.6])
-
-
-def random_pose(rng: np.random.Generator) -> pin.SE3:
-    """A pose with any rotation and a position of order 1 m."""
-    return pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
-
-
-def random_inertia(rng: np.random.Generator) -> pin.Inertia:
-    """A physical inertia: a random cloud of four point masses."""
-    points, masses = rng.normal(size=(4, 3)), rng.uniform(0.2, 1.0, 4)
-    total, center = masses.sum(), masses @ points / masses.sum()
-    arms = points - center
-    about = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(masses, arms, strict=True))
-    return pin.Inertia(total, center, about)
 
 
 def chain(joints: Sequence[pin.JointModel], seed: int = 0) -> pin.Model:

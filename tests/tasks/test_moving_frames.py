@@ -15,8 +15,8 @@ import pytest
 
 import wbc
 from tests.evaluation import sample, slope
+from tests.items import ITEMS
 from tests.repeats import MORE
-from tests.tasks.items import FACTORIES
 from tests.tasks.robots import NAMES, random_configuration, robot
 from wbc.errors import DuplicateNameError, RangeError, SolverError, UnknownNameError
 from wbc.robot import Robot
@@ -84,7 +84,7 @@ class Program:
 def declared(class_name: str, machine: Robot) -> Iterator[tuple[Item, dict[str, Any]]]:
     """Items of a class whose other frame, if they have one, is the world, with random values."""
     rng = np.random.default_rng(zlib.crc32(class_name.encode()))
-    for item, given in FACTORIES[class_name](machine):
+    for item, given in ITEMS[class_name](machine):
         drawn = {d.name: sample(machine, d, rng) for d in item.inputs(machine)}
         yield item, {"gain": 0.0, "rate": 1.0} | drawn | given
 
@@ -323,7 +323,7 @@ def test_one_way_to_say_it_and_what_is_refused() -> None:
 def test_the_rate_of_a_plane_is_that_past_the_frame() -> None:
     """A pitch plane's rate has no value to differentiate: a floating robot that turns with the frame turns no plane."""
     machine = robot("talos")
-    item = next(i for i, _ in FACTORIES["PitchPlane"](machine) if isinstance(i, PitchPlane) and i.commands_rate)
+    item = next(i for i, _ in ITEMS["PitchPlane"](machine) if isinstance(i, PitchPlane) and i.commands_rate)
     moving, rng = Program(machine, item, moving=True), np.random.default_rng(0)
     q, pose, twist = random_configuration(machine, rng), somewhere(6), rng.uniform(-1.0, 1.0, 6)
     found = moving(q, {"target": 0.0, "gain": 0.0}, pose=pose, twist=twist)

@@ -1,14 +1,14 @@
-"""The angle of an arm's plane and its derivative, from points and from an axis."""
+"""The angle of an arm's plane, from points and from an axis, and its rate."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.refusals import assert_refused
 from tests.tasks.planes import (
     CASES,
     OFFSET,
@@ -19,12 +19,11 @@ from tests.tasks.planes import (
     clear,
     compiled,
     evaluate,
-    quickly,
     robot,
     seen,
     wrap,
 )
-from wbc.tasks import _stereographic as stereo
+from wbc.errors import RangeError, UnknownNameError
 from wbc.tasks._stereographic import PlaneReference
 from wbc.tasks.pitch_plane import PitchPlane
 
@@ -36,38 +35,6 @@ def test_angle_is_that_of_pinocchio(case: str) -> None:
     q = clear(name, item, 1, seed=2)[0]
     assert item.angle(robot(name), q) == pytest.approx(seen(name, item, q).psi, abs=1e-12)
     assert item.initial(robot(name), q) == {"target": item.angle(robot(name), q)}
-
-
-def test_a_mutated_formula_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The angle check fails for a conventional reference in the place of the stereographic one."""
-
-    def conventional(line: ca.SX, direction: ca.SX, reference: PlaneReference) -> tuple[ca.SX, ca.SX]:
-        normal = ca.cross(line, ca.DM(reference.pole))
-        return ca.dot(ca.cross(normal, line), direction), ca.dot(normal, direction)
-
-    monkeypatch.setattr(stereo, "coordinates", conventional)
-    compiled.cache_clear()
-    quickly.cache_clear()
-    try:
-        assert angle_differs("panda", PANDA) > 0.1
-    finally:
-        compiled.cache_clear()
-        quickly.cache_clear()
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_jacobian_is_the_derivative(case: str) -> None:
-    """Against central differences of the referee's angle along every degree of freedom."""
-    name, item = CASES[case]
-    model, step = robot(name).model, 1e-5
-    for q in clear(name, item, 5, seed=3):
-        _, jacobian, _ = evaluate(name, item, q)
-        for k, direction in enumerate(np.eye(model.nv)):
-            ahead = seen(name, item, pin.integrate(model, q, step * direction)).psi
-            behind = seen(name, item, pin.integrate(model, q, -step * direction)).psi
-            want = wrap(ahead - behind) / (2 * step)
-            assert jacobian[0, k] == pytest.approx(want, abs=2e-7 * (1 + np.abs(jacobian).max() ** 3))
-        assert float(compiled(name, item)(q, 0.7)[3]) == pytest.approx(-1.0, abs=1e-14)
 
 
 def test_angle_in_a_moving_base_ignores_the_base() -> None:
@@ -148,3 +115,16 @@ def test_rate_form_counts_from_the_present_plane() -> None:
         value, _, _, drift = compiled("ssrms", item)(q, 0.25)
         assert float(value) == -0.25
         assert float(drift) == -1.0
+
+
+def test_axes_that_turn_no_plane_are_refused() -> None:
+    assert_refused(lambda: replace(TALOS, axis="root_joint").validate(robot("talos")), UnknownNameError, "axis")
+    ssrms = replace(OFFSET, axis="joint3", base="F2")
+    assert_refused(lambda: ssrms.validate(robot("ssrms")), RangeError, "axis")
+
+
+def test_plain_numbers_are_welcome() -> None:
+    item = replace(PANDA, elbow_offset=np.array([0, 0, 1], dtype=np.float32), reference_width=1)
+    assert item.elbow_offset == (0.0, 0.0, 1.0)
+    assert hash(item) == hash(replace(item))
+    assert PlaneReference(pole=[0, 0, 5], direction=[3, 0, 1]) == PlaneReference()

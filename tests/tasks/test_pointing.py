@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import wbc
-from tests.evaluation import later, numbers, sample, slope
-from tests.refusals import assert_refused
-from tests.tasks.items_pointing import FACTORIES, axes, line_of_sight
+from tests.evaluation import numbers, sample, slope
+from tests.items import ITEMS
+from tests.rates import axes, line_of_sight
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.api import Controller
-from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Limits, Robot
 from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum
 
@@ -38,7 +36,7 @@ def states(name: str, item: Item, given: dict[str, Any]) -> list[tuple[np.ndarra
 
 
 def declared(name: str, *classes: str) -> list[tuple[Item, dict[str, Any]]]:
-    return [pair for cls in classes for pair in FACTORIES[cls](robot(name))]
+    return [pair for cls in classes for pair in ITEMS[cls](robot(name))]
 
 
 def wanted_direction(item: Item, machine: Robot, q: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -63,37 +61,6 @@ def test_error_is_the_shortest_turn(name: str) -> None:
             np.testing.assert_allclose(turn.apply(direction), rows[:, 2], rtol=0, atol=1e-12)
             angle = np.arctan2(np.linalg.norm(np.cross(direction, rows[:, 2])), direction @ rows[:, 2])
             np.testing.assert_allclose(np.linalg.norm(e), angle, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_rows_lower_the_angle_as_its_gradient_does(name: str) -> None:
-    """e' (J v + de/dt) is the rate of |e|^2 / 2 while robot, reference and target move."""
-    machine = robot(name)
-    for item, given in declared(name, "AxisAlign", "LookAt"):
-        found = numbers(item, machine)
-        for q, v, values in states(name, item, given):
-
-            def half_square(t: float, item=item, found=found, q=q, v=v, values=values) -> np.ndarray:
-                e = found(pin.integrate(machine.model, q, t * v), later(machine, item, values, t))["value"]
-                return np.array([e @ e / 2])
-
-            here = found(q, values)
-            rate = here["value"] @ (here["jacobian"] @ v + here["drift"])
-            np.testing.assert_allclose(rate, slope(half_square)[0], rtol=1e-7, atol=1e-7)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_moving_target_asks_for_the_turning_of_its_direction(name: str) -> None:
-    machine = robot(name)
-    for item, given in declared(name, "AxisAlign", "LookAt"):
-        assert isinstance(item, (AxisAlign, LookAt))
-        found = numbers(item, machine)
-        for q, _, values in states(name, item, given):
-            rate = placement(machine, item.relative_to, q).rotation @ values["feedforward"]
-            d = wanted_direction(item, machine, q, values["target"])
-            turning = np.cross(d, rate) / (d @ d)
-            rows = placement(machine, item.frame, q).rotation @ axes(item)
-            np.testing.assert_allclose(found(q, values)["drift"], -rows[:, :2].T @ turning, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["panda", "talos"])
@@ -237,76 +204,3 @@ def test_momentum_of_a_point_mass_has_finite_weights() -> None:
     tick = controller(Momentum(), single)
     tick["item"].target = (0.0, 0.6, 0.0, 0.0, 0.0, 0.0)
     np.testing.assert_allclose(tick.step([0.0]).v, [1.0], rtol=1e-5)
-
-
-CASES: dict[str, tuple[Callable[[], Item], type[WbcError], str]] = {
-    "axis frame": (lambda: AxisAlign("panda_hnd"), UnknownNameError, HAND),
-    "axis frame type": (lambda: AxisAlign(3), UnknownNameError, "AxisAlign.frame"),
-    "axis zero": (lambda: AxisAlign(HAND, axis=(0, 0, 0)), RangeError, "AxisAlign.axis"),
-    "axis two": (lambda: AxisAlign(HAND, axis=(0, 1)), ShapeError, "AxisAlign.axis"),
-    "axis text": (lambda: AxisAlign(HAND, axis="z"), ShapeError, "AxisAlign.axis"),
-    "axis NaN": (lambda: AxisAlign(HAND, axis=(0, 0, np.nan)), NotFiniteError, "AxisAlign.axis"),
-    "axis around": (lambda: AxisAlign(HAND, around=(0, 0, -2)), RangeError, "AxisAlign.around"),
-    "axis around shape": (lambda: AxisAlign(HAND, around=3.0), ShapeError, "AxisAlign.around"),
-    "axis reference": (lambda: AxisAlign(HAND, relative_to="wrld"), UnknownNameError, "'world'"),
-    "axis same body": (lambda: AxisAlign(HAND, relative_to="panda_link8"), RangeError, "no joint moves"),
-    "axis fixed": (lambda: AxisAlign("panda_link0"), RangeError, "no joint moves"),
-    "sight frame": (lambda: LookAt("panda_hnd"), UnknownNameError, HAND),
-    "sight axis": (lambda: LookAt(HAND, axis=(0, 0, 0)), RangeError, "LookAt.axis"),
-    "sight around": (lambda: LookAt(HAND, around=(0, 0, 1)), RangeError, "LookAt.around"),
-    "sight offset": (lambda: LookAt(HAND, offset=(1, 2)), ShapeError, "LookAt.offset"),
-    "sight offset inf": (lambda: LookAt(HAND, offset=(1, 2, np.inf)), NotFiniteError, "LookAt.offset"),
-    "sight width": (lambda: LookAt(HAND, width=0.0), RangeError, "LookAt.width"),
-    "sight width large": (lambda: LookAt(HAND, width=2.0), RangeError, "LookAt.width"),
-    "sight reference": (lambda: LookAt(HAND, relative_to="wrld"), UnknownNameError, "'world'"),
-    "sight same body": (lambda: LookAt(HAND, relative_to="panda_link8"), RangeError, "no joint moves"),
-    "distance frame": (lambda: Distance("panda_hnd"), UnknownNameError, HAND),
-    "distance other": (lambda: Distance(HAND, "wrld"), UnknownNameError, "'world'"),
-    "distance same body": (lambda: Distance(HAND, "panda_link8"), RangeError, "no joint moves"),
-    "distance fixed": (lambda: Distance("panda_link0"), RangeError, "no joint moves"),
-    "distance offset": (lambda: Distance(HAND, offset=(1, 2)), ShapeError, "Distance.offset"),
-    "distance point": (lambda: Distance(HAND, point=(1, 2, np.nan)), NotFiniteError, "Distance.point"),
-    "momentum kind": (lambda: Momentum("angulr"), UnknownNameError, "'angular'"),
-    "momentum weights": (lambda: Momentum("linear", weights=(1,) * 6), ShapeError, "3 numbers"),
-    "momentum negative": (lambda: Momentum(weights=(1, 1, 1, 1, 1, -1)), RangeError, "weights[5]"),
-    "momentum NaN": (lambda: Momentum(weights=[np.nan] * 6), NotFiniteError, "weights"),
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_bad_declaration(case: str) -> None:
-    make, error, text = CASES[case]
-    assert_refused(lambda: make().validate(robot("panda")), error, text)
-
-
-def test_momentum_needs_mass() -> None:
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
-    none = np.full(1, np.inf)
-    bare = Robot("bare", model, Limits(-none, none, none, none, none))
-    with pytest.raises(RangeError, match="no mass"):
-        Momentum().validate(bare)
-
-
-BAD_INPUTS: dict[str, tuple[Callable[[], Item], str, Any, type[WbcError]]] = {
-    "direction zero": (lambda: AxisAlign(HAND), "target", (0, 0, 0), RangeError),
-    "direction NaN": (lambda: AxisAlign(HAND), "target", (0, 0, np.nan), NotFiniteError),
-    "direction shape": (lambda: AxisAlign(HAND), "target", (0, 1), ShapeError),
-    "sight inf": (lambda: LookAt(HAND), "target", (0, 0, np.inf), NotFiniteError),
-    "distance negative": (lambda: Distance(HAND), "target", -0.1, RangeError),
-    "distance point": (lambda: Distance(HAND), "point", (0, 0), ShapeError),
-    "momentum shape": (lambda: Momentum("angular"), "target", np.zeros(6), ShapeError),
-}
-
-
-@pytest.mark.parametrize("case", BAD_INPUTS)
-def test_bad_input_changes_nothing(case: str) -> None:
-    make, name, value, error = BAD_INPUTS[case]
-    machine = wbc.robots.load("panda")
-    tick, q = controller(make(), machine), machine.neutral
-    before = np.array(tick.step(q).v)
-    kept = np.array(getattr(tick["item"], name))
-    with pytest.raises(error, match=name):
-        setattr(tick["item"], name, value)
-    np.testing.assert_array_equal(getattr(tick["item"], name), kept)
-    np.testing.assert_array_equal(tick.step(q).v, before)

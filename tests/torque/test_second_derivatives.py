@@ -14,10 +14,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.constraints.items_forces import NO_VELOCITIES
 from tests.evaluation import Numbers, later, numbers, sample, slope
+from tests.items import ITEMS, NO_VELOCITIES
 from tests.repeats import ALL, MORE
-from tests.tasks.items import FACTORIES
 from tests.tasks.robots import NAMES, random_configuration, robot
 from wbc.api import Stack
 from wbc.errors import CommandError
@@ -39,7 +38,7 @@ def every_item(machine: Robot) -> tuple[Stack, dict[str, Numbers], list[str]]:
     and with ``REPEATS=3`` so has every arm.
     """
     stack, alone, refused, turn = Stack(machine, dt=DT), {}, [], NAMES.index(machine.name)
-    for class_name, factory in FACTORIES.items():
+    for class_name, factory in ITEMS.items():
         for k, (item, _) in enumerate(factory(machine)):
             mine = (k + zlib.crc32(class_name.encode())) % (len(NAMES) - 1) == turn
             if not (mine or (k == 0 and (machine.name == NAMES[-1] or MORE >= ALL))):
@@ -124,7 +123,7 @@ def test_rows_of_every_class(robot_name: str) -> None:
     layout = Layout(declared)
     rows = build(declared, layout).rows
     rng = np.random.default_rng(zlib.crc32(robot_name.encode()))
-    given = {f"{c} {k}": extra for c, f in FACTORIES.items() for k, (_, extra) in enumerate(f(machine))}
+    given = {f"{c} {k}": extra for c, f in ITEMS.items() for k, (_, extra) in enumerate(f(machine))}
     q, v = random_configuration(machine, rng), rng.uniform(-1.0, 1.0, machine.nv)
     p, drawn = np.zeros(layout.parameters), {}
     for name in alone:
@@ -149,7 +148,7 @@ def test_rows_of_every_class(robot_name: str) -> None:
 
 def test_what_has_no_second_derivative_says_so() -> None:
     machine = robot("panda")
-    for class_name, factory in FACTORIES.items():
+    for class_name, factory in ITEMS.items():
         for item, _ in factory(machine):
             stack = Stack(machine, dt=DT).add(item, name="it")
             for command in ("acceleration", "torque"):
@@ -159,14 +158,14 @@ def test_what_has_no_second_derivative_says_so() -> None:
                         stack.commanding(command)
                 elif class_name != "WrenchSum":
                     assert stack.commanding(command).command == command, class_name
-    tracked = Stack(machine, dt=DT).add(FACTORIES["EndEffector"](machine)[0][0], scaled=True)
+    tracked = Stack(machine, dt=DT).add(ITEMS["EndEffector"](machine)[0][0], scaled=True)
     with pytest.raises(CommandError, match="direction"):
         tracked.commanding("acceleration")
 
 
 def test_tasks_of_the_registry_are_all_there() -> None:
     machine = robot("panda")
-    for factory in FACTORIES.values():
+    for factory in ITEMS.values():
         item = factory(machine)[0][0]
         if isinstance(item, Task):
             assert not item.refusal(machine, "acceleration")
