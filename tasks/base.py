@@ -243,6 +243,9 @@ class Task(Item):
     #: Default gain [1/s]: e decays like exp(-gain t) where nothing hinders it
     default_gain: ClassVar[float] = 2.0
 
+    #: Its rows may ask for a rate other than 0
+    asks: ClassVar[bool] = True
+
     #: First value of the input ``gain`` [1/s] where the class's default is not wanted
     gain: float | None = dataclasses.field(default=None, kw_only=True)
 

@@ -47,6 +47,7 @@ class Damping(Task):
     """
 
     stands_in_world: ClassVar[bool] = False
+    asks: ClassVar[bool] = False
 
     weights: tuple[float, ...] | None = None
 

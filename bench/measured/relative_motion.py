@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from bench.sheet import Sheet
-from wbc.published.relative_motion import INCH, commanded, hold_on_table, line_errors, predicted, tables
+from wbc.published.relative_motion import INCH, commanded, line_errors, predicted, tables
+from wbc.published.relative_motion.studies import Row, holding
 
 ARM = ("4.3", "4.4", "4.5", "4.6", "4.7", "4.8")
 
 
 def parts() -> dict[str, Sheet | str]:
     """Largest errors of x, y and z in inches."""
-    return {"lines": _lines(), "table": _table()}
+    return {
+        "lines": _lines(),
+        "table": _sheet(holding()),
+    }
 
 
 def _lines() -> Sheet:
@@ -29,19 +31,8 @@ def _lines() -> Sheet:
     return Sheet("", columns, rows)
 
 
-def _table() -> Sheet:
-    """2 in at 0.1 Hz and 5 degrees at 0.05 Hz; cycles of 50 ms."""
+def _sheet(rows: list[Row]) -> Sheet:
+    def text(x: float | str) -> str:
+        return x if isinstance(x, str) else f"{x:.1g}" if 0.0 < abs(x) < 1e-3 else f"{x:.3f}"
 
-    def swaying(t: float) -> tuple[np.ndarray, np.ndarray]:
-        w, v, turn = 0.2 * math.pi, 0.1 * math.pi, math.radians(5.0)
-        moved = np.array([2.0 * INCH * math.sin(w * t), 19.39 * INCH, -40.0 * INCH, turn * math.sin(v * t)])
-        return moved, np.array([2.0 * INCH * w * math.cos(w * t), 0.0, 0.0, turn * v * math.cos(v * t)])
-
-    rows, at = [], np.array([0.5, -0.4, 0.3, 0.0]) * INCH
-    cases = (("nothing", False, False), ("pose", True, False), ("pose and twist", True, True))
-    for name, compensated, feedforward in cases:
-        held = hold_on_table(np.zeros(6), swaying, lambda t: at, 20.0, compensated=compensated, feedforward=feedforward)
-        off = held.relative - held.commanded
-        rows.append((name, f"{np.linalg.norm(off[:, :3], axis=1).max() / INCH:.5f}",
-                     f"{math.degrees(np.abs(off[:, 3]).max()):.4f}"))  # fmt: skip
-    return Sheet("", ("of the table is added", "position, in", "yaw, degrees"), rows)
+    return Sheet("", tuple(rows[0]), [tuple(map(text, row.values())) for row in rows])

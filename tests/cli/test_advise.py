@@ -28,7 +28,7 @@ def test_advice_on_a_locus() -> None:
 def test_the_page_has_the_written_restrictions() -> None:
     code, out, _ = run("spherical_4r", "--restrictions")
     assert code == 0
-    assert out.strip() in (Path(__file__).parents[2] / "docs" / "coordinates.md").read_text()
+    assert out.strip() in (Path(__file__).parents[2] / "docs" / "written_restrictions.md").read_text()
 
 
 def test_a_survey_of_random_configurations() -> None:

@@ -6,8 +6,13 @@ import json
 import time
 from pathlib import Path
 
+import numpy as np
+import pytest
 from typer.testing import CliRunner
 
+from tests.repeats import repeats
+from wbc import robots
+from wbc.analysis import BodyRows, ExactModel, JointRows, certify
 from wbc.cli.app import app
 
 
@@ -72,6 +77,30 @@ def test_minutes_are_kept_where_the_locus_takes_long() -> None:
     assert time.monotonic() - began < 20.0
     assert "end3: 9 x 7, " in out
     assert "  open     " in out or "end3: incomplete" in out
+
+
+@pytest.mark.parametrize("seed", range(repeats(2)))
+def test_minutes_are_kept_where_the_jacobian_takes_long(seed: int, tmp_path: Path) -> None:
+    """Eight joints about axes that are nobody's: their exact Jacobian alone takes a minute. That is said after 1.2 s,
+    and a certificate says that nothing is decided.
+    """
+    rng, text = np.random.default_rng(seed), '<link name="l0"/>'
+    for k in range(8):
+        axis, at = rng.normal(size=3), rng.uniform(-0.4, 0.4, 3)
+        text += f'<link name="l{k + 1}"/><joint name="j{k + 1}" type="continuous"><parent link="l{k}"/>'
+        text += f'<child link="l{k + 1}"/><origin xyz="{at[0]} {at[1]} {at[2]}"/>'
+        text += f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/></joint>'
+    file = tmp_path / "eight.urdf"
+    file.write_text(f'<robot name="eight">{text}</robot>')
+    began = time.monotonic()
+    code, out, err = run(file, "--approximate", "--frame", "l8", "--lock", "j1", "--lock", "j5", "--minutes", 0.02)
+    assert code == 2
+    assert "minutes: expected more: the exact Jacobian of 8 joints takes longer (got 0.02)" in out + err
+    model = ExactModel(robots.load(str(file)), approximate=True)
+    found = certify(model, (BodyRows("l8"),), (JointRows("j1"), JointRows("j5")), minutes=0.02)
+    assert found.verdict == "undecided"
+    # 2.4 s, and what a shared machine may hold up
+    assert time.monotonic() - began < 15.0
 
 
 def test_certificate_on_screen_and_gone_on_with(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import csv
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from wbc.cli.app import app
@@ -32,3 +33,37 @@ def test_a_table_row_by_row(tmp_path: Path) -> None:
     bad = RUN.invoke(app, ["relative-motion", "--table", "4.2"])
     assert bad.exit_code == 2
     assert "valid: 4.3" in bad.output
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        (("measuring", "--angles", "40,-25,-20,0"), ["40, -25, -20, 0", "0.658"]),
+        (("holding", "--seconds", "2"), ["pose and twist", "cycles of 50 ms"]),
+        (("master-slave", "--backlash", "0.1", "--share", "0.5"), ["swaying", "0.100", "A = 0.5"]),
+    ],
+)
+def test_parts_of_the_system(words: tuple[str, ...], shown: list[str], tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["relative-motion", *words, "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert all(text in done.output for text in shown)
+    with (tmp_path / f"{words[0]}.csv").open() as stream:
+        assert len(list(csv.DictReader(stream))) in (1, 3, 4)
+    assert words[0] in json.loads((tmp_path / "summary.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("meassuring",), "did you mean 'measuring'"),
+        (("measuring", "--angles", "1,2"), "four numbers"),
+        (("master-slave", "--backlash", "-1"), "backlash"),
+        (("master-slave", "--carried", "0.5"), "B: expected"),
+        (("holding", "--period", "0"), "period"),
+    ],
+)
+def test_bad_words_are_named(words: tuple[str, ...], named: str, tmp_path: Path) -> None:
+    done = RUN.invoke(app, ["relative-motion", *words, "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert named in done.output
+    assert not (tmp_path / "run" / "summary.json").exists()

@@ -13,7 +13,7 @@ from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
-from wbc.tasks import Damping, Elbow, EndEffector, Hold, JointLimits, Posture
+from wbc.tasks import AxisAlign, Damping, Elbow, EndEffector, Hold, JointLimits, Posture
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link4"
 Q = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
@@ -176,6 +176,30 @@ def test_the_explanation_names_the_share(two: Controller) -> None:
     assert "hand keeps its direction at" in str(found)
     assert not any(side.item.endswith("direction") for side in found.binding)
     assert "hand direction" in str(two)
+
+
+def test_a_task_with_rows_of_its_own_keeps_its_direction() -> None:
+    """An axis on joints of 0.05 rad/s turns straight to its target, the shortest way; by least squares it does not."""
+    bot, rng, turned = (
+        robot("panda").with_limits(velocity=0.05, acceleration=np.inf),
+        np.random.default_rng(2),
+        [0.0] * 2,
+    )
+    stacks = [Stack(bot, DT, calm=False).add(AxisAlign(TIP), name="axis", scaled=kept) for kept in (False, True)]
+    made = [stack.add(JointLimits(), name="limits").compile(backend="vm") for stack in stacks]
+    for _ in range(8):
+        q, target = Q + rng.uniform(-0.3, 0.3, 7), rng.normal(size=3)
+        target /= np.linalg.norm(target)
+        for k, controller in enumerate(made):
+            controller.reset(q)
+            controller["axis"].target = target
+            later = pin.integrate(bot.model, q, controller.step(q).v * 1e-4)
+            before, after = (bot.pose(at, TIP).rotation[:, 2] for at in (q, later))
+            way, moved = target - before * (before @ target), after - before
+            size = np.linalg.norm(way) * np.linalg.norm(moved)
+            turned[k] = max(turned[k], float(np.arccos(np.clip(way @ moved / size, -1.0, 1.0))))
+    assert turned[0] > 0.1
+    assert turned[1] < 1e-3
 
 
 def test_bad_declarations_are_refused() -> None:

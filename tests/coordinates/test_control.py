@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.repeats import repeats
 from wbc.coordinates import (
+    Adviser,
     BodyRows,
     CoordinatePair,
     JointRows,
@@ -18,6 +22,7 @@ from wbc.coordinates import (
     mode_pairs,
     parts,
 )
+from wbc.coordinates.control.pair_stack import row_count
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robots import operator_arm
 from wbc.tasks import WorkspaceBox
@@ -184,7 +189,7 @@ def test_what_both_pairs_hold_is_exact_while_one_becomes_the_other() -> None:
     for _ in range(round(seconds / control.dt) + 5):
         control.command([-0.05])
         step = control.step(q)
-        assert step.status == "solved"
+        assert step.ended == "solved"
         assert step.certificate.violation < 1e-10
         q, rates = pin.integrate(ARM.model, q, control.dt * step.v), [*rates, step.v]
         assert np.abs(place(q) - held).max() < 1e-5
@@ -211,3 +216,65 @@ def test_hands_stay_while_the_body_turns() -> None:
     for before, after in zip(*places, strict=True):
         assert np.linalg.norm(pin.log6(before.actInv(after)).vector) < 2e-6
     assert abs(q[robot.dofs("body_joint").start] - start[robot.dofs("body_joint").start] - 0.08) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["ssrms", "panda", "spherical_4r"])
+def test_scaled_tasks_are_slowed_down_and_keep_their_direction(name: str) -> None:
+    """Joints of 0.05 rad/s: random pairs, configurations and commands. What is met points along what is asked, and is
+    all of it where that takes no joint to its limit; least squares turns it by tens of degrees.
+    """
+    robot = parts(name).robot.with_limits(velocity=0.05)
+    pairs = [pair for mode in ("M1", "M2", "M3") for pair in mode_pairs(name, mode)][:: 2 if name == "ssrms" else 1]
+    plain, scaled = (
+        PairController(robot, pairs, limits=False, scaled=option, backend="vm") for option in (False, True)
+    )
+    rng, turned, slowed = np.random.default_rng(1), [], 0
+    for pair in (pairs * repeats(30))[: repeats(30)]:
+        q, rates = rng.uniform(-1.5, 1.5, robot.nq), rng.normal(size=row_count(robot, pair.task))
+        for size in (1.0, 1e-3):
+            steps, angles = [], []
+            for control in (plain, scaled):
+                control.switch(pair.name, 0.0)
+                control.reset(q)
+                control.command(size * 0.3 * rates / np.linalg.norm(rates))
+                steps.append(control.step(q))
+                met, asked = control.met(steps[-1].v), control.asked
+                length = np.linalg.norm(met)
+                angles.append(np.arccos(np.clip(met @ asked / length / np.linalg.norm(asked), -1.0, 1.0)))
+            if plain.eased or pair.over_determined(robot):
+                continue
+            if not any(abs(steps[0].v) > 0.05 - 1e-9):
+                assert np.abs(steps[1].v - steps[0].v).max() < 1e-6
+            elif length > 0.003 * size:
+                turned.append(angles[0])
+                assert angles[1] < 1e-2
+                slowed += 1
+    assert slowed >= 8
+    assert max(turned) > 0.5
+
+
+@pytest.mark.parametrize("name", ["ssrms", "spherical_4r", "panda"])
+def test_the_status_of_a_step_is_what_the_adviser_says_of_the_pair_there(name: str) -> None:
+    """Random configurations and such on a locus of a pair or near it: the same word, ``solved`` where it is regular."""
+    robot = parts(name).robot
+    pairs = [pair for mode in ("M1", "M2") for pair in mode_pairs(name, mode)][:6]
+    control, adviser = PairController(robot, pairs, backend="vm"), Adviser(robot, pairs, exact=False, backend="vm")
+    rng, seen = np.random.default_rng(2), []
+    for k in range(repeats(36)):
+        q = rng.uniform(-1.0, 1.0, robot.nq)
+        if k % 3:
+            # Wrists, elbows and planes lose their rank at quarter turns
+            q[rng.integers(robot.nq)] = np.pi / 2 * rng.integers(-1, 2) + rng.choice([0.0, 0.004])
+        q = np.clip(q, robot.limits.position_lower, robot.limits.position_upper)
+        control.switch(pairs[k % len(pairs)].name, 0.0)
+        control.reset(q)
+        control.command(0.01 * rng.normal(size=len(control.asked)))
+        step = control.step(q)
+        said = next(one.condition for one in adviser.advise(q) if one.pair == control.active)
+        assert step.condition is said
+        assert step.ended == "solved"
+        assert step.status == (said if said != "regular" else "solved")
+        assert pickle.loads(pickle.dumps(step)).status == step.status
+        seen.append(str(step.status))
+    assert seen.count("solved") > 5
+    assert len(seen) - seen.count("solved") > 3

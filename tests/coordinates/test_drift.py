@@ -80,7 +80,7 @@ def test_a_task_beside_a_locus_gives_way_and_what_is_held_stays(control: PairCon
     machine, q = Machine(ROBOT), STATE
     for _ in range(300):
         step = control.step(q)
-        assert step.status == "solved"
+        assert step.ended == "solved"
         assert np.abs(step.v).max() < ROBOT.limits.velocity[0] + 1e-9
         q = q + control.dt * step.v
     assert np.linalg.norm(machine.place("tip", q) - machine.place("tip", STATE)) < 2e-5

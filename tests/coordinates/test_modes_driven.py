@@ -90,7 +90,7 @@ def test_a_mode_drives_an_arm_or_says_what_is_missing(name: str, mode: Mode) -> 
         gone = np.zeros(len(held))
         for _ in range(TICKS):
             step = control.step(q)
-            assert step.status == "solved", pair.name
+            assert step.ended == "solved", pair.name
             A = control.rates(q)
             met = np.concatenate([A[one] @ step.v for one in pair.task])
             assert np.abs(met - command).max() < 1e-3 * np.abs(command).max(), pair.name

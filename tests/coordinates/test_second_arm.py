@@ -68,7 +68,7 @@ def go(control: PairController, pair: str, command: object, ticks: int) -> tuple
     way, rates = [STATE], []
     for _ in range(ticks):
         step = control.step(way[-1])
-        assert step.status == "solved"
+        assert step.ended == "solved"
         assert step.certificate.violation < 1e-10
         rates.append(step.v)
         way.append(way[-1] + control.dt * step.v)
@@ -153,7 +153,7 @@ def test_held_rows_are_exact_and_rates_continuous_while_a_pair_becomes_another(n
         control.command([command])
         for _ in range(count):
             step = control.step(q)
-            assert step.status == "solved"
+            assert step.ended == "solved"
             assert step.certificate.violation < 1e-10
             A = control.rates(q)
             for one in control.pair.constraint:

@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.published.relative_motion import (
     INCH,
@@ -40,6 +41,7 @@ from wbc.published.relative_motion import (
     tables,
     wrist_drives,
 )
+from wbc.published.relative_motion.studies import coupled, holding, measuring, registering, swaying
 from wbc.robot.transmission import Transmission
 from wbc.symbolic import Kinematics
 from wbc.symbolic.taylor import TaylorJacobian
@@ -433,14 +435,6 @@ def test_12_registration() -> None:
     np.testing.assert_allclose(left(turn), [0.211, 0.136, 0.025], atol=0.002)
 
 
-def swaying(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """2 in at 0.1 Hz along x and 5 degrees of yaw at 0.05 Hz, about where the hand is at home."""
-    w, v = 2 * math.pi * 0.1, 2 * math.pi * 0.05
-    at, turn = np.array([0.0, 19.39, -40.0, 0.0]) * LENGTHS, math.radians(5.0)
-    moved = np.array([2 * INCH * math.sin(w * t), 0.0, 0.0, turn * math.sin(v * t)])
-    return at + moved, np.array([2 * INCH * w * math.cos(w * t), 0.0, 0.0, turn * v * math.cos(v * t)])
-
-
 def at_rest(t: float) -> tuple[np.ndarray, np.ndarray]:
     return swaying(0.0)[0], np.zeros(4)
 
@@ -517,6 +511,45 @@ def test_14_recursion_with_and_without_table() -> None:
     np.testing.assert_allclose(moving[1][1:] - waves, rest[1][1:], atol=1e-15)
     with pytest.raises(ShapeError):
         MasterSlave().run(master, slave[:3], waves)
+
+
+@pytest.mark.parametrize("seed", range(repeats(20)))
+def test_14_arms_with_backlash_meet_up_to_a_part_of_it(seed: int) -> None:
+    """At rest they are apart by b / (2 A) at most, and nearly that somewhere; each is within its drive's play. Without
+    backlash they are where they were without the option, to the last bit.
+    """
+    rng = np.random.default_rng(seed)
+    arms, (master, slave) = MasterSlave(rng.uniform(0.05, 0.95), rng.uniform(0.0, 0.48)), rng.normal(size=(2, 5))
+    backlash, still = 10.0 ** rng.uniform(-3, 0), np.zeros((800, 5))
+    found = arms.run(master, slave, still, backlash)
+    apart = np.abs(found[0] - found[1])
+    assert apart[-1].max() <= backlash / (2.0 * arms.A) * (1.0 + 1e-9)
+    assert apart[-1].max() > 0.01 * backlash
+    assert np.abs(np.diff(found[0][-20:], axis=0)).max() < 1e-9
+    drives = arms.A * found[1][2:-1] + (1 - arms.A) * found[0][2:-1] + arms.B * (found[0][2:-1] - found[0][:-3])
+    assert np.abs(drives - found[0][3:]).max() <= 0.5 * backlash * (1.0 + 1e-9)
+    np.testing.assert_array_equal(arms.run(master, slave, still, 0.0), arms.run(master, slave, still))
+    with pytest.raises(RangeError, match="backlash"):
+        arms.run(master, slave, still, -backlash)
+
+
+def test_6_a_line_turns_the_hand_only_where_a_yaw_is_asked_for() -> None:
+    level, q = LevelHand(), LevelHand().reach(HOME, np.array([0.05, 0.45, -1.0, 0.3]))
+    for yaw, end in ((None, 0.3), (0.0, 0.0), (-0.2, -0.2)):
+        path = straight_line(level, q, [0.05, 0.0, 0.0], yaw, solves=4, feedback=True)
+        assert hand(path[-1])[1] == pytest.approx(end, abs=1e-9)
+        assert np.abs(deviation(path, np.array([0.05, 0.0, 0.0]))[0]).max() < 1e-9
+
+
+def test_figures_of_the_parts_are_what_the_parts_say() -> None:
+    row = measuring([[40.0, -25.0, -20.0, 0.0]])[0]
+    assert row["published off"] == pytest.approx(0.66, abs=0.005)
+    np.testing.assert_allclose([row[k] for k in "xyz"], measured(np.radians([40.0, -25.0, -20.0, 0.0]))[:3] / INCH)
+    assert [one["registered"] < one["raw"] for one in registering()] == [True, True]
+    nothing, pose, twist = holding(4.0)
+    assert nothing["position"] > 30 * pose["position"] > 900 * twist["position"]
+    rest, played = coupled(MasterSlave(), 0.02)[:2]
+    assert rest["at the end"] < 1e-12 < played["at the end"] <= played["b / (2 A)"]
 
 
 def test_15_wrist_drives() -> None:

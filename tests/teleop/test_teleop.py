@@ -15,7 +15,7 @@ import pytest
 from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.robots import operator_arm
+from wbc.robots import load, operator_arm
 from wbc.teleop import Keyboard, Order, RateFile, RateFileError, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELD
 from wbc.teleop.session import STALE
@@ -391,7 +391,7 @@ def test_an_arm_that_is_driven_straight_comes_to_rest() -> None:
     held, lost = expressions.here(session.robot, psi, q), []
     for _ in range(240):
         seen = session.step(q, Order((0.0, 0.02)))
-        assert seen.step.status == "solved"
+        assert seen.step.ended == "solved"
         assert np.linalg.norm(seen.met[:3]) < 0.021
         lost.append(seen.lost)
         q = pin.integrate(session.robot.model, q, session.control.dt * seen.step.v)
@@ -400,3 +400,20 @@ def test_an_arm_that_is_driven_straight_comes_to_rest() -> None:
     assert any("sigma" in text for text in seen.why)
     assert np.abs(seen.step.v).max() < 0.1
     assert expressions.here(session.robot, psi, q) == pytest.approx(held, abs=1e-3)
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_a_scaled_session_keeps_the_direction_of_orders_that_are_too_fast(scaled: bool) -> None:
+    """Joints of 0.03 rad/s, an order of the six fastest rates: by least squares the tip leaves its direction."""
+    robot = load("panda").with_limits(velocity=0.03)
+    session = Teleoperation(robot, ["M1"], acceleration=10.0, scaled=scaled, backend="vm")
+    q, turned = session.start(), 0.0
+    session.reset(q)
+    for k in range(25):
+        seen = session.step(q, Order((0.3, 0.3, -0.3, 0.07, 0.07, 0.07)))
+        q = pin.integrate(session.robot.model, q, seen.step.v * session.control.dt)
+        size = float(np.linalg.norm(seen.asked) * np.linalg.norm(seen.met))
+        if k > 5 and size > 0.0:
+            turned = max(turned, float(np.arccos(np.clip(seen.asked @ seen.met / size, -1.0, 1.0))))
+    assert 0.0 < seen.lost < 1.0
+    assert turned < 1e-2 if scaled else turned > 0.3

@@ -20,6 +20,7 @@ from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task, rank, singular_values
 from wbc.analysis.loci.budget import Budget, processor_seconds
 from wbc.analysis.loci.loci import STRICT, UNDECIDED, Loci, LocusSearch
+from wbc.analysis.loci.made_within import made_within
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import CompileError, RangeError, UnsupportedJointError
 from wbc.robot import Robot
@@ -105,7 +106,7 @@ def analyse(
 
     Raises:
         UnknownNameError: algorithm, frame or joint. RangeError: fewer rows than joints, more task rows than joints, or
-            a task that has full rank nowhere.
+            a task that has full rank nowhere; a budget that is spent before the Jacobian is there.
     """
     began, spent = time.monotonic(), processor_seconds()
     wanted, added = checked("task", task), checked("constraints", constraints)
@@ -116,6 +117,9 @@ def analyse(
     validation.function("progress", progress)
     budget.start()
     rows = (*wanted, *added)
+    if not made_within(model, rows, budget.seconds):
+        text = f"expected more: the exact Jacobian of {model.robot.nv} joints takes longer"
+        raise RangeError("minutes", budget.minutes, text)
     found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, progress)
     witness = None
     if certificate is not None and certificate.witness is not None:

@@ -87,7 +87,7 @@ COMMANDS = {
     "relative-motion": Listed(
         "relative_motion",
         "relative_motion",
-        "Largest errors in inches of each table's straight lines: as measured, by the published solve, and exactly.",
+        "Compensation of relative motion as published: its straight lines, or another part of its system.",
     ),
     "compare-controllers": Listed(
         "compare_controllers",

@@ -62,6 +62,9 @@ def drive(
         typer.Option("--out", "--output", help="A folder for log.csv, report.html and replay.html, after Ctrl-C, too."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that has a run.")] = False,
+    scaled: Annotated[
+        bool, typer.Option("--scaled", help="Rates that joints are too slow for keep their direction.")
+    ] = False,
     backend: Backend = "auto",
 ) -> None:
     """Drive an arm by rates: the pair of coordinates that is chosen, at most six rates at a time, 50 times a second.
@@ -75,7 +78,7 @@ def drive(
     given = configuration_of(parts(machine).robot, at) if at else None
     source = RateFile(rates) if rates is not None else None
     err().print(f"starting {escape(robot)} ...", soft_wrap=True)
-    session = Teleoperation(machine, mode or None, automatic=automatic, backend=backend)
+    session = Teleoperation(machine, mode or None, automatic=automatic, scaled=scaled, backend=backend)
     q = session.start() if given is None else given
     if given is None:
         err().print(f"from --at={','.join(f'{x:.4f}' for x in q)}", soft_wrap=True, markup=False)

@@ -8,7 +8,7 @@ from wbc import lazy
 
 if TYPE_CHECKING:
     from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
-    from wbc.coordinates.advice.adviser import Advice, Adviser, Basis, Condition
+    from wbc.coordinates.advice.adviser import Advice, Adviser, Basis
     from wbc.coordinates.advice.automatic import AutomaticPairs
     from wbc.coordinates.advice.complete_sets import CompleteSet, smallest_complete_sets
     from wbc.coordinates.advice.determinant_places import ClosedForm, closed_form
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from wbc.coordinates.control.cues import MotionCue, motion_cue
     from wbc.coordinates.control.pair_controller import PairController
     from wbc.coordinates.control.pair_stack import PairStack, pair_stack
+    from wbc.coordinates.control.pair_step import PairStep
+    from wbc.coordinates.control.rank_loss import Condition
     from wbc.coordinates.control.starts import regular_start
     from wbc.coordinates.items import FollowRows, KeepRows
     from wbc.coordinates.pair import CoordinatePair
@@ -64,6 +66,7 @@ __all__ = [
     "PairController",
     "PairCount",
     "PairStack",
+    "PairStep",
     "PairSurvey",
     "Parts",
     "PitchPlaneRows",

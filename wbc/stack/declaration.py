@@ -312,7 +312,7 @@ class Declaration:
                 raise RangeError("soft", soft, "hard=False is soft without a price; leave one of them out")
         added = [Entry(item, chosen, level, number, bool(hard), price, frame, None if item is given else given)]
         if validation.flag("scaled", scaled):
-            if not isinstance(item, Task) or type(item).jacobian is not Task.jacobian:
+            if not isinstance(item, Task) or not item.asks:
                 raise RangeError("scaled", scaled, f"{type(item).__name__} asks for no velocity with a direction")
             kept = self._free_name(f"{chosen} direction")
             added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))

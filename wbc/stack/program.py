@@ -51,6 +51,7 @@ from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
+from wbc.symbolic.motion import Motion
 from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.tracer import Carrier, Tracer, along
 from wbc.tasks._direction import Direction
@@ -126,6 +127,11 @@ class _Builder:
         """q (+) v dt."""
         return self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
 
+    @cached_property
+    def motion(self) -> Motion:
+        """Twists of the links at the last velocity, and their rates where it does not change."""
+        return Motion(self.kinematics)
+
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """What the item's expressions receive for its inputs."""
         return {name: as_value(slot.input, self.p[slot.span]) for name, slot in block.slots.items()}
@@ -175,22 +181,41 @@ class _Builder:
             total = total + ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)
         return ca.sparsify(total)
 
-    def advanced(self, block: Block) -> ca.SX:
-        """The parameter vector with this block's moving inputs dt later."""
+    def bending(self, block: Block, tracer: Tracer, error: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(c, C): at a velocity v the error changes by c + C v more within the tick than at its rate at q, as a rate:
+
+            dt/2 d2e/dt2 at the last v, and dt dJ/dt for what v has changed since,
+
+        with mean rates of what moves. What is left is of third order in dt.
+        """
+        moving = [
+            (self.p[slot.span], ca.densify(self.rate(owner, slot)))
+            for owner, slot in self.moving(block)
+            if all(other.input.rate != slot.input.name for other in owner.slots.values())
+        ]
+        second, v = tracer.second(error, self.motion, None, moving)[1], self.kinematics.v
+        rows, change = tracer.expand(tracer.slope(error)), ca.SX(0)
+        for symbols, rates in [(self.kinematics.q, self.kinematics.tangent_map @ v), *moving]:
+            change += ca.jtimes(ca.vec(rows), symbols, rates)
+        slope = self.dt * ca.reshape(change, rows.shape)
+        return 0.5 * self.dt * second - slope @ v, slope
+
+    def advanced(self, block: Block, dt: ca.SX) -> ca.SX:
+        """The parameter vector with this block's moving inputs ``dt`` later, at their mean rates over the tick."""
         out = ca.SX(self.p)
         for owner, slot in self.moving(block):
             speed = self.speed(owner, slot, mean=True)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
-                turn = rot.from_quaternion(rot.exp3(angular * self.dt)) @ ca.reshape(part[:9], 3, 3)
+                turn = rot.from_quaternion(rot.exp3(angular * dt)) @ ca.reshape(part[:9], 3, 3)
                 moved = ca.vec(turn)
                 if slot.input.kind == "pose":
-                    moved = ca.vertcat(moved, part[9:] + speed[:3] * self.dt)
+                    moved = ca.vertcat(moved, part[9:] + speed[:3] * dt)
             elif slot.input.kind == "configuration":
-                moved = self.kinematics.integrate(part, speed * self.dt)
+                moved = self.kinematics.integrate(part, speed * dt)
             else:
-                moved = part + speed * self.dt
+                moved = part + speed * dt
             out[slot.span] = moved
         return out
 
@@ -222,6 +247,9 @@ class _Builder:
             self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
         desired = -gain * error - self.drift(block, error)
+        if block.entry.frame and own is None:
+            bend, slope = self.bending(block, tracer, error)
+            desired, jacobian = desired - bend, jacobian + slope
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
         error, desired, factor, jacobian = tracer.expanded(error, desired, factor, jacobian)
@@ -302,7 +330,7 @@ class _Builder:
                 rate += ca.jacobian(kept, self.p[slot.span]) @ self.rate(owner, slot)
         keeps = ca.DM([float(not kept[k].is_zero()) for k in range(kept.numel())])
         kept, rate = tracer.expanded(kept, rate)
-        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block))
+        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block, self.dt))
         return ca.sparsify(keeps * (later - kept - rate * self.dt))
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
@@ -321,7 +349,7 @@ class _Builder:
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
-        margin = here(self.later, self.advanced(block))
+        margin = here(self.later, self.advanced(block, self.dt))
         sensed = item.sensed_rows(self.stack.robot)
         if sensed and not self.loops:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt

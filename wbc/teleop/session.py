@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.controller import Status, Step
+from wbc.controller import Status
 from wbc.coordinates import (
     Adviser,
     Condition,
     CoordinatePair,
     Mode,
     PairController,
+    PairStep,
     mode_pairs,
     modes_of,
     motion_cue,
@@ -67,7 +68,7 @@ class Seen:
             and not lost.
     """
 
-    step: Step
+    step: PairStep
     active: str
     blending: bool
     stale: bool
@@ -103,6 +104,7 @@ class Teleoperation:
         automatic: change to the pair that is advised.
         acceleration: of all joints [rad/s^2]; default: 0.02 for the published arms, else the robot's own, and 10 where
             it has none.
+        scaled: rates that the joints cannot have are slowed down together, and keep their direction.
 
     Raises:
         UnknownNameError, MissingPartError: no such robot or mode, or a mode that the robot has not.
@@ -120,6 +122,7 @@ class Teleoperation:
         fastest: tuple[float, float] = (0.3, 0.07),
         automatic: bool = False,
         acceleration: float | None = None,
+        scaled: bool = False,
         backend: str = "auto",
     ) -> None:
         chosen = (
@@ -137,7 +140,7 @@ class Teleoperation:
         metres, radians = validation.ordinary_array("fastest", fastest, (2,)).tolist()
         self._fastest = [validation.scalar("fastest", x, low=0.0, open_low=True) for x in (metres, radians)]
         self._automatic = validation.flag("automatic", automatic)
-        self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, backend=backend)
+        self.control = PairController(self.robot, list(given), 1.0 / RATE, items=items, scaled=scaled, backend=backend)
         self.adviser = Adviser(self.robot, list(given), exact=False, backend=backend)
         self._tall = {pair.name for pair in given if pair.over_determined(self.robot)}
         for pair in given:
@@ -203,7 +206,7 @@ class Teleoperation:
         missed = float(np.linalg.norm(scale * (asked - met)))
         lost = missed / size if size > 0.0 else 0.0
         kept = min(1.0, sigma / task) if task > 0.0 else float(sigma > 0.0)
-        at, solved = self._at_limits(step, before), step.status is Status.SOLVED
+        at, solved = self._at_limits(step, before), step.ended is Status.SOLVED
         why = self._why(q, step, sigma, kept, blending, at) if lost > NOTHING or not solved else ()
         held_back = at.keys() - {"acceleration"} or self.control.eased or not solved
         nearer = missed <= self._missed or not np.array_equal(asked, self._asked)
@@ -231,7 +234,7 @@ class Teleoperation:
             return f"{abs(found[1]):.2g} {self.robot.dof_units[found[0].dof]} from {found[0]}, {lost}"
         return f"about {here.distance:.2g} rad from {lost}"
 
-    def _at_limits(self, step: Step, before: Array) -> dict[str, list[str]]:
+    def _at_limits(self, step: PairStep, before: Array) -> dict[str, list[str]]:
         """Joints whose rates end at a limit, by what it limits: their acceleration, their rate or their position."""
         out: dict[str, list[str]] = {}
         limits, names = self.robot.limits, self.robot.dof_names
@@ -245,7 +248,7 @@ class Teleoperation:
         return out
 
     def _why(
-        self, q: Array, step: Step, sigma: float, kept: float, blending: bool, at: dict[str, list[str]]
+        self, q: Array, step: PairStep, sigma: float, kept: float, blending: bool, at: dict[str, list[str]]
     ) -> tuple[str, ...]:
         """What took a part of the command."""
         out = []
@@ -260,8 +263,8 @@ class Teleoperation:
         out += [f"{kind} limits of {', '.join(joints)}" for kind, joints in at.items()]
         if step.relaxed:
             out.append(f"relaxed: {', '.join(dict.fromkeys(slack.item for slack in step.relaxed))}")
-        if step.status is not Status.SOLVED:
-            out.append(f"the tick is {step.status}")
+        if step.ended is not Status.SOLVED:
+            out.append(f"the tick is {step.ended}")
         return tuple(out) or ("other constraints, or the pair has no full rank here",)
 
     def _take(self, order: Order) -> None:

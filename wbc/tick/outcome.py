@@ -30,6 +30,11 @@ class Status(StrEnum):
     #: The first answer had no certificate; another way led to one that has, see :attr:`Step.answered_by`. Rows may have
     #: given way, see :attr:`Step.relaxed`
     RECOVERED = "recovered"
+    #: Of pairs, see :class:`wbc.coordinates.PairStep`: solved, within 0.02 rad of where the active pair loses a rank:
+    #: task and constraint depend on each other there, the task's own rows do, or those of the constraint
+    ALGORITHMIC = "algorithmic"
+    TASK = "task"
+    CONSTRAINT = "constraint"
 
 
 #: By the tick's flag

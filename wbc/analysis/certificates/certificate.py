@@ -24,6 +24,7 @@ from wbc.analysis.jacobians.jacobian import symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import check_task
 from wbc.analysis.jacobians.rank_matrix import rank_matrices
+from wbc.analysis.loci.made_within import made_within
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import RangeError
 
@@ -107,13 +108,20 @@ def certify(
     part, minutes = _checked(part, minutes)
     wanted, added = _task(task), checked("constraints", constraints)
     workers, file = _means(workers, state, progress, ended)
-    J_T, J_R = _matrices(checked_model(model), wanted, added)
+    checked_model(model)
     until = (began := time.monotonic()) + 60.0 * minutes
     # What a file keeps must be the same problem for the next call, so there its preparation is not cut short
     last, ready = (until, began + 60.0 * _READY * minutes) if file is None else (np.inf, np.inf)
-    matrices = list(rank_matrices(model, (*wanted, *added)))
-    if any(not matrix for matrix in matrices):
-        return _without_boxes(COMPLETE, began)
+    if file is None and not made_within(model, (*wanted, *added), last - began):
+        return _without_boxes(UNDECIDED, began)
+    J_T, J_R = _matrices(model, wanted, added)
+    matrices = []
+    for matrix in rank_matrices(model, (*wanted, *added)):
+        if not matrix:
+            return _without_boxes(COMPLETE, began)
+        matrices.append(matrix)
+        if time.monotonic() > ready:
+            break
     if time.monotonic() > last:
         return _without_boxes(UNDECIDED, began)
     own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)

@@ -23,13 +23,13 @@ class Budget:
         branches = validation.integer("branches", branches, low=1)
         if validation.scalar("minutes", minutes) <= 0.0:
             raise RangeError("minutes", minutes, "expected more than 0")
-        self._left, self._minutes = branches, minutes
+        self._left, self.minutes = branches, minutes
         self._until: float | None = None
 
     def start(self) -> None:
         """The clock starts, if it has not yet."""
         if self._until is None:
-            self._until = time.monotonic() + 60.0 * self._minutes
+            self._until = time.monotonic() + 60.0 * self.minutes
 
     @property
     def seconds(self) -> float:

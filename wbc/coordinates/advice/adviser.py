@@ -5,44 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.analysis.rows import JointRows
 from wbc.coordinates.advice.determinant_places import ClosedForm, closed_form
-from wbc.coordinates.chains import Braked, braked
-from wbc.coordinates.control.conditioning import Conditioning, checked_configuration
+from wbc.coordinates.control.conditioning import checked_configuration
+from wbc.coordinates.control.rank_loss import NEAR, Condition, RankLoss
 from wbc.coordinates.pair import CoordinatePair, pairs_of
-from wbc.coordinates.rows import Coordinate
-from wbc.coordinates.samples import ROUNDING
 from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
 from wbc.validation import Array
 
 #: A change is recommended where another pair is better by this factor
 FACTOR = 1.5
-#: A rank counts as lost where it is lost within this distance in the space of joints [rad, part of the arm's length].
-#: Unlike a threshold on a singular value it does not depend on units, on the scale of rows or on how large the arm is.
-NEAR = 0.02
-#: Of a pair and its task, the one whose locus is this much nearer than the other's is to blame
-NEARER = 0.5
-#: Newton steps to a locus at most
-STEPS = 15
-
-
-class Condition(StrEnum):
-    """What is wrong with a pair at a configuration: what loses its rank within :data:`NEAR` of it."""
-
-    REGULAR = "regular"
-    #: Task and constraint have full rank each, but not together: another pair may do
-    ALGORITHMIC = "algorithmic"
-    #: The task itself loses rank: no constraint helps
-    TASK = "task"
-    #: The constraint rows depend on each other
-    CONSTRAINT = "constraint"
 
 
 class Basis(StrEnum):
@@ -79,16 +57,6 @@ class Advice:
     def ratio(self) -> float:
         """sigma over the task's own: how much the constraint costs."""
         return self.sigma / self.task if self.task > 0.0 else 0.0
-
-
-#: Coordinates, and joints that are locked
-_Group: TypeAlias = tuple[tuple[Coordinate, ...], tuple[str, ...]]
-
-
-def _groups(some: Braked) -> tuple[_Group, _Group, _Group]:
-    """Of a pair, of its task alone, of its constraint; the task's for a constraint of brakes."""
-    task = some.task, ()
-    return (some.task + some.held, some.joints), task, (some.held, some.joints) if some.held else task
 
 
 class Adviser:
@@ -134,33 +102,26 @@ class Adviser:
                 raise DuplicateNameError("pairs", pair.name, "two pairs of one name")
             self.pairs[pair.name] = pair
         self.robot = robot
-        self.near = validation.scalar("near", near, low=0.0, unit="rad")
         self.factor = validation.scalar("factor", factor, low=1.0)
         self._exact = validation.flag("exact", exact)
-        groups: dict[_Group, int] = {}
-        self._braked = [braked(robot, pair) for pair in given]
-        self._group_numbers = np.array(
-            [[groups.setdefault(g, len(groups)) for g in _groups(some)] for some in self._braked]
-        )
-        self.conditioning = Conditioning(
-            robot, [g[0] for g in groups], brakes=[g[1] for g in groups], length=length, backend=backend
-        )
+        self._loss = RankLoss(robot, given, length=length, near=near, backend=backend)
+        self.near, self.conditioning = self._loss.near, self._loss.conditioning
         self._names = list(self.pairs)
         #: Of each pair: what its singular value counts by where pairs are compared
         self._worth = np.array(
             [
                 1.0 / self.factor if any(isinstance(one, JointRows) for one in some.held) else 1.0
-                for some in self._braked
+                for some in self._loss.braked
             ]
         )
-        self._wholes = self.conditioning.chosen(self._group_numbers[:, 0].tolist())
-        self._wholes_and_tasks = self.conditioning.chosen(self._group_numbers[:, :2].ravel().tolist())
+        self._wholes = self.conditioning.chosen(self._loss.numbers[:, 0].tolist())
+        self._wholes_and_tasks = self.conditioning.chosen(self._loss.numbers[:, :2].ravel().tolist())
         alike = [[k for k, other in enumerate(given) if other.task == pair.task] for pair in given]
         #: Of each pair: those with its task, itself among them, and singular values of all these and of the task
         self._siblings = {
             pair.name: (
                 some,
-                self.conditioning.chosen([*self._group_numbers[some, 0].tolist(), int(self._group_numbers[k, 1])]),
+                self.conditioning.chosen([*self._loss.numbers[some, 0].tolist(), int(self._loss.numbers[k, 1])]),
             )
             for k, (pair, some) in enumerate(zip(given, alike, strict=True))
         }
@@ -192,16 +153,18 @@ class Adviser:
         sigmas, slopes, _ = self.conditioning.slopes(q)
         lost: dict[int, float] = {}
         out = []
-        for (whole, task, constraint), name, some in zip(self._group_numbers, self._names, self._braked, strict=True):
+        for (whole, task, constraint), name, some in zip(
+            self._loss.numbers, self._names, self._loss.braked, strict=True
+        ):
             known = closed_form(self.robot, self.pairs[name]) if self._exact else None
             distance, basis, direction, locus = self._nearest(q, float(sigmas[whole]), slopes[whole], known)
             for group in (whole, task, constraint):
                 if group not in lost:
-                    lost[group] = self._distance_to_loss(q, group, float(sigmas[group]), slopes[group])
+                    lost[group] = self._loss.distance(q, int(group))
             pair = min(lost[whole], distance) if basis is Basis.EXACT else lost[whole]
             # Brakes by themselves do not depend on each other
             held = lost[constraint] if some.held else np.inf
-            condition = self._condition(pair, lost[task], held)
+            condition = self._loss.blamed(pair, lost[task], held)
             alone, by_itself = float(sigmas[task]), float(sigmas[constraint]) if some.held else 1.0
             sigma = float(sigmas[whole])
             out.append(Advice(name, sigma, alone, by_itself, condition, distance, basis, direction, locus))
@@ -234,36 +197,6 @@ class Adviser:
         best, own = int(np.argmax(worth)), alike.index(self._names.index(current))
         stay = worth[best] < self.factor * worth[own] or best == own
         return float(sigmas[own]), task, current if stay else self._names[alike[best]]
-
-    def _condition(self, pair: float, task: float, constraint: float) -> Condition:
-        """What loses its rank near here, by the distances to the loci of the pair, its task and its constraint."""
-        if pair >= self.near:
-            return Condition.REGULAR
-        # On a locus of the pair the task's own may be near, too, and yet another pair does there
-        if task < self.near and NEARER * task <= pair:
-            return Condition.TASK
-        own = constraint < self.near and NEARER * constraint <= pair
-        return Condition.CONSTRAINT if own else Condition.ALGORITHMIC
-
-    def _distance_to_loss(self, q: Array, group: int, sigma: float, slope: Array) -> float:
-        """How far it is to a configuration where a group has lost a rank, by Newton's method; inf beyond ``near``."""
-        scale = self.conditioning.dof_scale
-        here, gone = q, np.zeros(self.robot.nv)
-        for _ in range(STEPS):
-            if sigma <= ROUNDING * self.conditioning.size(here, group):
-                return float(np.linalg.norm(gone))
-            # In coordinates in which a sliding joint counts by the arm's length
-            along = slope * scale
-            steep = float(along @ along)
-            if steep == 0.0 or sigma > 2.0 * self.near * np.sqrt(steep):
-                return np.inf
-            gone = gone - sigma / steep * along
-            if np.linalg.norm(gone) > self.near:
-                return np.inf
-            here = pin.integrate(self.robot.model, q, scale * gone)
-            sigmas, slopes, _ = self.conditioning.slopes(here)
-            sigma, slope = float(sigmas[group]), slopes[group]
-        return np.inf
 
     def _nearest(
         self, q: Array, sigma: float, slope: Array, known: ClosedForm | None

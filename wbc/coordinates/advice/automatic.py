@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from wbc import validation
-from wbc.controller import Step
 from wbc.coordinates.advice.adviser import Adviser
 from wbc.coordinates.control.pair_controller import PairController
+from wbc.coordinates.control.pair_step import PairStep
 from wbc.errors import RangeError
 
 
@@ -45,7 +45,7 @@ class AutomaticPairs:
         """See :meth:`PairController.command`."""
         self.control.command(rates)
 
-    def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
+    def step(self, q: Any, v: Any = None, dt: Any = None) -> PairStep:
         """One cycle, see :meth:`PairController.step`; a change begins before it."""
         if not self.control.blending:
             name = self.adviser.recommend(q, self.control.active)

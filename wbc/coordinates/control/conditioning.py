@@ -135,22 +135,30 @@ class Conditioning:
 
         return some
 
-    def slopes(self, q: Array) -> tuple[Array, Array, Array]:
+    def slopes(self, q: Array, group: int | None = None) -> tuple[Array, Array, Array]:
         """(least singular values, their derivatives along q [groups, nv], right singular vectors [groups, nv]).
+
+        Args:
+            group: the number of the one that is looked at; what the others have is then that of an earlier call.
 
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
         self._q[:] = q = checked_configuration(self.robot, q)
+        some = range(len(self.groups)) if group is None else (self._number(group),)
         if self._native is not None:
             at, *out = self._pointers
-            self._native(at, None, *out)
+            wanted = np.zeros(len(self.groups), dtype=np.uint8)
+            wanted[list(some)] = 1
+            self._native(at, wanted.ctypes.data_as(ctypes.c_void_p), *out)
             return self._sigma.copy(), self._slopes.copy(), self._right.copy()
-        self._right[:] = 0.0
-        for g, (rows, columns, J) in enumerate(zip(self._rows, self._columns, self.matrices(q), strict=True)):
-            u, sigma, v = np.linalg.svd(J, full_matrices=False)
+        matrices = self.matrices(q)
+        for g in some:
+            rows, columns = self._rows[g], self._columns[g]
+            u, sigma, v = np.linalg.svd(matrices[g], full_matrices=False)
             left, right = np.zeros(len(self._row_scale)), self._right[g]
             left[rows] = u[:, -1] * self._row_scale[rows]
+            right[:] = 0.0
             self._sigma[g], right[columns] = sigma[-1], v[-1]
             self._slopes[g] = np.asarray(self._slope(q, left, right * self.dof_scale).full()).ravel()
         return self._sigma.copy(), self._slopes.copy(), self._right.copy()

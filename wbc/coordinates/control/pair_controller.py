@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
-from wbc.controller import Step
+from wbc.controller import core_of
+from wbc.controller.step import state_of
 from wbc.coordinates import expressions
 from wbc.coordinates.control.conditioning import checked_configuration
 from wbc.coordinates.control.easing import Easing
 from wbc.coordinates.control.integrals import RateIntegrals, Rows
 from wbc.coordinates.control.pair_stack import EASE, PairStack, pair_stack
+from wbc.coordinates.control.pair_step import PairStep
+from wbc.coordinates.control.rank_loss import RankLoss
 from wbc.coordinates.control.serving import Served, served
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rate_matrices import RateMatrices
@@ -63,15 +67,19 @@ class PairController:
         limits: bool = True,
         gain: float | None = None,
         length: float | None = None,
+        scaled: bool = False,
         backend: str = "auto",
     ) -> None:
-        self.declared: PairStack = pair_stack(robot, pairs, dt, items=items, limits=limits, gain=gain, length=length)
+        self.declared: PairStack = pair_stack(
+            robot, pairs, dt, items=items, limits=limits, gain=gain, length=length, scaled=scaled
+        )
         self.robot, self.dt = robot, self.declared.stack.dt
         self.controller = self.declared.stack.compile(backend=backend)
         native = self.controller.backend == "native"
         self._rates = RateMatrices(robot, self.declared.coordinates, native=native)
         self._integrals = RateIntegrals(robot, self._rates)
         self._easing = Easing(robot, self.pairs.values(), self.declared.stack.length, self._rates, native=native)
+        self._loss = RankLoss(robot, list(self.pairs.values()), backend="auto" if native else "vm")
         self._made = {
             name: served(self.controller, self.declared, pair, self._rates, self._integrals.masked)
             for name, pair in self.pairs.items()
@@ -230,8 +238,9 @@ class PairController:
         whole = self._rates.whole(self.robot.configuration("q", q))
         return {one: whole[rows] for one, rows in self._rates.row_slices.items()}
 
-    def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
-        """One cycle: the velocity for the next dt seconds, see :meth:`wbc.Controller.step`.
+    def step(self, q: Any, v: Any = None, dt: Any = None) -> PairStep:
+        """One cycle: the velocity for the next dt seconds, see :meth:`wbc.Controller.step`; its status says where the
+        active pair is about to lose a rank.
 
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input.
@@ -261,7 +270,10 @@ class PairController:
         # Writing a weight costs more than a look at it
         if weight != self._weight:
             self.controller[EASE].weight = self._weight = weight
-        return self.controller.step(q, v, dt)
+        step = self.controller.step(q, v, dt)
+        return PairStep(
+            state_of(step), core_of(self.controller).context, partial(self._loss.condition, self._q, self.active)
+        )
 
     def _fade(self, period: float) -> None:
         """Serve what is asked and what is left of the difference that a switch began with."""

@@ -48,6 +48,7 @@ def pair_stack(
     limits: bool = True,
     gain: float | None = None,
     length: float | None = None,
+    scaled: bool = False,
 ) -> PairStack:
     """The stack of one pair or several.
 
@@ -58,6 +59,8 @@ def pair_stack(
             leave what it is linear for.
         gain: how fast drift of what is held decays [1/s]; default: half of it in one step.
         length: characteristic length [m], as of :class:`wbc.Stack`.
+        scaled: tasks that joints are too slow for are slowed down and keep their direction, see ``scaled`` of
+            :meth:`wbc.Stack.add`.
 
     Raises:
         ShapeError, DuplicateNameError: no pairs, two of one name. UnknownNameError, RangeError: as of
@@ -80,7 +83,7 @@ def pair_stack(
             metric = metric_of(pair, one)
             if (one, metric) not in follow:
                 name = f"follow {labels[one]}" + ("" if metric is None else f" by points at {metric:g} m")
-                stack.add(FollowRows(one, metric), name=name)
+                stack.add(FollowRows(one, metric), name=name, scaled=scaled)
                 follow[one, metric] = name
         for one in pair.constraint:
             if one not in keep:

@@ -88,12 +88,14 @@ class LevelHand:
 
 
 def straight_line(
-    level: LevelHand, q: Array, increment: Any, yaw: float = 0.0, *, solves: int = 1, feedback: bool = False,
+    level: LevelHand, q: Array, increment: Any, yaw: float | None = None, *, solves: int = 1, feedback: bool = False,
     divisions: int = 1, latched: Array | None = None,
 ) -> Array:  # fmt: skip
-    """Configurations of the program MAIN from q to q and an increment [m], with an absolute yaw [rad].
+    """Configurations of the program MAIN from q to q and an increment [m].
 
     Args:
+        yaw: of the hand at the end [rad], absolute as in the document: a hand that has another one is turned to it,
+            by the first solve. Default: the hand is not turned.
         solves: of the Jacobian on the way; the document has one. feedback: each is repeated until the hand is at its
             point of the line. divisions: of joint space between solves; they set the speed.
         latched: where the Jacobian is expanded; default: q ("initial set"), and each point with feedback.
@@ -106,8 +108,9 @@ def straight_line(
     """
     q, increment = validation.ordinary_array("q", q, (6,)), validation.ordinary_array("increment", increment, (3,))
     validation.integer("solves", solves, 1), validation.integer("divisions", divisions, 1)
-    level.latch(q if latched is None else latched, yaw)
     start, out = hand(q)[0], [q]
+    yaw = hand(q)[1] if yaw is None else float(validation.scalar("yaw", yaw, unit="rad"))
+    level.latch(q if latched is None else latched, yaw)
     for k in range(1, solves + 1):
         there = np.append(start + increment * k / solves, yaw)
         goal = level.reach(q, there) if feedback else level.step(q, increment / solves)

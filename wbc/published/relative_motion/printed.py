@@ -58,7 +58,7 @@ def start(table: str) -> Array:
     """Joints from which a table of the manipulator begins: all 0, or one published solve from there."""
     validation.one_of("table", table, [name for name in AXIS if name > "4.2"])
     level, home = LevelHand(published=True), np.zeros(6)
-    return home if table < "4.6" else straight_line(level, home, FIRST)[-1]
+    return home if table < "4.6" else straight_line(level, home, FIRST, 0.0)[-1]
 
 
 @functools.cache
@@ -72,7 +72,7 @@ def predicted(table: str, method: str) -> Array:
     """
     order = METHODS[validation.one_of("method", method, METHODS)]
     level, q = LevelHand(order, published=True), start(table)
-    lines = [straight_line(level, q, step, latched=np.zeros(6)) for step in commanded(table)]
+    lines = [straight_line(level, q, step, 0.0, latched=np.zeros(6)) for step in commanded(table)]
     return np.array([hand(line[-1])[0] - hand(q)[0] for line in lines]) / INCH
 
 
@@ -85,7 +85,7 @@ def line_errors(table: str, solves: int = 32) -> Array:
     """The exact method along a table's commands: error of the end, farthest from the line [rows - 1, 2] in inches."""
     q, out = start(table), []
     for step in commanded(table):
-        end, way = deviation(straight_line(LevelHand(), q, step, solves=solves, feedback=True, divisions=2), step)
+        end, way = deviation(straight_line(LevelHand(), q, step, 0.0, solves=solves, feedback=True, divisions=2), step)
         out.append((np.abs(end).max(), way))
     return np.array(out) / INCH
 

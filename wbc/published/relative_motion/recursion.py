@@ -21,6 +21,10 @@ class MasterSlave:
     The sum of both follows (z - 1)(z^2 - B z - B), their difference z^3 - (1 - 2 A + B) z^2 + B. No mode grows, and
     the sum comes to rest, where 0 < A < 1 and 0 <= B < 1/2; at B = 1/2 the sum has a double root at 1 and drifts off.
 
+    With a backlash b an arm x moves only where its drive y has taken up the play, x' = y' - clip(y' - x, -b/2, b/2),
+    and positions in the recursion are those of the arms. Arms that meet are then left apart by b / (2 A) at most: of
+    less than that a part A moves no drive out of its play.
+
     Raises:
         RangeError: A or B breaks this; nothing has moved.
     """
@@ -44,19 +48,21 @@ class MasterSlave:
             return np.asarray(np.roots([1.0, -1.0 - self.B, 0.0, self.B]))
         return np.asarray(np.roots([1.0, 2.0 * self.A - self.B - 1.0, 0.0, self.B]))
 
-    def run(self, master: Array, slave: Array, table: Array) -> tuple[Array, Array]:
-        """Commands of both arms cycle by cycle, each arm being where it was sent.
+    def run(self, master: Array, slave: Array, table: Array, backlash: float = 0.0) -> tuple[Array, Array]:
+        """Both arms cycle by cycle.
 
         Args:
-            master, slave: where they begin, at rest [n]; the slave on a table at 0.
+            master, slave: where they begin, at rest in the middle of their play [n]; the slave on a table at 0.
             table: its displacement [cycles, n].
+            backlash: b of both arms, in the unit of n. Default: each arm is where it was sent.
 
         Returns:
             Master and slave [cycles + 1, n].
 
         Raises:
-            ShapeError, NotFiniteError.
+            ShapeError, NotFiniteError, RangeError: bad input, a negative backlash.
         """
+        play = 0.5 * validation.scalar("backlash", backlash, low=0.0)
         master = validation.ordinary_array("master", master)
         shape = master.shape
         slave = validation.ordinary_array("slave", slave, shape)
@@ -65,7 +71,9 @@ class MasterSlave:
         slaves = [slave]
         for displaced in table:
             m, e, m2, e2 = masters[-1], relative[-1], masters[-3], relative[-3]
-            masters.append(self.A * e + (1 - self.A) * m + self.B * (m - m2))
-            relative.append(self.A * m + (1 - self.A) * e + self.B * (e - e2))
+            drive = self.A * e + (1 - self.A) * m + self.B * (m - m2)
+            masters.append(drive - np.clip(drive - m, -play, play))
+            drive = self.A * m + (1 - self.A) * e + self.B * (e - e2)
+            relative.append(drive - np.clip(drive + displaced - slaves[-1], -play, play))
             slaves.append(relative[-1] + displaced)
         return np.array(masters[2:]), np.array(slaves)
