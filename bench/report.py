@@ -56,8 +56,28 @@ def code_notes(results: dict[str, Any]) -> list[str]:
 
 
 def export_page(results: dict[str, Any]) -> str:
-    """The tables of docs/export.md."""
-    return "\n\n".join([*(sheet.markdown() for sheet in code_sheets(results)), *code_notes(results)])
+    """The tables of docs/export.md: durations of an exported tick, and what a cap on iterations does."""
+    ticked = [
+        (row["what"], problem["title"].split(":")[0],
+         *(f"{row['ns'][tail]:.0f}" for tail in ("median", "p99", "p99.9")),
+         f"{row['counts']['instructions']:.0f}" if "instructions" in row["counts"] else "-")
+        for problem in results["code"].values() for row in problem["rows"]
+    ]  # fmt: skip
+    capped = [
+        (name, "none" if row["cap"] is None else str(row["cap"]),
+         *(us(row["times"][tail]) for tail in ("p99", "p99.9")), us(row["least"]["max"]),
+         f"{100.0 * row['shares'].get('capped', 0.0):.2f}", f"{1e3 * row['error']:.1f}")
+        for name, course in results.get("deadlines", {}).items() for row in course["rows"]
+    ]  # fmt: skip
+    sheets = (
+        Sheet("One tick", ("", "robot", "ns, median", "p99", "p99.9", "instructions"), ticked),
+        Sheet(
+            "A cap on iterations",
+            ("robot", "cap", "us, p99", "p99.9", "longest, least of turns", "capped, %", "error, mm"),
+            capped,
+        ),
+    )
+    return "\n\n".join(sheet.markdown() for sheet in sheets if sheet.rows)
 
 
 def ticks(problem: dict[str, Any]) -> Sheet:

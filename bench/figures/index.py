@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,11 +12,9 @@ from bench import report
 from bench.figures import pages, store
 from bench.ik import tables as ik
 from bench.pool import ROOT
-from bench.sheet import Sheet
-from bench.walk import layout_tables, planning_tables
-from bench.walk import tables as walks
+from bench.walk.page import page_sheets
 from bench.walk.trial_parts import PARTS as TRIALS
-from bench.walk.trial_parts import trial_sheet
+from bench.walk.trial_parts import counted_sheet
 
 View = Callable[[Any], str]
 #: What a tick consists of
@@ -56,14 +53,6 @@ class Figure:
         return " ".join(self.command) if self.command else f"python -m bench.figures --only {self.name}"
 
 
-def walk_view(part: str, sheet: Callable[[Any], Sheet]) -> View:
-    """A table of the walker's bench."""
-    return lambda data: store.shown(vars(sheet(data["parts"][part])))
-
-
-#: Parts of the trials that are in their file
-MEASURED = frozenset(store.read(store.FOLDER / "trials.json")["parts"])
-
 _ALL = (
     Figure(
         "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 15.0, ("make", "bench"),
@@ -78,22 +67,17 @@ _ALL = (
         ("python", "-m", "bench.walk", "--layouts", "30", "--walked", "3", "--output", "bench/data"),
         "bench/data/walk.json",
         {
-            "courses": walk_view("courses", walks.course_sheet), "spins": walk_view("spins", walks.spin_sheet),
-            "trenches": walk_view("trenches", walks.trench_sheet), "highest": walk_view("highest", walks.highest_sheet),
-            "planning": walk_view("planning", planning_tables.planning_sheet),
-            "patches": walk_view("patches", planning_tables.patch_sheet),
-            "layouts": walk_view("layouts", layout_tables.layout_sheet),
+            "all": lambda data: "\n\n".join(sheet.markdown() for sheet in page_sheets(data["parts"])),
         },
     ),
     Figure(
         "trials", (*WALK, "bench/walk"), 600.0,
         ("python", "-m", "bench.walk", "--parts", *TRIALS, "--resume", "--output", "bench/data"),
         "bench/data/trials.json",
-        # The mode of one arm is shown once its trials have been measured
-        {part: walk_view(part, functools.partial(trial_sheet, part)) for part in TRIALS if part in MEASURED},
+        {"all": lambda data: store.shown(vars(counted_sheet(data["parts"])))},
     ),
     Figure("backends", TICK, 0.5),
-    Figure("batch", (*TICK, "wbc/batch", "wbc/ik"), 3.0),
+    Figure("batch", (*TICK, "wbc/batch"), 1.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("cortex_m7", (*TICK, "wbc/export", "bench/single.py", "bench/cortex_m7"), 5.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
@@ -111,11 +95,9 @@ _ALL = (
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),
     Figure("viewer", ("wbc/viewer",), 3.0),
-    Figure("viewer_soak", ("wbc/viewer",), 61.0, ("python", "-m", "bench.viewer_soak")),
     Figure("servos", (*TICK, "wbc/servo", "wbc/simulation/mujoco_plant.py", "bench/servo_arm.xml"), 2.0),
     Figure("soft", TICK, 1.0),
     Figure("solvers", (*TICK, "bench/qp"), 1.0),
-    Figure("plants", (*WALK, "wbc/simulation", "tests/simulation/lagging.py"), 1.0),
     Figure("plant_steps", ("wbc/simulation", "robots/walker_masses.py", "robots/data"), 1.0),
     Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),

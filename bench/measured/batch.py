@@ -1,15 +1,13 @@
-"""Ticks a second of many robots, beside mink and pink; and a map of what an arm reaches."""
+"""Ticks a second of many robots, beside mink and pink; and what derivatives cost."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter
 
 import numpy as np
 
-import wbc
 from bench.ours import Ours
 from bench.pool import Worker, cores
 from bench.prepare import panda, talos
@@ -21,16 +19,10 @@ from wbc.validation import Array
 PEERS = Path(".venv-peers/bin/python")
 #: Passes of a problem's path that a batch has at once, and how often it is timed
 PASSES, TURNS = {"panda": 50, "talos": 10}, 7
-#: Where the Panda's first two joints meet, and the shells of the map [m]
-SHOULDER, RADII = np.array([0.0, 0.0, 0.333]), (0.0, 0.2, 0.4, 0.6, 0.8)
-#: Poses of the map, and how many are sought at once
-POSES, CHUNK = 1_000_000, 50_000
-#: Searches from other configurations that a pose is given: with 100 of them 2 in 100 reachable poses more are found
-RESTARTS = 8
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Rates, then the map."""
+    """Rates, and derivatives."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, make in (("panda", panda), ("talos", talos)):
@@ -49,7 +41,7 @@ def parts() -> dict[str, Sheet | str]:
         "mink + daqp",
         "pink + daqp",
     )
-    return {"rates": Sheet("", columns, rows), "derivatives": derivatives(), "map": reach_map()}
+    return {"rates": Sheet("", columns, rows), "derivatives": derivatives()}
 
 
 def derivatives() -> Sheet:
@@ -130,51 +122,3 @@ def peer(contender: str, folder: Path, case: Case) -> float:
     with Worker(str(PEERS.absolute()), contender, folder, cores()[0]) as worker:
         worker.ask("time", ticks=case.ticks)
         return 1e9 / float(np.median(worker.ask("time", ticks=case.ticks)["cycle"]))
-
-
-def reach_map(poses: int = POSES) -> Sheet:
-    """Poses of a Panda's hand, drawn evenly in a ball about its shoulder and over all orientations."""
-    robot = wbc.robots.load("panda")
-    stack = wbc.Stack(robot, dt=0.01)
-    stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
-    stack.add(wbc.tasks.JointLimits())
-    kinematics = stack.inverse_kinematics()
-    q0 = (robot.limits.position_lower + robot.limits.position_upper) / 2.0
-    rng = np.random.default_rng(1)
-    targets = drawn(rng, poses)
-    kinematics.solve_batch(q0, {"hand": targets[:1000]})
-    found, began, used = np.zeros(poses, bool), perf_counter(), process_time()
-    for start in range(0, poses, CHUNK):
-        found[start : start + CHUNK] = kinematics.solve_batch(
-            q0, {"hand": targets[start : start + CHUNK]}, restarts=RESTARTS, nearest=False
-        ).solved
-    spent, used = perf_counter() - began, process_time() - used
-    places = np.linalg.norm(targets[:, :3, 3] - SHOULDER, axis=1)
-    shells = [
-        (f"{low:.1f} to {low + 0.2:.1f} m from the shoulder", (places >= low) & (places < low + 0.2)) for low in RADII
-    ]
-    rows = [(text, f"{inside.sum():,}", f"{100.0 * found[inside].mean():.1f} %") for text, inside in shells]
-    rows.append(
-        (
-            f"all, in {spent:.1f} s on {len(os.sched_getaffinity(0))} cores, {used:.1f} s of processor time",
-            f"{poses:,}",
-            f"{100.0 * found.mean():.1f} %",
-        )
-    )
-    return Sheet("", ("poses of the hand", "sought", "reached"), rows)
-
-
-def drawn(rng: np.random.Generator, count: int) -> Array:
-    """Random poses [count, 4, 4] in a ball of 1 m, each orientation as likely as any other."""
-    out = np.tile(np.eye(4), (count, 1, 1))
-    w, x, y, z = (part for part in unit(rng.normal(size=(count, 4))).T)
-    out[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1)
-    out[:, 1, :3] = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1)
-    out[:, 2, :3] = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
-    out[:, :3, 3] = SHOULDER + unit(rng.normal(size=(count, 3))) * np.cbrt(rng.random((count, 1)))
-    return out
-
-
-def unit(x: Array) -> Array:
-    """Rows of length 1."""
-    return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""The exported tick of a Panda in single precision beside double: here, and on a Cortex-M7 that qemu emulates.
+"""The exported tick of a Panda in single precision beside double, on a Cortex-M7 that qemu emulates.
 
 Needs gcc and make; for the processor arm-none-eabi-gcc with newlib, and qemu-system-arm; and DAQP's source from the
 package index. What is missing is named.
@@ -19,25 +19,19 @@ from bench.single import (
     Case,
     States,
     Ticks,
-    build_here,
     compiled,
     in_closed_loop,
     need,
-    random_cases,
     read,
     run,
-    ticks_here,
 )
 from tests.export.cases import panda
 from wbc.export.exporting import vectors
-from wbc.tick.outcome import STATUSES, Status
 
-#: States of the Panda and of a random stack, and random stacks
-COUNT, STATES, STACKS = 500, 300, 18
+#: States of the Panda of each family
+COUNT = 500
 #: Differences of commands where the statuses agree
-OFF = ("commands differ by: median [rad/s]", "p99", "p99.9", "largest")
-#: WBC_UNCERTIFIED
-UNCERTIFIED = 8
+OFF = ("commands differ by: median [rad/s]", "p99")
 #: Floating-point unit, options
 BUILDS = {
     "double, unit for double": ("fpv5-d16", ""),
@@ -77,28 +71,21 @@ def there(folder: Path, unit: str, precision: str, families: list[States]) -> tu
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Errors of single precision; instructions and bytes on the board."""
+    """Instructions and bytes on the board, and errors of single precision there."""
     need("gcc", "make", "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm")
     c = panda()
     families = {
         "targets near the hand": States(vectors(c.clone(), COUNT), 7, 7),
         "target and ball anywhere": in_closed_loop(c.clone(), COUNT, 1),
     }
-    errors, rows = [], []
+    rows = []
     with TemporaryDirectory() as place:
         folder = c.export(Path(place) / "panda", solver_source=True, states=1)
-        build_here(folder, SINGLE)
-        for family, states in families.items():
-            errors.append(error_row(f"Panda, {family}", [Case("", states, ticks_here(folder, states))]))
         for name, build in BUILDS.items():
             ticks, code = there(folder, *build, list(families.values()))
             rows += [
                 board_row(name, family, families[family], t, code) for family, t in zip(families, ticks, strict=True)
             ]
-    cases = list(random_cases(range(STACKS), STATES))
-    for k, family in enumerate(("targets near hands", "targets and obstacles anywhere")):
-        errors.append(error_row(f"{len(cases[k::2])} random robots and stacks, {family}", cases[k::2]))
-    counted = ("states", "relaxed", "statuses differ", "braked without a certificate")
     told = (
         "Cortex-M7",
         f"{COUNT} states each",
@@ -107,22 +94,8 @@ def parts() -> dict[str, Sheet | str]:
         "largest",
         "us at 480 MHz, median",
     )
-    sizes = ("code and constants [bytes]", "a controller [bytes]", "stack [bytes]", "statuses differ", *OFF[:2])
-    return {
-        "error": Sheet("", ("single precision beside double, on this machine", *counted, *OFF), errors),
-        "board": Sheet("", (*told, *sizes), rows),
-    }
-
-
-def error_row(name: str, cases: list[Case]) -> tuple[str, ...]:
-    """Single precision beside double: statuses, and commands where those agree."""
-    status = np.concatenate([case.states.status for case in cases])
-    braked = sum(int((case.single.status == UNCERTIFIED).sum()) for case in cases)
-    relaxed = int((status == STATUSES.index(Status.RELAXED)).sum())
-    off = np.concatenate([case.off for case in cases])
-    counts = (len(status), relaxed, sum(case.differ for case in cases), braked)
-    numbers = (np.median(off), np.percentile(off, 99), np.percentile(off, 99.9), off.max())
-    return (name, *map(str, counts), *(f"{x:.1e}" for x in numbers))
+    sizes = ("code and constants [bytes]", "a controller [bytes]", "stack [bytes]", "statuses differ", *OFF)
+    return {"board": Sheet("", (*told, *sizes), rows)}
 
 
 def board_row(name: str, family: str, states: States, ticks: Ticks, code: str) -> tuple[str, ...]:

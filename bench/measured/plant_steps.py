@@ -1,4 +1,4 @@
-"""What a step of a plant costs and keeps, and how soft grips are in MuJoCo."""
+"""What a step of a plant costs and keeps."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 import wbc
 from bench.sheet import Sheet, us
-from tests.simulation.machines import HANDS, held, off, velocity
-from wbc.simulation import GripKind, GrippingMujocoPlant, PinocchioPlant
+from tests.simulation.machines import held, off, velocity
+from wbc.simulation import PinocchioPlant
 from wbc.simulation.dynamics import Integrator
 
 #: Steps whose cost is measured at once, and how often; the quickest counts
@@ -19,14 +19,14 @@ FAST, WALKING = 0.8, 0.2
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Both tables."""
-    return {"steps": steps(), "soft": soft()}
+    """The table."""
+    return {"steps": steps()}
 
 
 def steps() -> Sheet:
     """For each number of grips and integrator: cost, and what 10 s of free swinging at 1 ms lose."""
     robot, rows = wbc.robots.with_masses(wbc.robots.walker()).robot, []
-    for grips in range(4):
+    for grips in (0, 3):
         for integrator in ("rk4", "midpoint"):
             plant = _plant(integrator)
             held(plant, grips)
@@ -57,20 +57,3 @@ def steps() -> Sheet:
 
 def _plant(integrator: Integrator) -> PinocchioPlant:
     return PinocchioPlant(wbc.robots.with_masses(wbc.robots.walker()).robot, integrator=integrator)
-
-
-def soft() -> Sheet:
-    """How far a gripped hand of the free walker gives way in MuJoCo when its body is pulled with 50 N."""
-    robot, rows = wbc.robots.with_masses(wbc.robots.walker()).robot, []
-    for constant in (0.002, 0.004, 0.02):
-        plant = GrippingMujocoPlant(robot, HANDS, time_constant=constant)
-        plant.reset(robot.neutral, 0.0)
-        plant.grasp(HANDS[0], robot.pose(robot.neutral, HANDS[0]), GripKind.POSE)
-        plant.data.xfrc_applied[1, 0] = 50.0
-        worst = 0.0
-        for _ in range(20):
-            plant.advance(0.1)
-            gap = robot.pose(plant.read().q, HANDS[0]).translation - plant.grips[HANDS[0]].pose.translation
-            worst = max(worst, float(np.linalg.norm(gap)))
-        rows.append((f"{1e3 * constant:g}", f"{1e3 * worst:.2g} mm"))
-    return Sheet("", ("time constant, ms", "hand off its hold"), rows)

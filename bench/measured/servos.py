@@ -21,7 +21,7 @@ ARM = ROOT / "bench" / "servo_arm.xml"
 HOME = np.array([0.0, 0.3, 0.0, -1.6, 0.0, 1.8, 0.0])
 DT, TICKS, SETTLED = 0.001, 4000, 500
 #: Servos drawn at random
-COUNT = 12
+COUNT = 6
 KINDS = (CommandKind.POSITION, CommandKind.VELOCITY, CommandKind.TORQUE)
 
 

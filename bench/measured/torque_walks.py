@@ -11,6 +11,7 @@ from math import pi, sin
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import shorten
 
 import numpy as np
 import pinocchio as pin
@@ -33,10 +34,11 @@ from wbc.walking.torque.faults import Fault, delay_of
 #: What is asked for in all of them
 REQUEST = PathRequest(Site(rigid=True), "13,9", ("13,14",))
 #: Along -y, towards the holds [m/s^2]
-PLUTO, MOST, MOON, MARS = (0.0, -0.62, 0.0), (0.0, -1.0, 0.0), (0.0, -1.62, 0.0), (0.0, -3.71, 0.0)
+MOST, MOON = (0.0, -1.0, 0.0), (0.0, -1.62, 0.0)
 #: Directions of gravity that are tried, along the structure's axes
-DIRECTIONS = {"towards the holds, -y": (0, -1, 0), "away from them, y": (0, 1, 0), "across, x": (1, 0, 0),
-              "across, -x": (-1, 0, 0), "along the cylinder, z": (0, 0, 1), "along it, -z": (0, 0, -1)}  # fmt: skip
+DIRECTIONS = {"towards the holds, -y": (0, -1, 0), "across, x": (1, 0, 0), "along the cylinder, z": (0, 0, 1)}
+#: Letters of a refusal that the table has room for
+WHY = 60
 #: Walks at once
 WORKERS = 2
 
@@ -64,26 +66,16 @@ class Trial:
 TRIALS = (
     Trial("Pinocchio, no gravity"),
     Trial("MuJoCo, no gravity", "mujoco"),
-    Trial("Pinocchio, on Pluto, 0.62 m/s^2", gravity=PLUTO),
     Trial("Pinocchio, 1 m/s^2", gravity=MOST),
-    Trial("MuJoCo, 1 m/s^2", "mujoco", gravity=MOST),
-    Trial("Pinocchio, 0.8 m/s^2 across", gravity=(0.8, 0.0, 0.0)),
     Trial("Pinocchio, on the Moon, 1.62 m/s^2", gravity=MOON),
     Trial("the same with four arms", gravity=MOON, arms=4),
-    Trial("four arms, 1.9 m/s^2", gravity=(0.0, -1.9, 0.0), arms=4),
-    Trial("four arms on Mars, 3.71 m/s^2", gravity=MARS, arms=4),
     Trial("four arms on holds that let hands tilt", arms=4, rigid=False),
-    Trial("four arms on holds that let hands tilt, MuJoCo", "mujoco", arms=4, rigid=False),
     Trial("20 kg on the body that the loop does not know", payload=20.0),
     Trial("friction that it does not know, 2 N m and 2 N m s", motors=Motors(coulomb=2.0, viscous=2.0)),
-    Trial("encoders of 20 bits with noise, 1e-6 rad and 1e-4 rad/s",
-          encoders=Encoders(position=1e-6, velocity=1e-4, resolution=2.0 * pi / 2**20)),
     Trial("encoders with noise, 1e-5 rad and 1e-3 rad/s", encoders=Encoders(position=1e-5, velocity=1e-3)),
     Trial("20 ms of delay, known", faults=("delay 0.02",)),
-    Trial("20 ms of delay, known, MuJoCo", "mujoco", faults=("delay 0.02",)),
     Trial("a motor of a hand that holds goes limp", faults=("limp arm3_joint2 at 4",)),
     Trial("one of a hand in the air", faults=("limp arm2_joint2 at 3.2",)),
-    Trial("a grip slips by 1 mm", faults=("slip arm2 0.001 at 2",)),
     Trial("a grip slips by 5 mm", faults=("slip arm2 0.005 at 2",)),
     Trial("a hold breaks off, three hold", faults=("break arm1 at 0.5",)),
     Trial("a hold breaks off, two hold", faults=("break arm1 at 3",)),
@@ -95,9 +87,7 @@ def walks() -> Sheet:
     # Forked processes would share locks of what is loaded here
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
         found = list(pool.map(tried, TRIALS))
-    columns = ("walk", "end", "found wrong by the loop", "hold slip", "grip off where it closed", "largest grip",
-               "momentum given", "external checker")  # fmt: skip
-    return Sheet("", columns, found)
+    return Sheet("", ("walk", "end", "hold slip", "largest grip", "external checker"), found)
 
 
 def tried(trial: Trial) -> tuple[str, ...]:
@@ -110,7 +100,7 @@ def tried(trial: Trial) -> tuple[str, ...]:
     run = perform_walk(request, bare, plant=loop)
     print(f"{trial.name}: {run.outcome} {run.reason}", file=sys.stderr)
     if run.log is None or run.ticks is None:
-        return (trial.name, f"{run.outcome}: {run.reason}", *[""] * 6)
+        return (trial.name, shorten(f"{run.outcome}: {run.reason}", WHY, placeholder=" ..."), *[""] * 3)
     with TemporaryDirectory() as folder:
         urdf, rules = bare.urdf(Path(folder) / "robot.urdf"), rules_of(bare)
         found = [check_walk(log, urdf, run.structure, rules) for log in (loop.truth(run.log), run.log)]
@@ -118,11 +108,8 @@ def tried(trial: Trial) -> tuple[str, ...]:
     return (
         trial.name,
         f"{run.outcome} after {run.log.t[-1]:.1f} s",
-        "; ".join(f"{text} at {when:.2f} s" for when, text in watch.noted) or "nothing",
         f"{1e3 * run.ticks.slip.max():.2g} mm",
-        f"{1e3 * watch.drift:.2g} mm",
         f"{watch.force:.0f} N, {watch.moment:.0f} N m",
-        f"{watch.given[0]:.0f} N s",
         verdict(*found),
     )
 

@@ -9,16 +9,14 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from websockets.sync.client import connect
 
 from bench.pool import ROOT
-from bench.sheet import Sheet, us
+from bench.sheet import Sheet
 from wbc.api import Controller
 from wbc.viewer import Viewer, show
-from wbc.viewer.chromium import Chromium, program
 from wbc.viewer.presets import playground
 
 #: Ticks of a block at the preset's rate, and blocks of each kind, taken in turn
@@ -53,14 +51,11 @@ def parts() -> dict[str, Sheet | str]:
             for name, count in (*kinds, ("one client", 1), ("ten clients", WATCHERS)):
                 with watched(viewer, count):
                     found.setdefault(name, []).append(block(controller, q, dt, None if count < 0 else viewer))
-        there, back, rate, explained = delays(controller, q, dt, viewer)
-    rows, worst = [], {}
+        there, back = delays(controller, q, dt, viewer)
+    worst = {}
     for name, blocks in found.items():
         # Whatever else the machine does only adds: of every block its percentiles, and of those the least
-        figures = [min(float(np.percentile(block[k], p)) for block in blocks) for k in range(3) for p in (50, 99)]
-        worst[name] = figures[1], figures[5]
-        rows.append((name, *(us(1e6 * x) for x in figures)))
-    columns = ("loop", "tick, median", "tick, p99", "processor, median", "processor, p99", "late, median", "late, p99")
+        worst[name] = [min(float(np.percentile(block[k], 99)) for block in blocks) for k in range(2)]
     changes = {
         name: [f"{100 * (of[k] / worst['no viewer'][k] - 1.0):+.0f} %" for k in (0, 1)] for name, of in worst.items()
     }
@@ -79,53 +74,26 @@ def parts() -> dict[str, Sheet | str]:
             ("is back in a state after", *(f"{1e3 * np.percentile(back, p):.1f} ms" for p in (50, 95))),
         ],
     )
-    drag = first_drag()
-    rates = f"A client gets {rate:.0f} states a second, and {explained:.0f} explanations a second while a row binds."
-    return {"jitter": Sheet("", columns, rows), "cost": text, "delay": delay, "rates": rates, "drag": drag}
-
-
-def first_drag() -> str:
-    """From the command to a hand that moves because a key is held down in a page."""
-    if program() is None:
-        return "How long it takes from `wbc play` to a hand that is moved was not measured, for want of Chromium."
-    began = time.perf_counter()
-    command = [str(Path(sys.executable).with_name("wbc")), "play", "--no-browser", "--seconds", "60"]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as playing:
-        assert playing.stdout is not None
-        url = next(line.strip() for line in playing.stdout if line.startswith("http"))
-        there = time.perf_counter() - began
-        with Chromium() as browser:
-            page = browser.open(url)
-            page.wait("wbc.state && wbc.operator === wbc.me")
-            page.wait("!!document.getElementById('scene').contentDocument.querySelector('canvas')")
-            page.key("KeyR", True)
-            page.wait("wbc.state.speed > 0.01")
-            moved = time.perf_counter() - began
-        playing.terminate()
-    return (
-        f"With compiled code cached, `wbc play` says its address after {there:.1f} s. After {moved:.1f} s Chromium, "
-        "started then, has drawn the scene by software, and the hand moves by a key that is held down."
-    )
+    return {"cost": text, "delay": delay}
 
 
 def block(controller: Controller, q: np.ndarray, dt: float, viewer: Viewer | None) -> np.ndarray:
-    """How long each tick took with its update, its processor time, and how late it began [3 x TICKS] s."""
-    took, processor, late = np.zeros((3, TICKS))
+    """How long each tick took with its update, and how late it began [2 x TICKS] s."""
+    took, late = np.zeros((2, TICKS))
     integrate = controller.stack.robot.integrate
     due = time.perf_counter() + dt
     for k in range(TICKS):
         wait = due - time.perf_counter()
         if wait > 0.0:
             time.sleep(wait)
-        start, own = time.perf_counter(), time.thread_time()
+        start = time.perf_counter()
         step = controller.step(q)
         if viewer is not None:
             viewer.update(step)
-        processor[k] = time.thread_time() - own
         took[k], late[k] = time.perf_counter() - start, start - due
         q = integrate(q, step.v, dt)
         due = max(due + dt, start)
-    return np.array([took, processor, late])
+    return np.array([took, late])
 
 
 @contextlib.contextmanager
@@ -143,10 +111,8 @@ def watched(viewer: Viewer, count: int) -> Iterator[None]:
     clients.wait()
 
 
-def delays(
-    controller: Controller, q: np.ndarray, dt: float, viewer: Viewer
-) -> tuple[list[float], list[float], float, float]:
-    """Times from a message to the controller and back in a state [s]; states and explanations a second."""
+def delays(controller: Controller, q: np.ndarray, dt: float, viewer: Viewer) -> tuple[list[float], list[float]]:
+    """Times from a message to the controller and back in a state [s]."""
     over = threading.Event()
     seen: dict[float, float] = {}
 
@@ -188,14 +154,6 @@ def delays(
             back.append(time.perf_counter() - sent)
             there.append(min(seen.values(), key=lambda when: abs(when - sent) if when >= sent else np.inf) - sent)
             time.sleep(0.01)
-        begun, states, explained, last = time.perf_counter(), 0, 0, -1
-        while time.perf_counter() - begun < 4.0:
-            message = json.loads(socket.recv())
-            if message["type"] == "state":
-                states += 1
-                explained += message["explained"] != last
-                last = message["explained"]
-                socket.send('{"type": "alive"}')
     over.set()
     thread.join()
-    return there, back, states / 4.0, explained / 4.0
+    return there, back

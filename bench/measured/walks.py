@@ -1,15 +1,13 @@
-"""The two-ended arm's walks, the least time of plans, and what the reference search says of trenches."""
+"""The least time of plans, and what the reference search says of trenches."""
 
 from __future__ import annotations
 
 from time import process_time
 
-import numpy as np
-
 import wbc.robots
 from bench.sheet import Sheet
 from bench.walk.reference import GridPose, Reference
-from wbc.walking import cylinder, remove_columns, remove_fraction, remove_rows
+from wbc.walking import cylinder, remove_rows
 from wbc.walking.body_path import grid_path
 from wbc.walking.planner import plan_walk
 from wbc.walking.planner.plan_time import least_plan_time
@@ -21,8 +19,8 @@ ROWS = {3: "12-14", 4: "11-14", 5: "11-15", 6: "10-15", 7: "10-16", 8: "9-16"}
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Four tables."""
-    return {"least": least_times(), "rows": rows(), "others": others()}
+    """Two tables."""
+    return {"least": least_times(), "rows": rows()}
 
 
 def least_times() -> Sheet:
@@ -60,23 +58,3 @@ def rows() -> Sheet:
         for count, span in ROWS.items()
     ]
     return Sheet("", ("rows removed", *HEIGHTS), out)
-
-
-def others() -> Sheet:
-    """Columns, and holds at random, at 46 to 54 in."""
-    reference, whole = Reference(heights=tuple(inch * INCH for inch in HEIGHTS["46 to 54 in"])), cylinder()
-    reference.judge(whole, GridPose(13, 5, None), GridPose(13, 20, None))
-    out = []
-    for count, span in {6: "10-15", 7: "10-16", 8: "9-16"}.items():
-        case = remove_columns(whole, span), GridPose(6, 12, None), GridPose(20, 12, None)
-        out.append((f"{count} columns ({span}), (6, 12) to (20, 12)", judged(reference, *case)))
-    for percent in (10, 20, 30, 40, 50, 60):
-        kinds, spent = [], []
-        for seed in range(10):
-            began = process_time()
-            case = remove_fraction(whole, percent / 100, seed=seed), GridPose(13, 6), GridPose(13, 19)
-            kinds.append(reference.judge(*case).kind)
-            spent.append(process_time() - began)
-        some = f"{kinds.count('possible')} of 10 possible, median {np.median(spent):.1f} s, longest {max(spent):.2f} s"
-        out.append((f"{percent} % of the holds at random, (13, 6) to (13, 19), heading 0", some))
-    return Sheet("", ("removed", "verdict, processor time"), out)

@@ -27,6 +27,11 @@ WELL, REFUSED = ("arrived", "time"), ("refused", "hold lost", "HoldLost", "NoPla
 CRASHED = ("crash", "error")
 #: Letters of a reason that a table has room for
 WHY = 200
+#: Columns of the tables
+COLUMNS = (
+    *("", "trials", "arrived", "violate", "violate, 2nd checker", "touch, 2nd", "refused", "no passage", "crashed"),
+    *("plan: median, most, s", "real time with planning: median, least", "what"),
+)
 #: Arms of the published machine
 USUAL = 3
 
@@ -86,10 +91,7 @@ def group(record: Record) -> str:
 def trial_sheet(part: str, records: list[Record]) -> Sheet:
     """Counts a family and a number of arms, then the trials that went wrong, each with its seed."""
     families = {family: [r for r in records if group(r) == family] for family in dict.fromkeys(map(group, records))}
-    rows = [_counts(family or part, mine) for family, mine in families.items()]
-    numbers = sorted({r["arms"] for r in records if "arms" in r}, key=str)
-    if len(numbers) > 1:
-        rows += [_counts(_of_arms(n), [r for r in records if r.get("arms") == n]) for n in numbers]
+    rows = [*(_counts(family or part, mine) for family, mine in families.items()), *_by_arms(records)]
     for r in records:
         wrong = [*r.get("violations", ())[:1], *r.get("second", ())[:1]]
         if r["outcome"] not in WELL:
@@ -97,11 +99,20 @@ def trial_sheet(part: str, records: list[Record]) -> Sheet:
         if wrong:
             spent = f"{r['plan_s']:.1f}" if "plan_s" in r else "-"
             rows.append((f"{part} {r['trial']}", *[""] * 8, spent, "", "; ".join(wrong)))
-    columns = (
-        *("", "trials", "arrived", "violate", "violate, 2nd checker", "touch, 2nd", "refused", "no passage", "crashed"),
-        *("plan: median, most, s", "real time with planning: median, least", "what"),
-    )
-    return Sheet(f"Trials from seeds: {part}", columns, rows)
+    return Sheet(f"Trials from seeds: {part}", COLUMNS, rows)
+
+
+def counted_sheet(parts: dict[str, list[Record]]) -> Sheet:
+    """Counts of structures by the number of arms, and of each other part."""
+    rows = [_counts(part, parts[part]) for part in PARTS if part in parts]
+    rows[1:1] = _by_arms(parts.get("structures", []))
+    return Sheet("Trials from seeds", COLUMNS[:-1], [row[:-1] for row in rows])
+
+
+def _by_arms(records: list[Record]) -> list[tuple[str, ...]]:
+    """Rows of the numbers of arms, where there are several."""
+    numbers = sorted({r["arms"] for r in records if "arms" in r}, key=str)
+    return [_counts(_of_arms(n), [r for r in records if r.get("arms") == n]) for n in numbers if len(numbers) > 1]
 
 
 def _counts(name: str, records: list[Record]) -> tuple[str, ...]:
@@ -176,4 +187,4 @@ def trial_goals(part: str, records: list[Record]) -> list[Goal]:
     return out
 
 
-__all__ = ["PARTS", "trial_goals", "trial_jobs", "trial_sheet"]
+__all__ = ["PARTS", "counted_sheet", "trial_goals", "trial_jobs", "trial_sheet"]
