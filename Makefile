@@ -69,9 +69,9 @@ check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 s
 
 wheel: $(READY)  ## a wheel for this platform, with the code that ticks need where there is no compiler, into dist/
 	@rm -rf build/lib
-	$(BIN)/python -m wbc.stack.prebuilt
+	$(BIN)/python -m wbc.stack.ahead
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
-	@rm -rf build/lib wbc/stack/prebuilt_libraries
+	@rm -rf build/lib
 
 figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code
 	$(BIN)/python -m bench.figures --stale

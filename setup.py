@@ -1,23 +1,55 @@
-"""A wheel that has libraries in it (``make wheel``) is of one platform; all else is in pyproject.toml."""
+"""What pyproject.toml cannot say: hand-written C is compiled ahead, into the clone or the wheel; wbc/stack/ahead.py."""
 
+import sys
 from pathlib import Path
 
 from setuptools import Distribution, setup
 from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools.command.build_py import build_py
+
+HERE = Path(__file__).parent
+
+
+def compile_ahead() -> None:
+    """Compile into wbc/native/ahead. Where that cannot be, a sentence says what follows."""
+    sys.path.insert(0, str(HERE))
+    try:
+        from wbc.errors import CompileError
+        from wbc.stack import ahead
+    except ModuleNotFoundError as error:
+        print(f"wbc: {error.name} is not there yet, so C is compiled when it is first used", file=sys.stderr)
+        return
+    try:
+        ahead.build()
+    except CompileError as error:
+        print(f"wbc: nothing was compiled, so stacks need a C compiler where they are used: {error}", file=sys.stderr)
 
 
 class WithLibraries(Distribution):
     """A package of one platform where the libraries are there."""
 
     def has_ext_modules(self) -> bool:
-        return any(Path(__file__).parent.glob("wbc/stack/prebuilt_libraries/*.so"))
+        return any(HERE.glob("wbc/native/ahead/*.so"))
+
+
+class Compiled(build_py):
+    """Libraries are package data, so they are made before those are listed."""
+
+    def finalize_options(self) -> None:
+        compile_ahead()
+        super().finalize_options()
 
 
 class AnyPython(bdist_wheel):
     """The libraries know nothing of Python, so the wheel is for all its versions."""
 
+    def finalize_options(self) -> None:
+        # Only now is it known whether the wheel is of one platform
+        self.get_finalized_command("build_py")
+        super().finalize_options()
+
     def get_tag(self) -> tuple[str, str, str]:
         return "py3", "none", super().get_tag()[2]
 
 
-setup(distclass=WithLibraries, cmdclass={"bdist_wheel": AnyPython})
+setup(distclass=WithLibraries, cmdclass={"bdist_wheel": AnyPython, "build_py": Compiled})

@@ -12,11 +12,14 @@ them takes as long as thousands of evaluations, and a third of the time of a new
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from tests import optimised, repeats
 from wbc.api import stack
 from wbc.native import toolchain
+from wbc.qp import solvers
 from wbc.stack import artifact, program
 from wbc.stack.artifact import Artifact, compile_stack
 from wbc.stack.declaration import Declaration
@@ -29,14 +32,23 @@ _ALWAYS = repeats.MORE >= repeats.ALL
 #: For tests of the tick's C code: the same, whether it is compiled once or for each stack
 COMPILED = "native" if _ALWAYS else "vm"
 
+#: A solver as Python calls it: the QP that C assembled goes the way of all solvers but the tick's own, to DAQP as well
+IN_PYTHON = "python"
+solvers._SUPPORTED[IN_PYTHON] = solvers._SUPPORTED["daqp"]
+
 #: The test that runs
 _running: list[pytest.Item] = []
 
 
-def _compile(declared: Declaration, backend: str, version: str) -> Artifact:
+def way(name: str) -> dict[str, Any]:
+    """Arguments of :meth:`wbc.Stack.compile` for a back end, or for :data:`IN_PYTHON`."""
+    return {"backend": "vm", "solver": IN_PYTHON} if name == IN_PYTHON else {"backend": name}
+
+
+def _compile(declared: Declaration, backend: str, version: str, wait: bool = True) -> Artifact:
     marked = any(item.get_closest_marker("compiled") for item in _running)
-    virtual = backend == "auto" and not _ALWAYS and not marked and not toolchain.missing()
-    return compile_stack(declared, "vm" if virtual else backend, version)
+    virtual = backend == "auto" and wait and not _ALWAYS and not marked and not toolchain.missing()
+    return compile_stack(declared, "vm" if virtual else backend, version, wait=wait)
 
 
 stack.compile_stack = _compile

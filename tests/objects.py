@@ -39,9 +39,9 @@ def keep(folder: pathlib.Path) -> None:
     """From now on this process takes object files from the folder where it can. Another compiler is always asked."""
     folder.mkdir(parents=True, exist_ok=True)
 
-    def run(command: list[str], place: pathlib.Path) -> None:
+    def run(command: list[str], place: pathlib.Path, behind: bool = False) -> None:
         if command[0] != _compiler:
-            _run(command, place)
+            _run(command, place, behind)
             return
         try:
             compile_or_take(command, place)

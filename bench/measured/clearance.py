@@ -18,18 +18,17 @@ from wbc.validation import Array
 #: Obstacles around, period of the samples [s], least distance [m]
 AROUND, PERIOD, CLEARANCE = 30, 0.01, 0.0254
 #: Name, arms, duration [s], how far the obstacles begin [m], what pairs have to spare [m] (inf: what they have), aim,
-#: in C, repeats
+#: repeats
 CASES = (
-    ("swing, all far", 3, 1.2, 6.0, inf, "any", True, 200),
-    ("swing, all far", 6, 1.2, 6.0, inf, "any", True, 200),
-    ("swing among obstacles", 3, 1.2, 2.0, inf, "any", True, 200),
-    ("swing, every pair within 1 mm of what is required", 3, 1.2, 2.0, 1e-3, "any", True, 20),
-    ("least of all pairs in that swing", 3, 1.2, 2.0, inf, "least", True, 50),
-    ("log of 60 s", 3, 60.0, 2.0, inf, "any", True, 5),
-    ("log of 60 s", 6, 60.0, 2.0, inf, "any", True, 5),
-    ("log of 60 s, every pair within 1 mm", 6, 60.0, 2.0, 1e-3, "any", True, 2),
-    ("least of all pairs in that log", 6, 60.0, 2.0, inf, "least", True, 3),
-    ("swing among obstacles, numpy", 3, 1.2, 2.0, inf, "any", False, 1),
+    ("swing, all far", 3, 1.2, 6.0, inf, "any", 200),
+    ("swing, all far", 6, 1.2, 6.0, inf, "any", 200),
+    ("swing among obstacles", 3, 1.2, 2.0, inf, "any", 200),
+    ("swing, every pair within 1 mm of what is required", 3, 1.2, 2.0, 1e-3, "any", 20),
+    ("least of all pairs in that swing", 3, 1.2, 2.0, inf, "least", 50),
+    ("log of 60 s", 3, 60.0, 2.0, inf, "any", 5),
+    ("log of 60 s", 6, 60.0, 2.0, inf, "any", 5),
+    ("log of 60 s, every pair within 1 mm", 6, 60.0, 2.0, 1e-3, "any", 2),
+    ("least of all pairs in that log", 6, 60.0, 2.0, inf, "least", 3),
 )
 
 
@@ -81,7 +80,7 @@ def spent(call: Callable[[], Sweep], repeats: int) -> tuple[Sweep, float]:
 def rows() -> list[tuple[str, ...]]:
     """One a case."""
     out = []
-    for name, arms, duration, far, spare, aim, native, repeats in CASES:
+    for name, arms, duration, far, spare, aim, repeats in CASES:
         scene, (times, q, poses) = scene_of(arms, far), motion_of(arms, duration)
         motion = Motion.linear(scene.tree, times, q, poses)
         own = Sweeper(scene).sweep(motion, aim="every", far=inf, tolerance=1e-2 if spare == inf else 1e-5)
@@ -90,7 +89,7 @@ def rows() -> list[tuple[str, ...]]:
             near = [Pair(pair.first, pair.second, pair.required + least - spare) for pair, least in pairs]
             scene = SweptScene(scene.tree, scene.bodies, near)
         # Links of the arms are too near to each other during this motion: the other pairs are swept
-        chosen, sweeper = own.pairs[own.bound > 1e-3], Sweeper(scene, native)
+        chosen, sweeper = own.pairs[own.bound > 1e-3], Sweeper(scene)
 
         def call(
             s: Sweeper = sweeper, t: Array = times, x: Array = q, p: Array = poses, c: Array = chosen, a: str = aim

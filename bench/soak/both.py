@@ -1,4 +1,4 @@
-"""The native tick beside the virtual machine's from the same states: how they end, and by how much they differ."""
+"""The native tick beside one solved by OSQP from the same states: how they end, and by how much they differ."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ SAME, ALIKE = 1e-9, 1e-12
 
 
 def both(seed: int, k: int, ticks: int, levels: bool = False) -> list[tuple[str, Counter[str]]]:
-    """A random stack on both back ends: its description and its counts."""
+    """A random stack with both solvers: its description and its counts."""
     rng = np.random.default_rng([seed, 14, k, int(levels)])
     robot = machine(rng)
     stack = random_stack(robot, rng)
     if levels:
         stack = with_levels(stack, rng)
-    pair, counts = (stack.compile(backend="native"), stack.compile(backend="python")), Counter[str]()
+    pair, counts = (stack.compile(backend="native"), stack.compile(backend="vm", solver="osqp")), Counter[str]()
     q, v = robot.neutral, np.zeros(robot.nv)
     for tick in range(ticks):
         if tick % LENGTH == 0:

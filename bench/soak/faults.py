@@ -58,17 +58,17 @@ def jumping_clock(controller: Controller, q: Array, v: Array, tick: int, rng: np
     return q, None, DT * float(rng.choice([0.25, 2.0]))
 
 
-def one_iteration(seed: int, k: int, backend: str) -> Found:
-    """The QP solver may take one iteration, in all its uses within a compiled tick or in numpy's."""
+def one_iteration(seed: int, k: int, backend: str, solver: str = "daqp") -> Found:
+    """DAQP may take one iteration: within a compiled tick, or where a tick that another solver answers calls it."""
     rng = np.random.default_rng([seed, 11, k])
     before = daqp.SETTINGS["iter_limit"]
-    if backend == "python":
+    if solver != "daqp":
         daqp.SETTINGS["iter_limit"] = 1
     try:
-        controller = random_stack(machine(rng), rng).compile(backend=backend)
-        if backend != "python":
+        controller = random_stack(machine(rng), rng).compile(backend=backend, solver=solver)
+        if solver == "daqp":
             controller.iteration_cap = 1
-        return [(f"one iteration, {backend} {seed}/{k}", episode(controller, Judge(controller), rng))]
+        return [(f"one iteration, {backend} {solver} {seed}/{k}", episode(controller, Judge(controller), rng))]
     finally:
         daqp.SETTINGS["iter_limit"] = before
 

@@ -20,6 +20,7 @@ from bench.soak.known import problems
 from bench.soak.machines import machine
 from bench.soak.stacks import random_stack
 from bench.soak.torques import torques
+from tests.backends import IN_PYTHON
 from wbc.api import Controller
 
 
@@ -54,8 +55,8 @@ def test_known_problems_are_solved_as_the_referee_does() -> None:
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_faults_are_survived() -> None:
-    for backend, outcomes in (("python", ("recovered", "braked")), ("vm", ("capped",))):
-        ((_, counts),) = one_iteration(0, 0, backend)
+    for solver, outcomes in ((IN_PYTHON, ("recovered", "braked")), ("daqp", ("capped",))):
+        ((_, counts),) = one_iteration(0, 0, "vm", solver)
         assert wrong(counts) == {}
         assert sum(n for key, n in counts.items() if key.startswith(outcomes)) > 0
     for name, each in plants(0, 1, "vm"):

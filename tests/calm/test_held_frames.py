@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.backends import IN_PYTHON, way
 from tests.calm import held
 from tests.repeats import repeats
 from wbc.api import Stack
@@ -148,12 +149,12 @@ class Parabola(Constraint):
         return Rows(kin.jacobian(self.residual(robot, kin, inputs)), ca.SX(1, 1), ca.SX(1, 1))
 
 
-@pytest.mark.parametrize("backend", ["vm", "python"])
+@pytest.mark.parametrize("backend", ["vm", IN_PYTHON])
 @pytest.mark.parametrize("acceleration", [1.0, np.inf])
 def test_what_no_side_changes_makes_a_short_step_or_is_said(acceleration: float, backend: str) -> None:
     robot = wbc.robots.load("ur5").with_limits(acceleration=acceleration)
     stack = Stack(robot, 0.01).add(Parabola(joint="elbow_joint"), name="parabola").add(Posture(), name="posture")
-    controller = stack.add(JointLimits()).compile(backend=backend)
+    controller = stack.add(JointLimits()).compile(**way(backend))
     q, v = np.zeros(robot.nq), np.zeros(robot.nv)
     v[2] = 1.0
     controller.reset(q)
@@ -181,12 +182,12 @@ def test_all_ticks_agree(calm: bool) -> None:
         stack.add(Hold(foot, kind="position"), name=foot)
     stack.add(EndEffector("base", kind="position", gain=3.0), name="base").add(Posture(), weight=1e-3)
     shared, plain = (
-        stack.add(JointLimits()).compile(backend=b) if b == "vm" else stack.compile(backend=b) for b in ("vm", "python")
+        stack.add(JointLimits()).compile(**way(b)) if b == "vm" else stack.compile(**way(b)) for b in ("vm", IN_PYTHON)
     )
-    q, way = np.array(robot.neutral), np.array([0.3, 0.1, 0.9])
+    q, ahead = np.array(robot.neutral), np.array([0.3, 0.1, 0.9])
     for k in range(100):
         for controller in (shared, plain):
-            controller["base"].target = robot.neutral[:3] + way * k * dt
+            controller["base"].target = robot.neutral[:3] + ahead * k * dt
         steps = [controller.step(q) for controller in (shared, plain)]
         np.testing.assert_allclose(steps[0].v, steps[1].v, atol=1e-7)
         assert steps[0].status == steps[1].status

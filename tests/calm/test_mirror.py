@@ -1,4 +1,4 @@
-"""The native cycle and its numpy mirror use the same constants."""
+"""The native cycle and what Python does beside it use the same constants."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from importlib import resources
 
 import pytest
 
+from wbc.controller import watch
 from wbc.ik import descent, search
-from wbc.tick import reach
-
-NAMES = ("TRUSTED", "AT_LIMIT", "PUSHED", "NEGLIGIBLE", "LEAST_PIVOT", "BRAKING", "REMOVED", "CORRECTIONS")
 
 
 def native(file: str, name: str) -> float:
@@ -20,15 +18,8 @@ def native(file: str, name: str) -> float:
     return float(found.group(1))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_of_reach(name: str) -> None:
-    assert native("reach.h", name) == getattr(reach, name)
-
-
 def test_of_margins() -> None:
-    assert native("margins.h", "BRAKING_MARGIN") == reach.BRAKING_MARGIN
-    assert native("settings.h", "DEAD") == reach.DEAD
-    assert native("settings.h", "TOO_FAR") == reach.TOO_FAR
+    assert native("margins.h", "BRAKING_MARGIN") == watch.BRAKING_MARGIN
 
 
 @pytest.mark.parametrize(

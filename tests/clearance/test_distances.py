@@ -19,20 +19,18 @@ from wbc.validation import Array
 
 #: No distance may be above the judge's by more, or below: Coal is off on round shapes by so much
 OVER, UNDER = 1e-9, 3e-6
-NATIVE = pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
 
 
-def measured(a: Shape, at: pin.SE3, b: Shape, there: pin.SE3, native: bool) -> tuple[float, Array]:
+def measured(a: Shape, at: pin.SE3, b: Shape, there: pin.SE3) -> tuple[float, Array]:
     """Distance and nearest points of two bodies, the first on a base that stands still."""
     scene = SweptScene(
         free_tree(), [SweptBody("a", a, "universe"), SweptBody("b", b, "world", there)], [Pair("a", "b")]
     )
-    found = Sweeper(scene, native).at(still(at), 0.5)[0]
+    found = Sweeper(scene).at(still(at), 0.5)[0]
     return found.distance, found.points
 
 
-@NATIVE
-def test_all_solids_as_coal_finds_them(native: bool) -> None:
+def test_all_solids_as_coal_finds_them() -> None:
     rng = np.random.default_rng(0)
     for _ in range(repeats(6)):
         for a, b in combinations_with_replacement(solids(rng), 2):
@@ -41,7 +39,7 @@ def test_all_solids_as_coal_finds_them(native: bool) -> None:
             scene = SweptScene(
                 free_tree(), [SweptBody("a", a, "universe"), SweptBody("b", b, "world", there)], [Pair("a", "b")]
             )
-            motion, sweeper = Motion.linear(scene.tree, np.arange(5.0), np.zeros((5, 0)), rows), Sweeper(scene, native)
+            motion, sweeper = Motion.linear(scene.tree, np.arange(5.0), np.zeros((5, 0)), rows), Sweeper(scene)
             for k, row in enumerate(rows):
                 found, at = sweeper.at(motion, k)[0], pin.XYZQUATToSE3(row)
                 expected = judged(a, at, b, there)
@@ -79,25 +77,23 @@ DEGENERATE: list[tuple[Solid, pin.SE3, Solid, pin.SE3, float]] = [
 ]
 
 
-@NATIVE
 @pytest.mark.parametrize("case", DEGENERATE, ids=range(len(DEGENERATE)))
-def test_bodies_that_lie_in_special_ways(case: tuple[Solid, pin.SE3, Solid, pin.SE3, float], native: bool) -> None:
+def test_bodies_that_lie_in_special_ways(case: tuple[Solid, pin.SE3, Solid, pin.SE3, float]) -> None:
     a, at, b, there, expected = case
     rng = np.random.default_rng(1)
     for moved in (pin.SE3.Identity(), random_pose(rng, 1.0), random_pose(rng, 10.0)):
         for one, other in (((a, at), (b, there)), ((b, there), (a, at))):
-            found, _ = measured(one[0], moved * one[1], other[0], moved * other[1], native)
+            found, _ = measured(one[0], moved * one[1], other[0], moved * other[1])
             assert found == pytest.approx(expected, abs=1e-8)
             assert found <= expected + 1e-9
 
 
-@NATIVE
-def test_nearly_parallel_capsules_against_a_fine_grid(native: bool) -> None:
+def test_nearly_parallel_capsules_against_a_fine_grid() -> None:
     """The formula of the two lines loses its digits there; ends do not."""
     rng = np.random.default_rng(2)
     for angle in (1e-3, 1e-5, 1e-7, 1e-9, 0.0):
         a = pin.SE3(pin.utils.rotate("x", angle), np.array([0.01, 0.3 * rng.normal(), 0.3 * rng.normal()]))
-        found, _ = measured(Capsule(0.0, 2.0), a, Capsule(0.0, 1.0), pin.SE3.Identity(), native)
+        found, _ = measured(Capsule(0.0, 2.0), a, Capsule(0.0, 1.0), pin.SE3.Identity())
         s = np.linspace(-1.0, 1.0, 20001)[:, None]
         points = a.translation + s * a.rotation[:, 2]
         foot = np.clip(points[:, 2], -0.5, 0.5)
@@ -105,8 +101,7 @@ def test_nearly_parallel_capsules_against_a_fine_grid(native: bool) -> None:
         assert grid - 1e-4 <= found <= grid + 1e-9
 
 
-@NATIVE
-def test_planes_and_endless_cylinders_against_points_of_the_solids(native: bool) -> None:
+def test_planes_and_endless_cylinders_against_points_of_the_solids() -> None:
     rng = np.random.default_rng(3)
     for _ in range(repeats(5)):
         wall, radius = random_pose(rng, 1.0), float(rng.uniform(2.0, 6.0))
@@ -115,13 +110,13 @@ def test_planes_and_endless_cylinders_against_points_of_the_solids(native: bool)
             points, ball = surface_points(rng, solid)
             local = (points @ at.rotation.T + at.translation - wall.translation) @ wall.rotation
             flat = np.linalg.norm(local[:, :2], axis=1)
-            height, _ = measured(solid, at, HalfSpace(), wall, native)
+            height, _ = measured(solid, at, HalfSpace(), wall)
             assert height == pytest.approx(local[:, 2].min() - ball, abs=1e-2 * np.ptp(points) + 1e-9)
             assert height <= local[:, 2].min() - ball + 1e-9
-            inner, _ = measured(solid, at, CylinderInside(radius), wall, native)
+            inner, _ = measured(solid, at, CylinderInside(radius), wall)
             assert inner <= radius - flat.max() - ball + 1e-9
             assert inner == pytest.approx(radius - flat.max() - ball, abs=1e-2 * np.ptp(points) + 1e-9)
-            outer, ends = measured(solid, at, EndlessCylinder(0.1), wall, native)
+            outer, ends = measured(solid, at, EndlessCylinder(0.1), wall)
             assert outer <= flat.min() - 0.1 - ball + 1e-9
             if outer > 0.0:
                 foot = (ends[1] - wall.translation) @ wall.rotation
@@ -144,8 +139,7 @@ def surface_points(rng: np.random.Generator, solid: Solid) -> tuple[Array, float
     return np.column_stack([rim, z * solid.length]), 0.0
 
 
-@NATIVE
-def test_surfaces_of_triangles_against_the_hull_of_a_box(native: bool) -> None:
+def test_surfaces_of_triangles_against_the_hull_of_a_box() -> None:
     """The twelve triangles of a box, and the box: outside they are as far."""
     rng = np.random.default_rng(4)
     box = Box((0.8, 0.5, 0.3))
@@ -155,15 +149,14 @@ def test_surfaces_of_triangles_against_the_hull_of_a_box(native: bool) -> None:
         for solid in solids(rng):
             at = random_pose(rng, 2.0)
             expected = judged(solid, at, box, there)
-            found, _ = measured(solid, at, TriangleMesh(corners), there, native)
+            found, _ = measured(solid, at, TriangleMesh(corners), there)
             if expected > 0.0:
                 assert expected - UNDER <= found <= expected + OVER
             else:
                 assert found <= 1e-8 or encloses(box, there, solid, at)
 
 
-@NATIVE
-def test_a_closed_mesh_has_an_inside(native: bool, tmp_path: Path) -> None:
+def test_a_closed_mesh_has_an_inside(tmp_path: Path) -> None:
     """The triangles of a box as a solid, from a file: a ball outside, wholly within, and in the wall."""
     rng = np.random.default_rng(6)
     box = Box((0.8, 0.5, 0.3))
@@ -176,7 +169,7 @@ def test_a_closed_mesh_has_an_inside(native: bool, tmp_path: Path) -> None:
     # 6 mm from the side, 60 mm across; in the middle; outside; through the wall
     for x, expected in ((0.394 - 0.03, -0.036 - 0.03), (0.0, -0.15 - 0.03), (0.5, 0.1 - 0.03), (0.4, -0.03)):
         there = random_pose(rng, 1.0)
-        found, points = measured(Sphere(0.03), there * up(x), mesh, there, native)
+        found, points = measured(Sphere(0.03), there * up(x), mesh, there)
         assert found == pytest.approx(expected, abs=3e-6)
         assert np.linalg.norm(points[1] - points[0]) == pytest.approx(abs(found), abs=1e-5)
     for wrong in (corners[1:], np.concatenate([corners[:1, ::-1], corners[1:]])):
@@ -216,8 +209,8 @@ def test_many_triangles_in_their_tree_are_as_far_as_one_by_one() -> None:
     corners = rng.normal(size=(100, 1, 3)) * 2.0 + 0.2 * rng.normal(size=(100, 3, 3))
     for _ in range(repeats(3)):
         at, capsule = random_pose(rng, 2.0), Capsule(0.05, float(rng.uniform(0.0, 1.0)))
-        found, points = measured(capsule, at, TriangleMesh(corners), pin.SE3.Identity(), True)
-        each = [measured(capsule, at, TriangleMesh(one[None]), pin.SE3.Identity(), True)[0] for one in corners]
+        found, points = measured(capsule, at, TriangleMesh(corners), pin.SE3.Identity())
+        each = [measured(capsule, at, TriangleMesh(one[None]), pin.SE3.Identity())[0] for one in corners]
         assert found == pytest.approx(min(each), abs=1e-12)
         if found > 0.0:
             assert np.linalg.norm(points[1] - points[0]) == pytest.approx(found, abs=1e-9)

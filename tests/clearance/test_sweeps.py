@@ -100,7 +100,7 @@ def test_bounds_hold_and_are_close_on_random_arms(cubic: bool) -> None:
         model = random_arms(rng)
         scene = machine(rng, model)
         motion, _, _ = random_motion(rng, scene.tree, 6, cubic)
-        swept = Sweeper(scene, native=True).sweep(motion, aim="every", tolerance=TOLERANCE, far=inf)
+        swept = Sweeper(scene).sweep(motion, aim="every", tolerance=TOLERANCE, far=inf)
         assert (swept.bound <= swept.found).all()
         assert (swept.found - swept.bound <= TOLERANCE * (1 + 1e-9)).all()
         times = np.concatenate([swept.times[::7], np.linspace(motion.times[0], motion.times[-1], 60)])
@@ -117,32 +117,7 @@ def test_bounds_hold_and_are_close_on_random_arms(cubic: bool) -> None:
             assert at == inf or at == pytest.approx(swept.found[k], abs=3e-6)
 
 
-def test_numpy_proves_the_same() -> None:
-    rng = np.random.default_rng(1)
-    for cubic in (False, True):
-        model = random_arms(rng, 2, 3)
-        scene = machine(rng, model)
-        motion, _, _ = random_motion(rng, scene.tree, 4, cubic)
-        c, numpy = (
-            Sweeper(scene, native).sweep(motion, aim="every", tolerance=5e-3, far=0.2) for native in (True, False)
-        )
-        # Far pairs need no more than a bound; of near ones both have the least
-        assert ((c.bound <= numpy.found) & (numpy.bound <= c.found + 3e-6)).all()
-        near = np.minimum(c.found, numpy.found) < 0.2
-        assert near.sum() > 5
-        assert np.abs(c.found[near] - numpy.found[near]).max() <= 5e-3 + 3e-6
-        one, other = (Sweeper(scene, native).sweep(motion, aim="least", far=inf) for native in (True, False))
-        assert one.nearest is not None
-        assert other.nearest is not None
-        assert one.nearest.distance - one.nearest.required == pytest.approx(
-            other.nearest.distance - other.nearest.required, abs=2e-4
-        )
-        every = Sweeper(scene).sweep(motion, aim="every", tolerance=1e-4, far=inf)
-        assert abs(float(one.found.min() - every.found.min())) <= 1e-4
-
-
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_what_a_sample_at_every_knot_misses_is_found(native: bool) -> None:
+def test_what_a_sample_at_every_knot_misses_is_found() -> None:
     """A ball flies past a thin post between two knots; at both it is a metre away."""
     tree = free_tree()
     scene = SweptScene(
@@ -153,7 +128,7 @@ def test_what_a_sample_at_every_knot_misses_is_found(native: bool) -> None:
     for aside, clear in ((0.03, False), (0.0349, False), (0.0352, True)):
         poses = np.array([[-1.0, aside, 0, 0, 0, 0, 1.0], [1.0, aside, 0, 0, 0, 0, 1.0]])
         motion = Motion.linear(tree, [0.0, 0.5], np.zeros((2, 0)), poses)
-        swept = Sweeper(scene, native).sweep(motion, tolerance=1e-5)
+        swept = Sweeper(scene).sweep(motion, tolerance=1e-5)
         assert swept.clear is clear
         if not clear:
             assert swept.violation is not None
@@ -161,7 +136,7 @@ def test_what_a_sample_at_every_knot_misses_is_found(native: bool) -> None:
             assert swept.violation.required == pytest.approx(0.01)
             assert swept.violation.distance < 0.01
             assert 0.2 < swept.violation.time < 0.3
-        least = Sweeper(scene, native).sweep(motion, aim="least", tolerance=1e-6, far=inf)
+        least = Sweeper(scene).sweep(motion, aim="least", tolerance=1e-6, far=inf)
         assert least.found[0] == pytest.approx(aside - 0.035, abs=1e-6)
         assert least.times[0] == pytest.approx(0.25, abs=1e-2)
 
@@ -191,9 +166,8 @@ def flown(angle: float, way: float) -> tuple[Tree, Motion]:
     return free_tree(), Motion.linear(free_tree(), [0.0, 1.0], np.zeros((2, 0)), poses)
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
 @pytest.mark.parametrize("rod", RODS, ids=lambda rod: f"{type(rod[0]).__name__} {rod[1]}")
-def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float], native: bool) -> None:
+def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float]) -> None:
     """One end or both go round, or the body slides or flies past; where the post stands is nowhere near the middle."""
     shape, side = rod
     tip = (0.45 + abs(side)) * (1.0 if side >= 0.0 else -1.0)
@@ -209,20 +183,19 @@ def test_rods_that_come_by_a_thin_post_between_two_knots(rod: tuple[Solid, float
             place = tip * np.array([np.cos(at), np.sin(at), 0.0]) if turns else np.array([tip, at, 0.0])
             body = SweptBody("rod", shape, link, pin.SE3(ALONG, np.array([side, 0.0, 0.0])))
             post = SweptBody("post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), place))
-            swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post", 0.001)]), native).sweep(motion)
+            swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post", 0.001)])).sweep(motion)
             assert swept.violation is not None, (link, turns, at)
             assert abs(swept.violation.time - 0.5) > 0.1
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_a_cubic_that_begins_fast_is_bound_by_its_fastest(native: bool) -> None:
+def test_a_cubic_that_begins_fast_is_bound_by_its_fastest() -> None:
     tree = jointed(pin.JointModelRZ())
     body = SweptBody("rod", Capsule(0.01, 1.0), "rod", pin.SE3(ALONG, np.zeros(3)))
     post = SweptBody(
         "post", Capsule(0.002, 0.5), "world", pin.SE3(np.eye(3), 0.45 * np.array([np.cos(0.2), np.sin(0.2), 0]))
     )
     motion = Motion.cubic(tree, [0.0, 1.0], [[0.0], [1.0]], [[2.7], [0.0]])
-    swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post")]), native).sweep(motion)
+    swept = Sweeper(SweptScene(tree, [body, post], [Pair("rod", "post")])).sweep(motion)
     assert swept.violation is not None
     assert swept.violation.time < 0.15
 
@@ -285,7 +258,7 @@ def test_what_carries_both_moves_them_not_apart() -> None:
     )
     motion, _, _ = random_motion(np.random.default_rng(5), tree, 50)
     held = Motion.linear(tree, motion.times, np.zeros((50, 8)), _as_rows(motion.poses[0]))
-    swept = Sweeper(scene, native=True).sweep(held, aim="every", tolerance=1e-6, far=inf)
+    swept = Sweeper(scene).sweep(held, aim="every", tolerance=1e-6, far=inf)
     assert swept.measured == (1, 1)
     assert swept.bound[0] == pytest.approx(swept.found[0])
 
@@ -294,13 +267,12 @@ def _as_rows(poses: Array) -> Array:
     return np.array([numbers(pin.SE3(row[:9].reshape(3, 3), row[9:])) for row in poses])
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds(native: bool) -> None:
+def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds() -> None:
     """A hand comes down onto a table, to 3 mm in it, and goes along it."""
     tree = free_tree()
     hand = SweptBody("hand", Capsule(0.02, 0.1), "universe", grasp=(0.0, 0.0, -0.07))
     scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.025)])
-    sweeper = Sweeper(scene, native)
+    sweeper = Sweeper(scene)
 
     def down(depth: float, along: float = 0.0) -> Motion:
         z, times = 0.07 - depth, np.arange(5.0)
@@ -324,8 +296,7 @@ def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds(native: bool) -> N
     assert not clear(down(0.003), since=0.0, until=3.5)
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption(native: bool) -> None:
+def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption() -> None:
     """A ball on the axis stands still in the mount, while its grasp point goes round by the hold."""
     tree = jointed(pin.JointModelRZ())
     hand = SweptBody("hand", Sphere(0.1), "rod", grasp=np.array([1.0, 0.0, 0.0]))
@@ -333,18 +304,17 @@ def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption(native: bool) -> 
     held = Exemption("hand", "table", np.array([1.0, 0.0, 0.0]), 0.05, 0.2)
     for turn, clear in ((1.0, False), (0.06, False), (0.04, True)):
         motion = Motion.linear(tree, [0.0, 1.0], [[-turn], [turn]])
-        assert Sweeper(scene, native).sweep(motion, exemptions=[held]).clear is clear
+        assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_a_body_that_rests_longer_than_it_may_is_seen(native: bool) -> None:
+def test_a_body_that_rests_longer_than_it_may_is_seen() -> None:
     tree = free_tree()
     hand = SweptBody("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
     scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     motion = Motion.linear(tree, np.arange(9.0), np.zeros((9, 0)), np.tile([0, 0, 0.02, 0, 0, 0, 1.0], (9, 1)))
     for since, until, clear in ((0.0, 8.0, True), (2.0, 6.0, False), (0.0, 7.0, False), (1.0, 8.0, False)):
         held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
-        assert Sweeper(scene, native).sweep(motion, exemptions=[held]).clear is clear
+        assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
 def test_times_of_an_exemption_are_those_of_the_hold() -> None:
@@ -355,10 +325,9 @@ def test_times_of_an_exemption_are_those_of_the_hold() -> None:
     z = np.array([1.0, 1.0, 0.04, 0.02, 0.02, 0.02, 0.04, 1.0, 1.0])
     poses = np.column_stack([0 * z, 0 * z, z, 0 * z, 0 * z, 0 * z, 0 * z + 1])
     motion = Motion.linear(tree, times, np.zeros((9, 0)), poses)
-    for native in (True, False):
-        for since, until, clear in ((2.0, 6.0, True), (3.0, 6.0, False), (2.0, 5.0, False), (0.0, 8.0, True)):
-            held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
-            assert Sweeper(scene, native).sweep(motion, exemptions=[held]).clear is clear
+    for since, until, clear in ((2.0, 6.0, True), (3.0, 6.0, False), (2.0, 5.0, False), (0.0, 8.0, True)):
+        held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
+        assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
 def test_a_body_that_stands_in_something_is_seen() -> None:
@@ -383,7 +352,7 @@ def test_pairs_can_be_chosen_and_far_ones_cost_one_bound() -> None:
     assert some.found == pytest.approx(every.found[[5, 2, 9]], abs=1e-4)
     assert sweeper.sweep(motion, []).clear
     lenient = SweptScene(scene.tree, scene.bodies, [Pair(p.first, p.second, -100.0) for p in scene.pairs])
-    assert Sweeper(lenient, native=True).sweep(motion).measured == (0, 1)
+    assert Sweeper(lenient).sweep(motion).measured == (0, 1)
 
 
 def test_links_of_a_robot_are_bodies_and_its_pairs_are_pairs() -> None:
@@ -418,8 +387,7 @@ def test_turns_from_knot_to_knot() -> None:
         assert np.linalg.norm(turn) == pytest.approx(angles[k + 1], abs=1e-7)
 
 
-@pytest.mark.parametrize("native", [True, False], ids=["C", "numpy"])
-def test_two_things_that_fly_past_each_other(native: bool) -> None:
+def test_two_things_that_fly_past_each_other() -> None:
     """They meet between two knots, both under way; a rod on a joint is on neither."""
     model = pin.Model()
     model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
@@ -433,9 +401,9 @@ def test_two_things_that_fly_past_each_other(native: bool) -> None:
         cart = [[-1.0, 0.0, 0.0, *still_turn], [1.0, 0.0, 0.0, *still_turn]]
         drone = [[0.0, off, -2.0, *still_turn], [0.0, off, 2.0, *still_turn]]
         motion = Motion.linear(tree, [0.0, 1.0], np.zeros((2, 1)), [cart, drone])
-        swept = Sweeper(scene, native).sweep(motion)
+        swept = Sweeper(scene).sweep(motion)
         assert swept.clear is clear
-        least = Sweeper(scene, native).sweep(motion, aim="least", far=inf, tolerance=1e-6)
+        least = Sweeper(scene).sweep(motion, aim="least", far=inf, tolerance=1e-6)
         assert least.found[0] == pytest.approx(off - 0.2, abs=1e-6)
 
 

@@ -1,48 +1,37 @@
-"""Where nothing can be compiled clearances are proven in numpy, and the log says at what price."""
+"""The C that proves clearances, where it cannot be had: the error says why, and what brings it."""
 
 from __future__ import annotations
 
-import logging
+import ctypes
+from pathlib import Path
 
-import numpy as np
-import pinocchio as pin
 import pytest
 
-from tests.clearance.world import free_tree, still
-from wbc.clearance import Pair, Sweeper, SweptBody, SweptScene, native, sweep
-from wbc.clearance.native import library
+from wbc.clearance import native as clearance
 from wbc.errors import CompileError
-from wbc.native import toolchain
-from wbc.shapes import Box, Sphere
+from wbc.native import kernel, toolchain
+from wbc.proximity import native as proximity
 
 
-def refuse(*_: object) -> None:
-    raise CompileError("compiler", "cc", "failed: no room")
+@pytest.fixture(autouse=True)
+def nothing_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No library was compiled when wbc was installed, and none is in the cache."""
+    monkeypatch.setattr(kernel, "AHEAD", tmp_path / "ahead")
+    monkeypatch.setenv("WBC_CACHE", str(tmp_path / "cache"))
+
+
+@pytest.mark.parametrize("module", [clearance, proximity], ids=["clearance", "proximity"])
+def test_no_compiler(module: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(toolchain, "compiler", lambda: None)
+    with pytest.raises(CompileError, match=r"no C compiler found.*install gcc or wbc\[compiler\].*make wheel"):
+        module.library.__wrapped__()  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
-    [("compiler", lambda: None, "no C compiler"), ("kernel", refuse, "failed: no room")],
+    ("module", "name"), [(clearance, "_Sweep"), (proximity, "_Scene")], ids=["clearance", "proximity"]
 )
-def test_numpy_stands_in(
-    name: str, value: object, said: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(toolchain if name == "compiler" else native, name, value)
-    with caplog.at_level(logging.WARNING, "wbc"):
-        assert library.__wrapped__() is None
-    assert said in caplog.text
-    monkeypatch.setattr(sweep, "library", library.__wrapped__)
-    bodies = [SweptBody("ball", Sphere(0.05), "universe"), SweptBody("box", Box((0.2, 0.2, 0.2)))]
-    sweeper = Sweeper(SweptScene(free_tree(), bodies, [Pair("ball", "box", 0.1)]))
-    assert not sweeper.native
-    swept = sweeper.sweep(still(pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))), aim="least")
-    assert swept.clear
-    assert swept.found == pytest.approx([0.05], abs=1e-9)
-
-
-def test_a_library_of_another_layout_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        native, "_Sweep", type("_Sweep", (native._Sweep,), {"_fields_": [("more", native.ctypes.c_int)]})
-    )
+def test_a_library_of_another_layout_is_refused(module: object, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    more = type(name, (getattr(module, name),), {"_fields_": [("more", ctypes.c_int)]})
+    monkeypatch.setattr(module, name, more)
     with pytest.raises(CompileError, match="bytes"):
-        library.__wrapped__()
+        module.library.__wrapped__()  # type: ignore[attr-defined]

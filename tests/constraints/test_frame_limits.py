@@ -125,7 +125,7 @@ def fresh(backend: str) -> Controller:
     return controller
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_infinite_sides_are_no_limit(backend: str) -> None:
     controller = fresh(backend)
     controller["item 0"].set(lower=[-INF, -INF, 0.0], upper=INF * np.ones(3))
@@ -141,7 +141,7 @@ def test_infinite_sides_are_no_limit(backend: str) -> None:
     assert controller["item 0"].lower.tolist() == [-INF, -INF, 0.0]
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_infinite_sides_beside_rows_that_give_way(backend: str) -> None:
     """A wall half a metre past the hand asks for more than the joints can; the infinite sides stay out of it."""
     controller = fresh(backend)
@@ -202,7 +202,7 @@ VALUES: dict[str, tuple[str, dict[str, Any], type[WbcError], str]] = {
 @pytest.mark.parametrize("case", VALUES)
 def test_bad_value_changes_nothing(case: str) -> None:
     name, values, error, text = VALUES[case]
-    controller = fresh("python")
+    controller = fresh("vm")
     before = core_of(controller).tick.p.copy()
     ways: list[Callable[[], None]] = [lambda: controller[name].set(**values)]
     if len(values) == 1 and "enabled" not in values:
@@ -218,7 +218,7 @@ def test_bad_value_changes_nothing(case: str) -> None:
 
 def test_a_box_moves_past_itself() -> None:
     """Each side alone would cross the other."""
-    controller = fresh("python")
+    controller = fresh("vm")
     controller["item 0"].set(lower=[5.0] * 3, upper=[6.0] * 3)
     controller["item 0"].set(lower=[-6.0] * 3, upper=[-5.0] * 3)
     controller["item 0"].lower = controller["item 0"].upper
@@ -226,7 +226,7 @@ def test_a_box_moves_past_itself() -> None:
 
 
 def test_directions_are_kept_at_unit_length() -> None:
-    controller = fresh("python")
+    controller = fresh("vm")
     for given in ([0, 0, 5], np.array([0.0, 0.0, 1e-9]), [0, 0, 1e200]):
         controller["item 2"].direction = given
         assert controller["item 2"].direction.tolist() == [0.0, 0.0, 1.0]

@@ -49,7 +49,7 @@ def _moved(machine: wbc.Robot, link: str) -> bool:
 @cache
 def pair(name: str, calm: bool = True) -> tuple[Controller, Controller]:
     """(native, vm)."""
-    return stack(name, calm).compile(backend="native"), stack(name, calm).compile(backend="python")
+    return stack(name, calm).compile(backend="native"), stack(name, calm).compile(backend="vm")
 
 
 def configuration(machine: wbc.Robot, rng: np.random.Generator) -> np.ndarray:

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.backends import IN_PYTHON, way
 from wbc.api import Stack
 from wbc.controller import Policy
 from wbc.tasks import Hold, JointLimits, Posture
@@ -14,7 +15,7 @@ from wbc.tasks import Hold, JointLimits, Posture
 DT, LIMIT = 0.01, 20.0
 
 
-@pytest.mark.parametrize("backend", ["vm", "python"])
+@pytest.mark.parametrize("backend", ["vm", IN_PYTHON])
 def test_a_base_without_a_limit_stops_with_the_joint_that_takes_longest(backend: str) -> None:
     robot = wbc.robots.load("quadruped")
     limits = np.r_[np.full(6, np.inf), np.full(robot.nv - 6, LIMIT)]
@@ -22,7 +23,7 @@ def test_a_base_without_a_limit_stops_with_the_joint_that_takes_longest(backend:
     stack = Stack(robot, DT).add(Posture()).add(JointLimits(), name="limits")
     for name, frame in zip(("a", "b"), ("front_left_foot", "front_left_foot"), strict=True):
         stack.add(Hold(robot.frames[frame], kind="position"), name=name)
-    controller = stack.compile(backend=backend)
+    controller = stack.compile(**way(backend))
     controller.policy = Policy(conflict="brake")
     v = np.r_[0.5, -0.2, 0.1, 0.3, -0.6, 0.2, 1.0, np.linspace(-0.5, 0.5, robot.nv - 7)]
     before, q = v.copy(), robot.neutral

@@ -13,16 +13,16 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack
 from wbc.tasks import EndEffector, JointLimits, Posture
 
-BACKENDS = ("python", COMPILED)
+BACKENDS = (IN_PYTHON, COMPILED)
 
 
 def arm(backend: str) -> Controller:
-    return controller("arm", "panda", backend=backend)
+    return controller("arm", "panda", **way(backend))
 
 
 def ticks(one: Controller, seed: int, count: int = 25) -> Iterator[bytes]:
@@ -118,7 +118,7 @@ def test_a_robot_of_one_joint() -> None:
     bot = wbc.robots.load(model, position_lower=-1.0, position_upper=1.0, velocity=2.0, acceleration=5.0)
     found: list[np.ndarray] = []
     for backend in BACKENDS:
-        one = Stack(bot, DT).add(Posture(), name="posture").add(JointLimits(), name="limits").compile(backend=backend)
+        one = Stack(bot, DT).add(Posture(), name="posture").add(JointLimits(), name="limits").compile(**way(backend))
         q = np.array([0.2])
         one["posture"].target, one["posture"].gain = [3.0], 5.0
         for _ in range(400):

@@ -88,7 +88,7 @@ print(json.dumps([at_compile, found]))
 """
 
 
-@pytest.mark.parametrize("backend", ["native", "python"])
+@pytest.mark.parametrize("backend", ["native", "vm"])
 def test_no_tick_imports_or_makes_a_solver(backend: str) -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM, backend], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON
 from tests.controller.stacks import DT, inside, robot
 from tests.controller.twins import BACKENDS, POSE, make, next_ticks, state
 from wbc import Stack
@@ -132,7 +132,7 @@ class Undecided(Task):
 
 def test_step_before_a_target_without_default() -> None:
     declared = Stack(robot("panda"), DT).add(Posture(), name="posture").add(Undecided(), name="joint")
-    controller, twin = declared.compile(backend="python"), declared.compile(backend="python")
+    controller, twin = declared.compile(solver=IN_PYTHON), declared.compile(solver=IN_PYTHON)
     before, q = state(controller), robot("panda").neutral
     for call in (lambda: controller.step(q), lambda: controller.step(q, np.ones(7), DT), lambda: controller.reset(q)):
         with pytest.raises(SolverError, match="no default value; set it before step") as caught:
@@ -149,7 +149,7 @@ def test_step_before_a_target_without_default() -> None:
 
 def test_poses_are_taken_and_refused_alike_by_both_backends() -> None:
     """The native check of a pose that is set every tick, against the one in Python."""
-    native, vm = make("panda", COMPILED), make("panda", "python")
+    native, vm = make("panda", COMPILED), make("panda", IN_PYTHON)
     slot = core_of(native).layout.blocks["hand"].slots["target"]
     rng, taken = np.random.default_rng(11), 0
     for size in (0.0, 1e-8, 1e-7, 2e-7, 3e-7, 4e-7, 6e-7, 1e-6, 1e-3):

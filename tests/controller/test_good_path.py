@@ -25,7 +25,7 @@ assert "wbc.explain.losses" in sys.modules
 """
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_nothing_of_it_is_even_loaded(backend: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(backend=backend)], capture_output=True, text=True, check=True

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.closed_loop.machines import anywhere
 from tests.controller.stacks import FRAMES, robot
 from wbc.api import Stack
@@ -15,7 +15,7 @@ from wbc.controller import Status
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Limit, Posture
 
 
-@pytest.mark.parametrize("backend", [COMPILED, "python"])
+@pytest.mark.parametrize("backend", [COMPILED, IN_PYTHON])
 def test_solved_means_held(backend: str) -> None:
     """A limit on the centre of mass far from where it is, joints at speed: most ticks relax, none says it held."""
     bare = replace(robot("panda"), couplings=(), locked_dofs=())
@@ -23,7 +23,7 @@ def test_solved_means_held(backend: str) -> None:
     machine = bare.with_limits(velocity=speed, acceleration=10.0)
     stack = Stack(machine, 0.01).add(Limit(CenterOfMass(), upper=0.3, only="z"), name="height")
     stack.add(Posture(), name="rest").add(JointLimits()).add(EndEffector(FRAMES["panda"].tip, kind="position"))
-    controller, rng, relaxed = stack.compile(backend=backend), np.random.default_rng(0), 0
+    controller, rng, relaxed = stack.compile(**way(backend)), np.random.default_rng(0), 0
     for _ in range(80 if backend == COMPILED else 25):
         q, v = anywhere(machine, rng), rng.uniform(-0.3, 0.3, machine.nv) * speed
         controller.reset(q)

@@ -130,7 +130,7 @@ def test_bad_caps_are_refused(cap: Any) -> None:
 
 
 def test_only_native_ticks_can_be_capped() -> None:
-    c = controller("arm", "panda", backend="python")
-    with pytest.raises(SolverError, match="python with daqp"):
+    c = controller("arm", "panda", backend="vm", solver="osqp")
+    with pytest.raises(SolverError, match="vm with osqp"):
         c.iteration_cap = 3
     assert c.iteration_cap is None

@@ -24,8 +24,8 @@ from wbc.shapes import Box
 from wbc.stack import artifact
 from wbc.tasks import Damping, Expression, Obstacle
 
-BACKENDS = ("python", "native")
-TICKS = {"python": 15, "native": 60}
+BACKENDS = ("vm", "native")
+TICKS = {"vm": 15, "native": 60}
 #: Small enough that threads take turns within most ticks
 SWITCH = 1e-6
 
@@ -69,7 +69,7 @@ def test_threads_with_sensors() -> None:
     """Distances by Coal, which have memory of their own in every controller."""
     stack = arm(obstacle=False).add(Obstacle(Box((0.1, 0.2, 0.3)), margin=0.01, closest=3), name="box")
     stack.add(Damping(), name="damping")
-    first = stack.compile(backend="python")
+    first = stack.compile(backend="vm")
     assert first["box"].distance.size > 0
     wanted = [work(first.clone(), seed, 12) for seed in range(4)]
     with ThreadPoolExecutor(4) as pool:
@@ -91,11 +91,7 @@ def test_threads_that_make_clones_while_others_step() -> None:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_clone_goes_on_as_its_original_would(backend: str) -> None:
     """After a reset of the solver: that is the one thing that it does not take over."""
-    one = (
-        controller("everything", "panda", backend="python")
-        if backend == "python"
-        else controller("arm", backend=backend)
-    )
+    one = controller("everything", "panda", backend="vm") if backend == "vm" else controller("arm", backend=backend)
     rng, bot = np.random.default_rng(4), one.stack.robot
     assert str(one.clone()) == str(one)
     for _ in range(3):
@@ -115,7 +111,7 @@ def test_a_clone_goes_on_as_its_original_would(backend: str) -> None:
 
 def test_a_clone_waits_for_its_own_first_configuration() -> None:
     """Targets that nobody has set come from the first step of each; those that were set stay."""
-    one = small.stack().compile(backend="python")
+    one = small.stack().compile(backend="vm")
     one["hand"].target = small.TARGET
     other = one.clone()
     one.step((0.1, 0.2))
@@ -150,7 +146,7 @@ def test_a_clone_reads_nothing_and_builds_nothing(monkeypatch: pytest.MonkeyPatc
 
 
 def test_one_controller_in_two_threads_is_an_error() -> None:
-    one = small.stack().compile(backend="python")
+    one = small.stack().compile(backend="vm")
     inside, go_on = threading.Event(), threading.Event()
     call = core_of(one).call
 
@@ -169,14 +165,14 @@ def test_one_controller_in_two_threads_is_an_error() -> None:
     go_on.set()
     other.join()
     # the tick that was under way is as if nobody had come
-    fresh = small.stack().compile(backend="python")
+    fresh = small.stack().compile(backend="vm")
     assert found[0]._data == fresh.step(small.Q)._data
     core_of(one).call = call
     assert one.step(small.Q)._data == fresh.step(small.Q)._data
 
 
 def test_a_refused_step_leaves_the_controller_free() -> None:
-    one = small.stack().compile(backend="python")
+    one = small.stack().compile(backend="vm")
     for bad in ((np.nan, 0.0), (0.0,), "x"):
         with pytest.raises((ValueError, Exception)) as caught:
             one.step(bad)

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -36,11 +36,11 @@ def violation(bot: Robot, v: np.ndarray) -> float:
     return float(np.abs(off).max())
 
 
-def build(name: str, backend: str = "python") -> Controller:
+def build(name: str, backend: str = IN_PYTHON) -> Controller:
     bot = wbc.robots.load(name).with_limits(acceleration=20.0)
     stack = Stack(bot, DT).add(EndEffector(TIPS[name]), name="hand").add(Posture(), name="posture", weight=1e-2)
     stack.add(JointLimits(), name="limits").add(FrameVelocityLimit(TIPS[name], linear=0.5), name="speed")
-    return stack.compile(backend=backend)
+    return stack.compile(**way(backend))
 
 
 @pytest.mark.parametrize("name", TIPS)
@@ -86,10 +86,10 @@ def test_a_platform_drives_round_its_sideways_direction() -> None:
     assert data.oMf[frame].translation == pytest.approx(goal.translation, abs=0.02)
 
 
-@pytest.mark.parametrize("backend", ["python", COMPILED])
+@pytest.mark.parametrize("backend", [IN_PYTHON, COMPILED])
 def test_a_configuration_that_does_not_fit_is_brought_back(backend: str) -> None:
-    bot = wbc.robots.load("talos_full", base="fixed") if backend == "python" else coupled_arm()
-    tick = Stack(bot, DT).add(Posture(), name="posture", weight=0.1).compile(backend=backend)
+    bot = wbc.robots.load("talos_full", base="fixed") if backend == IN_PYTHON else coupled_arm()
+    tick = Stack(bot, DT).add(Posture(), name="posture", weight=0.1).compile(**way(backend))
     q = coupled(bot, np.random.default_rng(2))
     c = bot.couplings[0]
     here, there = (int(bot.position_index[i]) for i in (c.follower, c.leader))

@@ -38,7 +38,7 @@ def through_pickle(thing: Any) -> Any:
 
 def used(stack: Stack) -> Stack:
     """The stack after everything that a robot or item works out from itself was asked for."""
-    key(stack, "1", "python")
+    key(stack, "1", "vm")
     for entry in stack.entries:
         entry.item.rows(stack.robot)
         entry.item.inputs(stack.robot)
@@ -62,7 +62,7 @@ def test_every_item_comes_out_as_it_went_in(class_name: str) -> None:
             assert other.declaration(machine) == item.declaration(machine)
             again = copied(stack)
             assert again.robot is not machine
-            assert key(again, "1", "python") == key(stack, "1", "python")
+            assert key(again, "1", "vm") == key(stack, "1", "vm")
             assert [(e.name, e.level, e.weight) for e in again.entries] == [
                 (e.name, e.level, e.weight) for e in stack.entries
             ]
@@ -109,7 +109,7 @@ def states(one: wbc.Controller, seed: int) -> list[bytes]:
     return [one.step(near_limits(bot, rng), rng.normal(size=bot.nv))._data for _ in range(8)]
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_an_unpickled_stack_is_in_the_cache_and_gives_the_same_bits(backend: str) -> None:
     first = controller("arm", "panda", backend=backend)
     for other in (
@@ -133,16 +133,14 @@ CHILD = """
 import pickle, sys
 from tests.controller.test_pickling import states
 stack = pickle.load(sys.stdin.buffer)
-controller = stack.compile(backend="python")
+controller = stack.compile(backend="vm")
 sys.stdout.buffer.write(pickle.dumps((controller.cached, states(controller, 5))))
 """
 
 
 def test_a_stack_crosses_to_a_fresh_process() -> None:
     """With a lambda in it, whose traced formula is in the key of the cache."""
-    here = (
-        small.stack().add(Expression(lambda kin, p: kin.q[0] - 0.3, units="rad"), name="mine").compile(backend="python")
-    )
+    here = small.stack().add(Expression(lambda kin, p: kin.q[0] - 0.3, units="rad"), name="mine").compile(backend="vm")
     done = subprocess.run(
         [sys.executable, "-c", CHILD], input=pickle.dumps(here.stack), cwd=TOP, capture_output=True, check=True
     )
@@ -150,7 +148,7 @@ def test_a_stack_crosses_to_a_fresh_process() -> None:
 
 
 def test_a_step_crosses_processes() -> None:
-    step = small.stack().compile(backend="python").step(small.Q)
+    step = small.stack().compile(backend="vm").step(small.Q)
     other = through_pickle(step)
     assert np.array_equal(other.v, step.v)
     assert other.status == step.status
@@ -215,11 +213,11 @@ def test_lambdas_without_cloudpickle_are_refused(monkeypatch: pytest.MonkeyPatch
             pickle.dumps(stack)
         assert caught.value.field == f"{name}.Expression.function"
         # a copy in this process needs no name
-        assert key(copy.deepcopy(stack), "1", "python") == key(stack, "1", "python")
+        assert key(copy.deepcopy(stack), "1", "vm") == key(stack, "1", "vm")
 
 
 def test_functions_that_hold_what_cannot_be_pickled() -> None:
-    here = small.stack().compile(backend="python")
+    here = small.stack().compile(backend="vm")
 
     def local(kin: Any, p: Any) -> Any:
         return kin.q[0] - here.stack.dt
@@ -241,7 +239,7 @@ def test_pickles_of_another_version_are_refused() -> None:
 
 
 def test_controllers_stay_in_their_process() -> None:
-    here = small.stack().compile(backend="python")
+    here = small.stack().compile(backend="vm")
     for attempt in (pickle.dumps, cloudpickle.dumps, copy.deepcopy, copy.copy):
         with pytest.raises(PicklingError, match=r"pickle controller\.stack"):
             attempt(here)
@@ -252,4 +250,4 @@ def test_meshes() -> None:
     points = np.random.default_rng(0).normal(size=(200, 3))
     machine = robot("panda")
     stack = Stack(machine, 0.005).add(Obstacle([Convex(points), Convex(points + 1.0)]), name="mesh")
-    assert key(through_pickle(stack), "1", "python") == key(stack, "1", "python")
+    assert key(through_pickle(stack), "1", "vm") == key(stack, "1", "vm")

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
 from wbc.api import Controller
@@ -24,14 +24,14 @@ from wbc.tasks import Hold
 from wbc.tick.buffers import UNSOUND
 
 
-@pytest.fixture(scope="module", params=("python", COMPILED))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return conflicting(request.param)
 
 
 def conflicting(backend: str) -> Controller:
     stack = arm(obstacle=False).add(Hold(FRAMES["panda"].tip, kind="position"), name="grip")
-    return stack.compile(backend=backend)
+    return stack.compile(**way(backend))
 
 
 @pytest.fixture(autouse=True)
@@ -117,9 +117,9 @@ def test_an_empty_chain_brakes(tick: Controller, monkeypatch: pytest.MonkeyPatch
 def test_a_solver_that_gives_up_is_followed_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
     """DAQP may take one iteration: no verdict, and OSQP answers; without it the elastic tick cannot, and it brakes."""
     bot = robot("panda")
-    good = conflicting("python")
+    good = conflicting(IN_PYTHON)
     monkeypatch.setattr(daqp_module, "SETTINGS", {**daqp_module.SETTINGS, "iter_limit": 1})
-    bad = conflicting("python")
+    bad = conflicting(IN_PYTHON)
     steps = []
     for each in (good, bad):
         each.policy = Policy(chain=("cold", "daqp", "osqp", "elastic"))

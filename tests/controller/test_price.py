@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.softness import Soft, Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
@@ -32,9 +32,9 @@ def stack(hold: float | None, slow: float | None, level: int = 0) -> Stack:
     return out.add(FrameVelocityLimit(TIP, linear=LIMIT), name="slow", soft=slow)
 
 
-@pytest.fixture(scope="module", params=("python", COMPILED))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
-    return stack(3.0, 5.0).compile(backend=request.param)
+    return stack(3.0, 5.0).compile(**way(request.param))
 
 
 @pytest.fixture(autouse=True)
@@ -189,8 +189,8 @@ def test_levels_price_violations_within_a_level() -> None:
     out.add(Hold(TIP, kind="position"), name="hold", soft=1e3, level=1)
     out.add(FrameVelocityLimit(TIP, linear=LIMIT), name="slow", soft=4.0)
     speeds = {}
-    for backend in ("python", COMPILED):
-        c = out.compile(backend=backend)
+    for backend in (IN_PYTHON, COMPILED):
+        c = out.compile(**way(backend))
         c.reset(bot.neutral)
         c["hand"].target = jacobian(bot, bot.neutral, TIP)[0] + np.array([0.0, 0.15, 0.0])
         step = c.step(bot.neutral)
@@ -199,7 +199,7 @@ def test_levels_price_violations_within_a_level() -> None:
         moved = (jacobian(bot, bot.neutral, TIP)[1] @ step.v)[1]
         assert moved == pytest.approx((0.3 + 4.0 * LIMIT) / 5.0, abs=1e-6)
         assert {(s.item, s.row) for s in step.relaxed} == {("slow", "y"), ("hold", "y")}
-    assert speeds[COMPILED] == pytest.approx(speeds["python"], abs=1e-8)
+    assert speeds[COMPILED] == pytest.approx(speeds[IN_PYTHON], abs=1e-8)
 
 
 @pytest.mark.parametrize("item", [JointLimits(), Fixed("panda_joint1"), EndEffector(TIP)])

@@ -39,7 +39,7 @@ def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_whole_qp_on_the_virtual_machine(name: str) -> None:
-    assert check(name, "python", STATES) < 1e-9
+    assert check(name, "vm", STATES) < 1e-9
 
 
 def test_whole_qp_compiled() -> None:

@@ -10,14 +10,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
 from wbc.api import Controller, Stack
 from wbc.controller import Status, Step, core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import Constraint, EndEffector, Fixed, Hold, JointLimits, Obstacle, Posture, Row, Rows, SacrificeOrder
 
-BACKENDS = (COMPILED, "python")
+BACKENDS = (COMPILED, IN_PYTHON)
 TIP = "panda_hand_tcp"
 
 
@@ -37,7 +37,7 @@ def within_actuators(step: Step, before: np.ndarray, dt: float, bot: object) -> 
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_actuator_bounds_hold_whatever_contradicts(backend: str) -> None:
-    tick = controller("conflicts", backend=backend)
+    tick = controller("conflicts", **way(backend))
     bot, rng = tick.stack.robot, np.random.default_rng(2)
     for _ in range(120 if backend == COMPILED else 30):
         q, v, dt = near_limits(bot, rng), 1.5 * rng.normal(size=bot.nv), DT * rng.uniform(0.25, 2.0)
@@ -59,7 +59,7 @@ def two_holds() -> Stack:
 
 @pytest.fixture(scope="module", params=BACKENDS)
 def both(request: pytest.FixtureRequest) -> Controller:
-    return two_holds().compile(backend=request.param)
+    return two_holds().compile(**way(request.param))
 
 
 def lifted(tick: Controller, q: np.ndarray, clearance: float) -> None:
@@ -127,7 +127,7 @@ def test_least_squares_among_equals() -> None:
     stack.add(Posture(), name="posture")
     stack.add(Hold(TIP, "position", gain=5.0), name="here").add(Hold(TIP, "position", gain=5.0), name="there")
     for backend in BACKENDS:
-        tick = stack.compile(backend=backend)
+        tick = stack.compile(**way(backend))
         q = robot("panda").neutral
         tick.reset(q)
         place = tick["here"].target
@@ -178,7 +178,7 @@ def test_classes_in_their_order(backend: str) -> None:
     stack.add(AskPosition(low=0.1, high=0.1), name="position")
     stack.add(Ask(low=0.2, high=0.2), name="margin")
     stack.add(AskSoft(low=0.3, high=0.3), name="soft")
-    tick = stack.compile(backend=backend)
+    tick = stack.compile(**way(backend))
     q = robot("panda").neutral
     for off, wanted, relaxed in (
         ((), 0.1, {"margin": 0.1, "soft": 0.2}),
@@ -199,7 +199,7 @@ def test_classes_in_their_order(backend: str) -> None:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_rows_whose_sides_cross_are_met_half_way(backend: str) -> None:
     stack = Stack(robot("panda"), DT).add(Posture(), name="posture").add(Ask(low=0.3, high=0.1), name="crossed")
-    tick = stack.compile(backend=backend)
+    tick = stack.compile(**way(backend))
     step = tick.step(robot("panda").neutral)
     assert step.status is Status.RELAXED
     assert step.v[0] == pytest.approx(0.2)
@@ -213,7 +213,7 @@ def test_an_impossible_row_of_the_actuators_brakes(backend: str) -> None:
     bot = robot("panda")
     stack = Stack(bot, DT).add(EndEffector(TIP), name="hand").add(Posture(), name="posture", weight=1e-3)
     stack.add(JointLimits(), name="limits").add(AskActuator(joint=1, low=50.0, high=60.0), name="never")
-    tick = stack.compile(backend=backend)
+    tick = stack.compile(**way(backend))
     v, q = np.array([1.0, -0.5, 0.02, 0.8, -1.2, 0.0, 0.3]), bot.neutral
     for _ in range(60):
         step = tick.step(q, v)
@@ -234,7 +234,7 @@ def test_a_fixed_joint_outside_its_limits_returns(backend: str) -> None:
     bot = robot("panda")
     stack = Stack(bot, DT).add(Posture(), name="posture").add(Fixed("panda_joint2"), name="fixed")
     stack.add(JointLimits(), name="limits")
-    tick = stack.compile(backend=backend)
+    tick = stack.compile(**way(backend))
     q = bot.neutral.copy()
     assert tick.step(q).v[1] == 0.0
     q[1] = bot.limits.position_upper[1] + 0.05

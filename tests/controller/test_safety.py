@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, aim, controller, near_limits, quarrel, random_configuration, robot
 from tests.controller.test_sacrifice import within_actuators
 from wbc.api import Stack
@@ -33,7 +33,7 @@ from wbc.tasks import (
     SacrificeOrder,
 )
 
-BACKENDS = (COMPILED, "python")
+BACKENDS = (COMPILED, IN_PYTHON)
 
 
 def numbers(step: Step) -> np.ndarray:
@@ -83,7 +83,7 @@ def test_any_state_with_every_item_on_the_virtual_machine(seed: int) -> None:
 @pytest.mark.parametrize("size", [1e60, 1e150, 1e300])
 def test_targets_beyond_any_measure(backend: str, size: float) -> None:
     """Squares of these numbers overflow: the tick may brake, but it gives no NaN and keeps the limits."""
-    tick = controller("arm", "panda", backend=backend)
+    tick = controller("arm", "panda", **way(backend))
     bot, v = tick.stack.robot, np.full(7, 0.3)
     tick.reset(bot.neutral, v)
     tick["hand"].target = pin.SE3(np.eye(3), np.array([size, -size, size]))
@@ -102,7 +102,7 @@ def test_degenerate_geometry(backend: str) -> None:
     stack = Stack(bot, DT).add(EndEffector(f.tip), name="hand").add(Posture(), name="posture", weight=1e-3)
     stack.add(PitchPlane("panda_link3", "panda_link3", "panda_link5"), name="plane")
     stack.add(JointLimits(), name="limits").add(Obstacle(Sphere(0.05)), name="ball")
-    tick = stack.compile(backend=backend)
+    tick = stack.compile(**way(backend))
     data = bot.model.createData()
     pin.framesForwardKinematics(bot.model, data, bot.neutral)
     link = data.oMf[bot.model.getFrameId("panda_link5")]
@@ -178,7 +178,7 @@ def fragile(backend: str) -> Any:
     for where in ("matrix", "lower", "upper"):
         stack.add(Broken(where), name=where)
     stack.add(BrokenBounds(), name="bounds").add(BrokenMargin(), name="margin")
-    return stack.compile(backend=backend)
+    return stack.compile(**way(backend))
 
 
 BAD = [("root", "x", -5.0), ("matrix", "x", -1.0), ("lower", "x", -1.0), ("upper", "x", -1.0), ("margin", "x", 3.0)]

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.softness import Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
@@ -29,10 +29,10 @@ def slow(scaled: bool, calm: bool = True, elbow: int | None = None) -> Stack:
     return out.add(JointLimits(acceleration=calm, position=calm), name="limits")
 
 
-@pytest.fixture(scope="module", params=("python", COMPILED))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def two(request: pytest.FixtureRequest) -> Controller:
     """Two scaled tasks that compete, on velocity limits alone."""
-    return slow(True, calm=False, elbow=0).compile(backend=request.param)
+    return slow(True, calm=False, elbow=0).compile(**way(request.param))
 
 
 def test_the_command_is_the_optimum_with_one_lambda_a_task(two: Controller) -> None:
@@ -79,9 +79,9 @@ def along_the_line(controller: Controller, ticks: int = 400) -> tuple[float, flo
     return beside, float(np.linalg.norm(start + line - jacobian(bot, q, TIP)[0])), np.array(shares)
 
 
-@pytest.mark.parametrize("backend", ["python", COMPILED])
+@pytest.mark.parametrize("backend", [IN_PYTHON, COMPILED])
 def test_a_hand_that_is_asked_for_too_much_goes_straight(backend: str) -> None:
-    beside, left, shares = along_the_line(slow(True).compile(backend=backend))
+    beside, left, shares = along_the_line(slow(True).compile(**way(backend)))
     assert beside < 5e-4, "second order of a step, 0.38 mm when this was written"
     assert left < 0.25
     assert shares.min() < 0.2
@@ -94,7 +94,7 @@ def test_without_the_option_it_leaves_the_line() -> None:
 
 
 def test_nothing_changes_where_nothing_limits() -> None:
-    plain, kept = (slow(scaled, calm=False).compile(backend="python") for scaled in (False, True))
+    plain, kept = (slow(scaled, calm=False).compile(solver=IN_PYTHON) for scaled in (False, True))
     q = Q
     for c in (plain, kept):
         c.reset(q)
@@ -145,7 +145,7 @@ def test_weights_masks_and_switches_of_the_task_count_for_its_direction(two: Con
 def test_scaled_tasks_at_strict_levels() -> None:
     out = slow(True, elbow=1)
     bot, q = out.robot, Q
-    both = [out.compile(backend=backend) for backend in ("python", COMPILED)]
+    both = [out.compile(**way(backend)) for backend in (IN_PYTHON, COMPILED)]
     targets = {"hand": (TIP, np.array([-0.15, 0.5, 0.1])), "elbow": (MIDDLE, np.array([0.0, 0.0, 0.3]))}
     for c in both:
         c.reset(q)
@@ -160,7 +160,7 @@ def test_scaled_tasks_at_strict_levels() -> None:
         assert J @ steps[0].v == pytest.approx(steps[0].scales["hand"] * wish, abs=1e-5)
         q = pin.integrate(bot.model, q, steps[0].v * DT)
     assert 0.1 < steps[0].scales["hand"] < 0.9
-    alone = slow(True).compile(backend="python")
+    alone = slow(True).compile(solver=IN_PYTHON)
     alone.reset(Q)
     alone["hand"].target = jacobian(bot, Q, TIP)[0] + targets["hand"][1]
     both[0].reset(Q)

@@ -6,21 +6,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
 from wbc import Controller, Stack, Step
 from wbc.controller import core_of
 from wbc.shapes import HalfSpace
 from wbc.tasks import EndEffector, Hold, Obstacle, PitchPlane, Posture
 
-BACKENDS = ("python", COMPILED)
+BACKENDS = (IN_PYTHON, COMPILED)
 ACCELERATION = 10.0
 FAR = pin.SE3(pin.exp3(np.array([0.3, 2.0, 0.7])), np.array([0.4, 0.2, 0.6]))
 START = np.array([0.1, -0.4, 0.2, -1.9, 0.1, 1.6, 0.4])
 
 
 def arm(backend: str) -> Controller:
-    return controller("arm", "panda", backend=backend)
+    return controller("arm", "panda", **way(backend))
 
 
 def same(one: Step, two: Step) -> bool:
@@ -180,7 +180,7 @@ def describe(step: Step) -> str:
 
 def test_residuals_have_units_and_labels() -> None:
     """Names, units and numbers, these by Pinocchio; the error is value - desired before the step."""
-    one, bot = arm("python"), robot("panda")
+    one, bot = arm(IN_PYTHON), robot("panda")
     one.step(START)
     one["hand"].target, one["posture"].target = FAR, np.zeros(7)
     step = one.step(START)
@@ -226,7 +226,7 @@ def test_binding_rows_of_constraints_have_names() -> None:
     bot, tip = robot("panda"), FRAMES["panda"].tip
     stack = Stack(bot, DT).add(Posture(), name="posture").add(Hold(tip, kind="position"), name="grip")
     stack.add(Obstacle(HalfSpace(), links="panda_link8"), name="table")
-    one = stack.compile(backend="python")
+    one = stack.compile(solver=IN_PYTHON)
     one.step(START)
     one["posture"].target = START + PULL
     held = one.step(START)
@@ -247,7 +247,7 @@ def test_faded_rows_are_named() -> None:
     crossing = -(np.arctan(0.0825 / 0.316) + np.arctan(0.0825 / 0.384))
     stack = Stack(robot("panda"), DT).add(Posture(), name="posture", weight=0.01)
     stack.add(PitchPlane(*FRAMES["panda"].plane), name="plane").add(EndEffector(FRAMES["panda"].tip), name="hand")
-    one = stack.compile(backend="python")
+    one = stack.compile(solver=IN_PYTHON)
     clear = np.array([0.2, 0.4, -0.3, -1.8, 0.1, 1.2, 0.5])
     singular = clear.copy()
     singular[3] = crossing

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -40,9 +40,9 @@ def stack(hard: bool) -> Stack:
     return out.add(Ask(0.01), name="firm").add(Ask(0.03), name="other", hard=hard)
 
 
-@pytest.fixture(scope="module", params=("python", COMPILED))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
-    return stack(hard=False).compile(backend=request.param)
+    return stack(hard=False).compile(**way(request.param))
 
 
 def test_soft_rows_give_way_alone(tick: Controller) -> None:
@@ -64,7 +64,7 @@ def test_soft_rows_give_way_alone(tick: Controller) -> None:
 def test_hard_rows_of_one_class_share(tick: Controller) -> None:
     """What `hard` changes: without it both rows are of one class and each gives half."""
     q = robot("panda").neutral
-    both = stack(hard=True).compile(backend="python")
+    both = stack(hard=True).compile(solver=IN_PYTHON)
     both.reset(q)
     assert both.step(q).v[0] == pytest.approx(0.02, abs=1e-8)
     assert stack(True).key_data() != stack(False).key_data()

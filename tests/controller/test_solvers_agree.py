@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.qp.reference import reference
+from tests.backends import IN_PYTHON
 from tests.controller.stacks import aim, controller, inside
 from tests.qp.problems import quadprog_solution
 from wbc.api import Controller
@@ -15,7 +16,7 @@ from wbc.controller import Status, core_of
 from wbc.qp import QPSolution
 
 WEIGHTS = (1.0, 1e-2, 1e-4, 1e-6)
-SOLVERS = ("daqp", "osqp", "qpoases")
+SOLVERS = (IN_PYTHON, "osqp", "qpoases")
 #: Of the linear model: out of reach the two assemblies make QPs that differ by the rounding of a factorisation
 SETS: dict[str, tuple[tuple[Any, ...], int, float]] = {
     "panda": (("arm", "panda", 1e-3, True, False), 14, 0.1),
@@ -24,9 +25,9 @@ SETS: dict[str, tuple[tuple[Any, ...], int, float]] = {
 
 
 def every(builder: tuple[Any, ...]) -> dict[str, Controller]:
-    """The native tick, and each solver behind both assemblies."""
+    """The native tick, and each solver behind the same assembly."""
     out = {"native": controller(*builder, backend="native")}
-    out |= {f"vm {solver}": controller(*builder, backend="python", solver=solver) for solver in SOLVERS}
+    out |= {f"vm {solver}": controller(*builder, backend="vm", solver=solver) for solver in SOLVERS}
     return out | {"native osqp": controller(*builder, backend="native", solver="osqp")}
 
 
@@ -48,9 +49,9 @@ def test_solvers_agree_and_know_their_error(name: str, weight: float) -> None:
         if steps["native"].status is not Status.SOLVED:
             continue
         solved += 1
-        judge = controllers["vm daqp"]
+        judge = controllers[f"vm {IN_PYTHON}"]
         core_of(judge).tick.v_last[:] = v
-        qp, guess = judge.qp(), steps["vm daqp"]
+        qp, guess = judge.qp(), steps[f"vm {IN_PYTHON}"]
         exact = reference(qp, QPSolution(guess.v.copy(), guess._part("multipliers").copy(), "solved")).x
         for label, step in steps.items():
             error = float(np.abs(step.v - exact).max())

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
 from wbc.api import Stack
 from wbc.tasks import EndEffector, Obstacle, Posture
 
 
-@pytest.mark.parametrize("backend", ["python", COMPILED])
+@pytest.mark.parametrize("backend", [IN_PYTHON, COMPILED])
 def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
     """One controller with numbers set at run time, one that was declared with them."""
     bot, f = robot("panda"), FRAMES["panda"]
@@ -20,7 +20,7 @@ def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
     for stack, w, gain, weights in ((one, 1.0, None, None), (two, 0.25, 3.5, (1, 2, 0, 0.5, 1, 3))):
         stack.add(EndEffector(f.tip, weights=weights, gain=gain), name="hand", weight=w)
         stack.add(Posture(), name="posture", weight=1e-3 * w)
-    changed, declared = one.compile(backend=backend), two.compile(backend=backend)
+    changed, declared = one.compile(**way(backend)), two.compile(**way(backend))
     changed["hand"].weight, changed["hand"].gain, changed["posture"].weight = 0.25, 3.5, 0.25e-3
     changed["hand"].mask = (1, 2, 0, 0.5, 1, 3)
     target = pin.SE3(pin.exp3(np.array([0.1, 0.2, -0.3])), np.array([0.4, 0.2, 0.6]))
@@ -63,7 +63,7 @@ def test_written_values_read_back() -> None:
 
 def test_default_rate_fits_the_longest_tick() -> None:
     stack = Stack(robot("panda"), dt=0.1).add(Obstacle(everything("panda")["ball"].item.shape), name="ball")
-    tick = stack.compile(backend="python")
+    tick = stack.compile(solver=IN_PYTHON)
     assert tick["ball"].rate * stack.dt_range[1] <= 1.0
     assert tick["ball"].rate == pytest.approx(5.0)
 

@@ -17,7 +17,7 @@ POSE = pin.SE3(pin.exp3(np.array([0.1, 2.0, -0.4])), np.array([0.4, 0.1, 0.5]))
 TURNED = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
 
 
-@pytest.fixture(params=["native", "python"])
+@pytest.fixture(params=["native", "vm"])
 def arm(request: pytest.FixtureRequest) -> Controller:
     return controller("arm", "panda", backend=request.param)
 

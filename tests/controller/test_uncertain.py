@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from bench.soak import machines, stacks
 from bench.soak.levels import with_levels
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -68,7 +68,7 @@ def wild(level: int, backend: str = COMPILED) -> Controller:
     out = Stack(robot("panda"), DT)
     out.add(EndEffector(TIP), name="hand").add(EndEffector(MIDDLE, kind="position"), name="elbow")
     out.add(Posture(), name="posture", level=level).add(JointLimits())
-    return out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(backend=backend)
+    return out.add(FrameVelocityLimit(TIP, linear=0.1), name="slow", soft=1.0).compile(**way(backend))
 
 
 def provoke(controller: Controller, rng: np.random.Generator) -> None:
@@ -153,11 +153,11 @@ def test_soft_rows_add_no_variables() -> None:
     assert Layout(faces(2000, 1.0)).variables == Layout(faces(2000, None)).variables == 7
 
 
-@pytest.mark.parametrize("backend", [COMPILED, "python"])
+@pytest.mark.parametrize("backend", [COMPILED, IN_PYTHON])
 def test_many_soft_rows_at_once(backend: str) -> None:
-    controller, rng = faces(60, 1.0).compile(backend=backend), np.random.default_rng(4)
+    controller, rng = faces(60, 1.0).compile(**way(backend)), np.random.default_rng(4)
     offsets, given = controller["planes"].offsets.copy(), 0
-    for k in range(6 if backend == "python" else 30):
+    for k in range(6 if backend == IN_PYTHON else 30):
         q = np.asarray(pin.integrate(robot("panda").model, robot("panda").neutral, rng.uniform(-0.05, 0.05, 7)))
         controller.reset(q)
         controller["planes"].set(price=float(10.0 ** rng.uniform(-4.0, 7.0)), offsets=offsets + 0.1 * (k % 3))
@@ -178,7 +178,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
     rng = np.random.default_rng(505)
     bot = machines.machine(rng)
     declared = with_levels(stacks.random_stack(bot, rng), rng)
-    native, vm = declared.compile(backend=COMPILED), declared.compile(backend="python")
+    native, vm = declared.compile(backend=COMPILED), declared.compile(solver=IN_PYTHON)
     for _ in range(12):
         q, state = machines.configuration(bot, rng, False), rng.bit_generator.state
         stacks.provoke(native, rng)
@@ -194,7 +194,7 @@ def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
 
 
 def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
-    controller, rng, statuses = wild(1, "python"), np.random.default_rng(0), []
+    controller, rng, statuses = wild(1, IN_PYTHON), np.random.default_rng(0), []
     for _ in range(50):
         provoke(controller, rng)
         statuses.append(

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from tests.backends import COMPILED
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, inside, robot
 from wbc import Controller, Stack
 from wbc.controller import core_of
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, PitchPlane, Posture
 
-BACKENDS = ("python", COMPILED)
+BACKENDS = (IN_PYTHON, COMPILED)
 TURN = pin.exp3(np.array([0.3, -1.2, 0.7]))
 POSE = pin.SE3(TURN, np.array([0.4, 0.1, 0.5]))
 
@@ -39,7 +39,7 @@ def stack(name: str) -> Stack:
 @cache
 def untouched(name: str, backend: str) -> Controller:
     """One that is compiled only."""
-    return stack(name).compile(backend=backend)
+    return stack(name).compile(**way(backend))
 
 
 def make(name: str, backend: str) -> Controller:

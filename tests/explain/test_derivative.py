@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import IN_PYTHON, way
 from tests.controller.stacks import FRAMES, arm, robot
 from wbc.api import Controller
 from wbc.errors import SolverError, UnknownNameError
@@ -15,10 +16,10 @@ from wbc.tasks import Hold
 STEP = 1e-5
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = arm(posture=0.1).add(Hold(FRAMES["panda"].tip, kind="position"), name="hold")
-    controller = stack.compile(backend=request.param)
+    controller = stack.compile(**way(request.param))
     controller.reset(robot("panda").neutral)
     place = pin.SE3(pin.exp3(np.array([0.4, 0.2, 0.1])), np.array([0.5, 0.2, 0.4]))
     controller["hand"].target = place

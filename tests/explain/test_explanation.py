@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, robot
 from tests.torque.problems import controller
 from wbc.api import Controller, Stack
@@ -42,13 +43,13 @@ class Ask(Constraint):
         return Rows(matrix, ca.sqrt(inputs["x"]), ca.SX.inf(1))
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = Stack(robot("panda"), DT)
     stack.add(EndEffector(TIP), name="hand").add(Posture(), name="posture", weight=1e-3)
     stack.add(JointLimits(), name="limits").add(Hold(TIP, kind="position"), name="grip")
     stack.add(Obstacle(Sphere(0.05)), name="ball").add(Ask(), name="ask")
-    controller = stack.compile(backend=request.param)
+    controller = stack.compile(**way(request.param))
     return controller
 
 

@@ -62,7 +62,6 @@ def test_obstacles_and_the_cap_arrive(tmp_path: Path) -> None:
         (("pandx",), "panda"),
         (("panda", "--iteration-cap", "-2", "--backend", "native"), "iteration_cap"),
         (("panda", "--states", "0"), "states"),
-        (("panda", "--backend", "python", "--iteration-cap", "3"), "only the native tick"),
         (("panda", "--solver-archive", "/none.tar.gz", "--states", "5", "--backend", "vm"), "cannot be read"),
     ],
 )

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import IN_PYTHON, way
 from tests.controller.test_policy import spread
 from tests.levels import arms
 from wbc.api import Controller
@@ -15,9 +16,9 @@ from wbc.controller.policy import CHAIN
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
 def tick(request: pytest.FixtureRequest) -> Controller:
-    return arms.levels().compile(backend=request.param)
+    return arms.levels().compile(**way(request.param))
 
 
 def put(tick: Controller, conflict: bool) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wbc
+from tests.backends import IN_PYTHON, way
 from tests.levels import arms
 from wbc.api import Controller
 from wbc.controller import Status, Step
@@ -18,20 +19,20 @@ STEP = 1e-6
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
 def calm(request: pytest.FixtureRequest) -> Controller:
-    return arms.levels(calm=True, soft=False).compile(backend=request.param)
+    return arms.levels(calm=True, soft=False).compile(**way(request.param))
 
 
 @pytest.fixture(scope="module")
 def plain() -> Controller:
-    return arms.levels().compile(backend="python")
+    return arms.levels().compile(solver=IN_PYTHON)
 
 
-@pytest.fixture(scope="module", params=("python", "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
 def held(request: pytest.FixtureRequest) -> Controller:
     """A hand that is held, and levels that pull at it."""
-    controller = holding(lower=True).compile(backend=request.param)
+    controller = holding(lower=True).compile(**way(request.param))
     pull(controller)
     return controller
 
@@ -145,7 +146,7 @@ def test_prices_reach_across_levels(plain: Controller) -> None:
 
 def test_equality_rows_tell_what_they_cost_the_first_level(held: Controller) -> None:
     step = held.step(Q)
-    alone = holding(lower=False).compile(backend="python")
+    alone = holding(lower=False).compile(solver=IN_PYTHON)
     pull(alone)
     wanted = {(b.item, b.row): b.multiplier for b in alone.step(Q).binding}
     found = {(b.item, b.row): b.multiplier for b in step.binding}

@@ -11,7 +11,7 @@ import pytest
 from tests.evaluation import random_configuration
 from tests.models import spherical_seven
 from tests.proximity.world import NAMES, all_pairs, place, robot, sensor, set_pose
-from wbc.proximity import Body, choice, distances
+from wbc.proximity import Body, distances, native
 from wbc.shapes import Sphere
 
 
@@ -48,7 +48,7 @@ def test_a_walk_keeps_what_is_close_enough(name: str) -> None:
     pairs, pose, count = all_pairs(bot, rng), place(rng, 0.4), 8
     sensing, numbers = sensor(bot, pairs, count, pose)
     everything, every = sensor(bot, pairs, len(pairs), pose)
-    q, slack = random_configuration(bot, rng), choice.KEEP_LENGTH * bot.characteristic_length
+    q, slack = random_configuration(bot, rng), native.KEEP_LENGTH * bot.characteristic_length
     names, changes, before = [(a.name, b.name) for a, b in pairs], 0, []
     for k in range(120):
         # Now and then a leap, over which no bound from before holds
@@ -61,7 +61,7 @@ def test_a_walk_keeps_what_is_close_enough(name: str) -> None:
         assert numbers["distance"] == pytest.approx(every["distance"][chosen], abs=1e-12)
         outside = np.delete(every["distance"], chosen).min()
         worst = numbers["distance"].max()
-        assert outside >= worst - choice.KEEP_SHARE * max(worst, 0.0) - slack - 1e-12
+        assert outside >= worst - native.KEEP_SHARE * max(worst, 0.0) - slack - 1e-12
         stays = [pair for pair in before if pair in rows]
         assert all(before.index(pair) == rows.index(pair) for pair in stays), "who stays, stays in its row"
         changes += len(stays) < len(before)
@@ -97,7 +97,7 @@ def test_a_closer_pair_takes_the_row_by_the_stated_margin(nearer: float) -> None
     sensing, numbers = sensor(bot, [(hand, comes), (hand, rests)], 1, pin.SE3(np.eye(3), tip + [0.0, 2.0, 0.0]))
     sensing.sense(bot.neutral)
     assert sensing.pairs() == (("hand", "rests", pytest.approx(0.5)),)
-    edge = (1 - choice.KEEP_SHARE) * 0.5 - choice.KEEP_LENGTH * bot.characteristic_length
+    edge = (1 - native.KEEP_SHARE) * 0.5 - native.KEEP_LENGTH * bot.characteristic_length
     set_pose(numbers, pin.SE3(np.eye(3), tip + [0.0, edge - nearer + 0.03, 0.0]))
     sensing.sense(bot.neutral)
     assert sensing.pairs()[0][:2] == ("hand", "comes" if nearer > 0 else "rests")

@@ -1,4 +1,4 @@
-"""Pairs without a row at a command: each that closes faster than its row would let it is found, by both sensors."""
+"""Pairs without a row at a command: each that closes faster than its row would let it is found."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from tests.proximity.world import NAMES, all_pairs, buffers, place, robot, rows_
 from tests.repeats import repeats
 from wbc.proximity import PairSensor
 from wbc.proximity.missing import ALL, HALF, LITTLE, TOO_MUCH
-from wbc.proximity.plain import PlainSensing
-from wbc.proximity.rows import PairRows
-from wbc.proximity.scene import PairScene
 from wbc.robot import Robot
 
 DT, MARGIN, RATE = 0.01, 0.02, 3.0
@@ -71,28 +68,6 @@ def test_what_has_no_row_is_found_where_it_needs_one(name: str, limited: bool) -
             wanting = set(np.flatnonzero(urgent == ALL).tolist())
             assert len(kept & wanting) == min(count, len(wanting)), "what needs a row has one"
     assert checked > 3
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_without_a_compiler_the_same_pairs_are_found(name: str) -> None:
-    bot, rng, seen = robot(name), np.random.default_rng(22), set()
-    pairs, count, corners = all_pairs(bot, rng), 5, 2
-    pose, twist, rows = place(rng, 0.4), rng.uniform(-0.1, 0.1, 6), count * (1 + corners)
-    mine, other = (numbers_of(bot, rows, pose, twist) for _ in range(2))
-    native, scene = PairSensor(bot, pairs, count, mine, corners=corners), PairScene(bot, pairs, frozenset({"obstacle"}))
-    plain = PlainSensing(scene, PairRows.of(scene, count, corners, other))
-    braking = np.full(bot.nv, 3.0)
-    for _ in range(repeats(5)):
-        q, v = random_configuration(bot, rng), rng.uniform(-1.0, 1.0, bot.nv) * 10.0 ** rng.uniform(0.0, 1.5)
-        native.reset()
-        plain.reset()
-        native.sense(q)
-        plain.sense(q)
-        found = native.missing(v, DT, braking), plain.missing(v, DT, braking)
-        assert found[0] == found[1]
-        seen.add(found[0])
-        assert (np.array(native._sensing.urgent) == plain.urgent).mean() > 0.97, "but for Coal's rounding"
-    assert max(seen) >= TOO_MUCH
 
 
 def test_a_sensor_that_measured_nothing_or_has_all_pairs_misses_none() -> None:

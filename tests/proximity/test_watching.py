@@ -10,7 +10,7 @@ from tests.evaluation import random_configuration
 from tests.models import robot as bare
 from tests.proximity.world import NAMES, all_pairs, place, robot, sensor, set_pose
 from tests.repeats import covering
-from wbc.proximity import Body, choice
+from wbc.proximity import Body, native
 from wbc.robot import Robot
 from wbc.shapes import Box, HalfSpace, Sphere
 
@@ -19,7 +19,7 @@ def kept(distance: np.ndarray, rows: list[int], count: int, slack: float) -> lis
     """The rows of the next tick by the rule alone, from all distances: whose score is among the best stays."""
     score = distance.copy()
     held = [k for k in rows if k >= 0]
-    score[held] -= choice.KEEP_SHARE * np.maximum(distance[held], 0.0) + slack
+    score[held] -= native.KEEP_SHARE * np.maximum(distance[held], 0.0) + slack
     best = np.argsort(score, kind="stable")[:count].tolist()
     fresh = [k for k in best if k not in held]
     return [k if k in best else fresh.pop(0) for k in rows]
@@ -40,7 +40,7 @@ def test_rows_are_those_of_measuring_everything(name: str, seed: int) -> None:
     pairs, pose = all_pairs(bot, rng), place(rng, 0.4)
     sensing, numbers = sensor(bot, pairs, count, pose)
     everything, every = sensor(bot, pairs, len(pairs), pose)
-    slack = choice.KEEP_LENGTH * bot.characteristic_length
+    slack = native.KEEP_LENGTH * bot.characteristic_length
     q, rows, watched, changes = random_configuration(bot, rng), [-1] * count, 0, 0
     for k, step in enumerate(steps(bot, rng, 250)):
         q = pin.integrate(bot.model, q, step)

@@ -168,7 +168,7 @@ def test_one_that_does_not_record_is_as_before(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("builder", "backend"), [("arm", "native"), ("arm", "vm"), ("sensed", "python"), ("humanoid", "vm")]
+    ("builder", "backend"), [("arm", "native"), ("arm", "vm"), ("sensed", "vm"), ("humanoid", "vm")]
 )
 def test_times_residuals_margins_and_inputs_are_those_of_the_run(builder: str, backend: str, tmp_path: Path) -> None:
     one = sensed().compile(backend=backend) if builder == "sensed" else controller(builder, backend=backend)

@@ -46,7 +46,7 @@ def entries(place: Folder) -> list[Folder]:
     return [p for p in place.iterdir() if not p.name.startswith(".")]
 
 
-def name_of(stack: Stack, version: str = "1", tools: str = "python") -> str:
+def name_of(stack: Stack, version: str = "1", tools: str = "vm") -> str:
     return key(stack, version, tools)
 
 
@@ -136,6 +136,7 @@ def test_key_stays_with(other: Callable[[], Stack]) -> None:
 
 def test_key_changes_with_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     def native() -> str:
+        toolchain.machine.cache_clear()
         toolchain.identity.cache_clear()
         return name_of(small.stack(), tools=toolchain.identity())
 
@@ -174,7 +175,7 @@ def test_key_changes_with_the_code_of_a_users_class(tmp_path: Folder, monkeypatc
 # Hits
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_a_hit_builds_no_graph(backend: str, folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     first = small.stack().compile(backend=backend)
     assert not first.cached
@@ -197,10 +198,10 @@ def test_a_hit_builds_no_graph(backend: str, folder: Folder, monkeypatch: pytest
 
 def test_wbc_cache_chooses_the_folder(folder: Folder, tmp_path: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     assert cache.root() == folder
-    small.stack().compile(backend="python")
+    small.stack().compile(backend="vm")
     assert len(entries(folder)) == 1
     monkeypatch.setenv("WBC_CACHE", str(tmp_path / "deep" / "other"))
-    assert not small.stack().compile(backend="python").cached
+    assert not small.stack().compile(backend="vm").cached
     assert len(entries(tmp_path / "deep" / "other")) == 1
     monkeypatch.delenv("WBC_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "platform"))
@@ -209,17 +210,17 @@ def test_wbc_cache_chooses_the_folder(folder: Folder, tmp_path: Folder, monkeypa
 
 def test_clear_leaves_nothing(folder: Folder) -> None:
     assert cache.clear() == 0
-    small.stack().compile(backend="python")
-    small.stack().add(Damping()).compile(backend="python")
+    small.stack().compile(backend="vm")
+    small.stack().add(Damping()).compile(backend="vm")
     assert cache.clear() == 2
     assert list(folder.iterdir()) == []
-    assert not small.stack().compile(backend="python").cached
+    assert not small.stack().compile(backend="vm").cached
 
 
 # Privacy
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"])
 def test_entries_are_private(backend: str, folder: Folder) -> None:
     old = os.umask(0)  # the most careless user
     try:
@@ -351,7 +352,7 @@ def wanted(tmp_path_factory: pytest.TempPathFactory) -> list[float]:
     """The command of the small stack, from a cache of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("WBC_CACHE", str(tmp_path_factory.mktemp("sound")))
-        return small.command(small.stack().compile(backend="python"))
+        return small.command(small.stack().compile(backend="vm"))
 
 
 @pytest.fixture
@@ -394,7 +395,7 @@ def test_damaged_entries_are_built_again(
     loaded: list[bool],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    rebuilt(damage, folder, "python", wanted, caplog)
+    rebuilt(damage, folder, "vm", wanted, caplog)
     assert loaded == [True, True, True]
 
 
@@ -426,7 +427,7 @@ print(json.dumps([controller.cached, controller.backend, small.command(controlle
 
 
 #: The lock is the same for both: with ``REPEATS=3`` the virtual machine, too
-@pytest.mark.parametrize("backend", ["native"] if MORE < ALL else ["native", "python"])
+@pytest.mark.parametrize("backend", ["native"] if MORE < ALL else ["native", "vm"])
 def test_parallel_builds_end_in_one_entry(backend: str, folder: Folder, tmp_path: Folder) -> None:
     count = 2
     workers = [
@@ -531,9 +532,9 @@ def test_unusable_folders_are_replaced(
     if spoil is read_only:  # the superuser may write anywhere, so ask for the answer another user gets
         monkeypatch.setattr(cache.os, "access", lambda *arguments: False)
     before = set(folder.iterdir()) if folder.is_dir() else set()
-    one = small.stack().compile(backend="python")
-    two = small.stack().compile(backend="python")
-    other = small.stack().add(Damping()).compile(backend="python")
+    one = small.stack().compile(backend="vm")
+    two = small.stack().compile(backend="vm")
+    other = small.stack().add(Damping()).compile(backend="vm")
     assert [one.cached, two.cached, other.cached] == [False, True, False]
     assert small.command(one) == small.command(two)
     assert [(r.name, r.levelno) for r in caplog.records] == [("wbc", logging.WARNING)], "one line, not one a stack"
@@ -549,7 +550,7 @@ def test_temporary_folder_goes_with_its_process(tmp_path: Folder) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "temporary").mkdir()
     script = (
-        "import pathlib, sys\nfrom tests.stack import small\nc = small.stack().compile(backend='python')\n"
+        "import pathlib, sys\nfrom tests.stack import small\nc = small.stack().compile(backend='vm')\n"
         "small.command(c)\nprint(len(list(pathlib.Path(sys.argv[1]).iterdir())))"
     )
     done = subprocess.run(
@@ -568,9 +569,9 @@ def test_temporary_folder_goes_with_its_process(tmp_path: Folder) -> None:
 def test_a_read_only_folder_serves_what_it_has(
     folder: Folder, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    wanted = small.command(small.stack().compile(backend="python"))
+    wanted = small.command(small.stack().compile(backend="vm"))
     monkeypatch.setattr(cache.os, "access", lambda *arguments: False)
-    controller = small.stack().compile(backend="python")
+    controller = small.stack().compile(backend="vm")
     assert controller.cached
     assert small.command(controller) == wanted
     assert caplog.records == []
@@ -586,7 +587,7 @@ def test_libraries_need_a_file_system_that_runs_them(
         return os.statvfs_result((*found[:8], found.f_flag | os.ST_NOEXEC, *found[9:]))
 
     monkeypatch.setattr(cache.os, "statvfs", without)
-    small.stack().compile(backend="python")
+    small.stack().compile(backend="vm")
     assert len(entries(folder)) == 1
     assert caplog.records == []
     assert small.stack().compile(backend="native").backend == "native"
@@ -597,8 +598,8 @@ def test_libraries_need_a_file_system_that_runs_them(
 def test_a_sticky_folder_is_safe(folder: Folder) -> None:
     folder.mkdir()
     folder.chmod(0o1777)
-    assert not small.stack().compile(backend="python").cached
-    assert small.stack().compile(backend="python").cached
+    assert not small.stack().compile(backend="vm").cached
+    assert small.stack().compile(backend="vm").cached
     assert len(entries(folder)) == 1
 
 
@@ -608,7 +609,7 @@ def test_answers_do_not_depend_on_the_cache() -> None:
     heavy = Stack(small.arm(), small.DT).add(EndEffector("tip", kind="position"), name="hand")
     light.add(Posture(), name="posture", weight=1e-3)
     heavy.add(Posture(gain=1.0), name="posture", weight=1e3)
-    one, two = light.compile(backend="python"), heavy.compile(backend="python")
+    one, two = light.compile(backend="vm"), heavy.compile(backend="vm")
     assert two.cached
     assert not np.allclose(small.command(one), small.command(two), atol=1e-2)
     assert (one["posture"].gain, two["posture"].gain) == (Posture.default_gain, 1.0)

@@ -41,7 +41,7 @@ def test_the_wheel_is_found_and_used(
     assert found == str(tmp_path / "site" / "ziglang" / "zig")
     monkeypatch.setattr(toolchain, "compiler", lambda: found)
     source = "int wbc_twice(int a) { return 2 * a; }"
-    toolchain.compile_library({"twice.c": source}, "twice.c", tmp_path / "twice.so", ("-O0",))
+    toolchain.compile_kernel({"twice.c": source}, tmp_path / "twice.so")
     assert ctypes.CDLL(str(tmp_path / "twice.so")).wbc_twice(21) == 42
     files = {"rows.c": "int rows(void) { return 1; }", "library.c": "int rows(void); int tick(void) { return rows(); }"}
     toolchain.compile_tick(files, tmp_path / "tick.so")

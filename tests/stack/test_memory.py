@@ -49,7 +49,7 @@ def test_a_library_of_another_layout_is_refused() -> None:
 
 
 def test_both_back_ends_have_one_state() -> None:
-    native, vm = (core_of(small.stack().compile(backend=backend)).tick for backend in ("native", "python"))
+    native, vm = (core_of(small.stack().compile(backend=backend)).tick for backend in ("native", "vm"))
     assert native.state.size == vm.state.size
     for name in ("q", "v_last", "p", "dt", "v_in", "use_v", "cap", "weight", "enabled", "bound_enabled"):
         starts = [(getattr(t, name).ctypes.data - t.state.ctypes.data, getattr(t, name).size) for t in (native, vm)]

@@ -130,7 +130,7 @@ def step(tick: Controller, bot: Robot, given: tuple[Any, ...], scale: float) -> 
 @pytest.mark.parametrize(
     ("case", "scale"),
     covering(
-        [("panda", "python"), ("tiago", "python"), ("rail", "python"), ("talos", "python"), ("rail", "native")],
+        [("panda", "vm"), ("tiago", "vm"), ("rail", "vm"), ("talos", "vm"), ("rail", "native")],
         [1000.0, 1e-3],
     ),
 )
@@ -169,7 +169,7 @@ def test_a_fixed_length_would_change_the_answer() -> None:
         stack = Stack(scaled(bot, scale), DT, length=1.0)
         stack.add(EndEffector("tip"), name="hand").add(CenterOfMass(), name="com", weight=0.1)
         stack.add(Posture(), name="posture", weight=1e-3)
-        tick = stack.compile(backend="python")
+        tick = stack.compile(backend="vm")
         tick["hand"].target = moved(given[2], scale)
         tick["com"].target = scale * given[3]
         tick["posture"].target = configuration(bot, given[4], scale)
@@ -217,7 +217,7 @@ def row_in(unit: str) -> Expression:
     return Expression(lambda kin, p: many * (kin.position("tip")[1] - 0.3), units=unit)
 
 
-@pytest.mark.parametrize(("unit", "backend"), [*((u, "python") for u in KNOWN), ("deg", "native")])
+@pytest.mark.parametrize(("unit", "backend"), [*((u, "vm") for u in KNOWN), ("deg", "native")])
 def test_a_row_costs_the_same_in_every_unit(unit: str, backend: str) -> None:
     """Against a posture that wants something else, and the tolerance of inverse kinematics with it."""
     base, answers = {"m": "m", "rad": "rad"}.get(unit, "rad" if unit in ("mrad", "deg") else "m"), []
@@ -235,7 +235,7 @@ def test_a_row_costs_the_same_in_every_unit(unit: str, backend: str) -> None:
 def test_tolerances_of_inverse_kinematics_are_in_metres() -> None:
     for unit in ("m", "mm"):
         stack = Stack(arm(), 0.01).add(row_in(unit), name="row")
-        found = stack.solve((0.3, 0.8), goals=["row"], backend="python", tolerance=1e-4, budget=None)
+        found = stack.solve((0.3, 0.8), goals=["row"], backend="vm", tolerance=1e-4, budget=None)
         residual = found.step.residuals["row"].values[0] / KNOWN[unit]
         assert found.status == "solved"
         assert abs(residual) <= 1e-4

@@ -249,7 +249,7 @@ def rigid(machine: Robot, q: np.ndarray, pose: pin.SE3, twist: np.ndarray) -> np
 
 def hand_on_a_table(machine: Robot = PANDA, tip: str = "panda_hand_tcp", dt: float = DT) -> wbc.Controller:
     stack = wbc.Stack(machine, dt, calm=False).add(MovingFrame(), name="table")
-    return stack.add(EndEffector(tip, relative_to="table"), name="hand").compile(backend="python")
+    return stack.add(EndEffector(tip, relative_to="table"), name="hand").compile(backend="vm")
 
 
 def test_robot_and_frame_that_stand_together_need_no_command_and_defaults_are_those_of_the_frame() -> None:
@@ -272,7 +272,7 @@ def test_a_hand_that_goes_with_the_frame_has_the_acceleration_of_its_point(comma
     rng, tip = np.random.default_rng(0), PANDA.model.getFrameId("panda_hand_tcp")
     stack = wbc.Stack(PANDA, DT).add(MovingFrame(), name="table")
     stack.add(EndEffector("panda_hand_tcp", relative_to="table"), name="hand")
-    controller, q = stack.compile(command=command, backend="python"), PANDA.neutral + 0.1 * rng.normal(size=7)
+    controller, q = stack.compile(command=command, backend="vm"), PANDA.neutral + 0.1 * rng.normal(size=7)
     pose, (twist, push), data = somewhere(0), rng.uniform(-0.3, 0.3, (2, 6)), PANDA.model.createData()
     jacobian = pin.computeFrameJacobian(PANDA.model, data, q, tip, pin.LOCAL_WORLD_ALIGNED)
     arm = pin.updateFramePlacement(PANDA.model, data, tip).translation - pose.translation
@@ -350,7 +350,7 @@ def test_an_obstacle_in_a_frame_is_the_obstacle_where_the_frame_has_it(shape: An
         stack = wbc.Stack(machine, DT).add(Posture(), name="posture")
         stack.add(MovingFrame(frame), name="table")
         stack.add(Obstacle(shape), name="post", relative_to="table" if moving else None)
-        controller = stack.compile(backend="python")
+        controller = stack.compile(backend="vm")
         if moving:
             controller["table"].twist = twist
             controller["post"].set(pose=local, velocity=drift)
@@ -371,7 +371,7 @@ def test_one_way_to_say_it_and_what_is_refused() -> None:
     hand = EndEffector("panda_hand_tcp", relative_to="table")
     stack.add(hand, name="hand")
     assert stack["hand"].frame == "table"
-    controller = stack.compile(backend="python")
+    controller = stack.compile(backend="vm")
     assert controller[hand] is controller["hand"]
     with pytest.raises(UnknownNameError, match="table"):
         stack.add(Obstacle(Sphere(0.1)), name="ball", relative_to="tabel")
@@ -407,7 +407,7 @@ def test_a_stack_in_a_frame_is_compiled_pickled_and_solved_like_any_other() -> N
     stack.add(FrameVelocityLimit("tool0", linear=0.3), name="speed", relative_to="the table", soft=10.0)
     stack.add(Posture(), level=1)
     commands = []
-    for made, backend in ((stack, "native"), (pickle.loads(pickle.dumps(stack)), "python")):
+    for made, backend in ((stack, "native"), (pickle.loads(pickle.dumps(stack)), "vm")):
         controller = made.compile(backend=backend)
         controller["the table"].twist = [0.1, 0.2, -0.1, 0.3, 0.1, 0.0]
         commands.append(controller.step(machine.neutral + 0.3).v)

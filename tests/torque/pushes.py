@@ -12,6 +12,7 @@ import quadprog
 from scipy.spatial import ConvexHull
 
 import wbc
+from tests.backends import way
 from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.shapes import Box, PlacedShape
@@ -79,7 +80,7 @@ def controller(name: str, backend: str = "auto", soft: float | None = None) -> C
     stack.add(tasks.JointLimits()).add(tasks.TorqueLimits())
     for sole in one.soles:
         stack.add(tasks.SurfaceContact(sole, half_lengths=one.half, friction=FRICTION), name=sole, soft=soft)
-    return stack.compile(command="torque", backend=backend)
+    return stack.compile(command="torque", **way(backend))
 
 
 class Peer:

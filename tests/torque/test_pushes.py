@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import IN_PYTHON
 from tests.repeats import repeats
 from tests.torque.pushes import DT, Peer, controller, pushed, stand
 from wbc import Policy
@@ -80,7 +81,7 @@ def test_states_beyond_limits_have_an_answer() -> None:
 
 
 def test_back_ends_relax_alike() -> None:
-    python = controller("talos", "python")
+    python = controller("talos", IN_PYTHON)
     for v, step in thrown(controller("talos"), 2):
         q = python.stack.robot.neutral
         python.reset(q)

@@ -12,6 +12,7 @@ import wbc
 from bench.soak import machines
 from bench.soak.torque_stacks import strong, torque_stack
 from bench.soak.torques import Needed
+from tests.backends import IN_PYTHON, way
 from tests.torque.problems import controller
 from wbc import Status
 from wbc.api import Controller
@@ -28,7 +29,7 @@ def drawn(k: int, backend: str, more: bool = False, masses: str = "") -> Control
             patch.setattr(machines, "inertia", lambda rng: pin.Inertia.FromDynamicParameters(next(given)))
             return drawn(k, backend, more)
     rng = np.random.default_rng([0, True, k, 2])
-    return torque_stack(strong(rng, more), rng, more).compile(backend=backend, command="torque")
+    return torque_stack(strong(rng, more), rng, more).compile(**way(backend), command="torque")
 
 
 def again(tick: Controller, name: str) -> Step:
@@ -69,10 +70,10 @@ def test_a_relaxed_tick_needs_the_torques_that_are_sent() -> None:
     assert "motors" not in {slack.item for slack in step.relaxed}
 
 
-@pytest.mark.parametrize("backend", ["vm", "python"])
+@pytest.mark.parametrize("backend", ["vm", IN_PYTHON])
 def test_a_proof_spares_the_search_for_another_answer(backend: str) -> None:
     """Motors that can carry nothing: the tick brakes at once, not at the end of the chain, and says what is lacking."""
-    tick = controller("panda", backend).clone()
+    tick = controller("panda", **way(backend)).clone()
     robot = tick.stack.robot
     tick.reset(robot.neutral)
     tick["torque_limits"].scale = 0.01

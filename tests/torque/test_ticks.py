@@ -99,7 +99,7 @@ def test_levels_and_prices() -> None:
     made.add(EndEffector("panda_hand_tcp", kind="orientation"), name="turn", level=1, weight=100.0)
     made.add(Posture(), level=2).add(JointLimits()).add(TorqueLimits())
     made.add(WorkspaceBox("panda_hand_tcp", (-2, -2, 0.45), (2, 2, 2)), name="box", soft=1e-3)
-    tick, bot = made.compile(command="torque", backend="python"), robot("panda")
+    tick, bot = made.compile(command="torque", backend="vm"), robot("panda")
     q, v = bot.neutral.copy(), np.zeros(bot.nv)
     tick.reset(q)
     tick["hand"].target = tick["hand"].target + np.array([0.02, 0.03, -0.05])
@@ -120,11 +120,11 @@ def test_levels_and_prices() -> None:
 def test_gravity_is_that_of_the_model() -> None:
     """Floating freely without gravity nothing needs a torque; on earth the arm carries itself."""
     free = robot("walker")
-    tick = Stack(free, dt=DT).add(Posture()).compile(command="torque", backend="python")
+    tick = Stack(free, dt=DT).add(Posture()).compile(command="torque", backend="vm")
     tick.reset(free.neutral)
     assert np.abs(tick.step(free.neutral, np.zeros(free.nv)).torque).max() < 1e-9
     arm = robot("panda")
-    tick = Stack(arm, dt=DT).add(Posture()).compile(command="torque", backend="python")
+    tick = Stack(arm, dt=DT).add(Posture()).compile(command="torque", backend="vm")
     tick.reset(arm.neutral)
     found = tick.step(arm.neutral, np.zeros(arm.nv)).torque
     wanted = pin.computeGeneralizedGravity(arm.model, arm.model.createData(), arm.neutral)
@@ -144,7 +144,7 @@ def test_a_tick_goes_on_from_its_own_velocity_where_none_is_measured() -> None:
 def test_joints_that_no_task_moves_come_to_rest() -> None:
     bot = robot("panda")
     made = Stack(bot, dt=DT).add(EndEffector("panda_hand_tcp", kind="position"), name="hand")
-    tick = made.compile(command="acceleration", backend="python")
+    tick = made.compile(command="acceleration", backend="vm")
     q, v = bot.neutral.copy(), np.zeros(bot.nv)
     tick.reset(q)
     v[6] = 1.0
@@ -160,7 +160,7 @@ def test_names_that_the_stack_makes_are_not_taken() -> None:
     made = Stack(robot("walker"), dt=DT).add(RigidGrasp("arm1_hand"), name="grip").add(Posture(), name="grip force")
     with pytest.raises(DuplicateNameError):
         made.compile(command="torque")
-    assert made.compile(backend="python").stack.command == "velocity"
+    assert made.compile(backend="vm").stack.command == "velocity"
 
 
 def test_random_ticks_end_without_exceptions_nan_or_torques_beyond_limits() -> None:

@@ -100,24 +100,30 @@ class Stack(Declaration):
         if any(compiled() is self for compiled in list(_COMPILED.values())):
             log.warning("%r was added after compile(): controllers that exist do not have it; compile again", name)
 
-    def compile(self, solver: str = "daqp", backend: str = "auto", command: str | None = None) -> Controller:
+    def compile(
+        self, solver: str = "daqp", backend: str = "auto", command: str | None = None, wait: bool = True
+    ) -> Controller:
         """A controller with its own memory; compiled code comes from the cache where it can.
 
         Args:
             command: what ticks command: ``velocity`` (default), ``acceleration`` or ``torque``. docs/torque.md.
             solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
-            backend: ``native``, ``vm``, ``python``, or ``auto``: native where gcc is, else ``vm``: rows on the CasADi
-                virtual machine, all else in code that is compiled once for all stacks. ``python``: all else in numpy.
+            backend: ``native``, ``vm``, or ``auto``: native where gcc is, else ``vm``: rows on the CasADi virtual
+                machine, all else in code that is compiled once for all stacks.
+            wait: False: ``auto`` is ``vm`` at once; where gcc is its rows are compiled in the background, and the
+                controller changes over between two ticks, to the same bits (:attr:`Controller.tier`).
 
         Raises:
-            UnknownNameError: unknown solver, backend or command. CompileError: native without gcc, or gcc failed.
+            UnknownNameError: unknown solver, backend or command. CompileError: native without gcc, or gcc failed;
+                neither gcc nor code that was compiled ahead.
             CommandError: an item of the stack has no meaning for this command, and why.
         """
         from wbc import __version__
 
         validation.one_of("solver", solver, available_solvers(experimental=True))
+        wait = validation.flag("wait", wait)
         declared = self.commanding(self.command if command is None else command)
-        controller = Controller(declared, compile_stack(declared, backend, __version__), solver)
+        controller = Controller(declared, compile_stack(declared, backend, __version__, wait=wait), solver)
         core_of(controller).fallback.prepare()
         # Of accelerations and torques the controller's own stack is a copy with more in it
         _COMPILED[controller] = weakref.ref(self)

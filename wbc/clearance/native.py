@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-import wbc.proximity
 from wbc.clearance.motion import Motion
 from wbc.clearance.scene import SweptScene, TriangleMesh, sizes_of
 from wbc.errors import CompileError
-from wbc.native import toolchain
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
+from wbc.proximity.native import SOURCES as SHAPES
 from wbc.shapes import Convex
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
-log = logging.getLogger("wbc")
-
 _SOURCES = Path(__file__).parent / "native"
-_SHAPES = Path(wbc.proximity.__file__).parent / "native"
-_FILES: tuple[str | Path, ...] = (
-    *(_SHAPES / name for name in ("scene.h", "vectors.h", "steps.h", "shapes.h", "gjk.h", "epa.h", "pair.h")),
-    *("sweep.h", "motion.h", "distance.h", "sweep.c"),
-)
 _INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs", "depth", "aim")
 _ARRAYS = (
     *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
@@ -66,16 +58,13 @@ class _Sweep(ctypes.Structure):
 
 
 @functools.cache
-def library() -> ctypes.PyDLL | None:
-    """The compiled code, or None where there is no compiler, or it fails; the log says so once."""
-    if toolchain.compiler() is None:
-        log.warning("no C compiler: clearances are proven in numpy, some 100 times slower")
-        return None
-    try:
-        found = load_library(kernel(_SOURCES, _FILES))
-    except CompileError as error:
-        log.warning("%s: clearances are proven in numpy, some 100 times slower", error)
-        return None
+def library() -> ctypes.PyDLL:
+    """The compiled code.
+
+    Raises:
+        CompileError: as of :func:`wbc.proximity.native.library`.
+    """
+    found = load_library(kernel(_SOURCES / "sweep.c", SHAPES))
     found.wbc_sweep_size.restype = ctypes.c_longlong
     if found.wbc_sweep_size() != ctypes.sizeof(_Sweep):
         raise CompileError("wbc_sweep_size", found.wbc_sweep_size(), f"expected {ctypes.sizeof(_Sweep)} bytes")
@@ -85,15 +74,15 @@ def library() -> ctypes.PyDLL | None:
 
 
 class NativeSweep:
-    """A scene in memory; see :class:`wbc.clearance.plain.PlainSweep` for the same in numpy.
+    """A scene in memory.
 
     Attributes:
         low, high, when: of every pair at the last sweep: the proven least of what counts, the least that was found, and
             when [knots].
     """
 
-    def __init__(self, functions: ctypes.PyDLL, scene: SweptScene) -> None:
-        self.scene, self._functions = scene, functions
+    def __init__(self, scene: SweptScene) -> None:
+        self.scene, self._functions = scene, library()
         bodies, pairs, frames = len(scene.bodies), len(scene.pairs), len(scene.tree.frames)
         depth = max([1, *(len(chain) for chain in scene.chain)])
         chain = np.full((bodies, depth), -1)
@@ -129,7 +118,7 @@ class NativeSweep:
         return int(self._sweep.measured), int(self._sweep.nodes)
 
     def sweep(
-        self, motion: Motion, chosen: Array, exempt: Sequence[Any], aim: int, tolerance: float, far: float
+        self, motion: Motion, chosen: NDArray[np.intp], exempt: Sequence[Any], aim: int, tolerance: float, far: float
     ) -> int | None:
         """Fill ``low``, ``high`` and ``when`` of the ``chosen`` pairs; the pair at which it stopped, None: at none."""
         self._take(motion, exempt)

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.clearance.motion import Motion
-from wbc.clearance.native import NativeSweep, library
-from wbc.clearance.plain import PlainSweep
+from wbc.clearance.native import NativeSweep
 from wbc.clearance.scene import Exemption, SweptScene
 from wbc.errors import RangeError, ShapeError
 from wbc.validation import Array
@@ -93,20 +92,13 @@ class Sweeper:
     (conservative advancement: Mirtich, Impulse-based dynamic simulation, 1996). m = sum_j |q_j - q_j(middle)| r_j along
     the chain from the body to what carries both, with r_j the reach of the body about joint j, all in the middle.
 
-    Args:
-        native: compiled C; None: where there is a compiler. Numpy and Coal give the same, some 100 times slower;
-            distances of cylinders, boxes and hulls within 2e-5 m.
+    Raises:
+        CompileError: the C that does it was not compiled ahead, and there is no compiler, or it fails.
     """
 
-    def __init__(self, scene: SweptScene, native: bool | None = None) -> None:
+    def __init__(self, scene: SweptScene) -> None:
         self.scene = validation.instance("scene", scene, SweptScene, "a SweptScene")
-        functions = None if native is False else library()
-        self._sweep: Any = PlainSweep(scene) if functions is None else NativeSweep(functions, scene)
-
-    @property
-    def native(self) -> bool:
-        """Whether it runs in C."""
-        return isinstance(self._sweep, NativeSweep)
+        self._sweep = NativeSweep(scene)
 
     def sweep(
         self,

@@ -19,7 +19,6 @@ from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.tick.buffers import Assembly
 from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
@@ -40,7 +39,9 @@ class CompiledStack(Handles):
         cached: the compiled stack was found in the cache.
     """
 
-    def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
+    def __init__(
+        self, stack: Declaration, artifact: Artifact, solver: str, assembly: CompiledTick | None = None
+    ) -> None:
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
         self.backend = artifact.backend
         self._artifact = artifact
@@ -166,6 +167,13 @@ class CompiledStack(Handles):
             raise SolverError("qp", None, "needs the first configuration; call step(q) or reset(q) first")
         self._core.assembly.unbend()
         return self._core.tick.qp()
+
+    @property
+    def tier(self) -> str:
+        """What ticks run now: ``native``: code that was compiled for the stack; ``rows``: its rows, in code that all
+        stacks share; ``vm``: its rows on CasADi's virtual machine, in the same code.
+        """
+        return self._core.assembly.tier
 
     @property
     def last_command(self) -> Array:

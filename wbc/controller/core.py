@@ -23,26 +23,24 @@ from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint, Sensor
-from wbc.tick.buffers import BAD_V, Assembly
+from wbc.tick.buffers import BAD_V
 from wbc.tick.context import Context
-from wbc.tick.generic import generic_tick
+from wbc.tick.generic import GenericTick
 from wbc.tick.native import CompiledTick, NativeTick
 from wbc.tick.solved import SolvedTick
-from wbc.tick.vm import VmAssembly
 from wbc.validation import Array
 
 
-def assembly_of(stack: Declaration, artifact: Artifact) -> Assembly:
-    """The native tick, or the virtual machine's.
+def assembly_of(stack: Declaration, artifact: Artifact) -> CompiledTick:
+    """The native tick, or that of rows on the virtual machine.
 
     Raises:
-        SolverError: the artifact has neither.
+        CompileError: as of :class:`GenericTick`. SolverError: the artifact has neither.
     """
     if artifact.library is not None:
         return NativeTick(artifact.library, artifact.layout)
     if artifact.program is not None:
-        generic = generic_tick(artifact.program, stack, artifact.layout) if artifact.compiled else None
-        return generic or VmAssembly(artifact.program, stack, artifact.layout)
+        return GenericTick(artifact.program, stack, artifact.layout, artifact.rows)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
 
 
@@ -82,13 +80,15 @@ class Core:
         waits: the next step has more to do than to copy q: defaults to take from it, ramps, or dt to set back.
     """
 
-    def __init__(self, stack: Declaration, artifact: Artifact, solver: str, assembly: Assembly | None = None) -> None:
+    def __init__(
+        self, stack: Declaration, artifact: Artifact, solver: str, assembly: CompiledTick | None = None
+    ) -> None:
         self.stack, self.layout = stack, artifact.layout
         layout = self.layout
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
         self.assembly = assembly_of(stack, artifact) if assembly is None else assembly
-        native = self.assembly if isinstance(self.assembly, CompiledTick) and solver == "daqp" else None
-        self.tick: CompiledTick | SolvedTick = native or SolvedTick(self.assembly, stack, layout, solver)
+        solved = None if solver == "daqp" else SolvedTick(self.assembly, stack, layout, solver)
+        self.tick: CompiledTick | SolvedTick = solved or self.assembly
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
         self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
         self._plain_call = self.call
@@ -201,8 +201,6 @@ class Core:
 
     def write_pose(self, slot: Slot, matrix: Array) -> bool:
         """Write a pose from its homogeneous matrix [4, 4]; False, and nothing written, where :meth:`write` has to."""
-        if not self.assembly.takes:
-            return False
         place, plan = self._poses.get(slot) or self._add_pose(slot)
         place[:] = matrix.tobytes()
         if not plan():

@@ -22,7 +22,6 @@ from wbc.tick.buffers import (
     RELAXED,
     SOLVED,
     UNSOUND,
-    Assembly,
 )
 from wbc.tick.elastic import ElasticTick
 from wbc.tick.native import CompiledTick
@@ -77,7 +76,9 @@ class Fallback:
         prepared: no tick has to import or to make anything.
     """
 
-    def __init__(self, tick: CompiledTick | SolvedTick, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
+    def __init__(
+        self, tick: CompiledTick | SolvedTick, assembly: CompiledTick, stack: Declaration, layout: Layout
+    ) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
         self._flag, self._v = Memory(layout).flag, Memory(layout)["v"]

@@ -11,7 +11,7 @@ from wbc import validation
 from wbc.controller.handle import POSE, Handle
 from wbc.errors import ShapeError
 from wbc.stack.layout import Slot
-from wbc.tick.buffers import Assembly
+from wbc.tick.native import CompiledTick
 
 _POSE_SHAPE = (4, 4)
 
@@ -24,7 +24,7 @@ class Plan:
         take: check them all and write them; 0, and nothing written, where one is refused.
     """
 
-    def __init__(self, assembly: Assembly, slots: list[Slot], kinds: list[int]) -> None:
+    def __init__(self, assembly: CompiledTick, slots: list[Slot], kinds: list[int]) -> None:
         self.slots = slots
         self.shapes = [_POSE_SHAPE if kind == POSE else (slot.size,) for slot, kind in zip(slots, kinds, strict=True)]
         sizes = [int(np.prod(shape)) for shape in self.shapes]
@@ -42,7 +42,7 @@ class Plan:
 class Together:
     """Sets values of several items: quickly where one native call can check them, else one by one."""
 
-    def __init__(self, handles: Mapping[str, Handle], assembly: Assembly) -> None:
+    def __init__(self, handles: Mapping[str, Handle], assembly: CompiledTick) -> None:
         self._handles, self._assembly = handles, assembly
         #: of names that were given together and can be taken quickly
         self.plans: dict[tuple[str, ...], Plan] = {}
@@ -53,7 +53,7 @@ class Together:
         Raises:
             UnknownNameError: no such item. ShapeError: an item without a target.
         """
-        if not (values and self._assembly.takes) or any(isinstance(value, Mapping) for value in values.values()):
+        if not values or any(isinstance(value, Mapping) for value in values.values()):
             return None
         handles = [self._handles[validation.one_of("set", name, self._handles)] for name in values]
         slots = [handle.slot(main_input(handle)) for handle in handles]

@@ -16,11 +16,12 @@ from wbc.stack.memory import Memory
 from wbc.stack.tables import brakes
 from wbc.tasks.base import Sensor
 from wbc.tick.buffers import BRAKED, CHAIN_BRAKED, POLICY_BRAKED, UNSOUND, Buffers
-from wbc.tick.reach import BRAKING_MARGIN
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
 
+#: Part of its deceleration that a joint counts on in front of a margin; as in ``native/margins.h``
+BRAKING_MARGIN = 0.25
 #: A tick is found again at most so many times: each time what pushes keeps its row, and what comes too near has one.
 ROUNDS = 8
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.explain.past import Past, keeps_rows, kept_rows, rows_of
+from wbc.explain.past import Past, kept_rows, rows_of
 from wbc.stack.layout import Block
 from wbc.stack.tables import stops
 from wbc.tasks.mechanism import Mechanism
@@ -110,7 +110,7 @@ class Alone:
         """Rows at a configuration; ``own``: with the equality rows of the mechanism only."""
         tick, past, nv = self._tick, self._past, self._past.layout.nv
         tick.q[:] = q
-        if keeps_rows(past, tick):
+        if past.layout.cascade:
             qp = tick.qp()
             J, desired = kept_rows(tick, self.block)
         else:

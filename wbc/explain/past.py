@@ -18,10 +18,9 @@ from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
 from wbc.tasks._direction import Direction
 from wbc.tasks.mechanism import Mechanism
-from wbc.tick.buffers import Assembly
 from wbc.tick.context import Context
+from wbc.tick.native import CompiledTick
 from wbc.tick.solved import SolvedTick
-from wbc.tick.vm import VmAssembly
 from wbc.validation import Array
 
 
@@ -51,7 +50,7 @@ class Past:
         owner_low, owner_high: bound block that sets each simple bound, -1 for none.
     """
 
-    def __init__(self, data: bytes, stack: Declaration, layout: Layout, assembly: Assembly) -> None:
+    def __init__(self, data: bytes, stack: Declaration, layout: Layout, assembly: CompiledTick) -> None:
         self.stack, self.layout = stack, layout
         self.places = Memory(layout)
         self.tick = assembly.twin()
@@ -148,12 +147,12 @@ class Past:
         return rows_of(self, self.tick, block)
 
 
-def rows_of(past: Past, tick: Assembly, block: Block) -> tuple[Array, Array]:
+def rows_of(past: Past, tick: CompiledTick, block: Block) -> tuple[Array, Array]:
     """:meth:`Past.task_rows` from the buffers of any tick of the same code.
 
     A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
     """
-    if keeps_rows(past, tick):
+    if past.layout.cascade:
         tick.qp()
         return kept_rows(tick, block)
     weight, before = tick.weight.copy(), float(tick.plain[0])
@@ -181,12 +180,7 @@ def rows_of(past: Past, tick: Assembly, block: Block) -> tuple[Array, Array]:
     return rows, desired
 
 
-def keeps_rows(past: Past, tick: Assembly) -> bool:
-    """Whether a tick keeps the rows of its last QP."""
-    return past.layout.cascade or isinstance(tick, VmAssembly)
-
-
-def kept_rows(tick: Assembly, block: Block) -> tuple[Array, Array]:
+def kept_rows(tick: CompiledTick, block: Block) -> tuple[Array, Array]:
     """:func:`rows_of` the last QP, where the tick keeps its rows."""
     tasks, span = tick.task_rows(), block.span
     counts = (tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)

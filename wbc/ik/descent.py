@@ -16,7 +16,7 @@ from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.tick.buffers import Assembly
+from wbc.tick.native import CompiledTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
@@ -28,7 +28,7 @@ DESCENT, SETTLING, AT_REST, GAINED, RETURNS, CLOSELY, SEEKING = 60, 200, 1e-7, 1
 class Search:
     """The search on the buffers of an assembly; ``sense`` measures what items want measured at the tick's q."""
 
-    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, sense: Callable[[], None]) -> None:
+    def __init__(self, assembly: CompiledTick, stack: Declaration, layout: Layout, sense: Callable[[], None]) -> None:
         self._assembly, self._sense = assembly, sense
         self._tick = SolvedTick(assembly, stack, layout, "daqp")
         self._model, self._rows = stack.robot.model, layout.task_rows

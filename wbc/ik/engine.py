@@ -21,8 +21,7 @@ from wbc.qp.problem import QP
 from wbc.stack.declaration import Declaration
 from wbc.stack.tables import stops
 from wbc.tasks.base import Constraint, Sensor
-from wbc.tick.buffers import Assembly
-from wbc.tick.native import NativeTick
+from wbc.tick.native import CompiledTick, NativeTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
@@ -41,7 +40,7 @@ class Sensing:
     parameters; false where there are none.
     """
 
-    def __init__(self, core: Core, tick: Assembly) -> None:
+    def __init__(self, core: Core, tick: CompiledTick) -> None:
         robot, self._tick = core.stack.robot, tick
         self._sensors: list[tuple[Sensor, Handle]] = []
         for entry in core.stack.entries:
@@ -80,7 +79,7 @@ class Engine:
         self.dof_scales = layout.dof_scales(self.stack)
         #: unit of each task row in one metre or radian, in which tolerances are given
         self._units = np.array([row.scale(1.0) for block in layout.of_form("task") for row in block.rows])
-        self.tick: Assembly = tick.assembly if isinstance(tick, SolvedTick) else tick
+        self.tick: CompiledTick = tick.assembly if isinstance(tick, SolvedTick) else tick
         self._stops = stops(self.stack, layout)
         at, lower, upper = np.array(self._stops[0]), *self._stops[1:]
         dofs = np.flatnonzero(at >= 0)

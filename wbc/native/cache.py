@@ -142,7 +142,12 @@ def _locked(path: pathlib.Path) -> Iterator[None]:
         # Some network file systems have no locks: then parallel builds do the work twice
         with contextlib.suppress(OSError):
             fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+        try:
+            yield
+        finally:
+            # Closing would leave it to a process that was forked meanwhile
+            with contextlib.suppress(OSError):
+                fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def _seal(folder: pathlib.Path) -> None:

@@ -1,30 +1,76 @@
-"""C of a package's own, next to its modules, as a library in the cache."""
+"""Hand-written C, which is the same for every stack, as libraries: compiled when the package is installed or made a
+wheel, else once on a machine, into the cache.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import platform
+import re
+import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wbc.native import cache, toolchain
 
+#: Libraries that were compiled ahead, see :mod:`wbc.stack.ahead`
+AHEAD = Path(__file__).parent / "ahead"
+#: What is compiled: name -> text
+Texts = Mapping[str, str]
 
-def kernel(sources: Path, files: Sequence[str | Path]) -> Path:
-    """The library of C files in a folder, the last of which is compiled; named in the cache by what they say.
+
+def kernel(main: Path, *folders: Path) -> Path:
+    """The library of a C file and of the headers that it includes.
 
     Args:
-        files: names in the folder, or paths of headers of another package.
+        folders: of headers of other packages.
 
     Raises:
-        CompileError: there is no compiler, or it fails.
+        CompileError: it was not compiled ahead, and there is no compiler, or it fails.
     """
-    texts = {Path(name).name: (sources / name).read_text(encoding="utf-8") for name in files}
-    main = Path(files[-1]).name
-    name = hashlib.sha256("\n".join((*texts.values(), toolchain.identity())).encode()).hexdigest()
-    library = Path(main).with_suffix(".so").name
+    return library(texts_of(main, *folders), toolchain.compile_kernel)
 
-    def fill(folder: Path) -> None:
-        toolchain.compile_library(texts, main, folder / library)
 
-    folder, _ = cache.fetch(name, fill, library=True)
-    return folder / library
+def texts_of(main: Path, *folders: Path) -> dict[str, str]:
+    """Name -> text of a C file, which comes first, and of the headers that it includes."""
+    texts: dict[str, str] = {}
+    waiting = [main.name]
+    while waiting:
+        name = waiting.pop(0)
+        if name not in texts:
+            found = next(file for folder in (main.parent, *folders) if (file := folder / name).exists())
+            texts[name] = found.read_text(encoding="utf-8")
+            waiting += re.findall(r'^#include "(.+)"', texts[name], re.MULTILINE)
+    return texts
+
+
+def library(
+    texts: Texts, compile_to: Callable[[Texts, Path], None], what: str = "C code", at_once: bool = False
+) -> Path:
+    """The library of some texts.
+
+    Args:
+        compile_to: (texts, output). what: it is, for the log where compiling takes long.
+        at_once: what was compiled ahead, for any processor of this kind, is taken also where a compiler is.
+
+    Raises:
+        CompileError: as of :func:`kernel`.
+    """
+    shipped = ahead(texts)
+    if shipped.exists() and (at_once or toolchain.compiler() is None):
+        return shipped
+    name = _hash(*texts.values(), toolchain.machine())
+    folder, _ = cache.fetch(name, lambda place: compile_to(texts, place / "code.so"), library=True, what=what)
+    return folder / "code.so"
+
+
+def ahead(texts: Texts) -> Path:
+    """Where the library of some texts, for any processor of this kind, is if it was compiled ahead: its name says what
+    it was made of.
+    """
+    name = _hash(*texts.values(), sys.platform, platform.machine(), toolchain.solver_version())
+    return AHEAD / f"{name[:32]}.so"
+
+
+def _hash(*texts: str) -> str:
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib.util
 import logging
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from importlib import metadata
 
 import casadi as ca
 
@@ -40,6 +44,11 @@ COMMON_FLAGS = (
     "-DCASADI_SYMBOL_EXPORT=",
     "-w",
 )
+
+#: Priority of compilers that work behind (nice)
+_LOW = 10
+#: What needs no compiler
+WITHOUT = "a wheel of `make wheel`, or an installation made where a compiler is, brings compiled code"
 
 
 @functools.cache
@@ -93,12 +102,26 @@ def available() -> bool:
     return not missing()
 
 
+def reason(error: CompileError) -> str:
+    """What to say of code that could not be compiled: the same where it is for want of a compiler."""
+    return " and ".join(missing()) or str(error)
+
+
+def require() -> None:
+    """Nothing that native ticks need is missing.
+
+    Raises:
+        CompileError: something is.
+    """
+    if missing():
+        raise CompileError("compiler", compiler(), f"cannot compile: {', '.join(missing())}; {WITHOUT}")
+
+
 @functools.cache
 def fall_back(reason: str) -> None:
     """Say once for each reason that ticks are not native."""
     log.warning(
-        "%s: rows run on CasADi's virtual machine; a tick takes 3 to 5 times as long with the library of `make wheel`, "
-        "and some hundred times as long in numpy",
+        "%s: rows run on CasADi's virtual machine, and a tick takes 3 to 5 times as long",
         reason,
     )
 
@@ -115,14 +138,25 @@ def library() -> pathlib.Path:
 
 @functools.cache
 def identity() -> str:
-    """Compiler version, target processor and flags: part of the cache key."""
+    """Compiler version, target processor and flags: part of the cache key of a stack."""
+    return "\n".join([machine(), *ROWS_FLAGS, *TICK_FLAGS])
+
+
+@functools.cache
+def machine() -> str:
+    """Compiler version, target processor and flags of all code, with the version of the solver."""
     cc = compiler()
     if cc is None:
         return "none"
     version = _output([*_command(cc), "--version"]).splitlines()[:1]
     asked = ("-dM", "-E", "-x", "c", os.devnull) if _is_zig(cc) else ("-Q", "--help=target")
     target = _output([*_command(cc), "-march=native", *asked])
-    return "\n".join([*version, target, *ROWS_FLAGS, *TICK_FLAGS, *COMMON_FLAGS])
+    return "\n".join([*version, target, *COMMON_FLAGS, solver_version()])
+
+
+def solver_version() -> str:
+    """Of the casadi wheel, whose DAQP is linked."""
+    return metadata.version("casadi")
 
 
 def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = False) -> None:
@@ -154,48 +188,67 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         _run([*_command(cc), "rows.o", "tick.o", *_with_solver(cc, output)], place)
 
 
-def compile_rows(text: str, output: pathlib.Path) -> None:
+def compile_rows(text: str, output: pathlib.Path, behind: bool = False) -> None:
     """Compile generated straight-line code to a shared library at ``output``.
 
-    Raises:
-        CompileError: as of :func:`compile_tick`.
-    """
-    compile_library({"rows.c": text}, "rows.c", output, ROWS_FLAGS)
-
-
-def compile_library(
-    files: dict[str, str], main: str, output: pathlib.Path, optimisation: Sequence[str] = ("-O3",)
-) -> None:
-    """Compile hand-written files, of which ``main`` includes the others, to a shared library at ``output``.
+    ``behind``: the process has more urgent work: at low priority, not ended by Ctrl-C, but by :func:`end_behind`.
 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
-    with _written(files) as (cc, place):
-        # What it exports must be seen by who loads the library
-        flags = [f for f in COMMON_FLAGS if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        _run([*_command(cc), *flags, *optimisation, "-shared", main, "-lm", "-o", str(output)], place)
+    flags = ROWS_FLAGS if len(text) <= LONG_ROWS else ("-O0",)
+    _compile_visible({"rows.c": text}, output, flags, COMMON_FLAGS, behind)
 
 
-def compile_generic(files: dict[str, str], output: pathlib.Path, portable: bool = False) -> None:
-    """Compile the files of :func:`wbc.stack.generic.sources`, with DAQP, to a shared library at ``output``.
+def compile_kernel(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
+    """Compile hand-written files, of which the first includes the others, to a shared library at ``output``.
 
     ``portable``: for any processor of this kind, not only for this machine's.
 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
+    _compile_visible(files, output, ("-O3",), _common(portable))
+
+
+def _compile_visible(
+    files: Mapping[str, str],
+    output: pathlib.Path,
+    optimisation: tuple[str, ...],
+    common: tuple[str, ...],
+    behind: bool = False,
+) -> None:
     with _written(files) as (cc, place):
-        flags = [flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native")]
-        _run([*_command(cc), *flags, "-O1", f"-I{headers()}", "generic.c", *_with_solver(cc, output)], place)
+        # What it exports must be seen by who loads the library
+        flags = [f for f in common if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
+        command = [*_command(cc), *flags, *optimisation, "-shared", next(iter(files)), "-lm", "-o", str(output)]
+        _run(command, place, behind)
+
+
+def compile_generic(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
+    """Compile the files of :func:`wbc.stack.generic.sources`, with DAQP, to a shared library at ``output``.
+
+    ``portable``: as of :func:`compile_kernel`.
+
+    Raises:
+        CompileError: as of :func:`compile_tick`.
+    """
+    require()
+    with _written(files) as (cc, place):
+        command = [*_command(cc), *_common(portable), "-O1", f"-I{headers()}", "generic.c"]
+        _run([*command, *_with_solver(cc, output)], place)
+
+
+def _common(portable: bool) -> tuple[str, ...]:
+    return tuple(flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native"))
 
 
 @contextmanager
-def _written(files: dict[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
+def _written(files: Mapping[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
     """The compiler, and a folder that has the files while it is used."""
     cc = compiler()
     if cc is None:
-        raise CompileError("compiler", None, "no C compiler found; install gcc or wbc[compiler], or use backend='vm'")
+        raise CompileError("compiler", None, f"no C compiler found; install gcc or wbc[compiler]; {WITHOUT}")
     with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
         place = pathlib.Path(folder)
         for name, text in files.items():
@@ -218,11 +271,46 @@ def _output(command: list[str]) -> str:
         return ""
 
 
-def _run(command: list[str], folder: pathlib.Path) -> None:
+#: Compilers that work behind, and the process that started them: a fork must not end those of its parent
+_behind: set[tuple[int, subprocess.Popen[str]]] = set()
+_ending = threading.Event()
+
+
+def ends() -> bool:
+    """The process ends, and so have compilers that worked behind."""
+    return _ending.is_set()
+
+
+def end_behind() -> None:
+    """End them, for good."""
+    _ending.set()
+    for owner, child in list(_behind):
+        if owner == os.getpid():
+            with contextlib.suppress(OSError):
+                os.killpg(child.pid, signal.SIGTERM)
+
+
+def _run(command: list[str], folder: pathlib.Path, behind: bool = False) -> None:
     try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+        child = subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
+            start_new_session=behind,
+        )  # fmt: skip
     except OSError as error:
         raise CompileError("compiler", command[0], f"cannot be started: {error.strerror}") from error
-    if done.returncode != 0:
-        said = " / ".join(done.stderr.splitlines()[:4]) or f"exit status {done.returncode}, no message"
+    mine = (os.getpid(), child)
+    with child:
+        try:
+            if behind:
+                _behind.add(mine)
+                with contextlib.suppress(OSError):
+                    os.setpriority(os.PRIO_PGRP, child.pid, _LOW)
+            _, errors = child.communicate()
+        except BaseException:
+            child.kill()
+            raise
+        finally:
+            _behind.discard(mine)
+    if child.returncode != 0:
+        said = " / ".join(errors.splitlines()[:4]) or f"exit status {child.returncode}, no message"
         raise CompileError("compiler", command[0], f"failed: {said}")

@@ -1,4 +1,4 @@
-"""Distances between bodies that no expression states, measured with Coal (floor 2)."""
+"""Distances between bodies that no expression states, measured in C (floor 2)."""
 
 from wbc.proximity.body import MAX_PAIRS, OBSTACLE, Body
 from wbc.proximity.sensor import PairSensor

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import CompileError
-from wbc.native import toolchain
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
-from wbc.proximity.choice import KEEP_LENGTH, KEEP_SHARE
 from wbc.proximity.corners import NEAR, corners_of
 from wbc.proximity.missing import Screws
 from wbc.proximity.rows import PairRows
@@ -25,26 +22,16 @@ from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sp
 from wbc.symbolic.joint_steps import JointStep, joint_steps, place
 from wbc.validation import Array
 
-log = logging.getLogger("wbc")
-
-_SOURCES = Path(__file__).parent / "native"
-_FILES = (
-    "scene.h",
-    "vectors.h",
-    "steps.h",
-    "shapes.h",
-    "gjk.h",
-    "epa.h",
-    "pair.h",
-    "choose.h",
-    "corners.h",
-    "missing.h",
-    "sensor.c",
-)
+#: Where the C is that measures
+SOURCES = Path(__file__).parent / "native"
 
 #: Shapes that are no farther apart than this, without the balls that are added to them, overlap; in parts of the
 #: robot's characteristic length.
 TOUCH = 1e-10
+#: A pair keeps its row until another one is closer by this share of its distance ...
+KEEP_SHARE = 0.1
+#: ... and by this share of the robot's characteristic length.
+KEEP_LENGTH = 0.005
 #: Points of hulls that ``native/shapes.h`` takes at a time.
 LANES = 8
 #: What rounding may do to bounds, in the same parts.
@@ -73,16 +60,13 @@ class _Scene(ctypes.Structure):
 
 
 @functools.cache
-def library() -> ctypes.PyDLL | None:
-    """The compiled sensor, or None where there is no compiler, or it fails; the log says so once."""
-    if toolchain.compiler() is None:
-        log.warning("no C compiler: distances are measured with Coal from Python, some 100 times slower")
-        return None
-    try:
-        found = load_library(kernel(_SOURCES, _FILES))
-    except CompileError as error:
-        log.warning("%s: distances are measured with Coal from Python, some 100 times slower", error)
-        return None
+def library() -> ctypes.PyDLL:
+    """The compiled sensor.
+
+    Raises:
+        CompileError: it was not compiled ahead, and there is no compiler, or it fails; or it is of another layout.
+    """
+    found = load_library(kernel(SOURCES / "sensor.c"))
     found.wbc_scene_size.restype = ctypes.c_longlong
     if found.wbc_scene_size() != ctypes.sizeof(_Scene):
         raise CompileError("wbc_scene_size", found.wbc_scene_size(), f"expected {ctypes.sizeof(_Scene)} bytes")
@@ -93,16 +77,17 @@ def library() -> ctypes.PyDLL | None:
     return found
 
 
-class NativeSensing:
-    """A scene, its rows and their memory; see :class:`wbc.proximity.plain.PlainSensing` for the same in Python.
+class Sensing:
+    """A scene, its rows and their memory.
 
     Attributes:
         pairs: number of the pair of each row, -1 without.
         distances, normals, points, doubtful: of every pair at its last measurement.
-        urgent: which pairs come before others, see :class:`wbc.proximity.missing.Missing`.
+        urgent: which pairs come before others, see :mod:`wbc.proximity.missing`.
     """
 
-    def __init__(self, functions: ctypes.PyDLL, scene: PairScene, rows: PairRows | None = None) -> None:
+    def __init__(self, scene: PairScene, rows: PairRows | None = None) -> None:
+        functions = library()
         length = scene.robot.characteristic_length
         count, pairs = (0 if rows is None else rows.count), len(scene.first)
         self._q, self._pose = np.zeros(scene.robot.nq), np.zeros(12)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc.errors import RangeError, ShapeError, UnknownNameError, UnsupportedJointError
-from wbc.proximity.scene import Index, PairScene
+from wbc.proximity.scene import PairScene
 from wbc.shapes import FAR
 from wbc.validation import Array
 
@@ -73,10 +73,6 @@ class PairRows:
             rate=rate,
             most=whole_margin,
         )
-
-    def extra(self, pairs: Index) -> Array:
-        """What is added to the distances of some pairs that keep less than the margin [m]."""
-        return np.maximum(0.0, self.margin.item() - self.most[pairs])
 
     def clear(self) -> None:
         """No row has a pair."""

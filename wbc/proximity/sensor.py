@@ -9,15 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import RangeError
-from wbc.proximity import native
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
-from wbc.proximity.native import NativeSensing
+from wbc.proximity.native import Sensing
 from wbc.proximity.rows import PairRows
 from wbc.proximity.scene import PairScene
 from wbc.validation import Array
 
 if TYPE_CHECKING:
-    from wbc.proximity.plain import PlainSensing
     from wbc.robot import Robot
 
 
@@ -65,7 +63,7 @@ class PairSensor:
         scene = PairScene(robot, checked, outside)
         self._names = [(a.name, b.name) for a, b in checked]
         self._rows = PairRows.of(scene, count, corners, numbers, most)
-        self._sensing = sensing(scene, self._rows)
+        self._sensing = Sensing(scene, self._rows)
         self.count, self._robot, self._shape = count, robot, (robot.nq,)
         self.reset()
 
@@ -110,13 +108,3 @@ class PairSensor:
         """(name of A, name of B, distance [m]) of the rows that have a pair, in the last call."""
         distances = self._sensing.distances
         return tuple((*self._names[k], float(distances[k])) for k in self._sensing.pairs.tolist() if k >= 0)
-
-
-def sensing(scene: PairScene, rows: PairRows | None = None) -> NativeSensing | PlainSensing:
-    """What measures a scene: compiled where there is a compiler."""
-    functions = native.library()
-    if functions is not None:
-        return NativeSensing(functions, scene, rows)
-    from wbc.proximity.plain import PlainSensing
-
-    return PlainSensing(scene, rows)

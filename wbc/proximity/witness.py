@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
+from wbc.proximity.native import Sensing
 from wbc.proximity.scene import PairScene
-from wbc.proximity.sensor import sensing
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def witnesses(robot: Robot, pairs: Sequence[tuple[Body, Body]], q: Any, pose: An
     where = pin.SE3.Identity() if pose is None else validation.pose("pose", pose)
     if not checked:
         return ()
-    found = sensing(PairScene(robot, checked, outside))
+    found = Sensing(PairScene(robot, checked, outside))
     found.measure(configuration, where)
     out = []
     for k in range(len(checked)):

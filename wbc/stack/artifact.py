@@ -16,9 +16,10 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.key import key
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram, build
+from wbc.stack.rows import Rows
 
-BackendName = Literal["auto", "native", "vm", "python"]
-BACKENDS = ("auto", "native", "vm", "python")
+BackendName = Literal["auto", "native", "vm"]
+BACKENDS = ("auto", "native", "vm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,30 +31,28 @@ class Artifact:
         library: shared library of the tick, or None for the virtual machine.
         program: CasADi functions, or None for a native library.
         cached: it was in the cache, no expression was built.
-        compiled: the rest of a tick on the virtual machine is compiled code where that can be had, else numpy.
+        rows: the program as native code in the making, or None.
     """
 
     layout: Layout
     library: pathlib.Path | None
     program: TickProgram | None
     cached: bool
-    compiled: bool = True
+    rows: Rows | None = None
 
     @property
     def backend(self) -> str:
         """Its name."""
-        if self.library is not None:
-            return "native"
-        return "vm" if self.compiled else "python"
+        return "vm" if self.library is None else "native"
 
 
-def compile_stack(stack: Declaration, backend: str, version: str, search: bool = False) -> Artifact:
+def compile_stack(stack: Declaration, backend: str, version: str, search: bool = False, wait: bool = True) -> Artifact:
     """Compile a stack, or find it in the cache.
 
     Args:
-        backend: ``native`` (needs gcc), ``vm``: rows on CasADi's virtual machine, ``python``: and the rest in numpy, or
-            ``auto``: native where it can be.
+        backend: ``native`` (needs gcc), ``vm``: rows on CasADi's virtual machine, or ``auto``: native where it can be.
         search: a native library with inverse kinematics.
+        wait: False, of ``auto``: the virtual machine at once, and its rows as native code when they are compiled.
 
     Where ``auto`` finds a compiler that fails, the first lines of its message are in the log and the virtual machine
     does the work.
@@ -65,6 +64,8 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
     if backend == "native" and toolchain.missing():
         raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
     layout = Layout(stack)
+    if backend == "auto" and not wait:
+        return _at_once(stack, layout, version)
     if backend == "native" or (backend == "auto" and toolchain.available()):
         try:
             return _native(stack, layout, version, search)
@@ -72,7 +73,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
-    return _virtual(stack, layout, version, backend != "python")
+    return _virtual(stack, layout, version)
 
 
 def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> Artifact:
@@ -89,7 +90,7 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
-def _virtual(stack: Declaration, layout: Layout, version: str, compiled: bool) -> Artifact:
+def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
     """The functions for the virtual machine, built or from the cache."""
     made: dict[str, ca.Function] = {}
 
@@ -102,7 +103,17 @@ def _virtual(stack: Declaration, layout: Layout, version: str, compiled: bool) -
     saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
     functions = replace(functions, lost=saved.get("lost"))
-    return Artifact(layout, None, functions, cached, compiled)
+    return Artifact(layout, None, functions, cached)
+
+
+def _at_once(stack: Declaration, layout: Layout, version: str) -> Artifact:
+    """The functions for the virtual machine, and behind them the same as native code, where a compiler is."""
+    out = _virtual(stack, layout, version)
+    if not toolchain.available() or out.program is None:
+        return out
+    name = key(stack, version, f"{toolchain.identity()}\nrows")
+    text = codegen.casadi_source(list(out.program.functions.values()))
+    return replace(out, rows=Rows(name, text, _said(stack)))
 
 
 def _said(stack: Declaration) -> str:

@@ -11,7 +11,8 @@ import casadi as ca
 import numpy as np
 
 from wbc.shapes import FAR
-from wbc.stack.declaration import COMMANDS, Declaration
+from wbc.stack.commands import COMMANDS
+from wbc.stack.declaration import Declaration
 from wbc.stack.handing_over import hand_over
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
@@ -45,14 +46,15 @@ def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[st
         compiled["rows"], compiled["curvature"] = hand_over(program.rows, program.curvature, HANDED)
     functions = [*compiled.values(), motion(stack)]
     return {
-        "rows.c": _casadi_source(functions),
+        "rows.c": casadi_source(functions),
         "stack.h": header(stack, layout, program, functions),
         "memory.h": structures(layout),
         **written,
     }
 
 
-def _casadi_source(functions: list[ca.Function]) -> str:
+def casadi_source(functions: list[ca.Function]) -> str:
+    """Functions as C, to the same bits as on the virtual machine but for the sign of zeros."""
     generator = ca.CodeGenerator("rows.c", {"with_header": False})
     for function in functions:
         generator.add(function)

@@ -7,7 +7,7 @@ import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Self, get_args
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,7 @@ from wbc.errors import (
     UnknownNameError,
 )
 from wbc.robot import Robot
+from wbc.stack.commands import COMMANDS
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
 from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
@@ -95,8 +96,6 @@ class Entry:
         """Task (True) or constraint (False)."""
         return isinstance(self.item, Task)
 
-
-COMMANDS: tuple[Command, ...] = get_args(Command)
 
 #: Of a stack of accelerations: joints that no task moves come to rest like exp(-4 REST t) [1/s]
 REST = 5.0

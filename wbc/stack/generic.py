@@ -5,27 +5,28 @@ structure, a table is a constant. Here the same text is made to take them when i
 context, a table a pointer of it, and an array a pointer into memory that ``bind_tick`` lays out. So nothing is written
 twice, and a tick gives the same answer both ways.
 
-Rows are evaluated by :class:`casadi.FunctionBuffer`, whose address the context has.
+Rows are evaluated by :class:`casadi.FunctionBuffer`, whose address the context has, until it has that of native code.
 """
 
 from __future__ import annotations
 
-import hashlib
 import pathlib
-import platform
 import re
-import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import metadata, resources
+from importlib import resources
 
-from wbc.errors import CompileError
-from wbc.native import cache, toolchain
-from wbc.stack.declaration import COMMANDS
-from wbc.stack.memory import INPUTS, LEVEL_NUMBERS, LEVEL_REPORT, QP_FIELDS, REPORT, REST_INPUTS, TORQUE_REPORT, Field
-
-#: What ``make wheel`` puts into a wheel, see :mod:`wbc.stack.prebuilt`
-PREBUILT = pathlib.Path(__file__).parent / "prebuilt_libraries"
+from wbc.native import kernel, toolchain
+from wbc.stack.commands import COMMANDS
+from wbc.stack.memory import (
+    INPUTS,
+    LEVEL_NUMBERS,
+    LEVEL_REPORT,
+    QP_FIELDS,
+    REPORT,
+    REST_INPUTS,
+    TORQUE_REPORT,
+    Field,
+)
 
 #: Whole sizes of ``stack.h``, and real ones
 SIZES = (
@@ -50,8 +51,8 @@ COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)"
 #: Arrays that only C knows and the functions write
 WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries")
 #: What is either there or not when C is compiled
-_CHOICES = ("LEVELS", "SOFT_ROWS", "NNZK", "SLEWED")
-_ALWAYS = ("MH", "KEPT", "BENDING")
+_CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")
+_ALWAYS = ("MH", "KEPT", "BENDING", "NNZK")
 
 _MEMBERS = re.compile(r"^    (double|int|long long|wide) (.*?);", re.MULTILINE)
 _ARRAY = re.compile(r"(\w+)\[(.*)\]")
@@ -64,7 +65,6 @@ class Variant:
     command: str
     levels: bool
     soft: bool
-    curved: bool
 
     def fields(self) -> tuple[tuple[Field, ...], tuple[Field, ...]]:
         """The report, and what follows it, of :class:`wbc.stack.memory.Memory`."""
@@ -109,39 +109,16 @@ class _Structure:
 def variants() -> list[Variant]:
     """All kinds of code."""
     kinds = ((False, False), (False, True), (True, False))
-    return [
-        Variant(command, levels, soft, curved)
-        for command in COMMANDS
-        for levels, soft in kinds
-        for curved in (False, True)
-    ]
+    return [Variant(command, levels, soft) for command in COMMANDS for levels, soft in kinds]
 
 
 def library(variant: Variant) -> pathlib.Path:
-    """The library of a variant, compiled where it is not in the cache.
+    """The library of a variant.
 
     Raises:
-        CompileError: there is no compiler, or it fails.
+        CompileError: it was not compiled ahead, and there is no compiler, or it fails.
     """
-    files = sources(variant)
-    if toolchain.missing():
-        if (shipped := prebuilt(files)).exists():
-            return shipped
-        raise CompileError("compiler", toolchain.compiler(), f"cannot compile: {', '.join(toolchain.missing())}")
-    said = "\n".join((*files.values(), toolchain.identity(), "generic"))
-    name = hashlib.sha256(said.encode()).hexdigest()
-
-    def fill(place: pathlib.Path) -> None:
-        toolchain.compile_generic(files, place / "generic.so")
-
-    folder, _ = cache.fetch(name, fill, library=True, what="the tick, once for all stacks")
-    return folder / "generic.so"
-
-
-def prebuilt(files: Mapping[str, str]) -> pathlib.Path:
-    """Where the library of these sources is, if it came with the package: its name says what it was made of."""
-    said = "\n".join((*files.values(), metadata.version("casadi"), sys.platform, platform.machine()))
-    return PREBUILT / f"{hashlib.sha256(said.encode()).hexdigest()[:32]}.so"
+    return kernel.library(sources(variant), toolchain.compile_generic, "the tick, once for all stacks", at_once=True)
 
 
 def sources(variant: Variant) -> dict[str, str]:
@@ -269,7 +246,7 @@ def _memory(report: list[str], rest: list[str]) -> str:
 
 def _context(variant: Variant) -> str:
     """``stack.h``: sizes and tables of the stack whose tick runs."""
-    there = (variant.levels, variant.soft, variant.curved, variant.command != "velocity")
+    there = (variant.levels, variant.soft, variant.command != "velocity")
     chosen = dict(zip(_CHOICES, there, strict=True))
     tables = [(name, "int") for name in INT_TABLES] + [(name, "double") for name in REAL_TABLES]
     copies = [name for given in COPIED.values() for _, name, _ in given]
@@ -284,6 +261,7 @@ def _context(variant: Variant) -> str:
         *(f"#define {name} 0" for name in ("BALLS", "SEGMENTS", "SENSED", "HANDED", "WORK_W", "WORK_IW")),
         *(f"#define HAS_{name} {int(there)}" for name, there in chosen.items()),
         *(f"#define HAS_{name} 1" for name in _ALWAYS),
+        "typedef int (*wbc_code)(const double **, double **, long long *, double *, int);",
         "/* Of eight bytes each, in the order that Python writes them in */",
         "typedef struct {",
         "    long long serial;",
@@ -292,6 +270,9 @@ def _context(variant: Variant) -> str:
         *(f"    const {kind} *{name}_;" for name, kind in tables),
         "    void (*evaluate)(void *);",
         *(f"    void *{name}_;" for name in FUNCTIONS),
+        *(f"    wbc_code {name}_code_;" for name in FUNCTIONS),
+        "    long long *iw_;",
+        "    double *w_;",
         *(f"    double *{name}_;" for name in copies),
         "    double *memory;",
         "} wbc_context;",
@@ -331,7 +312,8 @@ _MAIN = (
         (void)arg, (void)res, (void)iw, (void)w, (void)mem;
 """
     + "".join(
-        f"EVALUATED({name})\n    if (!S.{name}_) return 0;\n"
+        f"EVALUATED({name})\n    if (S.{name}_code_) return S.{name}_code_(arg, res, S.iw_, S.w_, mem);\n"
+        f"    if (!S.{name}_) return 0;\n"
         + "".join(f"    memcpy(S.{to}_, arg[{k}], {n} * 8);\n" for k, to, n in COPIED.get(name, ()))
         + f"    S.evaluate(S.{name}_);\n    return 0;\n}}\n"
         for name in FUNCTIONS

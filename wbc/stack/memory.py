@@ -10,10 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from wbc.errors import CompileError
-from wbc.stack.layout import Layout
-from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.stack.layout import Layout
+    from wbc.validation import Array
 
 #: What is reported of each level, and of the least velocity after them
 LEVEL_NUMBERS = (

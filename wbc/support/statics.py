@@ -22,7 +22,8 @@ from wbc.stack.layout import Slot
 from wbc.tasks._contact import ContactWrench, Unactuated
 from wbc.tasks.base import Constraint
 from wbc.tasks.wrench_sum import WrenchSum
-from wbc.tick.buffers import INFINITE, Assembly
+from wbc.tick.buffers import INFINITE
+from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
 #: What is lacking counts from this share of a row's size on
@@ -101,7 +102,7 @@ class Rows:
         self.names, self.sizes = tuple(names), np.array(sizes)
         self.base, self.torques = np.array(base, bool), np.array(torques, bool)
         self.scale = self.layout.dof_scales(self.stack)
-        self._tick: Assembly | None = None
+        self._tick: CompiledTick | None = None
 
     @property
     def returning(self) -> Array:

@@ -1,1 +1,1 @@
-"""One tick, in C or in numpy: rows, the QP, its answer, the certificate and the report."""
+"""One tick: rows, the QP, its answer, the certificate and the report."""

@@ -8,13 +8,13 @@ from typing import Any
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
-from wbc.tick.buffers import Assembly
+from wbc.tick.native import CompiledTick
 
 
 class Context:
     """What all steps of a controller share: names and offsets."""
 
-    def __init__(self, stack: Declaration, layout: Layout, assembly: Assembly | None) -> None:
+    def __init__(self, stack: Declaration, layout: Layout, assembly: CompiledTick | None) -> None:
         self.stack, self.layout, self.assembly = stack, layout, assembly
         self.nv, self.command = layout.nv, layout.command
         self.memory = Memory(layout)

@@ -10,7 +10,8 @@ from wbc.qp.solvers.backend import Prepared
 from wbc.qp.solvers.daqp import Daqp
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
-from wbc.tick.buffers import BRAKED, RELAXED, Assembly
+from wbc.tick.buffers import BRAKED, RELAXED
+from wbc.tick.native import CompiledTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
@@ -27,7 +28,7 @@ class ElasticTick(SolvedTick):
     the problem whose bounds have been moved by the slack.
     """
 
-    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
+    def __init__(self, assembly: CompiledTick, stack: Declaration, layout: Layout) -> None:
         super().__init__(assembly, stack, layout, "daqp")
         self._wide = Prepared(Daqp(layout.with_slacks + layout.general_rows, layout.general_rows))
 

@@ -21,6 +21,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
+from wbc.stack.rows import Rows
 from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
@@ -34,26 +35,18 @@ _capsule_name.restype, _capsule_name.argtypes = ctypes.c_char_p, [ctypes.py_obje
 
 @functools.cache
 def _evaluate() -> int:
-    """Address of what evaluates a buffer of CasADi; 0 where its library does not have it."""
+    """Address of what evaluates a buffer of CasADi.
+
+    Raises:
+        CompileError: its library does not have it.
+    """
     for path in sorted(pathlib.Path(ca.__file__).parent.glob("libcasadi.*")):
         try:
             found: Any = ctypes.PyDLL(str(path))._ZN6casadi21_function_buffer_evalEPv
         except (OSError, AttributeError):
             continue
         return ctypes.cast(found, ctypes.c_void_p).value or 0
-    return 0
-
-
-def generic_tick(program: TickProgram, stack: Declaration, layout: Layout) -> GenericTick | None:
-    """The tick of a stack; None where there is neither its library nor a compiler, and the log says so."""
-    if not _evaluate():
-        return None
-    try:
-        return GenericTick(program, stack, layout)
-    except CompileError as error:
-        if not toolchain.missing():
-            toolchain.fall_back(str(error))
-        return None
+    raise CompileError("casadi", toolchain.solver_version(), "its library has no function that evaluates a buffer")
 
 
 @functools.cache
@@ -71,12 +64,13 @@ class GenericTick(CompiledTick):
         CompileError: there is no such library and no compiler that could make it.
     """
 
-    def __init__(self, program: TickProgram, stack: Declaration, layout: Layout) -> None:
-        self._given = (program, stack, layout)
+    def __init__(
+        self, program: TickProgram, stack: Declaration, layout: Layout, native_rows: Rows | None = None
+    ) -> None:
+        self._given = (program, stack, layout, native_rows)
         soft = not layout.cascade and any(at >= 0 for at in layout.price_at)
-        curved = program.curvature is not None and program.curvature.nnz_out(0) > 0
-        variant = generic.Variant(layout.command, layout.cascade, soft, curved)
-        library = _library(variant)
+        variant = generic.Variant(layout.command, layout.cascade, soft)
+        library, self._native = _library(variant), False
         self._context = _Context(stack, layout, program)
         room = int(library.wbc_generic_room(self._context.pointer)) // 8
         memory, self._tick = np.zeros(room), np.zeros(int(library.wbc_tick_size()) // 8 + 1)
@@ -85,6 +79,22 @@ class GenericTick(CompiledTick):
         library.wbc_generic_context(pointer, self._context.pointer)
         super().__init__(library, layout, memory, pointer)
         self._bind(program, layout)
+        if native_rows is not None:
+            native_rows.give(self)
+
+    @property
+    def tier(self) -> str:
+        return "rows" if self._native else "vm"
+
+    def change_over(self, library: ctypes.PyDLL) -> None:
+        """The same functions in native code, to the same bits, from the next call on."""
+        functions = self._given[0].functions
+        w = np.zeros(1 + max(f.sz_w() for f in functions.values()))
+        iw = np.zeros(1 + max(f.sz_iw() for f in functions.values()), np.int64)
+        codes = {f"{name}_code": ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0 for name in functions}
+        self._kept += [w, iw]
+        self._context.set_together(codes | {"w": w.ctypes.data, "iw": iw.ctypes.data})
+        self._native = True
 
     def twin(self) -> GenericTick:
         return GenericTick(*self._given)
@@ -156,7 +166,8 @@ class _Context:
         numbers["BLOCKED"] = str(len(found))
         self.names = [
             "serial", *generic.SIZES, *generic.REALS, *generic.INT_TABLES, *generic.REAL_TABLES, "evaluate",
-            *generic.FUNCTIONS, *(name for given in generic.COPIED.values() for _, name, _ in given), "memory",
+            *generic.FUNCTIONS, *(f"{name}_code" for name in generic.FUNCTIONS), "iw", "w",
+            *(name for given in generic.COPIED.values() for _, name, _ in given), "memory",
         ]  # fmt: skip
         self._entries = np.zeros(len(self.names), np.int64)
         self._kept: list[np.ndarray] = []
@@ -178,6 +189,14 @@ class _Context:
         """A whole number, or an address; with a new serial, by which C sees that something has changed."""
         self._entries[0] = next(_serials)
         self._entries[self.names.index(name)] = value
+
+    def set_together(self, values: dict[str, int]) -> None:
+        """Several at once: no tick sees but some of them, as one copy is made under the interpreter's lock."""
+        entries = self._entries.copy()
+        for name, value in values.items():
+            entries[self.names.index(name)] = value
+        entries[0] = next(_serials)
+        self._entries[:] = entries
 
     def _table(self, name: str, values: np.ndarray) -> None:
         self._kept.append(values)

@@ -14,7 +14,8 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, Memory
 from wbc.stack.tables import left_free
-from wbc.tick.buffers import INFINITE, Assembly
+from wbc.tick.buffers import INFINITE
+from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
 
@@ -25,7 +26,7 @@ class Levels:
         cascade: what solves them. sizes: these scales, of v and of general rows.
     """
 
-    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout) -> None:
+    def __init__(self, assembly: CompiledTick, stack: Declaration, layout: Layout) -> None:
         self._assembly, self._layout = assembly, layout
         self._dofs, self._scales = layout.dof_scales(stack), layout.row_scales(stack)
         self._units = np.array(row_units(stack, layout), dtype=np.float64)

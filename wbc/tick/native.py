@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import pathlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -16,16 +17,18 @@ from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.tick.buffers import INFINITE, Assembly, TaskRows
+from wbc.tick.buffers import INFINITE, OWN, REST_RATE, Buffers, TaskRows
 from wbc.validation import Array
 
 
-class CompiledTick(Assembly):
-    """Memory of one controller and the functions of a library that works on it; see
-    :class:`wbc.tick.Buffers`.
+class CompiledTick(Buffers, ABC):
+    """Memory of one controller and the functions of a library that works on it; and the QP at their values.
 
     Args:
         memory: begins with the fields of :class:`wbc.stack.memory.Memory`. pointer: what the functions take.
+
+    Attributes:
+        plain: not 0 for the linear model as it is, without curvature.
     """
 
     def __init__(self, library: ctypes.PyDLL, layout: Layout, memory: Array, pointer: ctypes.c_void_p) -> None:
@@ -47,6 +50,11 @@ class CompiledTick(Assembly):
         self._A = view("A").reshape(layout.general_rows, layout.variables)
         self._unusable, self.plain = view("unusable"), view("plain")
         self._desired, self._factor = view("desired"), view("factor")
+        #: what rows report, and what stands for numbers that have no value, as in ``tidy`` of ``native/certify.h``
+        self._undefined = [
+            (view(name), instead)
+            for name, instead in (("error", np.inf), ("factor", 0.0), ("margin", -np.inf), ("margin_factor", 0.0))
+        ]
         self._sides = view("free_low"), view("free_high")
         self._give, self.bend = view("give"), view("bend")
         self.curving, self.stopped, self.shortened = view("curving"), view("stopped"), view("shortened")
@@ -60,9 +68,13 @@ class CompiledTick(Assembly):
     def step(self) -> int:
         return self.call()
 
-    takes = True
-
     def taker(self, staged: Array, plan: np.ndarray) -> Callable[[], int]:
+        """What checks values that wait in ``staged`` and writes them to ``p``; 0, and nothing written, where one is
+        refused.
+
+        Args:
+            plan: of each value what it is, where it goes in ``p``, how many numbers it has [count, 3].
+        """
         table = np.ascontiguousarray(plan, np.intc)
         request = np.array([self.pointer.value, staged.ctypes.data, table.ctypes.data, len(table)], np.int64)
         self._kept += [staged, table, request]
@@ -72,8 +84,10 @@ class CompiledTick(Assembly):
         self._library.wbc_tick_reset(self.pointer)
 
     def assemble(self) -> None:
-        """Rows and QP only."""
+        """Rows and QP only; no reported number is NaN."""
         self._library.wbc_tick_assemble(self.pointer)
+        for reported, instead in self._undefined:
+            reported[np.isnan(reported)] = instead
 
     def solve(self) -> int:
         """Active-set solution of the assembled QP only."""
@@ -88,13 +102,72 @@ class CompiledTick(Assembly):
         self._library.wbc_tick_look_ahead(self.pointer)
 
     def find_lost(self, everything: bool) -> float:
+        """What equality rows lose at the reported command, into the report; the largest as a rate, in row units.
+
+        Args:
+            everything: what they miss of moved sides, too, which is not what the order of sacrifice has taken.
+        """
         return float(self._library.wbc_tick_find_lost(self.pointer, int(everything)))
 
     def check(self) -> int:
-        """Only refuse bad inputs, and take over a measured velocity."""
+        """Take q and a measured velocity over, or put the last good q back; negative for refused inputs."""
         return int(self._library.wbc_tick_check(self.pointer))
 
+    def commanded(self, v: Array, sound: bool) -> None:
+        """What follows from a command in the report: torques, and the velocity that the next tick counts from.
+
+        Args:
+            sound: it is a certified answer, whose wrenches the next tick keeps if it has none.
+        """
+        if self._command == "velocity":
+            self.v_last[:] = v
+            return
+        nv = self._dofs
+        self._find_torques()
+        if self._command == "torque":
+            self.kept[:nv] = self.report[self._torque]
+        self.v_last[:nv] += float(self.dt[0]) * v[:nv]
+        if sound:
+            self.kept[nv:] = v[nv:]
+
+    def forget(self) -> None:
+        """No wrenches are kept, and the last torques are not known."""
+        self.kept[:] = 0.0
+        self.kept[: self._dofs] = INFINITE
+
+    def rewind(self) -> None:
+        """Before the tick is done again: accelerations and torques count from where they did."""
+        self.v_last[:] = self.v_in
+        self.unbend()
+        self.kept[self._slewed[1]] = self.p[self._slewed[0]]
+
+    def unbend(self) -> None:
+        """The rows as they are at q."""
+        for name in OWN:
+            getattr(self, name)[:] = 0.0
+
+    def rest(self, lower: Array, upper: Array, coasting: Array) -> Array:
+        """The command within simple bounds that is nearest to rest: of velocities ``coasting``; else at once or, on a
+        floating base, by damping.
+        """
+        nearest = coasting.copy()
+        if self._command != "velocity":
+            nv = self._dofs
+            rate = REST_RATE if self._elastic else 1.0 / float(self.dt[0])
+            nearest[:nv], nearest[nv:] = -rate * self.v_last[:nv], self.kept[nv:]
+        return np.minimum(np.maximum(nearest, lower), upper)
+
+    @property
+    @abstractmethod
+    def tier(self) -> str:
+        """``native``: code of this stack alone; ``rows``: its rows are, the rest is shared; ``vm``: neither is."""
+
+    @abstractmethod
+    def twin(self) -> CompiledTick:
+        """Another one of the same code, with memory of its own."""
+
     def _find_torques(self) -> None:
+        """Torques of the command into the report, where torques are commanded."""
         if self._layout.command == "torque":
             self._library.wbc_tick_torques(self.pointer)
 
@@ -104,12 +177,22 @@ class CompiledTick(Assembly):
         return bool(self._unusable[0] == 0.0)
 
     def task_rows(self) -> TaskRows:
+        """Rows of all levels in the last QP.
+
+        Raises:
+            SolverError: there is one level, whose code does not keep them.
+        """
         self._require_levels("task_rows")
         J = np.zeros((self._layout.task_rows, self._layout.variables))
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
         return TaskRows(J, self._desired.copy(), self._factor.copy())
 
     def curvature(self) -> Array | None:
+        """Curvature in H of the last QP [nv, nv], before anything made H positive definite; None for none.
+
+        Raises:
+            SolverError: there is one level, whose code does not keep it.
+        """
         self._require_levels("curvature")
         out = np.zeros((self._layout.variables, self._layout.variables))
         curved = self._library.wbc_tick_curvature(self.pointer, ctypes.c_void_p(out.ctypes.data))
@@ -121,11 +204,18 @@ class CompiledTick(Assembly):
             raise SolverError(asked, "one level", "only stacks with strict levels keep this; see qp()")
 
     def row_bounds(self) -> tuple[Array, Array]:
+        """Bounds of the general rows in the last QP, those that are minimised at a level included."""
         low, high = (side.copy() for side in self._sides)
         low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
         return low, high
 
+    def move_sides(self, change: Array) -> None:
+        """Both sides of the general rows of the last QP, as ``bend_rows`` of ``native/bend.h`` moves them."""
+        for side in self._sides:
+            side += change
+
     def quadratic(self) -> tuple[Array, Array]:
+        """(H, g) of :meth:`qp` until the next call; only the upper triangle of H counts."""
         self.assemble()
         nv = self._layout.variables
         return self._H[:, :nv], self._g[:nv]
@@ -137,6 +227,7 @@ class CompiledTick(Assembly):
         return np.tri(nv, dtype=bool).T
 
     def qp(self) -> QP:
+        """The QP at the buffers' values, before any relaxation: of the first level, where there are several."""
         self.assemble()
         nv = self._layout.variables
         above = self._H[:, :nv]
@@ -179,6 +270,8 @@ class NativeTick(CompiledTick):
     def converge_many(self) -> Any:
         """Thousands of searches in one call."""
         return self.library_function("wbc_tick_converge_many", None, unlocked=True)
+
+    tier = "native"
 
     def twin(self) -> NativeTick:
         return NativeTick(self._library, self._layout)

@@ -1,4 +1,4 @@
-"""A tick whose QP is solved by a Python-level solver: the virtual machine, or another solver than the native one."""
+"""A tick whose QP, which C has assembled, is solved by a solver that is called from Python."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ from wbc.tick.buffers import (
     TOLERANCE,
     TURNING,
     UNSOUND,
-    Assembly,
     Buffers,
 )
 from wbc.tick.levels import Levels
+from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
@@ -59,7 +59,7 @@ _NONE = Certificate(INFINITE, INFINITE, INFINITE, INFINITE)
 class SolvedTick(Buffers):
     """Assembly, then a kept solver with its relaxation, then the certificate; see ``wbc/stack/native``."""
 
-    def __init__(self, assembly: Assembly, stack: Declaration, layout: Layout, solver: str) -> None:
+    def __init__(self, assembly: CompiledTick, stack: Declaration, layout: Layout, solver: str) -> None:
         self.assembly = assembly
         self.share(assembly)
         self._nv, self._velocities = layout.variables, layout.nv
@@ -170,6 +170,7 @@ class SolvedTick(Buffers):
         out.lower[n:] += change
         out.upper[n:] += change
         self.bend[equal] = bend[equal]
+        self.assembly.move_sides(change)
         return out
 
     def _answered(self, qp: QP) -> int:

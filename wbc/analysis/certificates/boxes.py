@@ -18,7 +18,6 @@ from wbc.native.kernel import kernel
 from wbc.validation import Array
 
 _SOURCES = Path(__file__).parent / "native"
-_FILES = ("form.h", "bases.h", "tests.h", "subdivide.c")
 #: Sizes of native/form.h: rows, columns, joints, waves
 _MOST = {"rows": 24, "columns": 16, "joints": 16, "waves": 1024}
 #: Boxes that wait inside one call, beyond those given to it; undecided ones that are kept
@@ -134,6 +133,6 @@ class BoxSearch:
 @functools.cache
 def _library() -> ctypes.CDLL:
     """The compiled code, from the cache."""
-    library = ctypes.CDLL(str(kernel(_SOURCES, _FILES)))
+    library = ctypes.CDLL(str(kernel(_SOURCES / "subdivide.c")))
     library.subdivide.restype = ctypes.c_int
     return library

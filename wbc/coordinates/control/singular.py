@@ -42,12 +42,10 @@ class LeastSingular:
 
 @functools.cache
 def _compiled() -> ctypes._NamedFuncPointer | None:
-    if not toolchain.available():
-        return None
     try:
-        function = load_library(kernel(_SOURCES, ("singular.c",))).least_singular
+        function = load_library(kernel(_SOURCES / "singular.c")).least_singular
     except CompileError as error:
-        toolchain.fall_back(str(error))
+        toolchain.fall_back(toolchain.reason(error))
         return None
     function.restype = ctypes.c_double
     function.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]

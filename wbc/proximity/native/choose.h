@@ -1,4 +1,4 @@
-/* Which pairs have which rows: see wbc/proximity/choice.py, which does the same with all distances.
+/* Which pairs have which rows: the closest ones, and those that were close enough to stay.
  *
  * A pair's score is its distance, less what lets it keep a row that it has; urgent ones come before all others. The `rows`
  * least scores are chosen, of equal ones the pair named first. Pairs that are not urgent and whose bound is above the greatest

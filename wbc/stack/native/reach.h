@@ -1,5 +1,5 @@
 /* What one step along the Jacobians cannot do: errors that no step removes, and speeds that no joint can stop.
- * The formulas are in docs/reach.md; wbc/controller/tick/reach.py is the same in numpy. */
+ * The formulas are in docs/reach.md. */
 #ifndef WBC_REACH_H
 #define WBC_REACH_H
 
@@ -363,21 +363,24 @@ static void reach(wbc_tick *t) {
         return;
     }
 #if NNZK > 0
-    double force[MT + MC + 1];
-    if (!left_over(t, free, error, slope, KEPT, force)) return;
+    /* There may be none also where code for stacks of any size is compiled */
+    if (NNZK > 0) {
+        double force[MT + MC + 1];
+        if (!left_over(t, free, error, slope, KEPT, force)) return;
 #if BENDING > 0
-    /* Errors that are left push against rows that bend: with how much is seen where these are firm */
-    double least, most;
-    if (BENDING > 0 && !KEPT) {
-        find_pivots(t, &least, &most);
-        if (counted(t, error, force, least) > 0.0 && !left_over(t, free, error, slope, 1, force)) return;
-    }
+        /* Errors that are left push against rows that bend: with how much is seen where these are firm */
+        double least, most;
+        if (BENDING > 0 && !KEPT) {
+            find_pivots(t, &least, &most);
+            if (counted(t, error, force, least) > 0.0 && !left_over(t, free, error, slope, 1, force)) return;
+        }
 #endif
-    const int prepared = t->prepared;
-    t->prepared = 1;
-    t->curved = add_curvature(t, free, error, slope, force);
-    if (!t->prepared) return;
-    if (!t->curved) t->prepared = prepared;
+        const int prepared = t->prepared;
+        t->prepared = 1;
+        t->curved = add_curvature(t, free, error, slope, force);
+        if (!t->prepared) return;
+        if (!t->curved) t->prepared = prepared;
+    }
 #endif
     const double allowed = CALM ? stoppable(t, free, error, largest) : largest;
     if (!t->curved && allowed >= largest) return;

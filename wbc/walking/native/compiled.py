@@ -22,18 +22,6 @@ from wbc.native.kernel import kernel
 from wbc.robots import BodyLimb, WalkerData
 
 _SOURCES = Path(__file__).parent
-_FILES = (
-    "arm.h",
-    "surface.h",
-    "near.h",
-    "world.h",
-    "curve.h",
-    "grips.h",
-    "speeds.h",
-    "tracks.h",
-    "choice.h",
-    "planner.c",
-)
 
 
 class ArmNumbers(ctypes.Structure):
@@ -83,13 +71,11 @@ def packed(array: Any) -> NDArray[np.float64]:
 
 @functools.cache
 def library() -> ctypes.PyDLL | None:
-    """The compiled code, from the cache; None where there is no compiler, or it fails, which the log says."""
-    if not toolchain.available():
-        return None
+    """The compiled code; None where it was not compiled ahead and cannot be now, which the log says."""
     try:
-        path = kernel(_SOURCES, _FILES)
+        path = kernel(_SOURCES / "planner.c")
     except CompileError as error:
-        toolchain.fall_back(str(error))
+        toolchain.fall_back(toolchain.reason(error))
         return None
     # Not CDLL: a call takes microseconds, giving up the interpreter's lock would cost as much
     return ctypes.PyDLL(str(path))
