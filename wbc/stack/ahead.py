@@ -21,6 +21,7 @@ KERNELS = (
     "clearance/native/sweep.c",
     "coordinates/control/native/singular.c",
     "proximity/native/sensor.c",
+    "resolvers/fsp/native/fsp.c",
     "walking/native/planner.c",
 )
 

@@ -72,14 +72,11 @@ def generated(name: str, J: Array, x: Array, held: Iterable[int], free: bool) ->
 @functools.cache
 def _loaded() -> ctypes.PyDLL | None:
     """Says once in the log if there is none."""
-    from wbc.native import toolchain
     from wbc.native.kernel import kernel
     from wbc.native.library import load_library
 
     try:
-        if toolchain.compiler() is None:
-            raise CompileError("compiler", None, "none was found")
-        found = load_library(kernel(_SOURCES, ("fsp.c",)))
+        found = load_library(kernel(_SOURCES / "fsp.c"))
     except CompileError as error:
         log.warning("%s: spaces of solutions are made by numpy, which takes some 5 times as long", error)
         return None
