@@ -1,4 +1,4 @@
-"""Bilateral teleoperation over delay: what is followed and felt, what is refused, random families, and a picture."""
+"""Bilateral teleoperation over delay: what is refused without passivity control, and a picture."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import dataclasses
 
 import numpy as np
 
-import wbc
 from bench.pool import ROOT
 from bench.sheet import Sheet
-from tests.teleop.bilateral_runs import DT, drawn, reach
+from tests.teleop.bilateral_runs import DT, reach
 from wbc import style
 from wbc.errors import RangeError
 from wbc.teleop.bilateral import (
@@ -25,7 +24,6 @@ from wbc.teleop.bilateral import (
     position_position,
     run_bilateral,
 )
-from wbc.teleop.bilateral.arms import FollowingArm
 
 PICTURE = ROOT / "docs" / "images" / "bilateral.png"
 DEVICE, LIGHT = Device(2.0, 15.0), Device(2.0, 10.0)
@@ -52,73 +50,14 @@ FAMILY, BATCHES, TICKS = 250, 16, 1200
 
 
 def parts() -> dict[str, Sheet | str]:
-    """What is felt, what is accepted without passivity control, and the random families."""
+    """What is accepted without passivity control, and the picture."""
     _picture()
-    return {"felt": _felt(), "accepted": _accepted(), "robots": _robots(), "families": _families()}
-
-
-def _felt() -> Sheet:
-    """Free motion and contact by each scheme and link, with passivity control."""
-    cases = [(name, link) for name in SCHEMES for link in LINKS]
-    systems = [_system(SCHEMES[name], *link) for name, link in cases]
-    path = reach(seconds=SECONDS)
-    count = len(cases)
-    hands = [Operator(path)] * (2 * count)
-    run = run_bilateral(systems * 2, hands, [Wall()] * count + [WALL] * count)
-    rows = []
-    for k, (name, (delay, jitter, loss)) in enumerate(cases):
-        late = round(0.5 * delay / DT)
-        behind = run.slave[late:, k, 0] - run.master[: len(run.master) - late, k, 0]
-        at, touch = round(3.9 / DT), count + k
-        felt = run.operator_force[at, touch, 0] / (run.master[at, touch, 0] - WALL.at)
-        damped = (run.scale[:, touch] < 0.999).any(axis=1).mean()
-        link = f"{1e3 * delay:.0f}" + (f", jitter {1e3 * jitter:.0f}, loss {loss:.0%}" if jitter else "")
-        ratio = -run.operator_force[at, touch, 0] / run.wall_force[at, touch, 0]
-        kept = (run.taken - run.given)[-1, touch]
-        rows.append((
-            name, link, f"{1e3 * np.sqrt(np.mean(behind**2)):.1f}", f"{felt:.0f}", f"{ratio:.2f}",
-            f"{1e3 * abs(run.slave[-1, touch, 0]):.0f}", f"{damped:.0%}", f"{kept:.2f}",
-        ))  # fmt: skip
-    columns = (
-        "scheme", "round trip, ms", "following, mm rms", "felt stiffness, N/m", "felt force", "back at rest, mm",
-        "ticks damped", "energy kept, J",
-    )  # fmt: skip
-    return Sheet("", columns, rows)
+    return {"accepted": _accepted()}
 
 
 def _system(scheme: Scheme, delay: float, jitter: float, loss: float) -> Bilateral:
     link = Link(0.5 * delay, jitter, loss)
     return Bilateral(scheme, DEVICE, DEVICE, link, link, DT)
-
-
-def _robots() -> Sheet:
-    """Pairs of robots with four channels, 600 ms, jitter and losses: to a wall and back."""
-    system, path = _system(SCHEMES["four-channel"], 0.6, 0.05, 0.1), reach(0.1, SECONDS, 3, 1)
-    rows = []
-    for lead, follow, scale, by_joints in PAIRS:
-        n, wall = (6 if by_joints else 3), Wall(0.05)
-        arms = tuple(
-            FollowingArm(
-                wbc.robots.load(name), None if by_joints else TIPS[name], dt=DT, scale=part,
-                q=np.radians(BENT) if name == "ssrms" else None,
-            )
-            for name, part in ((lead, 1.0), (follow, scale))
-        )  # fmt: skip
-        run = run_bilateral(system, Operator(reach(0.1, SECONDS, n, 1) if by_joints else path), wall, arms=arms)
-        at = round(3.9 / DT)
-        space = "joints" if by_joints else "hand"
-        off = [arm.move(x[-1, 0]) - x[-1, 0] for arm, x in zip(arms, (run.master, run.slave), strict=True)]
-        rows.append((
-            f"{lead}, {follow}", space, f"{scale:g}", f"{1e3 * run.slave[at, 0, 1]:.0f}",
-            f"{run.operator_force[at, 0, 1]:.1f}", f"{-run.wall_force[at, 0, 1]:.1f}",
-            f"{1e3 * abs(run.slave[-1, 0, 1]):.1f}", f"{1e3 * np.abs(off).max():.2g}",
-            f"{(run.taken - run.given).min():.2g}",
-        ))  # fmt: skip
-    columns = (
-        "master, slave", "by", "scale", "slave at the wall", "felt, N", "on the wall, N", "at the end",
-        "arms off devices", "least energy kept, J",
-    )  # fmt: skip
-    return Sheet("", columns, rows)
 
 
 def _accepted() -> Sheet:
@@ -139,28 +78,6 @@ def _fits(scheme: Scheme, device: Device, delay: float) -> bool:
     except RangeError:
         return False
     return True
-
-
-def _families() -> str:
-    """Random systems, each with and without passivity control."""
-    wild, worst, most = 0, 0.0, -np.inf
-    for batch in range(BATCHES):
-        rng = np.random.default_rng(1000 + batch)
-        systems, hands, walls = zip(*[drawn(rng, TICKS) for _ in range(FAMILY)], strict=True)
-        run = run_bilateral(systems, hands, walls, seed=batch)
-        size = run.injected.max(axis=0) + 1e-9
-        worst = max(worst, float(((run.given - run.taken) / size).max()))
-        most = max(most, float(((run.stored - run.injected) / size)[1:].max()))
-        free = [dataclasses.replace(one, passivity=False, unchecked=True) for one in systems]
-        with np.errstate(all="ignore"):
-            wild += int((~(run_bilateral(free, hands, walls, seed=batch).excess() < size)).sum())
-    return (
-        f"Of {FAMILY * BATCHES} random systems (gains over four decades, devices at their bounds, up to 600 ms each "
-        f"way, jitter up to 300 ms, up to 90 % lost) {wild} had, without passivity control, more than twice the energy "
-        f"that their operator put in. With it none had more than was put in (largest excess {max(most, 0.0):.1g} of "
-        "it), and at no tick did both sides together give out more than they had taken in (largest excess "
-        f"{max(worst, 0.0):.1g})."
-    )
 
 
 def _picture() -> None:

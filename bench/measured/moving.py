@@ -1,4 +1,4 @@
-"""Work on a moving object: a peg into the hole of a table on a sea, the published swing, a tumbling body grasped."""
+"""Work on a moving object: a peg into the hole of a table on a sea."""
 
 from __future__ import annotations
 
@@ -8,26 +8,18 @@ import wbc
 from bench.sheet import Sheet
 from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.pictures import LABELS
-from wbc.moving_target.study import Outcome, Study, grasp, outcome, peg, trials
+from wbc.moving_target.study import Outcome, Study, outcome, peg, trials
 
 COLUMNS = ("the object is known by", "done", "rms, mm", "largest, mm", "time, s", "joint rate / limit")
 #: Trials with each knowledge; the exact ones differ little
-RUNS, EXACT, GRASPS = 200, 20, 60
+RUNS, EXACT = 200, 20
 
 
 def parts() -> dict[str, Sheet | str]:
-    """A table for each job."""
+    """A table of the peg on a sea."""
     panda, sensor = wbc.robots.load("panda"), Measurement()
-    sea, swing = (peg(panda, "panda_hand_tcp", motion, 1.5e-3, sensor) for motion in ("sea", "swing"))
-    tight = peg(panda, "panda_hand_tcp", "sea", 1e-3, sensor)
-    body = grasp(wbc.robots.load("ssrms"), "tip", "tumble", Measurement((5e-3, 1e-3)))
-    every = list(Knowledge)
-    return {
-        "sea": sheet(sea, {k: RUNS if k in (Knowledge.NONE, Knowledge.ESTIMATED) else EXACT for k in every}),
-        "tight": sheet(tight, {Knowledge.NONE: EXACT, Knowledge.TWIST: EXACT, Knowledge.ESTIMATED: RUNS}),
-        "swing": sheet(swing, dict.fromkeys(every, 5)),
-        "grasp": sheet(body, dict.fromkeys((Knowledge.NONE, Knowledge.TWIST, Knowledge.ESTIMATED), GRASPS)),
-    }
+    sea = peg(panda, "panda_hand_tcp", "sea", 1.5e-3, sensor)
+    return {"sea": sheet(sea, {k: RUNS if k in (Knowledge.NONE, Knowledge.ESTIMATED) else EXACT for k in Knowledge})}
 
 
 def sheet(study: Study, counts: dict[Knowledge, int]) -> Sheet:

@@ -213,7 +213,7 @@ def test_a_trial_that_fails_is_a_record(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 def test_costs_of_proofs_are_tabulated(monkeypatch: pytest.MonkeyPatch) -> None:
-    cases = (("short", 3, 0.1, 6.0, 1e-3, "any", True, 2), ("least", 3, 0.1, 2.0, float("inf"), "least", True, 1))
+    cases = (("short", 3, 0.1, 6.0, 1e-3, "any", 2), ("least", 3, 0.1, 2.0, float("inf"), "least", 1))
     monkeypatch.setattr(clearance, "CASES", cases)
     sheet = clearance.parts()["costs"]
     assert isinstance(sheet, Sheet)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tests.repeats import repeats
 from tests.resolvers.given_rows import stack_rates
-from wbc.errors import InfeasibleError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
-from wbc.native import kernel, toolchain
+from wbc.errors import CompileError, InfeasibleError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
+from wbc.native import kernel
 from wbc.resolvers import FullSpace, PseudoInverse, RateProblem
 from wbc.resolvers.fsp import (
     Consistency,
@@ -121,11 +121,13 @@ def test_compiled_and_numpy_are_the_same(kind: str, monkeypatch: pytest.MonkeyPa
             np.testing.assert_allclose(v.v, u.v, rtol=0, atol=1e-7 * max(1.0, np.abs(u.v).max()))
 
 
-def test_without_a_compiler_numpy_does_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(toolchain, "compiler", lambda: None)
-    monkeypatch.setattr(kernel, "AHEAD", tmp_path)
+def test_without_a_compiler_numpy_does_it(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    """And without a library that was compiled before."""
+
+    def refuse(*sources: Path) -> Path:
+        raise CompileError("compiler", None, "none was found")
+
+    monkeypatch.setattr(kernel, "kernel", refuse)
     monkeypatch.setattr(compiled, "_loaded", compiled._loaded.__wrapped__)
     J, x = system("plain", 3)
     np.testing.assert_allclose(best(blocked(J, x)).v, np.linalg.pinv(J) @ x, atol=1e-9)

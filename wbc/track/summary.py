@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from wbc.controller import Status
+from wbc.tick.outcome import STATUSES
 from wbc.track.log import Log
 from wbc.validation import Array
 
@@ -143,7 +144,7 @@ def _solver(log: Log) -> list[Figure]:
     shown = [f"{name} {100 * share:.1f} %" for name, share in ranked[:6]]
     more = [f"and {len(ranked) - 6} more"] if len(ranked) > 6 else []
     status = log["status"]
-    counts = {str(s): int((status == k).sum()) for k, s in enumerate(Status)}
+    counts = {str(s): int((status == k).sum()) for k, s in enumerate(Status) if s in STATUSES}
     tick = log["tick"]
     times = {"median": float(np.median(tick)), "p99": float(np.quantile(tick, 0.99)), "max": float(tick.max())}
     meta = log.meta
