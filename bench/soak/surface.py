@@ -48,7 +48,7 @@ MADE = (
     *("Form", "Order", "Status", "WbcError", "Bounds", "Rows", "Row", "Certificate", "Worst", "State", "Recipe"),
     *("SacrificeOrder", "RankCertificate", "LawCertificate"),
     *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
-    *("CompleteSet", "Leg", "MotionCue", "PairCount", "PairStack", "PairStep", "PairSurvey"),
+    *("CompleteSet", "Leg", "LoopError", "MotionCue", "PairCount", "PairStack", "PairStep", "PairSurvey"),
     *("Parts", "TreeSet", "TreeSets"),
     *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
     *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
