@@ -8,8 +8,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.repeats import repeats
-from wbc.clearance import sweep
 from wbc.errors import RangeError
 from wbc.robots import Walker, WalkerData
 from wbc.shapes import Sphere
@@ -480,27 +478,3 @@ def at_once(walk: Walk, place: np.ndarray):  # type: ignore[no-untyped-def]
         return 0.0
 
     return put
-
-
-def test_what_a_lagging_arm_may_touch_is_the_same_without_a_compiler(
-    machine: Walker, structure: Structure, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of motions on which an arm comes about as near as a lagging one may."""
-    compiled = Foresight(machine, structure)
-    monkeypatch.setattr(sweep, "library", lambda: None)
-    plain = Foresight(machine, structure)
-    rng, times, grips = np.random.default_rng(4), np.linspace(0.0, 0.5, 11), plan.grips
-    assert grips is not None
-    seen = list[bool]()
-    for _ in range(repeats(60)):
-        sample = int(rng.integers(0, 60))
-        q = np.zeros((11, machine.robot.nq))
-        q[:, :7] = pin.SE3ToXYZQUAT(pin.SE3(plan.path.poses[sample]))
-        for k, arm in enumerate(machine.arms):
-            q[:, arm.q] = grips.posture_at(plan.chain[k][0], sample)
-        moving = int(rng.integers(0, len(machine.arms)))
-        turns = rng.uniform(-0.6, 0.6, (2, 6))
-        q[:, machine.arms[moving].q] += turns[0] + times[:, None] * turns[1]
-        seen.append(compiled.close(times, q, moving))
-        assert plain.close(times, q, moving) == seen[-1]
-    assert 0.1 < np.mean(seen) < 0.9
