@@ -200,22 +200,22 @@ class _Builder:
         slope = self.dt * ca.reshape(change, rows.shape)
         return 0.5 * self.dt * second - slope @ v, slope
 
-    def advanced(self, block: Block, dt: ca.SX) -> ca.SX:
-        """The parameter vector with this block's moving inputs ``dt`` later, at their mean rates over the tick."""
+    def advanced(self, block: Block) -> ca.SX:
+        """The parameter vector with this block's moving inputs dt later, at their mean rates over the tick."""
         out = ca.SX(self.p)
         for owner, slot in self.moving(block):
             speed = self.speed(owner, slot, mean=True)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
-                turn = rot.from_quaternion(rot.exp3(angular * dt)) @ ca.reshape(part[:9], 3, 3)
+                turn = rot.from_quaternion(rot.exp3(angular * self.dt)) @ ca.reshape(part[:9], 3, 3)
                 moved = ca.vec(turn)
                 if slot.input.kind == "pose":
-                    moved = ca.vertcat(moved, part[9:] + speed[:3] * dt)
+                    moved = ca.vertcat(moved, part[9:] + speed[:3] * self.dt)
             elif slot.input.kind == "configuration":
-                moved = self.kinematics.integrate(part, speed * dt)
+                moved = self.kinematics.integrate(part, speed * self.dt)
             else:
-                moved = part + speed * dt
+                moved = part + speed * self.dt
             out[slot.span] = moved
         return out
 
@@ -330,7 +330,7 @@ class _Builder:
                 rate += ca.jacobian(kept, self.p[slot.span]) @ self.rate(owner, slot)
         keeps = ca.DM([float(not kept[k].is_zero()) for k in range(kept.numel())])
         kept, rate = tracer.expanded(kept, rate)
-        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block, self.dt))
+        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block))
         return ca.sparsify(keeps * (later - kept - rate * self.dt))
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
@@ -349,7 +349,7 @@ class _Builder:
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
-        margin = here(self.later, self.advanced(block, self.dt))
+        margin = here(self.later, self.advanced(block))
         sensed = item.sensed_rows(self.stack.robot)
         if sensed and not self.loops:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
