@@ -56,8 +56,8 @@ class Mechanism(Constraint):
     def refusal(self, robot: Robot, command: Command) -> str:
         """Torques that a loop transmits are not computed."""
         if robot.loops and command != "velocity":
-            names = ", ".join(loop.name for loop in robot.loops.loops)
-            return f"keeps the loops {names}, which only velocities are computed for; robot.with_loops() opens them"
+            kept = f"keeps the loops {robot.loops.names}"
+            return f"{kept}, which only velocities are computed for; robot.with_loops() opens them"
         return ""
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:

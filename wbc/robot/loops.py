@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import WbcError
+from wbc.robot.limits import Limits
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -134,30 +135,29 @@ class LoopRows:
     def __bool__(self) -> bool:
         return bool(self.loops)
 
+    @property
+    def names(self) -> str:
+        """Those of the loops, for a sentence."""
+        return ", ".join(loop.name for loop in self.loops)
+
     def error(self, kin: Tracer) -> ca.SX:
         """Residuals of all rows [m, rad]."""
         parts = [ca.DM(basis) @ loop.error(kin) for loop, basis in zip(self.loops, self.bases, strict=True)]
         return ca.SX(ca.vertcat(*parts))
 
 
-@dataclass(frozen=True, eq=False)
-class Range:
-    """Position limits by degree of freedom, and the index in q of the coordinate of each, -1 for none."""
-
-    lower: Array
-    upper: Array
-    index: Array
-
-
 class Closing:
     """Newton's shortest steps towards configurations at which loops are closed.
 
     Args:
-        model: the robot's. loops: its loops. limits: that the configurations keep.
+        model: the robot's. loops: its loops. limits: whose positions the configurations keep. index: in q of the
+            coordinate of each degree of freedom, -1 for none.
     """
 
-    def __init__(self, model: pin.Model, loops: Sequence[AnyLoop], limits: Range) -> None:
-        self._model, self._limits, self._loops = model, limits, loops
+    def __init__(self, model: pin.Model, loops: Sequence[AnyLoop], limits: Limits, index: Array) -> None:
+        self._model, self._loops = model, loops
+        has = index >= 0
+        self._at, self._lower, self._upper = index[has], limits.position_lower[has], limits.position_upper[has]
         kin = Tracer(Kinematics(model))
         error = ca.SX(ca.vertcat(*[loop.error(kin) for loop in loops]))
         outputs = [ca.densify(part) for part in kin.expanded(error, ca.densify(kin.slope(error)))]
@@ -222,9 +222,8 @@ class Closing:
         return LoopRows(tuple(self._loops[:count]), bases, tuple(rows))
 
     def _within(self, q: Array) -> Array:
-        out, has = np.array(pin.normalize(self._model, q)), self._limits.index >= 0
-        at = self._limits.index[has]
-        out[at] = np.clip(out[at], self._limits.lower[has], self._limits.upper[has])
+        out = np.array(pin.normalize(self._model, q))
+        out[self._at] = np.clip(out[self._at], self._lower, self._upper)
         return out
 
 

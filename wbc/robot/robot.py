@@ -16,7 +16,7 @@ import pinocchio as pin
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError, UnsupportedJointError
 from wbc.robot.limits import Limits
-from wbc.robot.loops import CLOSED, AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows, Range
+from wbc.robot.loops import CLOSED, AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
@@ -386,8 +386,8 @@ class Robot:
             UnsupportedJointError: it has loops; which, and that :meth:`with_loops` without any opens them.
         """
         if self.loops:
-            names = ", ".join(loop.name for loop in self.loops.loops)
-            raise UnsupportedJointError("robot", names, f"{what} knows no closed loops; robot.with_loops() opens them")
+            reason = f"{what} knows no closed loops; robot.with_loops() opens them"
+            raise UnsupportedJointError("robot", self.loops.names, reason)
 
     def closed(self, q: Any) -> Array:
         """The nearest configuration that closes the loops, by Newton's shortest steps from q.
@@ -413,8 +413,7 @@ class Robot:
             for c in self.couplings
             if min(self.position_index[[c.follower, c.leader]]) >= 0
         ]
-        limits = Range(self.limits.position_lower, self.limits.position_upper, self.position_index)
-        return Closing(self.model, [*self.loops.loops, *coupled], limits)
+        return Closing(self.model, [*self.loops.loops, *coupled], self.limits, self.position_index)
 
     def seen_from(self, pose: pin.SE3) -> Robot:
         """A copy whose world is the frame at ``pose``: links and gravity are there as seen from that frame.
