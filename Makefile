@@ -20,14 +20,14 @@ PUBLIC := build/public
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock clean
+.PHONY: help setup demo test check slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock platforms clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
 setup: $(READY)  ## create .venv with the pinned packages and this one
 
-demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into runs/walk (the Panda: wbc demo)
+demo: $(READY)  ## a three-armed robot walks along a cylinder at 4 in/s, into runs/walk (the Panda: wbc track demo)
 	$(BIN)/wbc walk --out runs/walk --force
 
 test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases; build/failed.txt names those that failed
@@ -88,8 +88,11 @@ bench-ik: $(READY) $(PEERS_READY)  ## inverse kinematics on TRAC-IK's protocol, 
 bench-time-laws: $(READY)  ## laws of motion beside raw toppra and raw ruckig, 10^6 states; Ctrl-C keeps what it has
 	$(BIN)/python -m bench.time_laws --full
 
-soak: $(READY)  ## 10^6 random ticks on random stacks and under faults, minutes; counts every fall-back; Ctrl-C keeps the counts
-	$(BIN)/python -m bench.soak
+soak: $(READY)  ## random stacks, faults, calls and walks from seeds, minutes; more with REPEATS=30
+	WBC_REPEATS=$(if $(filter 1,$(REPEATS)),10,$(REPEATS)) $(BIN)/python -m pytest -n $(PYTEST_JOBS) tests/soak tests/fuzz tests/walking/trials $(PYTEST_ARGS)
+
+platforms: $(READY)  ## which platforms and Pythons have everything that wbc needs as wheels
+	$(BIN)/python requirements/platforms.py
 
 lock: $(READY)  ## write the versions in .venv to requirements/lock.txt
 	$(BIN)/python requirements/freeze.py > requirements/lock.txt.new

@@ -123,7 +123,7 @@ def strip() -> Path:
             shown = (
                 Image.open(io.BytesIO(page.picture())).convert("RGB").crop(CUT).resize(CELL, Image.Resampling.LANCZOS)
             )
-        ImageDraw.Draw(shown).text((10, 8), f"wbc play {name}", fill=(29, 39, 51), font=ImageFont.load_default(15))
+        ImageDraw.Draw(shown).text((10, 8), f"wbc view play {name}", fill=(29, 39, 51), font=ImageFont.load_default(15))
         pictures.append(shown)
     sheet = Image.new("RGB", (3 * CELL[0], 2 * CELL[1]))
     for k, shown in enumerate(pictures):

@@ -13,15 +13,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from PIL import Image
 
 import wbc
 from bench.gallery import save
 from bench.pool import ROOT
-from bench.walk.machine import walker_of
-from bench.walk.trials import among
-from wbc.track import Scene
+from tests.walking.trials.torque_trials import walker_of
+from tests.walking.trials.trials import among
+from wbc.track import Scene, render
 from wbc.walking.report.animation import pictures
 from wbc.walking.run.session import perform_walk
 
@@ -64,23 +63,19 @@ def film(run: dict[str, Any], file: Path) -> None:
     hands = np.array([hand for _, hand, _ in run["path"]])
     low, high = hands.min(axis=0) - ROUND, hands.max(axis=0) + ROUND
     low[2] = 0.0
-    # Grains at the corners of all that is ever seen: every picture has the same in it
     corners = np.array(list(product(*np.stack([low, high], axis=1))))
+    scene = Scene(run["robot"], dark=[run["tip"]], detail=0.006)
+    scene.add_path(hands, radius=0.012)
+    frame = scene.film(render.framed(corners, SMALL, 3.3, 0.6))
     frames = []
     for k in np.linspace(0, len(hands) - 1, FRAMES, endpoint=False).astype(int):
-        scene = Scene(run["robot"], dark=[run["tip"]], detail=0.006)
         scene.add_robot(run["path"][k][0])
-        scene.add_path(hands, "path of the hand", radius=0.012)
-        for corner in corners:
-            scene.add_shape(wbc.shapes.Sphere(1e-4), pin.SE3(np.eye(3), corner))
-        with Image.open(scene.save(file.with_suffix(".png"), size=SMALL, azimuth=3.3, elevation=0.6)) as shown:
-            frames.append(shown.convert("RGB"))
-    file.with_suffix(".png").unlink()
+        frames.append(Image.fromarray(frame()))
     save(frames, file)
 
 
 def posts(_: dict[str, Any], file: Path) -> None:
-    """The walk of ``python -m bench.walk.trials structures "posts 2" FOLDER``, from its beginning to its end."""
+    """The walk of the trial structures "posts 2" (``tests.walking.trials``), from its beginning to its end."""
     walker = walker_of(3)
     with TemporaryDirectory() as folder:
         run = perform_walk(among("posts", 2, walker, Path(folder)), walker)

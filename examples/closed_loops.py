@@ -27,12 +27,14 @@ MODEL = f"""<mujoco model="ankle"><compiler angle="radian"/><worldbody><body nam
     <equality><connect name="left" body1="left_rod" body2="foot" anchor="0 0 -0.25"/>
     <connect name="right" body1="right_rod" body2="foot" anchor="0 0 -0.25"/></equality></mujoco>"""
 
-robot = wbc.robots.load(MODEL, shapes="exact").with_limits(velocity={"left_motor": 2.0, "right_motor": 2.0})
+robot = wbc.robots.load(MODEL, shapes="exact", actuated=("left_motor", "right_motor")).with_limits(
+    velocity={"left_motor": 2.0, "right_motor": 2.0}
+)
 stack = wbc.Stack(robot, dt=DT)
 stack.add(wbc.tasks.EndEffector("foot", kind="orientation", gain=50.0), name="foot")
 stack.add(wbc.tasks.Posture(), name="posture", weight=1e-4).add(wbc.tasks.JointLimits())
 controller, q, rows = stack.compile(), robot.neutral, []
-motors = [robot.position_index[robot.dofs(name).start] for name in ("left_motor", "right_motor")]
+motors = robot.position_index[list(robot.motors)]
 for t in DT * np.arange(round(SECONDS / DT)):
     controller["foot"].target = pin.rpy.rpyToMatrix(0.25 * np.sin(3.0 * t), 0.4 * np.sin(2.0 * t), 0.0)
     step = controller.step(q)
@@ -43,6 +45,14 @@ rows = np.array(rows)
 moved, off = np.degrees(np.ptp(rows[:, :2], axis=0)), np.degrees(rows[500:, 2].max())
 print(f"{step.status}: motors moved over {moved[0]:.0f} and {moved[1]:.0f} degrees, foot at most {off:.1f} degrees off")
 print(f"loops open by at most {rows[:, 3].max():.0e} m")
+
+# What the motors give to hold it there against 50 N down, 0.1 m ahead of the ankle, and what the rods bear
+loaded = wbc.Stack(robot, dt=DT).add(wbc.tasks.Posture()).add(wbc.tasks.ExternalWrench("foot"), name="load")
+holding = loaded.compile(command="torque")
+holding["load"].set(wrench=[0.0, 0.0, -50.0, 0.0, 5.0, 0.0])
+held = holding.step(q, np.zeros(robot.nv))
+bears = ", ".join(f"{name} {np.linalg.norm(force):.0f} N" for name, force in held.loop_forces.items())
+print(f"held by {' and '.join(f'{x:.2f}' for x in held.torque[list(robot.motors)])} N m; rods bear {bears}")
 
 scene = Scene(robot)
 scene.add_robot(robot.neutral, pale=True)

@@ -14,14 +14,14 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import WbcError
 from wbc.robot.loading import build, finish, looks_like_path, unknown
+from wbc.robot.loops import AnyLoop
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
+from wbc.robot.sources.loop_file import read_loops
 from wbc.robot.sources.mjmodel import compiled, is_mjmodel, is_text, model_name
 from wbc.robot.sources.table import read_table
-from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
-from wbc.robots.walker_robot import MADE, as_made, made_here, recipe_of
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -58,14 +58,15 @@ def load(
     velocity: Any = None,
     acceleration: Any = None,
     effort: Any = None,
-    loops: bool = True,
+    loops: bool | str | os.PathLike[str] | Sequence[AnyLoop] = True,
+    actuated: Sequence[str] | None = None,
 ) -> Robot:
     """A robot from the table, a file, a model, or a chain of Denavit-Hartenberg rows.
 
     Args:
         robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
-            name of :func:`~wbc.robots.operator_arm`, a path of a URDF or MJCF file, MJCF as a string, a ``pin.Model``,
-            a ``mujoco.MjModel``, or DH rows.
+            name of :func:`~wbc.robots.operator_arm`, a path of a URDF, SDF or MJCF file, MJCF as a string, a
+            ``pin.Model``, a ``mujoco.MjModel``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or file brings, or fixed.
@@ -83,23 +84,26 @@ def load(
         position_lower, position_upper, velocity, acceleration, effort: limits that replace the description's, in SI
             units (rad or m, s, N m or N); one number for all joints but the base, nv numbers, or a mapping from joint
             (or degree of freedom) to a number; infinite for none.
-        loops: keep the closed loops of an MJCF file (``connect``, ``weld`` and ``joint`` of its equalities) closed, see
-            :meth:`~wbc.robot.Robot.with_loops`; False: an open tree.
+        loops: keep the closed loops of an MJCF file (``connect``, ``weld`` and ``joint`` of its equalities) or of an
+            SDF file closed, see :meth:`~wbc.robot.Robot.with_loops`; False: an open tree; loops, or the path of a file
+            with a row ``frame,frame,kind`` for each: these as well.
+        actuated: names of the joints with motors, see :meth:`~wbc.robot.Robot.with_actuated`; ``"transmissions"``:
+            those with a ``<transmission>`` in the URDF file. Default: of an MJCF file with actuators the joints that
+            these move, else all.
 
     Raises:
         LoopError: no configuration closes the loops.
         UnknownNameError: no such robot (nearest names first), base, joint or frame.
-        RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF
-            nor MJCF; a base that contradicts the description.
+        RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF,
+            SDF nor MJCF; a base that contradicts the description.
         UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
         ShapeError, NotFiniteError, RangeError, BoundsError: a bad limit, lock or neutral value.
 
-    Cannot do: SDF and xacro files. What a robot cannot hold of an MJCF file is named in the log; loops of a URDF, which
-    is a tree, are given by :meth:`~wbc.robot.Robot.with_loops`.
+    Cannot do: xacro files; shapes of SDF files. What a robot cannot hold of a file is named in the log.
     """
-    made = made_here(robot) if isinstance(robot, str) else None
-    recipe, source = _find(robot) if made is None else (recipe_of(made), made.model)
-    changes: dict[str, Any] = {"loops": validation.flag("loops", loops)}
+    recipe, source, made = _find(robot)
+    more, own = _loops(loops)
+    changes: dict[str, Any] = {"loops": own, "actuated": actuated}
     if lock is not None:
         changes["lock"] = lock_mapping(lock)
         changes["pairs"] = ""  # other links move against each other
@@ -117,11 +121,16 @@ def load(
     }
     try:
         built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
+        built = built.with_loops(*built.loops.loops, *more) if more else built
     except WbcError as error:
         if recipe.file or not isinstance(source, (str, os.PathLike)) or str(source) in str(error):
             raise
         raise error.about(str(source)) from error
-    return built if made is None else as_made(built, made, lock is None and shapes == "auto", limits, neutral)
+    if made is None:
+        return built
+    from wbc.robots.walker_robot import as_made
+
+    return as_made(built, made, lock is None and shapes == "auto", limits, neutral)
 
 
 def from_dh(
@@ -149,21 +158,42 @@ def from_dh(
     return finish(read_dh(rows, base, tool), Recipe(name, frames={"tip": "tip"}), "none", (), limits)
 
 
-def _find(robot: Any) -> tuple[Recipe, Any]:
-    """(recipe, what to read): the table's row for a name, an empty recipe otherwise."""
+def _loops(loops: Any) -> tuple[tuple[AnyLoop, ...], bool]:
+    """(loops that are given, whether those of the description are kept)."""
+    if isinstance(loops, (str, os.PathLike)):
+        return read_loops(pathlib.Path(loops)), True
+    if isinstance(loops, Sequence):
+        return tuple(loops), True
+    return (), validation.flag("loops", loops)
+
+
+def _find(robot: Any) -> tuple[Recipe, Any, Robot | None]:
+    """(recipe, what to read, the robot if it is one that is made here): the table's row for a name, an empty recipe
+    otherwise.
+    """
     if is_text(robot):
         robot = compiled(robot)
     if isinstance(robot, str):
         recipe = _by_name().get(robot)
         if recipe is not None:
             pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
-            return replace(recipe, pairs=pairs), example_data_folder() / recipe.file
-        if robot in OPERATOR_ARMS:
-            return operator_recipe(robot)
+            return replace(recipe, pairs=pairs), example_data_folder() / recipe.file, None
         if not looks_like_path(robot):
-            raise unknown(robot, (*_by_name(), *MADE, *OPERATOR_ARMS))
+            return _made(robot)
     if isinstance(robot, (str, os.PathLike)):
-        return Recipe(validation.file_path("robot", robot).stem), robot
+        return Recipe(validation.file_path("robot", robot).stem), robot, None
     if is_mjmodel(robot):
-        return Recipe(model_name(robot)), robot
-    return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot
+        return Recipe(model_name(robot)), robot, None
+    return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot, None
+
+
+def _made(name: str) -> tuple[Recipe, Any, Robot | None]:
+    # Imported here: robots that are made of numbers and not of files cost every other one a tenth of its loading time
+    from wbc.robots.operator_arms import OPERATOR_ARMS, operator_recipe
+    from wbc.robots.walker_robot import MADE, made_here, recipe_of
+
+    if (made := made_here(name)) is not None:
+        return recipe_of(made), made.model, made
+    if name in OPERATOR_ARMS:
+        return *operator_recipe(name), None
+    raise unknown(name, (*_by_name(), *MADE, *OPERATOR_ARMS))

@@ -21,7 +21,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class TreeLink:
     """A link and the joint that carries it: revolute, sliding, or welded.
 
     Attributes:
@@ -48,7 +48,7 @@ class Link:
     inertia: pin.Inertia | None = None
 
 
-def build_model(name: str, root: str, links: Iterable[Link], floating: bool = True) -> pin.Model:
+def build_model(name: str, root: str, links: Iterable[TreeLink], floating: bool = True) -> pin.Model:
     """The model whose link ``root`` a free flyer carries, or the world; frames have the names of the links and joints.
 
     URDF's parser makes the same joints and frames out of :func:`urdf_text`.
@@ -78,14 +78,14 @@ def build_model(name: str, root: str, links: Iterable[Link], floating: bool = Tr
     return model
 
 
-def _joint(link: Link) -> pin.JointModel:
+def _joint(link: TreeLink) -> pin.JointModel:
     axis = np.array(link.axis)
     if link.sliding:
         return pin.JointModelPrismaticUnaligned(axis)
     return pin.JointModelRZ() if link.axis == Z else pin.JointModelRevoluteUnaligned(axis)
 
 
-def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Iterable[Link]) -> pathlib.Path:
+def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Iterable[TreeLink]) -> pathlib.Path:
     """Writes :func:`urdf_text`.
 
     Raises:
@@ -99,7 +99,7 @@ def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Ite
     return file
 
 
-def urdf_text(robot: Robot, root: str, links: Iterable[Link]) -> str:
+def urdf_text(robot: Robot, root: str, links: Iterable[TreeLink]) -> str:
     """The robot as URDF: joints with position and velocity limits, shapes as collision and visual bodies.
 
     A capsule becomes a cylinder with a ball at each end, a convex body is left out (URDF has it as a mesh only). URDF

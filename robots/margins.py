@@ -29,7 +29,7 @@ class Margins:
     """Margins of plans beyond the limits and clearances of a walker, and their patience.
 
     All of them were chosen here, on the published courses: as small as walks under feedback allow without a violation
-    in ``wbc bench walk``. Lengths are those of an arm with a reach of 0.8636 m; :meth:`of_reach` scales them.
+    in ``python -m bench.walk``. Lengths are those of an arm with a reach of 0.8636 m; :meth:`of_reach` scales them.
 
     Attributes:
         held_rate: part of the joints' rates that holding arms use. held_angle: to joint limits [rad].

@@ -20,7 +20,7 @@ from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
 from wbc.robot.sources.description import Description
 from wbc.robots import operator_chains as chains
-from wbc.robots.link_tree import Link, build_model, write_urdf
+from wbc.robots.link_tree import TreeLink, build_model, write_urdf
 from wbc.robots.operator_chains import ChainJoint, Triple
 from wbc.validation import Array
 
@@ -43,7 +43,7 @@ class OperatorArm:
 
     robot: Robot
     origin: str
-    links: tuple[Link, ...] = field(repr=False)
+    links: tuple[TreeLink, ...] = field(repr=False)
 
     def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """Writes the robot as URDF; returns the file.
@@ -60,7 +60,7 @@ def _data() -> dict[str, dict[str, Any]]:
 
 
 @dataclass(frozen=True)
-class _Limits:
+class _ChainLimits:
     """Of the joints of one chain, and how thick its links are drawn [m]."""
 
     lower: Sequence[float]
@@ -70,7 +70,7 @@ class _Limits:
     effort: float
 
 
-def _chain(name: str) -> tuple[tuple[ChainJoint, ...], _Limits, list[pin.Inertia | None]]:
+def _chain(name: str) -> tuple[tuple[ChainJoint, ...], _ChainLimits, list[pin.Inertia | None]]:
     """The chain of a section of the file, with its limits and the inertias of its links."""
     numbers = dict(_data()[name])
     numbers.pop("origin")
@@ -88,7 +88,7 @@ def _chain(name: str) -> tuple[tuple[ChainJoint, ...], _Limits, list[pin.Inertia
     bodies: list[pin.Inertia | None] = [pin.Inertia(m, np.array(c), _matrix(i)) for m, c, i in zip(*given, strict=True)]
     if per_m:
         bodies = [_tubes(ends, per_m, radius) if ends else None for ends in map(_offsets, joints)]
-    return joints, _Limits(low, high, rate, radius, effort), bodies or [None] * len(joints)
+    return joints, _ChainLimits(low, high, rate, radius, effort), bodies or [None] * len(joints)
 
 
 def _matrix(six: Sequence[float]) -> Array:
@@ -121,30 +121,30 @@ def _tubes(ends: Sequence[tuple[Triple, Triple]], mass_per_m: float, radius: flo
     return out
 
 
-def _links(prefix: str, parent: str, place: pin.SE3, name: str) -> tuple[list[Link], list[LinkShape]]:
+def _links(prefix: str, parent: str, place: pin.SE3, name: str) -> tuple[list[TreeLink], list[LinkShape]]:
     """Links of a chain on a frame, and capsules along its offsets: along z, y and then x."""
     joints, limits, bodies = _chain(name)
-    links: list[Link] = []
+    links: list[TreeLink] = []
     shapes: list[LinkShape] = []
     for k, joint in enumerate(joints, start=1):
         link = f"{prefix}F{k}"
         bounds = (limits.lower[k - 1], limits.upper[k - 1], limits.rate, np.inf)
         about = (joint.axis, joint.sliding, limits.effort, bodies[k - 1])
-        links.append(Link(link, parent, place, f"{prefix}joint{k}", *bounds, *about))
+        links.append(TreeLink(link, parent, place, f"{prefix}joint{k}", *bounds, *about))
         shapes += [LinkShape(link, *ends, limits.radius) for ends in _offsets(joint)]
         parent, place = link, pin.SE3(np.eye(3), np.array(joint.after))
         end = "tip" if k == len(joints) else f"end{k}"
-        links.append(Link(f"{prefix}{end}", link, place))
+        links.append(TreeLink(f"{prefix}{end}", link, place))
     return links, shapes
 
 
-def _single(name: str) -> tuple[list[Link], list[LinkShape], dict[str, str]]:
+def _single(name: str) -> tuple[list[TreeLink], list[LinkShape], dict[str, str]]:
     links, shapes = _links("", ROOT, pin.SE3.Identity(), name)
     roles = _ROLES if any(link.name == "F5" for link in links) else {"tip": "tip"}
     return links, shapes, roles
 
 
-def _two_arms(parent: str, place: pin.SE3, terminal: bool) -> tuple[list[Link], list[LinkShape]]:
+def _two_arms(parent: str, place: pin.SE3, terminal: bool) -> tuple[list[TreeLink], list[LinkShape]]:
     """Body and arms of the dexterous manipulator; ``terminal``: held by the body, the body joint moves no arm."""
     numbers = _data()["spdm"]
     travel, rate = numbers["body_limit_deg"] * pi / 180.0, numbers["body_rate_deg_s"] * pi / 180.0
@@ -155,9 +155,9 @@ def _two_arms(parent: str, place: pin.SE3, terminal: bool) -> tuple[list[Link], 
     )
     whole = column if terminal else column + shoulders
     limits = -travel, travel, rate, np.inf, chains.X
-    turning = Link("body_turned", parent, place, "body_joint", *limits, inertia=whole)
+    turning = TreeLink("body_turned", parent, place, "body_joint", *limits, inertia=whole)
     held = "body" if terminal else "body_turned"
-    links = [Link("body", parent, place, inertia=shoulders), turning] if terminal else [turning]
+    links = [TreeLink("body", parent, place, inertia=shoulders), turning] if terminal else [turning]
     shapes: list[LinkShape] = []
     for k, side in ((1, 1.0), (2, -1.0)):
         out = np.array([high, side * wide, 0.0])
@@ -167,12 +167,12 @@ def _two_arms(parent: str, place: pin.SE3, terminal: bool) -> tuple[list[Link], 
     return links, shapes
 
 
-def _spdm() -> tuple[list[Link], list[LinkShape], dict[str, str]]:
+def _spdm() -> tuple[list[TreeLink], list[LinkShape], dict[str, str]]:
     links, shapes = _two_arms(ROOT, pin.SE3.Identity(), terminal=False)
     return links, shapes, {"tip": "arm1_tip", "other_tip": "arm2_tip"}
 
 
-def _spdm_on_ssrms() -> tuple[list[Link], list[LinkShape], dict[str, str]]:
+def _spdm_on_ssrms() -> tuple[list[TreeLink], list[LinkShape], dict[str, str]]:
     carrier, tubes = _links("carrier_", ROOT, pin.SE3.Identity(), "ssrms")
     links, shapes = _two_arms("carrier_tip", pin.SE3.Identity(), terminal=True)
     roles = {"tip": "arm1_tip", "other_tip": "arm2_tip", "carrier_tip": "carrier_tip"}
@@ -194,7 +194,7 @@ OPERATOR_ARMS = (*_SINGLE, *_TREES)
 
 
 @functools.cache
-def _parts(name: str) -> tuple[Recipe, pin.Model, tuple[Link, ...]]:
+def _parts(name: str) -> tuple[Recipe, pin.Model, tuple[TreeLink, ...]]:
     links, shapes, roles = _TREES[name]() if name in _TREES else _single(name)
     recipe = Recipe(name, about=_data()[name]["origin"], frames=roles, shapes=tuple(shapes))
     model = build_model(name, ROOT, links, floating=False)

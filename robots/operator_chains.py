@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 Triple = tuple[float, float, float]
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+X = (1.0, 0.0, 0.0)
+Y = (0.0, 1.0, 0.0)
+Z = (0.0, 0.0, 1.0)
 MINUS_Z = (0.0, 0.0, -1.0)
 
 

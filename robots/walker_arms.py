@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.robot import DHRow
-from wbc.robots.link_tree import Link
+from wbc.robots.link_tree import TreeLink
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 
 #: Link and frame of the body
@@ -67,15 +67,15 @@ def puma_rows(data: WalkerData, artificial_limits: bool = False) -> tuple[DHRow,
     )
 
 
-def chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int = 1) -> list[Link]:
+def chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int = 1) -> list[TreeLink]:
     """Links ``prefix_link1`` ... on joints ``prefix_joint1`` ..., counted from ``first``; ``hand``: last frame."""
     links, parent, tail = [], base, pin.SE3.Identity()
     for number, row in enumerate(rows, start=first):
         link = f"{prefix}_link{number}"
         limits = (row.lower, row.upper, row.velocity, row.acceleration)
-        links.append(Link(link, parent, tail * row.before(), f"{prefix}_joint{number}", *limits))
+        links.append(TreeLink(link, parent, tail * row.before(), f"{prefix}_joint{number}", *limits))
         parent, tail = link, row.after()
-    links.append(Link(hand, parent, tail))
+    links.append(TreeLink(hand, parent, tail))
     return links
 
 
@@ -99,7 +99,7 @@ def two_ended_rows(data: TwoEndedData) -> tuple[DHRow, ...]:
     )
 
 
-def reversed_chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int) -> list[Link]:
+def reversed_chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, first: int) -> list[TreeLink]:
     """The same chain seen from the frame of its last row: joints numbered downwards to ``first``, coordinates alike.
 
     T^-1 = after^-1 Rz(-q) before^-1, and Rz(-q) = Rx(pi) Rz(q) Rx(-pi). ``hand`` is the frame before the first row,
@@ -111,7 +111,7 @@ def reversed_chain(prefix: str, base: str, rows: Sequence[DHRow], hand: str, fir
         link = f"{prefix}_link{number}"
         limits = (row.lower, row.upper, row.velocity, row.acceleration)
         placement = tail * row.after().inverse() * flip
-        links.append(Link(link, parent, placement, f"{prefix}_joint{number}", *limits))
+        links.append(TreeLink(link, parent, placement, f"{prefix}_joint{number}", *limits))
         parent, tail = link, flip.inverse() * row.before().inverse()
-    links.append(Link(hand, parent, tail * flip))
+    links.append(TreeLink(hand, parent, tail * flip))
     return links

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
 import pathlib
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import pi
+from math import pi, sin
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -89,6 +91,32 @@ class _Numbers:
         if missing:
             raise RobotFileError("data", str(path), f"the file lacks {', '.join(missing)}")
         return cls(**{**values, **changes})
+
+
+def data_changes(texts: Sequence[str]) -> dict[str, Any]:
+    """Fields of the data from texts NAME=NUMBER or NAME=[NUMBER, ...].
+
+    Raises:
+        ShapeError: another text.
+    """
+    values: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        try:
+            read = json.loads(value if sign else "")
+        except (ValueError, RecursionError) as error:
+            raise ShapeError("set", text, "expected NAME=NUMBER or NAME=[NUMBER, ...]") from error
+        values[name] = tuple(read) if isinstance(read, list) else read
+    return values
+
+
+def spaced_radius(arms: int, radius: float) -> float:
+    """Body centre to arm base [m] with which arms are as far from each other as three are at ``radius``; up to three
+    arms keep that:
+
+        radius sin(pi / 3) / sin(pi / arms)
+    """
+    return radius * sin(pi / 3) / sin(pi / arms) if arms > 3 else radius
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from wbc.robots.walker_robot import Walker
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 
-FILE = Path(__file__).parent / "data" / "walker_masses.toml"
+MASSES_FILE = Path(__file__).parent / "data" / "walker_masses.toml"
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def with_masses(walker: Walker, gravity: Any = (0.0, 0.0, 0.0)) -> Walker:
             _load(model, model.getJointId(f"{arm.name}_joint{k + 1}"), mass, shapes)
         effort[arm.v], armature[arm.v] = published["torques"], published["rotors"]
     model.armature = armature
-    notes = {**robot.notes, "inertia": f"masses, rotors and torques of {FILE.name}"}
+    notes = {**robot.notes, "inertia": f"masses, rotors and torques of {MASSES_FILE.name}"}
     limits = robot.limits.override(effort=effort)
     return replace(walker, robot=replace(robot, model=model, limits=limits, notes=notes))
 
@@ -78,7 +78,7 @@ def hold_rating() -> HoldRating:
 
 @cache
 def _data() -> dict[str, Any]:
-    return tomllib.loads(FILE.read_text(encoding="utf-8"))
+    return tomllib.loads(MASSES_FILE.read_text(encoding="utf-8"))
 
 
 def _load(model: pin.Model, joint: int, mass: float, shapes: list[tuple[str, PlacedShape]]) -> None:

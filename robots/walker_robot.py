@@ -19,7 +19,7 @@ from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
 from wbc.robot.sources.description import Description
 from wbc.robots.limb import BodyLimb
-from wbc.robots.link_tree import Link, build_model, write_urdf
+from wbc.robots.link_tree import TreeLink, build_model, write_urdf
 from wbc.robots.margins import Margins
 from wbc.robots.walker_arms import BODY, WalkerArm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
@@ -51,7 +51,7 @@ class Walker:
     arms: tuple[WalkerArm, ...]
     min_holds: int
     data: WalkerData | TwoEndedData
-    links: tuple[Link, ...] = field(repr=False)
+    links: tuple[TreeLink, ...] = field(repr=False)
     limb: BodyLimb | None = field(default=None, repr=False)
     margins: Margins = field(default_factory=Margins, repr=False)
 
@@ -206,10 +206,10 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
     corners = [pin.SE3(pin.utils.rotate("z", 2 * pi * i / count), np.zeros(3)) for i in range(count)]
     out = pin.SE3(np.eye(3), np.array([data.shoulder_radius, 0.0, 0.0]))
     bases = [corner * out for corner in corners]
-    links: list[Link] = []
+    links: list[TreeLink] = []
     shapes = body_shapes([np.array(base.translation) for base in bases], data, body_shape)
     for name, base in zip(names, bases, strict=True):
-        links.append(Link(f"{name}_base", BODY, base))
+        links.append(TreeLink(f"{name}_base", BODY, base))
         links += chain(name, f"{name}_base", puma_rows(data, artificial_limits), f"{name}_hand")
         shapes |= puma_shapes(name, data)
     neutral = {f"{name}_joint{k + 1}": x for name in names for k, x in enumerate(data.initial_posture)}
@@ -233,8 +233,8 @@ def _two_ended(data: TwoEndedData) -> Walker:
     rows = two_ended_rows(data)
     bases = [pin.SE3.Identity(), pin.SE3.Identity()]
     # Joints have the numbers 1 to 7 from tip to tip, whichever half they belong to
-    links = [Link("arm1_base", BODY, bases[0]), *reversed_chain("arm1", "arm1_base", rows[:3], "arm1_hand", 1)]
-    links += [Link("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand", 4)]
+    links = [TreeLink("arm1_base", BODY, bases[0]), *reversed_chain("arm1", "arm1_base", rows[:3], "arm1_hand", 1)]
+    links += [TreeLink("arm2_base", BODY, bases[1]), *chain("arm2", "arm2_base", rows[3:], "arm2_hand", 4)]
     neutral = {f"arm{1 if k <= 3 else 2}_joint{k}": angle for k, angle in enumerate(data.initial_posture, start=1)}
     robot = _robot(MADE[1], links, neutral, {"body": BODY, "elbow": BODY}, data.digest)
     model, shapes = robot.model, two_ended_shapes(data)
@@ -251,7 +251,7 @@ def _two_ended(data: TwoEndedData) -> Walker:
 
 
 def _robot(
-    name: str, links: Sequence[Link], neutral: Mapping[str, float], frames: Mapping[str, str], digest: str
+    name: str, links: Sequence[TreeLink], neutral: Mapping[str, float], frames: Mapping[str, str], digest: str
 ) -> Robot:
     """The robot of a tree of links, without shapes."""
     source = f"assumed: rate / acceleration time of the data {digest}"

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from wbc import validation
-from wbc.errors import MissingShapeError, RangeError, nearest
+from wbc.errors import MissingShapeError, RangeError, ShapeError, nearest
 from wbc.proximity import MAX_PAIRS, Body
-from wbc.shapes import PlacedShape
+from wbc.shapes import Geometry, PlacedShape
+from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.tasks.base import Row, Values
 
@@ -77,6 +78,17 @@ def check_sensed(field: str, count: int) -> None:
     """
     if count > MAX_PAIRS:
         raise RangeError(field, count, f"more pairs of shapes than a sensor measures, which are {MAX_PAIRS}")
+
+
+def check_distances(field: str, pairs: Iterable[tuple[Geometry, Geometry]]) -> None:
+    """Refuse pairs of shapes that have no distance.
+
+    Raises:
+        ShapeError: such a pair.
+    """
+    for one, other in pairs:
+        if reason := why_apart(one, other):
+            raise ShapeError(field, (one, other), reason)
 
 
 def check_shaped(robot: Robot, field: str, link: Any, available: Iterable[str]) -> None:

@@ -17,7 +17,7 @@ from wbc.tasks.base import Input
 COINCIDENT = 1e-10
 
 #: Smallest half angle [rad]; an axis that may not leave a direction at all is a task for alignment.
-LEAST = 1e-3
+LEAST_ANGLE = 1e-3
 
 
 def reach(axis: Triple, vector: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -68,7 +68,7 @@ def cone_margin(angle: ca.SX, half_angle: ca.SX) -> ca.SX:
 def half_angle_inputs(half_angle: float) -> tuple[Input, Input]:
     """``half_angle`` and ``half_angle_rate``."""
     return (
-        Input("half_angle", unit="rad", default=half_angle, rate="half_angle_rate", low=LEAST, high=math.pi),
+        Input("half_angle", unit="rad", default=half_angle, rate="half_angle_rate", low=LEAST_ANGLE, high=math.pi),
         Input("half_angle_rate", unit="rad/s", default=0.0),
     )
 
@@ -79,4 +79,4 @@ def checked_half_angle(field: str, value: object) -> float:
     Raises:
         ShapeError, NotFiniteError, RangeError: it is none.
     """
-    return validation.scalar(field, value, low=LEAST, high=math.pi, unit="rad")
+    return validation.scalar(field, value, low=LEAST_ANGLE, high=math.pi, unit="rad")

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from wbc.robot import Robot
 
 #: Components of a wrench, of a force its first three
-LABELS = ("fx", "fy", "fz", "mx", "my", "mz")
-UNITS = ("N", "N", "N", "N m", "N m", "N m")
+WRENCH_LABELS = ("fx", "fy", "fz", "mx", "my", "mz")
+WRENCH_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 #: Acceleration by which a robot's mass is a force, whatever gravity it is in [m/s^2]
 NOMINAL = 9.81
 #: First weight of a force against task rows of weight 1: a robot's own weight costs as much as 0.01 rad/s^2 missed
@@ -220,30 +220,49 @@ class ContactForce(Task):
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The components of the wrench."""
         sizes = force_sizes(robot)
-        return tuple(Row(LABELS[k], UNITS[k], float(sizes[k])) for k in self.contact.axes)
+        return tuple(Row(WRENCH_LABELS[k], WRENCH_UNITS[k], float(sizes[k])) for k in self.contact.axes)
+
+
+@dataclass(frozen=True)
+class LoopForces(Task):
+    """Of the forces in loops that move the robot alike, the least. Made by the stack, under the name ``"loops"``."""
+
+    abstract: ClassVar[bool] = True
+    asks: ClassVar[bool] = False
+
+    def inputs(self, robot: Robot) -> tuple[Input, ...]:
+        """None but those of every task; ``gain`` has no meaning."""
+        return (Input("gain", unit="1/s", default=0.0, low=0.0),)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """One a row of the loops, of the force or moment along it."""
+        return tuple(force_row(robot, label, "N" if unit == "m" else "N m") for label, unit in robot.loops.rows)
 
 
 @dataclass(frozen=True)
 class Unactuated(Constraint):
-    """No motor drives a floating base: its six rows of  M a + h = J'w  hold whatever gives way. Made by the stack."""
+    """What no motor drives, a floating base and passive joints: its rows of  M a + h = J'w + J_l' f  hold whatever
+    gives way. Made by the stack.
+    """
 
     abstract: ClassVar[bool] = True
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
     equality: ClassVar[bool] = True
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [N] and rx, ry, rz [N m] along the base's own axes."""
-        sizes = force_sizes(robot)
-        return tuple(Row(robot.dof_names[k], UNITS[k], float(sizes[k])) for k in range(6))
+        """One a degree of freedom [N, N m], of a base along its own axes."""
+        return tuple(
+            force_row(robot, robot.dof_names[k], "N" if robot.dof_units[k] == "m" else "N m") for k in robot.unactuated
+        )
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
         """None: its rows are on generalised forces."""
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
-        """None for the base."""
-        zero = ca.SX.zeros(6)
-        return Torques(tuple(range(6)), zero, zero)
+        """None."""
+        zero = ca.SX.zeros(len(robot.unactuated))
+        return Torques(robot.unactuated, zero, zero)
 
 
 def force_row(robot: Robot, label: str, kind: str = "N") -> Row:

@@ -89,7 +89,7 @@ def core(shape: Shape) -> Shape:
 
 
 def plane_rows(solid: Solid) -> tuple[str, ...]:
-    """Names of the rows of a solid over a half-space; none for a convex hull of many vertices.
+    """Names of the rows of a solid over a half-space; none for a convex hull of many vertices, and for other solids.
 
         sphere          ``""``
         capsule         ``.start``, ``.end``      ends of the core
@@ -107,7 +107,8 @@ def plane_rows(solid: Solid) -> tuple[str, ...]:
         return tuple("." + "".join(signs) for signs in itertools.product("-+", repeat=3))
     if isinstance(shape, Convex) and len(shape.points) <= VERTEX_ROWS:
         return tuple(f".{k}" for k in range(len(shape.points)))
-    return () if isinstance(shape, Convex) and len(shape.points) > SUPPORT_VERTICES else ("",)
+    lowest = isinstance(shape, Sphere) or (isinstance(shape, Convex) and len(shape.points) <= SUPPORT_VERTICES)
+    return ("",) if lowest else ()
 
 
 def pair_rows(first: Solid, second: Shape) -> tuple[str, ...]:

@@ -20,6 +20,8 @@ tables are derived from the expressions.
 from __future__ import annotations
 
 import dataclasses
+import importlib
+import pkgutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -399,13 +401,20 @@ class Constraint(Item):
         return None
 
     def acceleration_bounds(
-        self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float
+        self,
+        robot: Robot,
+        kin: Tracer,
+        inputs: Values,
+        dt: ca.SX,
+        longest: float,
+        motors: Mapping[int, ca.SX] | None = None,
     ) -> Bounds | None:
         """The same as bounds on the acceleration a that is held for dt from the velocity ``kin.v`` on, or None:
         by default :meth:`bounds` hold for the velocity at the end of it, v + a dt.
 
         Args:
             longest: no tick is longer [s].
+            motors: degree of freedom -> deceleration that its motor has; None: not known.
         """
         own = self.bounds(robot, kin, inputs, dt)
         return None if own is None else Bounds((own.lower - kin.v) / dt, (own.upper - kin.v) / dt)
@@ -438,4 +447,7 @@ class Constraint(Item):
 
 def registry() -> dict[str, type[Item]]:
     """Every concrete task and constraint class by name, the user's own included."""
+    package = importlib.import_module(__package__)
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{__package__}.{module.name}")
     return dict(_registry)

@@ -83,6 +83,8 @@ class DriveTorqueLimits(Constraint):
         for name, i in zip(self.transmission.joints, self.dofs(robot), strict=True):
             if i in followers:
                 raise RangeError(field, name, "this joint follows another: its leader has the motor")
+            if i in robot.unactuated:
+                raise RangeError(field, name, "no motor drives this joint")
 
     def refusal(self, robot: Robot, command: Command) -> str:
         """Only a stack of torques has torques."""

@@ -19,7 +19,7 @@ from wbc.tasks.frames import frame_pose, require_motion
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-KINDS = ("pose", "position", "orientation", "axis", "roll")
+HELD_KINDS = ("pose", "position", "orientation", "axis", "roll")
 #: Least square of the part of the x axis across the target's z axis that counts for ``roll``
 UPRIGHT = 1e-12
 
@@ -74,7 +74,7 @@ class Hold(Constraint):
     gain: float = 10.0
 
     def __post_init__(self) -> None:
-        validation.one_of("Hold.kind", self.kind, KINDS)
+        validation.one_of("Hold.kind", self.kind, HELD_KINDS)
         object.__setattr__(self, "gain", validation.scalar("Hold.gain", self.gain, low=0.0, unit="1/s"))
 
     def validate(self, robot: Robot) -> None:

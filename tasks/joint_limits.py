@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
@@ -65,7 +65,7 @@ class JointLimits(Constraint):
     too close to it. The promise ``shortest_dt`` is not checked: where it is broken the limit is passed. Without an
     acceleration limit A is infinite and the joint may stop at once. Degrees of freedom whose rate is not that of one
     coordinate (floating and planar bases, ball joints, unbounded joints) have no position limit. Whether the motors
-    have the torque for A is not considered.
+    have the torque for A is considered on a floating base with ``TorqueLimits`` only.
 
     Example:
         >>> import wbc
@@ -153,14 +153,28 @@ class JointLimits(Constraint):
         """See the class."""
         return self._intervals(robot, kin, inputs, partial(allowed_interval, dt=dt, shortest_dt=self.shortest_dt))
 
-    def acceleration_bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX, longest: float) -> Bounds:
+    def acceleration_bounds(
+        self,
+        robot: Robot,
+        kin: Tracer,
+        inputs: Values,
+        dt: ca.SX,
+        longest: float,
+        motors: Mapping[int, ca.SX] | None = None,
+    ) -> Bounds:
         """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
-        return self._intervals(robot, kin, inputs, partial(allowed_accelerations, dt=dt, longest=longest))
+        interval = partial(allowed_accelerations, dt=dt, longest=longest)
+        return self._intervals(robot, kin, inputs, interval, motor=motors or {})
 
     def _intervals(
-        self, robot: Robot, kin: Tracer, inputs: Values, interval: Callable[..., tuple[ca.SX, ca.SX]]
+        self,
+        robot: Robot,
+        kin: Tracer,
+        inputs: Values,
+        interval: Callable[..., tuple[ca.SX, ca.SX]],
+        **own: Mapping[int, ca.SX],
     ) -> Bounds:
-        """What ``interval`` allows each chosen degree of freedom."""
+        """What ``interval`` allows each chosen degree of freedom, of which ``own`` has more arguments."""
         limits, count = self.limits(robot), robot.nv
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
         for i in range(count):
@@ -173,6 +187,7 @@ class JointLimits(Constraint):
                 acceleration=float(limits.acceleration[i]),
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
+                **{name: values[i] for name, values in own.items() if i in values},
             )
         return Bounds(lower, upper)
 

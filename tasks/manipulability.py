@@ -23,11 +23,13 @@ if TYPE_CHECKING:
     from wbc.robot import Robot
 
 LABELS = ("x", "y", "z", "rx", "ry", "rz")
-KINDS = {"pose": LABELS, "position": LABELS[:3], "orientation": LABELS[3:]}
+ROWS_OF_KIND = {"pose": LABELS, "position": LABELS[:3], "orientation": LABELS[3:]}
 FORMS = ("linear", "log")
 
-#: Configurations at which :meth:`Manipulability.validate` looks for one that is not singular, and what it calls so.
-_TRIED, _SINGULAR = 8, 1e-6
+#: Configurations at which :meth:`Manipulability.validate` looks for one that is not singular
+_TRIED = 8
+#: Manipulability below this part of the largest counts as singular
+_SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Manipulability(Task):
     length: float | None = None
 
     def __post_init__(self) -> None:
-        validation.one_of("Manipulability.kind", self.kind, KINDS)
+        validation.one_of("Manipulability.kind", self.kind, ROWS_OF_KIND)
         validation.one_of("Manipulability.form", self.form, FORMS)
         if self.along is not None:
             labels = selection("Manipulability.along", self.along)
@@ -140,7 +142,7 @@ class Manipulability(Task):
 
     @property
     def _rows(self) -> tuple[int, ...]:
-        return tuple(LABELS.index(label) for label in self.along or KINDS[self.kind])
+        return tuple(LABELS.index(label) for label in self.along or ROWS_OF_KIND[self.kind])
 
     def _length(self, robot: Robot) -> float:
         return robot.characteristic_length if self.length is None else self.length

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Values
+from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.braking import clip
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ class Mechanism(Constraint):
         mimic joint   v_follower - ratio v_leader = -gain (q_follower - ratio q_leader - offset)      [rad/s or m/s]
         undriven      v_i = 0          (a differential-drive base sideways; what no motor moves)      [m/s or rad/s]
         loop          de/dq v = -e / dt, as fast as 0.1 lengths or rad/s allow, and e(q (+) v dt) = 0 to 1e-10 of them
+        the same      d2e/dt2 = -2 w (de/dt + w e / 2),  w = 0.2 / dt, w e / 2 up to the same rates (accelerations)
 
     It is added to every stack under the name ``mechanism`` where ``robot.couplings`` (mimic joints of the description
     that were not locked when the robot was loaded), ``robot.locked_dofs`` or ``robot.loops`` is not empty. The right
@@ -36,8 +37,8 @@ class Mechanism(Constraint):
     Inputs:
         gain: how fast a configuration that does not fit its couplings is brought back [1/s].
 
-    What it cannot do: couple unbounded joints in position (they are coupled in velocity only), keep loops in stacks
-    that command accelerations or torques, or know couplings that the robot does not state: gears, tendons.
+    What it cannot do: couple unbounded joints in position (they are coupled in velocity only), or know couplings that
+    the robot does not state: gears, tendons.
 
     Example:
         >>> import wbc
@@ -52,13 +53,6 @@ class Mechanism(Constraint):
     order: ClassVar[SacrificeOrder] = SacrificeOrder.POSITION
     equality: ClassVar[bool] = True
     exact: ClassVar[bool] = True
-
-    def refusal(self, robot: Robot, command: Command) -> str:
-        """Torques that a loop transmits are not computed."""
-        if robot.loops and command != "velocity":
-            kept = f"keeps the loops {robot.loops.names}"
-            return f"{kept}, which only velocities are computed for; robot.with_loops() opens them"
-        return ""
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``gain`` of the mimic rows."""

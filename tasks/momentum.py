@@ -20,7 +20,7 @@ from wbc.tasks.frames import checked_weights, weights_of_rows
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-KINDS = ("both", "linear", "angular")
+MOMENTUM_KINDS = ("both", "linear", "angular")
 
 #: A centroidal inertia below this part of m L^2 is that of a point mass and no scale for angular rows.
 SMALLEST_INERTIA = 1e-6
@@ -69,7 +69,7 @@ class Momentum(Task):
     weights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        validation.one_of("Momentum.kind", self.kind, KINDS)
+        validation.one_of("Momentum.kind", self.kind, MOMENTUM_KINDS)
         object.__setattr__(self, "weights", checked_weights("Momentum.weights", self.weights, self._count))
 
     @property

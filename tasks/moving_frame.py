@@ -32,8 +32,8 @@ class MovingFrame(Constraint):
         R_T' (J v - (v_T + w_T x (p - p_T); w_T)),
 
     so T's twist is fed forward exactly, and a robot and an object that move together need no command.
-    Within a tick the twist changes: for velocities its mean over the tick counts, twist + acceleration dt / 2, and of
-    tasks the second order of what robot and frame do meanwhile, docs/moving_frames.md. Of accelerations and torques
+    Within a tick the twist changes: for velocities its mean over the tick counts, twist + acceleration dt / 2, and
+    every row is its mean over what robot and frame do meanwhile, docs/moving_frames.md. Of accelerations and torques
     both are fed forward as they are, with the terms of Coriolis and of the centrifuge.
 
     Attributes:

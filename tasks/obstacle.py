@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,8 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
 from wbc.proximity import OBSTACLE, Body, PairSensor
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, Sphere
+from wbc.shapes import Capsule, Convex, Shape, Solid, Sphere
+from wbc.shapes.solid import names_of_shapes
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies
 from wbc.tasks import _gap as gap
@@ -24,13 +26,11 @@ from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sens
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
-
 
 @dataclass(frozen=True)
 class Obstacle(Constraint):
-    """Links keep clear of a sphere, capsule, box, cylinder, convex hull, mesh or half-space, at rest or moving (a
-    structure's box or capsule is a ``wbc.walking.Obstacle``):
+    """Links keep clear of a sphere, capsule, box, cylinder, ellipsoid, convex hull, mesh, half-space or height map, at
+    rest or moving (a structure's box or capsule is a ``wbc.walking.Obstacle``):
 
         h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
@@ -45,9 +45,9 @@ class Obstacle(Constraint):
         cylinder   1        2 and sensed   sensed         sensed         sensed   2, lowest points of the rims
         hull       sensed   sensed         sensed         sensed         sensed   vertices to 12; 1 to 64; else sensed
 
-    A half-space has the points with z <= 0 of its frame. A mesh is a list of its convex parts. Rows of shape i are
-    ``link[i]`` with a suffix where there are several, sensed rows ``closest[k]``; ``controller.pairs(name)`` says
-    which pairs they were about.
+    Ellipsoids and height maps are sensed. A half-space has the points with z <= 0 of its frame. A mesh is a list of its
+    convex parts. Rows of shape i are ``link[i]`` with a suffix where there are several, sensed rows ``closest[k]``;
+    ``controller.pairs(name)`` says which pairs they were about.
 
     Choose ``margin`` to cover the curvature of a point's path over one tick, at most (1/2) rho w^2 dt^2 for a point
     within rho of joint axes that turn at w in all: some millimetres at 10 ms on an arm at full speed, more for boxes
@@ -129,7 +129,9 @@ class Obstacle(Constraint):
             bodies.check_shaped(robot, "Obstacle.links", link, available)
             if not bodies.joint_of(robot, link):
                 raise RangeError("Obstacle.links", link, "no joint moves this link, so it cannot keep clear")
-        bodies.check_sensed("Obstacle.shape", len(self.pairs(robot)) * len(self.parts))
+        own = [placed.shape for _, _, placed in self.pairs(robot)]
+        bodies.check_distances("Obstacle.shape", itertools.product(own, self.parts))
+        bodies.check_sensed("Obstacle.shape", len(own) * len(self.parts))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``pose``, ``velocity`` and ``margin``."""
@@ -215,9 +217,8 @@ def _checked_shape(shape: object) -> Shape | tuple[Convex, ...]:
     Raises:
         ShapeError: neither.
     """
-    if isinstance(shape, SHAPES):
+    if isinstance(shape, Shape):
         return shape
     if isinstance(shape, (list, tuple)) and shape and all(isinstance(part, Convex) for part in shape):
         return tuple(shape)
-    names = [kind.__name__ for kind in SHAPES]
-    raise ShapeError("Obstacle.shape", shape, "expected a shape, or the Convex parts of a mesh", names)
+    raise ShapeError("Obstacle.shape", shape, "expected a shape, or the Convex parts of a mesh", names_of_shapes())

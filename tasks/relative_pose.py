@@ -19,7 +19,7 @@ from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows,
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
-KINDS = ("pose", "position", "orientation")
+RELATIVE_KINDS = ("pose", "position", "orientation")
 MIDWAY = "midway"
 
 
@@ -88,7 +88,7 @@ class RelativePose(Task):
     weights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        validation.one_of("RelativePose.kind", self.kind, KINDS)
+        validation.one_of("RelativePose.kind", self.kind, RELATIVE_KINDS)
         object.__setattr__(self, "weights", checked_weights("RelativePose.weights", self.weights, self._count))
         if self.at is not None:
             point = validation.real_array("RelativePose.at", self.at, (3,))

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.robot import Robot
-from wbc.tasks._contact import LABELS, UNITS, Cone, Contact, force_row
+from wbc.tasks._contact import WRENCH_LABELS, WRENCH_UNITS, Cone, Contact, force_row
 from wbc.tasks._limits import checked_limits
 from wbc.tasks.base import Input, Row, Values
 
@@ -74,7 +74,7 @@ class RigidGrasp(Contact):
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         """The limited components."""
-        return tuple(force_row(robot, LABELS[k], UNITS[k]) for k in self._limited)
+        return tuple(force_row(robot, WRENCH_LABELS[k], WRENCH_UNITS[k]) for k in self._limited)
 
     def cone(self, inputs: Values) -> Cone:
         """The box of the class."""

@@ -131,6 +131,8 @@ class SelfCollision(Constraint):
                 bodies.check_shaped(robot, "SelfCollision.pairs", link, available)
             if bodies.joint_of(robot, a) == bodies.joint_of(robot, b):
                 raise RangeError("SelfCollision.pairs", (a, b), "no joint moves these links against each other")
+        every = ((a[2].shape, b[2].shape) for a, b in self._every_shape_pair(robot))
+        bodies.check_distances("SelfCollision.pairs", every)
         pairs = self._shape_pairs(robot)
         if not pairs:
             none = (
@@ -236,7 +238,7 @@ class SelfCollision(Constraint):
 
     def _most_apart(self, robot: Robot) -> dict[tuple[str, str], float]:
         """What no posture brings as far apart as counts here, and how far apart some posture brings it [m]."""
-        from wbc.robot.pairs.apart import most_apart  # Coal is imported where it is used
+        from wbc.robot.pairs.apart import most_apart
 
         enough = max(self.margin / SHARE, SEARCHED * robot.characteristic_length)
         known, key = _FOUND.setdefault(robot, {}), (self.link_pairs(robot), enough)

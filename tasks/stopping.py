@@ -40,6 +40,8 @@ from wbc.tasks.braking import clip
 
 #: Distances to a limit below this count as this [rad or m]: v^2 / d is finite
 LEAST = 1e-12
+#: Braking counts on this at least [rad/s^2 or m/s^2]: distances are divided by it
+WEAKEST = 1e-3
 
 
 def stopping_deceleration(acceleration: float, velocity: float, width: float, longest: float) -> float:
@@ -58,12 +60,14 @@ def allowed_accelerations(
     velocity_scale: ca.SX,
     return_rate: ca.SX,
     longest: float,
+    motor: ca.SX | None = None,
 ) -> tuple[ca.SX, ca.SX]:
     """The interval of the module for one coordinate, lower <= upper always. Infinite limits cost no operation.
 
     From a state that is not viable it is the end of the acceleration limits, or of the velocity limits where there are
     none, that is nearest to what the limits ask for; from outside the position limits a joint brakes, then returns at
-    ``return_rate`` times the violation at least, but no faster than it can stop.
+    ``return_rate`` times the violation at least, but no faster than it can stop. ``motor`` is a deceleration that may
+    change with the state, such as that which a motor has: B is no more than that, and a state may cease to be viable.
     """
     low, high = -ca.SX.inf(1), ca.SX.inf(1)
     if math.isfinite(velocity):
@@ -73,7 +77,9 @@ def allowed_accelerations(
         most_a = ca.SX(acceleration)
         low, high = clip(low, -most_a, most_a), clip(high, -most_a, most_a)
     bounded = math.isfinite(velocity) or math.isfinite(acceleration)
-    deceleration = stopping_deceleration(acceleration, velocity, position[1] - position[0], longest)
+    deceleration: ca.SX | float = stopping_deceleration(acceleration, velocity, position[1] - position[0], longest)
+    if motor is not None:
+        deceleration = ca.fmin(deceleration, ca.fmax(motor, WEAKEST))
     lower, upper = low, high
     if math.isfinite(position[1]):
         upper = (_velocity_at_end(position[1] - q, v, dt, deceleration, return_rate) - v) / dt
@@ -86,9 +92,9 @@ def allowed_accelerations(
     return lower, upper
 
 
-def _velocity_at_end(distance: ca.SX, v: ca.SX, dt: ca.SX, deceleration: float, return_rate: ca.SX) -> ca.SX:
+def _velocity_at_end(distance: ca.SX, v: ca.SX, dt: ca.SX, deceleration: ca.SX | float, return_rate: ca.SX) -> ca.SX:
     """w of the module towards a limit ``distance`` away; negative outside, the slowest return."""
-    if math.isinf(deceleration):
+    if isinstance(deceleration, float) and math.isinf(deceleration):
         stopped = 2.0 * distance / dt - v
         return stopped
     c = distance - 0.5 * v * dt
@@ -98,7 +104,7 @@ def _velocity_at_end(distance: ca.SX, v: ca.SX, dt: ca.SX, deceleration: float, 
     return ca.if_else(distance < 0.0, outside, ca.if_else(c < 0.0, turning, speed))
 
 
-def _fastest(c: ca.SX, dt: ca.SX, deceleration: float) -> ca.SX:
-    if deceleration == 0.0:
+def _fastest(c: ca.SX, dt: ca.SX, deceleration: ca.SX | float) -> ca.SX:
+    if isinstance(deceleration, float) and deceleration == 0.0:
         return 0.0 * c  # a joint whose limit of velocity is zero
     return 4.0 * c / (dt + ca.sqrt(dt * dt + (8.0 / deceleration) * c))

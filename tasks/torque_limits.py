@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.errors import RangeError
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits
 from wbc.tasks._selection import joint_dofs, selection
@@ -39,7 +40,7 @@ class TorqueLimits(Constraint):
     free.
 
     Attributes:
-        joints: names of the joints to limit; None: all whose limit is finite.
+        joints: names of the joints to limit; None: all with a motor whose limit is finite.
         slew: first value of the input, one number or one a row; None: torques may change at once.
 
     Inputs:
@@ -57,8 +58,8 @@ class TorqueLimits(Constraint):
         >>> stack.add(wbc.tasks.Posture())
 
     Raises:
-        UnknownNameError, DuplicateNameError: an unknown joint, or one twice. ShapeError, NotFiniteError, RangeError,
-            BoundsError: ``slew``.
+        UnknownNameError, DuplicateNameError: an unknown joint, or one twice. RangeError: one without a motor.
+        ShapeError, NotFiniteError, RangeError, BoundsError: ``slew``.
     """
 
     order: ClassVar[SacrificeOrder] = SacrificeOrder.ACTUATOR
@@ -76,7 +77,9 @@ class TorqueLimits(Constraint):
 
     def validate(self, robot: Robot) -> None:
         """Check the joint names and that there is one slew rate a row, see :meth:`Item.validate`."""
-        joint_dofs(robot, "TorqueLimits.joints", self.joints)
+        named = joint_dofs(robot, "TorqueLimits.joints", self.joints)
+        if self.joints is not None and (passive := [i for i in named if i in robot.passive]):
+            raise RangeError("TorqueLimits.joints", robot.dof_names[passive[0]], "no motor drives this joint")
         if isinstance(self.slew, tuple):
             validation.real_array("TorqueLimits.slew", self.slew, (len(self.dofs(robot)),))
 
@@ -118,7 +121,6 @@ class TorqueLimits(Constraint):
 
     def dofs(self, robot: Robot) -> tuple[int, ...]:
         """Degrees of freedom with a limit, in the order of the rows."""
-        followers = {c.follower for c in robot.couplings}
         chosen = joint_dofs(robot, "TorqueLimits.joints", self.joints)
-        base = 6 if robot.base == "floating" else 0
-        return tuple(i for i in chosen if i >= base and np.isfinite(robot.limits.effort[i]) and i not in followers)
+        others = {*robot.unactuated, *(c.follower for c in robot.couplings)}
+        return tuple(i for i in chosen if i not in others and np.isfinite(robot.limits.effort[i]))

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks._contact import LABELS, UNITS, force_row
+from wbc.tasks._contact import WRENCH_LABELS, WRENCH_UNITS, force_row
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Values
 
@@ -75,7 +75,7 @@ class WrenchSum(Constraint):
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """fx, fy, fz [N] and mx, my, mz [N m]."""
-        return tuple(force_row(robot, label, unit) for label, unit in zip(LABELS, UNITS, strict=True))
+        return tuple(force_row(robot, label, unit) for label, unit in zip(WRENCH_LABELS, WRENCH_UNITS, strict=True))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
         """None: its rows are on forces."""

@@ -10,7 +10,7 @@ import pinocchio as pin
 # isort: split
 import coal
 
-from wbc.shapes import Box, Capsule, Convex, Cylinder, Shape, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Shape, Sphere
 
 
 def coal_shape(shape: Shape) -> object:
@@ -23,6 +23,8 @@ def coal_shape(shape: Shape) -> object:
         return coal.Cylinder(shape.radius, shape.length)
     if isinstance(shape, Box):
         return coal.Box(*shape.size)
+    if isinstance(shape, Ellipsoid):
+        return coal.Ellipsoid(*shape.semi_axes)
     if isinstance(shape, Convex):
         points = coal.StdVec_Vec3s()
         points.extend(shape.points)

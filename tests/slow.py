@@ -50,15 +50,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
     """What tests of a file share costs the first of them that runs, so all of them are slow."""
-    return (yield from _timed(file_of(item), max))
+    return (yield from _timed(item, file_of(item), max))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    return (yield from _timed(name_of(item), operator.add))
+    return (yield from _timed(item, name_of(item), operator.add))
 
 
-def _timed(name: str, together: Callable[[float, float], float]) -> Iterator[None]:
+def _timed(item: pytest.Item, name: str, together: Callable[[float, float], float]) -> Iterator[None]:
+    # Asking for processor time costs more than many a test
+    if not item.config.getoption("--find-slow"):
+        return (yield)
     began = spent()
     result = yield
     _times[name] = together(_times.get(name, 0.0), spent() - began)

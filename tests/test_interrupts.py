@@ -93,7 +93,7 @@ cli.main()
 
 
 def test_a_command_in_the_background_goes_on_at_ctrl_c_and_ends_in_order_at_kill(tmp_path: Path) -> None:
-    command = ["demo", "--backend", "vm", "--rate", "50", "--no-plots", "--output", str(tmp_path)]
+    command = ["track", "demo", "--backend", "vm", "--rate", "50", "--no-plots", "--out", str(tmp_path)]
     done = subprocess.run(
         [*IN_BACKGROUND, sys.executable, "-c", BACKGROUND, *command],
         capture_output=True,

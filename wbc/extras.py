@@ -11,6 +11,7 @@ from wbc.errors import WbcError
 EXTRAS = {
     "analysis": ("flint",),
     "cluster": ("distributed",),
+    "laws": ("ruckig", "toppra"),
     "mujoco": ("mujoco",),
     "osqp": ("osqp",),
     "plots": ("matplotlib",),
@@ -26,16 +27,17 @@ class MissingPackageError(WbcError, ModuleNotFoundError):
     """What was asked for needs a package that is not installed; the text has the command that installs it."""
 
 
-def require(extra: str, what: str) -> None:
+def require(extra: str, what: str, module: str = "") -> None:
     """Pass where the packages of an extra are installed.
 
     Args:
         what: needs them, in the words of the text: "exact rank analysis".
+        module: the one of them that it needs; default: all.
 
     Raises:
         MissingPackageError: the first that is not.
     """
-    for module in EXTRAS[extra]:
-        if sys.modules.get(module) is None and importlib.util.find_spec(module) is None:
+    for name in (module,) if module else EXTRAS[extra]:
+        if sys.modules.get(name) is None and importlib.util.find_spec(name) is None:
             reason = f"{what} needs this package: pip install 'wbc[{extra}]'"
-            raise MissingPackageError(extra, module, reason)
+            raise MissingPackageError(extra, name, reason)

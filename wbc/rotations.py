@@ -9,8 +9,10 @@ import pinocchio as pin
 
 from wbc.validation import Array
 
-#: Entries of x, y, z, w, which is Pinocchio's order, in MuJoCo's and viser's, which is w, x, y, z; and back
-TO_MUJOCO, TO_PINOCCHIO = [3, 0, 1, 2], [1, 2, 3, 0]
+#: Entries of a quaternion x, y, z, w, which is Pinocchio's order, in MuJoCo's and viser's, which is w, x, y, z
+TO_MUJOCO = [3, 0, 1, 2]
+#: Entries of a quaternion w, x, y, z in the order x, y, z, w
+TO_PINOCCHIO = [1, 2, 3, 0]
 
 
 def exponential(turns: Array) -> Array:

@@ -6,21 +6,16 @@ import contextlib
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from wbc import extras
 
 #: Colours by meaning
-BLUE, ORANGE, GREEN, RED, PURPLE, TEAL, GREY = (
-    "#1f5fa8",
-    "#e07b18",
-    "#2e8b57",
-    "#c0392b",
-    "#7b4fa6",
-    "#1f9aa0",
-    "#6b7280",
-)
+BLUE = "#1f5fa8"
+ORANGE = "#e07b18"
+GREEN = "#2e8b57"
+RED = "#c0392b"
+PURPLE = "#7b4fa6"
+TEAL = "#1f9aa0"
+GREY = "#6b7280"
 INK = "#22272e"
 #: For curves that stand side by side, told apart by most people with a colour-vision deficiency
 CYCLE = (BLUE, ORANGE, TEAL, PURPLE, GREEN, RED, "#b08900", "#4aa3df", "#8c564b", GREY)
@@ -65,32 +60,3 @@ def pyplot() -> Iterator[Any]:
     settings: Any = {**SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
     with plt.rc_context(settings):
         yield plt
-
-
-def tick_histogram(plt: Any, seconds: NDArray[np.float64], title: str) -> Any:
-    """Figure: how often ``controller.step`` took how long, with median and 99th percentile; ``seconds`` (ticks) [s]."""
-    micro = 1e6 * seconds
-    edges = np.geomspace(max(0.8 * micro.min(), 1e-2), 1.25 * micro.max(), 70)
-    figure, panel = plt.subplots(figsize=(9.2, 3.4), layout="constrained")
-    panel.hist(micro, bins=edges, color=TEAL, alpha=0.85)
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
-    # Labels of all minor ticks would lie on each other
-    panel.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:g}"[0] in "25" else "")
-    for name, part, colour in (("median", 50, INK), ("p99", 99, RED)):
-        value = float(np.percentile(micro, part))
-        panel.axvline(value, color=colour, lw=1.4)
-        panel.annotate(
-            f"{name} {value:.1f} us",
-            (value, 1.0),
-            (4, -2),
-            ("data", "axes fraction"),
-            "offset points",
-            va="top",
-            color=colour,
-        )
-    panel.set_xlabel("time of controller.step [us]")
-    panel.set_ylabel("ticks")
-    panel.set_title(title, fontsize=13)
-    return figure

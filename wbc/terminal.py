@@ -1,4 +1,4 @@
-"""Keys of a terminal as they are pressed."""
+"""Keys of a terminal as they are pressed, and lines of the standard input that may be waited for in vain."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from wbc.errors import WbcError
 
 #: What stands for the end of the input
 END_OF_INPUT = "\x04"
+#: Time between two looks at whether to stop while a line is waited for [s]
+WAIT = 0.1
 
 
 class NoTerminalError(WbcError):
@@ -64,3 +66,34 @@ def terminal_keys(file: int | None = None) -> Iterator[Callable[[], str]]:
         yield read
     finally:
         termios.tcsetattr(number, termios.TCSADRAIN, before)
+
+
+class LinesOfInput:
+    """Lines of the standard input, until it ends or somebody stops waiting.
+
+    Attributes:
+        stop: asked while there is no line yet; true: there is none.
+    """
+
+    def __init__(self) -> None:
+        self.stop: Callable[[], bool] = lambda: False
+        self._read = b""
+
+    def read(self) -> str | None:
+        """The next line without blanks at its ends; None at the end of the input, or where it was stopped."""
+        try:
+            number = sys.stdin.fileno()
+        except (OSError, ValueError):  # no file, as in a test
+            line = sys.stdin.readline()
+            return line.strip() if line else None
+        # A line that waits in a buffer of sys.stdin would not be seen by select, and readline would not hear a stop
+        while b"\n" not in self._read:
+            if self.stop():
+                return None
+            if select.select([number], [], [], WAIT)[0]:
+                some = os.read(number, 4096)
+                if not some:
+                    return None
+                self._read += some
+        first, _, self._read = self._read.partition(b"\n")
+        return first.decode(errors="replace").strip()

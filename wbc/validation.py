@@ -26,8 +26,10 @@ T = TypeVar("T")
 #: How far a rotation may be from orthonormal (Frobenius norm of R'R - I) or a quaternion from unit length.
 ROTATION_TOLERANCE = 1e-6
 
-#: Numbers beyond these have products that overflow, or vanish, in what is computed from them
-LARGEST, SMALLEST = 1e60, 1e-60
+#: Numbers beyond this have products that overflow in what is computed from them
+LARGEST = 1e60
+#: Numbers below this have products that vanish in what is computed from them
+SMALLEST = 1e-60
 
 #: Arrays of fewer numbers are checked by one sum
 SMALL = 1000

@@ -13,8 +13,6 @@ from bench.figures import pages, store
 from bench.ik import tables as ik
 from bench.pool import ROOT
 from bench.walk.page import page_sheets
-from bench.walk.trial_parts import PARTS as TRIALS
-from bench.walk.trial_parts import counted_sheet
 
 View = Callable[[Any], str]
 #: What a tick consists of
@@ -64,24 +62,18 @@ _ALL = (
     ),
     Figure(
         "walk", (*WALK, "bench/walk"), 20.0,
-        ("python", "-m", "bench.walk", "--layouts", "30", "--walked", "3", "--output", "bench/data"),
+        ("python", "-m", "bench.walk", "--output", "bench/data"),
         "bench/data/walk.json",
         {
             "all": lambda data: "\n\n".join(sheet.markdown() for sheet in page_sheets(data["parts"])),
         },
     ),
-    Figure(
-        "trials", (*WALK, "bench/walk"), 600.0,
-        ("python", "-m", "bench.walk", "--parts", *TRIALS, "--resume", "--output", "bench/data"),
-        "bench/data/trials.json",
-        {"all": lambda data: store.shown(vars(counted_sheet(data["parts"])))},
-    ),
     Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch"), 1.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
-    Figure("cortex_m7", (*TICK, "wbc/export", "bench/single.py", "bench/cortex_m7"), 5.0),
+    Figure("cortex_m7", (*TICK, "wbc/export", "tests/export/single.py", "bench/cortex_m7"), 5.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
-    Figure("demo", (*TICK, "wbc/track", "wbc/cli/demo.py"), 0.5),
+    Figure("demo", (*TICK, "wbc/track"), 0.5),
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
     Figure("identification", ("wbc/identification",), 2.0),
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/published/newton_euler"), 3.0),
@@ -89,21 +81,18 @@ _ALL = (
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
-    Figure("policy", TICK, 0.5),
     Figure("programs", ("examples", "bench/programs"), 0.1),
     Figure("relative_motion", ("wbc/published/relative_motion", "wbc/symbolic/taylor.py"), 0.2),
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),
     Figure("viewer", ("wbc/viewer",), 3.0),
     Figure("servos", (*TICK, "wbc/servo", "wbc/simulation/mujoco_plant.py", "bench/servo_arm.xml"), 2.0),
-    Figure("soft", TICK, 1.0),
+    Figure("loops", (*TICK, "wbc/robot/loops.py", "tests/loops/mechanisms.py"), 3.0),
     Figure("solvers", (*TICK, "bench/qp"), 1.0),
     Figure("plant_steps", ("wbc/simulation", "robots/walker_masses.py", "robots/data"), 1.0),
     Figure("torque_walks", (*WALK, "wbc/simulation"), 3.0),
     Figure("moving", (*TICK, "wbc/moving_target", "wbc/estimation", "wbc/simulation"), 6.0),
     Figure("torques", (*TICK, "bench/torque_peer.py"), 1.5),
-    Figure("two_ended", WALK, 0.5),
-    Figure("walks", (*WALK, "bench/walk/reference"), 1.5),
 )  # fmt: skip
 FIGURES = {figure.name: figure for figure in _ALL}
 

@@ -31,7 +31,7 @@ OWN, THEIRS = ("wbc", "casadi", "pin", "numpy"), ("pin-pink", "mink", "mujoco", 
 
 def arguments(given: list[str] | None) -> argparse.Namespace:
     """What is asked for."""
-    parser = argparse.ArgumentParser(prog="wbc bench ik", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m bench.ik", description=__doc__)
     parser.add_argument("--full", action="store_true", help=f"{FULL[0]} poses a chain instead of {QUICK[0]}")
     parser.add_argument("--count", type=int, help="poses a chain")
     parser.add_argument("--peers-count", type=int, help=f"poses a chain for pink and mink: {QUICK[1]}, or {FULL[1]}")

@@ -14,8 +14,8 @@ from wbc.errors import RangeError
 from wbc.teleop.bilateral import (
     Bilateral,
     BilateralRecord,
+    Channel,
     Device,
-    Link,
     Operator,
     Scheme,
     Wall,
@@ -56,7 +56,7 @@ def parts() -> dict[str, Sheet | str]:
 
 
 def _system(scheme: Scheme, delay: float, jitter: float, loss: float) -> Bilateral:
-    link = Link(0.5 * delay, jitter, loss)
+    link = Channel(0.5 * delay, jitter, loss)
     return Bilateral(scheme, DEVICE, DEVICE, link, link, DT)
 
 
@@ -74,7 +74,7 @@ def _accepted() -> Sheet:
 
 def _fits(scheme: Scheme, device: Device, delay: float) -> bool:
     try:
-        Bilateral(scheme, device, device, Link(delay), Link(delay), DT, passivity=False)
+        Bilateral(scheme, device, device, Channel(delay), Channel(delay), DT, passivity=False)
     except RangeError:
         return False
     return True
@@ -82,7 +82,9 @@ def _fits(scheme: Scheme, device: Device, delay: float) -> bool:
 
 def _picture() -> None:
     """Forces that are late, on a wall, without passivity control and with it, and four channels."""
-    free = Bilateral(SCHEMES["position-force"], LIGHT, LIGHT, Link(0.3), Link(0.3), DT, passivity=False, unchecked=True)
+    free = Bilateral(
+        SCHEMES["position-force"], LIGHT, LIGHT, Channel(0.3), Channel(0.3), DT, passivity=False, unchecked=True
+    )
     systems = [free, dataclasses.replace(free, passivity=True), _system(SCHEMES["four-channel"], 0.6, 0.0, 0.0)]
     run = run_bilateral(systems, [Operator(reach(seconds=SECONDS), k) for k in (100.0, 100.0, 400.0)], [WALL] * 3)
     titles = ("position-force, no control", "position-force, passive", "four-channel, passive")

@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from bench.sheet import Sheet
-from bench.single import (
+from tests.export.cases import panda
+from tests.export.single import (
     PROGRAM,
     SINGLE,
     BuildError,
@@ -25,7 +26,6 @@ from bench.single import (
     read,
     run,
 )
-from tests.export.cases import panda
 from wbc.export.exporting import vectors
 
 #: States of the Panda of each family

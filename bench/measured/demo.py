@@ -18,10 +18,11 @@ def parts() -> dict[str, Sheet | str]:
         out = Path(folder) / "demo"
         command = [
             str(Path(sys.executable).with_name("wbc")),
+            "track",
             "demo",
             "--no-plots",
             "--no-record",
-            "--output",
+            "--out",
             str(out),
         ]
         subprocess.run(command, check=True, capture_output=True)
@@ -34,7 +35,7 @@ def parts() -> dict[str, Sheet | str]:
         ("position error of the hand", f"{1e3 * place['max']:.3f} mm at most, {1e3 * place['rms']:.3f} mm rms"),
         ("rotation error of the hand", f"{math.degrees(turn['max']):.3f} deg at most"),
         ("elbow plane: commanded and reached", f"up to {found['plane_error']['max']:.2f} rad apart"),
-        ("least distance of the link shapes from an obstacle, by Coal",
+        ("least distance of the link shapes from an obstacle",
          f"{1e3 * least['least']:.2f} mm, for a margin of {1e3 * found['margin']:.0f} mm"),
         ("the same for the description's collision meshes", f"{1e3 * meshes['least']:.2f} mm"),
         ("largest acceleration", f"{found['acceleration']['share']:.3f} of its limit, {found['acceleration']['dof']}"),

@@ -8,20 +8,20 @@ import numpy as np
 
 from bench.sheet import Sheet
 from wbc.errors import RangeError
-from wbc.motion_control.comparison import Condition, compare
+from wbc.motion_control.comparison import TrialCondition, compare
 from wbc.motion_control.trial import AWAY
 from wbc.published.newton_euler import (
     Adaptive,
     DecoupledArm,
     DecoupledTwo,
-    Drive,
+    DriveTrain,
     Linearised,
     Nominal,
     Rigid,
     simulate,
 )
 from wbc.published.newton_euler.comparison import PUBLISHED, published_scenario
-from wbc.published.newton_euler.control import Controller
+from wbc.published.newton_euler.control import ControlLaw
 from wbc.published.newton_euler.simulation import PLANTS
 from wbc.published.newton_euler.three_link import ELECTRIC, HYDRAULIC, MOTOR, arm, task, tip
 
@@ -32,8 +32,8 @@ def parts() -> dict[str, Sheet | str]:
 
 
 def _tracking() -> Sheet:
-    chosen, motion, drive, rows = arm(), task(), Drive([MOTOR] * 3), []
-    laws: dict[str, Callable[[], Controller]] = {
+    chosen, motion, drive, rows = arm(), task(), DriveTrain([MOTOR] * 3), []
+    laws: dict[str, Callable[[], ControlLaw]] = {
         "nominal torque": lambda: Nominal(chosen, motion),
         "1 linearised": lambda: Linearised(chosen, motion, 0.01),
         "2 decoupled": lambda: DecoupledTwo(motion, 0.01),
@@ -65,7 +65,7 @@ def _drives() -> Sheet:
         for motor in (MOTOR, ELECTRIC, HYDRAULIC):
             law = scenario.controllers[name](scenario.robot, motion, 0.01)
             try:
-                run = simulate(chosen.model, law, motion, plant="motor", drive=Drive([motor] * 3))
+                run = simulate(chosen.model, law, motion, plant="motor", drive=DriveTrain([motor] * 3))
             except RangeError:
                 cells.append("ran away")
                 continue
@@ -77,7 +77,7 @@ def _drives() -> Sheet:
 
 def _payload() -> Sheet:
     rows, scenario = [], published_scenario()
-    slow, fast = (list(compare(scenario, Condition(scenario.payload, rate=rate))) for rate in (100.0, 1000.0))
+    slow, fast = (list(compare(scenario, TrialCondition(scenario.payload, rate=rate))) for rate in (100.0, 1000.0))
     for one, other in zip(slow, fast, strict=True):
         cells = [one.name]
         for found in (one, other):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bench.sheet import Sheet
-from wbc.motion_control.comparison import Compared, compare, standard_conditions
+from wbc.motion_control.comparison import ComparisonRow, compare, standard_conditions
 from wbc.published.newton_euler.comparison import scenario_with_published
 from wbc.robots import load
 
@@ -13,7 +13,7 @@ def parts() -> dict[str, Sheet | str]:
     return {"arm": _arm()}
 
 
-def _off(one: Compared) -> str:
+def _off(one: ComparisonRow) -> str:
     return "ran away" if one.trial.away else f"{1e3 * one.largest:.3g}; {1e3 * one.residual:.2g}"
 
 

@@ -8,7 +8,7 @@ import wbc
 from bench.sheet import Sheet
 from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.pictures import LABELS
-from wbc.moving_target.study import Outcome, Study, outcome, peg, trials
+from wbc.moving_target.study import Outcome, TargetStudy, outcome, peg, trials
 
 COLUMNS = ("the object is known by", "done", "rms, mm", "largest, mm", "time, s", "joint rate / limit")
 #: Trials with each knowledge; the exact ones differ little
@@ -22,7 +22,7 @@ def parts() -> dict[str, Sheet | str]:
     return {"sea": sheet(sea, {k: RUNS if k in (Knowledge.NONE, Knowledge.ESTIMATED) else EXACT for k in Knowledge})}
 
 
-def sheet(study: Study, counts: dict[Knowledge, int]) -> Sheet:
+def sheet(study: TargetStudy, counts: dict[Knowledge, int]) -> Sheet:
     """A row for each knowledge."""
     return Sheet("", COLUMNS, [row(k, outcome(k, trials(study, n, [k])[k])) for k, n in counts.items()])
 

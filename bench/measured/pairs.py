@@ -1,10 +1,9 @@
-"""Pairs of task and constraint coordinates: a tick, the adviser, and how good the best pair is."""
+"""Pairs of task and constraint coordinates: how good the best pair is, and what the adviser takes."""
 
 from __future__ import annotations
 
 import wbc.coordinates as coordinates
-from bench.pair_ticks import pair_ticks
-from bench.sheet import Sheet, us
+from bench.sheet import Sheet
 
 #: Configurations of a survey, and pairs that the adviser's time is of
 COUNT, TIMED = 5000, 5
@@ -12,8 +11,7 @@ ARMS = ("ssrms", "spdm_arm", "spdm")
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Two tables."""
-    ticks = [(pair, us(1e6 * whole), us(1e6 * bare)) for pair, (whole, bare) in pair_ticks("ssrms").items()]
+    """The table."""
     rows = []
     for name in ARMS:
         robot, pairs = coordinates.parts(name).robot, coordinates.mode_pairs(name, "M1")
@@ -25,7 +23,4 @@ def parts() -> dict[str, Sheet | str]:
         )
     columns = ("robot", "minimum", "1 % below", "10 % below", "half below", "task's own sigma at the minimum",
                f"adviser of {TIMED} pairs [us]")  # fmt: skip
-    return {
-        "ticks": Sheet("", ("pair of the SSRMS", "command and tick [us]", "of these the controller [us]"), ticks),
-        "survey": Sheet("", columns, rows),
-    }
+    return {"survey": Sheet("", columns, rows)}

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
-from math import pi, sin
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,8 +18,9 @@ from scipy.optimize import linprog
 
 import wbc
 from bench.sheet import Sheet
-from bench.walk.torque_trials import witnessed
+from tests.walking.trials.torque_trials import witnessed
 from wbc.robots import Walker
+from wbc.robots.walker_data import spaced_radius
 from wbc.simulation import Encoders, GripKind, Motors
 from wbc.validation import Array
 from wbc.walking.checker import Report, check_walk
@@ -124,7 +124,7 @@ def verdict(was: Report, read: Report) -> str:
 def machine(arms: int) -> Walker:
     """The walker; more than three arms stand as far from each other as three do."""
     data = wbc.robots.walker().arm_data
-    radius = data.shoulder_radius * (sin(pi / 3) / sin(pi / arms) if arms > 3 else 1.0)
+    radius = spaced_radius(arms, data.shoulder_radius)
     return wbc.robots.walker(arms, data=replace(data, shoulder_radius=radius))
 
 

@@ -1,7 +1,7 @@
 """Every solver on one set of problems, each in its own process: ``python -m bench.qp.survey``.
 
 Some plugins of ``casadi.conic`` crash, hang, or call a wrong answer solved. A child process keeps that
-from the caller, and the exact minimiser (:mod:`bench.qp.reference`) tells the rest.
+from the caller, and the exact minimiser (:mod:`tests.judges.exact_qp`) tells the rest.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.qp.reference import reference
-from bench.qp.samples import sample_set
+from tests.judges.exact_qp import reference
+from tests.qp.samples import sample_set
 from wbc.errors import WbcError
 from wbc.qp.certificate import certify
 from wbc.qp.problem import QP

@@ -23,8 +23,8 @@ from bench.records import measure
 from bench.report import goal_sheet
 from bench.time_laws import least_time, states, ticks
 from bench.time_laws.goals import goals
-from bench.time_laws.suite import INSTANCES
 from bench.time_laws.tables import Parts, Record, sheets
+from tests.trajectory.suite import INSTANCES
 from wbc.interrupts import obey_kill
 
 PACKAGES = ("wbc", "toppra", "ruckig", "numpy", "scipy", "pin")
@@ -100,7 +100,7 @@ def setting(chosen: argparse.Namespace, sizes: dict[str, int]) -> list[str]:
 
 def arguments(given: list[str] | None) -> argparse.Namespace:
     """What is asked for."""
-    parser = argparse.ArgumentParser(prog="wbc bench time-laws", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m bench.time_laws", description=__doc__)
     parser.add_argument("--full", action="store_true", help="the sizes of the published tables, 10^6 states")
     parser.add_argument("--count", type=int, help="states from which raw ruckig and wbc start")
     parser.add_argument("--problems", type=int, help="problems of every other part, for a shorter run")

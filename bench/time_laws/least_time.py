@@ -13,7 +13,7 @@ import pinocchio as pin
 
 import wbc.robots
 from bench.time_laws import raw
-from bench.time_laws.suite import INSTANCES, PROBLEMS
+from tests.trajectory.suite import INSTANCES, PROBLEMS
 from wbc.errors import WbcError
 from wbc.trajectory import Law, MotionLimits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
 from wbc.trajectory.least_time.checks import TorqueCheck

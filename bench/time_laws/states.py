@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bench.time_laws import raw
-from bench.time_laws.families import FAMILIES, drawn, misses
+from tests.trajectory.random_motions import FAMILIES, drawn, misses
 from wbc.errors import BoundsError
 from wbc.trajectory import jerk_limited
 from wbc.trajectory.jerk.braking import reach

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bench.sheet import Sheet
-from bench.time_laws.families import FAMILIES
 from bench.time_laws.states import BENT
+from tests.trajectory.random_motions import FAMILIES
 
 Record = dict[str, Any]
 Parts = dict[str, list[Record]]

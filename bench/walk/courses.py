@@ -72,9 +72,7 @@ def binding(record: Record) -> str:
         return str(record["reason"])
     if record["violations"]:
         return "; ".join(record["violations"])
-    why = record["plan_limit"] or "hands land later than planned"
-    swings = f"; {record['swing_limit']}" if record["swing_limit"] else ""
-    return f"{record['kept']:.3f} of the speed: {why}{swings}"
+    return f"{record['kept']:.3f} of the speed: hands land later than planned"
 
 
 def course_jobs(it: Machine) -> list[Job]:

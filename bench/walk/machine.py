@@ -6,16 +6,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi, sin
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-import wbc
-from bench.walk.limits import Pressed, plan_limit
-from bench.walk.reference import Reference
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking import Structure, cylinder
@@ -34,12 +30,8 @@ from wbc.walking.run.recording import WalkRecorder
 Record = dict[str, Any]
 
 INCH = 0.0254
-#: Body and necks are within this beyond the shoulders [m]
-NECK = 0.105
 #: A walk keeps its speed if its mean is this part of the command
 KEPT = 0.98
-#: Heights of the body of the reference [m]
-HEIGHTS = tuple(inch * INCH for inch in (44.0, 46.0, 49.0, 52.0, 54.0))
 
 
 @dataclass(frozen=True)
@@ -51,7 +43,7 @@ class Job:
 
 
 class Machine:
-    """What all parts share: the robot, its compiled stack, the reference's tables; each made when first asked for.
+    """What all parts share: the robot and its compiled stack, each made when first asked for.
 
     Attributes:
         loading: processor time of :meth:`load` [s]; None: nothing was loaded.
@@ -82,11 +74,6 @@ class Machine:
             keep()
             self.loading = time.process_time() - cpu
 
-    @cached_property
-    def reference(self) -> Reference:
-        """What is possible, at heights from 44 to 54 in."""
-        return Reference(self.walker, HEIGHTS)
-
     def planned(self, structure: Structure, path: BodyPath, **asked: Any) -> tuple[Plan | None, Record]:
         """A plan, None where it is refused, and what is to be said of it."""
         self.load()
@@ -108,7 +95,6 @@ class Machine:
             "path_s": plan.path.duration,
             "detour": plan.path is not path,
             "plan_s": time.process_time() - cpu,
-            "plan_limit": plan_limit(self.walker, plan),
         }
 
     def walk(self, structure: Structure, path: BodyPath, **asked: Any) -> Record:
@@ -149,7 +135,6 @@ class Machine:
             "rate": float((np.abs(log.v) / limit).max()),
             "real_time": walk.time / spent,
             "real_time_planned": walk.time / (spent + planned),
-            "swing_limit": Pressed(self.walker, walk.dt).of(log),
             "violations": self.violations(log, structure),
         }
 
@@ -192,11 +177,3 @@ def costs(ticks: TickColumns, loop: Array) -> Record:
         "loop_us": 1e6 * float(np.median(loop)),
         "loop_p99_us": 1e6 * float(np.percentile(loop, 99)),
     }
-
-
-def walker_of(arms: int) -> Walker:
-    """A walker whose arms are as far from each other as three of them, as ``wbc walk --arms`` has it."""
-    three = wbc.robots.walker()
-    if arms <= 3:
-        return wbc.robots.walker(arms)
-    return wbc.robots.walker(arms, three.data.shoulder_radius * sin(pi / 3) / sin(pi / arms))

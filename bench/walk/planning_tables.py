@@ -1,4 +1,4 @@
-"""The tables of plans in slices and of patches, and what is asked of them."""
+"""The table of plans in slices, and what is asked of them."""
 
 from __future__ import annotations
 
@@ -46,40 +46,6 @@ def planning_goals(records: list[Record]) -> list[Goal]:
             Goal("plans in slices with which 0.98 of the speed is not kept", slow, 0, ""),
             Goal("one over real time, planner in slices and log", max(1 / r["real_time"] for r in whole), 0.05, ""),
         ]
-    return out
-
-
-def patch_sheet(records: list[Record]) -> Sheet:
-    """How many more re-grasps than the fewest, and how many patches."""
-    rows = []
-    for more, some in sorted(_by_difference(records).items()):
-        seeds = [r["seed"] for r in some]
-        shown = "all others" if more == "equal" else ", ".join(map(str, seeds))
-        rows.append((more, str(len(some)), shown))
-    times = [sum(r[key] for r in records) / len(records) for key in ("plan_s", "search_s")]
-    rows.append(("processor time of a plan, of a search, s", f"{times[0]:.2f}, {times[1]:.2f}", ""))
-    return Sheet(f"Re-grasps over {len(records)} patches of 8 x 8", ("planner beside breadth-first", "", "seeds"), rows)
-
-
-def patch_goals(records: list[Record]) -> list[Goal]:
-    """As many as breadth-first search."""
-    other = sum(r["planned"] != r["fewest"] for r in records)
-    return [Goal(f"patches of {len(records)} on which re-grasps are not the fewest", other, 0, "")]
-
-
-def _by_difference(records: list[Record]) -> dict[str, list[Record]]:
-    out: dict[str, list[Record]] = {}
-    for r in records:
-        planned, fewest = r["planned"], r["fewest"]
-        if planned == fewest:
-            name = "equal"
-        elif planned is None:
-            name = "refused, though there is a way"
-        elif fewest is None:
-            name = "planned, though the search finds no way"
-        else:
-            name = f"{planned - fewest:+d}"
-        out.setdefault(name, []).append(r)
     return out
 
 

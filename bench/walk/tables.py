@@ -1,19 +1,14 @@
-"""The tables of walks: courses, the highest speeds, turns, trenches; and what is asked of them."""
+"""The tables of walks: courses, the highest speeds, turns; and what is asked of them."""
 
 from __future__ import annotations
-
-from textwrap import shorten
 
 from bench.goals import Goal
 from bench.sheet import Sheet
 from bench.walk.courses import RATE, SPEED, binding, keeps
 from bench.walk.machine import INCH, Record
-from bench.walk.trenches import LEAST, crossed
 
 #: Columns of a walk that was carried out
 WALK = ("re-grasps", "plan, s", "real time with planning", "tick, us", "99 %", "body, mm", "hands, mm", "checker")
-#: Letters of a refusal that a table has room for
-WHY = 160
 
 
 def course_sheet(records: list[Record]) -> Sheet:
@@ -42,19 +37,6 @@ def spin_sheet(records: list[Record]) -> Sheet:
     return Sheet("Turning on the spot", columns, rows)
 
 
-def trench_sheet(records: list[Record]) -> Sheet:
-    """Reference, and what came out; of a refusal the beginning of its reason."""
-    rows = []
-    for r in records:
-        done = "yes" if crossed(r) else "refused" if not r["planned"] else "no"
-        fast = f"{r['progress'] / INCH:.2f}" if "progress" in r else "-"
-        took = f"{r['walk_s']:.0f}" if "walk_s" in r else "-"
-        why = shorten(r["reason"], WHY, placeholder=" ...")
-        rows.append((r["trench"], r["verdict"], done, took, fast, *_walk(r), why))
-    columns = ("", "reference", "crossed", "s", "in/s", *WALK, "why not")
-    return Sheet("Trenches; the body may go from 44 to 54 in, turn and go round", columns, rows)
-
-
 def course_goals(records: list[Record]) -> list[Goal]:
     """0.98 of 6 in/s everywhere, in time, and nothing that the checker finds."""
     slow = sum(not keeps(r) for r in records)
@@ -77,18 +59,6 @@ def spin_goals(records: list[Record]) -> list[Goal]:
     return (
         [Goal(f"turns at {RATE:g} rad/s that are not kept", sum(not keeps(r) for r in asked), 0, "")] if asked else []
     )
-
-
-def trench_goals(records: list[Record]) -> list[Goal]:
-    """Four and five rows; every walk is sound, every refusal names holds."""
-    wanted = [r for r in records if r["trench"] in ("4 rows", "5 rows")]
-    bad = sum(bool(r.get("violations")) or (r["planned"] and not r.get("arrived")) for r in records)
-    mute = sum(not r["planned"] and not r["separating"] for r in records)
-    return [
-        Goal(f"trenches of 4 and 5 rows not crossed at {LEAST:g} in/s", sum(not crossed(r) for r in wanted), 0, ""),
-        Goal("trenches that are planned and then not walked as the checker wants it", bad, 0, ""),
-        Goal("trenches that are refused without separating holds", mute, 0, ""),
-    ]
 
 
 def _speed(r: Record, key: str, unit: float) -> tuple[str, str, str]:
@@ -119,4 +89,4 @@ def _highest(r: Record) -> tuple[str, ...]:
 
 
 def _lacks(r: Record) -> str:
-    return r.get("swing_limit", "") if keeps(r) else binding(r)
+    return "" if keeps(r) else binding(r)

@@ -1,6 +1,6 @@
 /* Closes the loop on a simulated Panda: the hand moves by 0.1 m to the side, through the exported tick.
  *
- *     wbc export panda --output panda_tick && make -C panda_tick
+ *     wbc export panda --out panda_tick && make -C panda_tick
  *     gcc -std=c99 -Ipanda_tick main.c panda_tick/libwbc_tick.a panda_tick/daqp/libdaqp.a -lm -o main && ./main
  */
 #include "wbc_tick.h"

@@ -1,6 +1,6 @@
-"""Drives what `wbc play` shows from a script of its own: the hand goes round a circle, by rates over a WebSocket.
+"""Drives what `wbc view play` shows from a script of its own: the hand goes round a circle, by rates over a WebSocket.
 
-wbc play --port 8080 --no-browser
+wbc view play --port 8080 --no-browser
 python examples/remote/over_websocket.py ws://127.0.0.1:8080/wbc
 """
 

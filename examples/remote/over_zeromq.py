@@ -1,6 +1,6 @@
-"""Drives what `wbc play` shows from a script of its own: the hand goes round a circle, by rates over ZeroMQ.
+"""Drives what `wbc view play` shows from a script of its own: the hand goes round a circle, by rates over ZeroMQ.
 
-wbc play --zeromq tcp://127.0.0.1:5555 --no-browser
+wbc view play --zeromq tcp://127.0.0.1:5555 --no-browser
 python examples/remote/over_zeromq.py tcp://127.0.0.1:5555
 """
 

@@ -3,7 +3,7 @@
 This file has not been run: ROS 2 is not a package of the Python index and was not installed where it was written. What
 it says to the viewer is what over_websocket.py says, which is run; what it says to ROS 2 is from rclpy's documentation.
 
-    wbc play --port 8080 --no-browser
+    wbc view play --port 8080 --no-browser
     python examples/remote/ros2_bridge.py ws://127.0.0.1:8080/wbc
     ros2 topic pub /wbc/target geometry_msgs/msg/PoseStamped ...      # a target in the world frame [m]
     ros2 topic echo /joint_states

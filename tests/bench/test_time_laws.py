@@ -19,10 +19,10 @@ import pytest
 from rich.progress import Progress
 
 from bench.time_laws import __main__ as run
-from bench.time_laws import families, least_time, raw, states
+from bench.time_laws import least_time, raw, states
 from bench.time_laws.goals import goals
 from bench.time_laws.tables import sheets
-from tests.processes import IN_BACKGROUND
+from tests.trajectory import random_motions as families
 from wbc.trajectory import Law, PolynomialPath, jerk_limited
 
 ROOT = Path(__file__).parents[2]
@@ -74,11 +74,8 @@ def test_ctrl_c_keeps_what_was_measured() -> None:
     assert len(goals(parts)) == 1
 
 
-@pytest.mark.parametrize("background", [False, True])
-def test_ctrl_c_ends_a_run_with_its_workers(background: bool, tmp_path: Path) -> None:
-    """In the background of a shell that ignores Ctrl-C, kill does."""
+def test_ctrl_c_ends_a_run_with_its_workers(tmp_path: Path) -> None:
     command = [
-        *(IN_BACKGROUND if background else ()),
         sys.executable,
         "-m",
         "bench.time_laws",
@@ -98,7 +95,7 @@ def test_ctrl_c_ends_a_run_with_its_workers(background: bool, tmp_path: Path) ->
         letter = process.stderr.read(1)
         assert letter, seen
         seen += letter
-    process.send_signal(signal.SIGTERM if background else signal.SIGINT)
+    process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "Ended by Ctrl-C in: states" in out

@@ -77,7 +77,7 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: Sweeper(scene()).sweep(still(pin.SE3.Identity()), [0.5]), ShapeError, "pairs"),
     (lambda: scene(pairs=[Pair("hand", "tabel")]), UnknownNameError, "table"),
     (lambda: scene(pairs=[Pair("hand", "table", float("nan"))]), NotFiniteError, "hand and table"),
-    (lambda: scene(pairs=[Pair("table", "table")]), ShapeError, "solid"),
+    (lambda: scene(pairs=[Pair("table", "table")]), ShapeError, "have no distance"),
     (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), "universe")]), ShapeError, "fixed in the world"),
     (lambda: scene(bodies=[HAND, SweptBody("table", HalfSpace(), "wrold")]), UnknownNameError, "world"),
     (lambda: scene(bodies=[HAND, SweptBody("table", "box")]), ShapeError, "table.shape"),  # type: ignore[arg-type]

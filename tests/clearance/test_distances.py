@@ -14,7 +14,7 @@ from tests.clearance.world import free_tree, judged, numbers, random_pose, solid
 from tests.repeats import repeats
 from wbc.clearance import CylinderInside, EndlessCylinder, Motion, Pair, Sweeper, SweptBody, SweptScene, TriangleMesh
 from wbc.errors import ShapeError
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Solid, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpace, Shape, Solid, Sphere
 from wbc.validation import Array
 
 #: No distance may be above the judge's by more, or below: Coal is off on round shapes by so much
@@ -134,6 +134,9 @@ def surface_points(rng: np.random.Generator, solid: Solid) -> tuple[Array, float
     if isinstance(solid, Box):
         grid = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, 15)] * 3), axis=-1).reshape(-1, 3)
         return grid * solid.size, 0.0
+    if isinstance(solid, Ellipsoid):
+        away = rng.normal(size=(20000, 3))
+        return away / np.linalg.norm(away, axis=1, keepdims=True) * solid.semi_axes, 0.0
     angle, z, r = (x.ravel() for x in np.meshgrid(np.linspace(0, 2 * pi, 721), [-0.5, 0.0, 0.5], [0.0, 0.5, 1.0]))
     rim = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1) * solid.radius
     return np.column_stack([rim, z * solid.length]), 0.0

@@ -28,7 +28,7 @@ def test_no_compiler(module: object, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [(clearance, "_Sweep"), (proximity, "_Scene")], ids=["clearance", "proximity"]
+    ("module", "name"), [(clearance, "_SweepStruct"), (proximity, "_SceneStruct")], ids=["clearance", "proximity"]
 )
 def test_a_library_of_another_layout_is_refused(module: object, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     more = type(name, (getattr(module, name),), {"_fields_": [("more", ctypes.c_int)]})

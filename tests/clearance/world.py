@@ -12,7 +12,7 @@ import pinocchio as pin
 from tests.distances import coal_distance
 from tests.random_robots import Drawn, random_model, random_pose
 from wbc.clearance import Motion, Tree
-from wbc.shapes import Box, Capsule, Convex, Cylinder, Solid, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Solid, Sphere
 from wbc.validation import Array
 
 
@@ -25,7 +25,7 @@ def solids(rng: np.random.Generator) -> list[Solid]:
     hull = rng.normal(size=(12, 3)) * [size(), size(), size()]
     return [
         Sphere(size()), Capsule(size(), size()), Capsule(size(), 0.0), Capsule(0.0, size()),
-        Box((size(), size(), size())), Cylinder(size(), size()), Convex(hull),
+        Box((size(), size(), size())), Cylinder(size(), size()), Convex(hull), Ellipsoid((size(), size(), size())),
     ]  # fmt: skip
 
 

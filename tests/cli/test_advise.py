@@ -1,22 +1,17 @@
-"""``wbc advise`` as a user types it."""
+"""``wbc coordinates advise`` as a user types it."""
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
-from typer.testing import CliRunner
+from tests.cli.test_commands import run as wbc_command
 
-from wbc.cli.app import app
-
-
-def run(*arguments: str) -> tuple[int, str, str]:
-    """(exit code, standard output, standard error) of ``wbc advise ARGUMENTS``."""
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["advise", *arguments])
-    return result.exit_code, result.stdout, result.stderr
+run = functools.partial(wbc_command, "coordinates")
 
 
 def test_advice_on_a_locus() -> None:
-    code, out, _ = run("spherical_4r", "--at", "0.3,1.5707963267948966,-0.7,1.1")
+    code, out, _ = run("advise", "spherical_4r", "--at", "0.3,1.5707963267948966,-0.7,1.1")
     assert code == 0
     lines = {line.split("  ")[0]: line for line in out.splitlines()}
     assert "algorithmic" in lines["tip | alpha"]
@@ -26,20 +21,20 @@ def test_advice_on_a_locus() -> None:
 
 
 def test_the_page_has_the_written_restrictions() -> None:
-    code, out, _ = run("spherical_4r", "--restrictions")
+    code, out, _ = run("restrictions", "spherical_4r")
     assert code == 0
     assert out.strip() in (Path(__file__).parents[2] / "docs" / "written_restrictions.md").read_text()
 
 
 def test_a_survey_of_random_configurations() -> None:
-    code, out, _ = run("spherical_4r", "--survey", "40")
+    code, out, _ = run("survey", "spherical_4r", "--count", "40")
     assert code == 0
     first, least, where, parts, spent = out.splitlines()
     assert first.startswith("best of 7 pairs at 40 configurations")
     assert "adviser of 5 pairs" in spent
     # Advice at that configuration says the same
     ratio, name = least.split()[1][:-1], least.split(": ")[1].split(", task")[0]
-    _, advice, _ = run("spherical_4r", where.strip(), "--no-exact")
+    _, advice, _ = run("advise", "spherical_4r", where.strip(), "--no-exact")
     lines = {line.split("  ")[0]: line.split("  ")[1:] for line in advice.splitlines()}
     ratios = [float([x for x in rest if x.strip()][1]) for row, rest in lines.items() if row.startswith("tip |")]
     assert abs(max(ratios) - float(ratio)) < 2e-3
@@ -49,9 +44,10 @@ def test_a_survey_of_random_configurations() -> None:
 
 
 def test_bad_input() -> None:
-    assert run("spherical_4r", "--at", "0.3")[0] == 2
-    assert run("spherical_4r", "--at", "a,b,c,d")[0] == 2
-    assert run("spherical_4r", "--mode", "M6")[0] == 2
-    assert run("srms")[0] == 2
-    assert run("spherical_4r", "--survey", "-3")[0] == 2
-    assert run("spherical_4r", "--current", "alpha")[0] == 2
+    assert run("advise", "spherical_4r", "--at", "0.3")[0] == 2
+    assert run("advise", "spherical_4r", "--at", "a,b,c,d")[0] == 2
+    assert run("advise", "spherical_4r", "--mode", "M6")[0] == 2
+    assert "did you mean 'M1'" in run("advise", "spherical_4r", "--mode", "m1")[2]
+    assert run("advise", "srms")[0] == 2
+    assert run("survey", "spherical_4r", "--count", "-3")[0] == 2
+    assert run("advise", "spherical_4r", "--current", "alpha")[0] == 2

@@ -1,27 +1,22 @@
-"""``wbc analyse`` as a user types it."""
+"""``wbc coordinates analyse`` as a user types it."""
 
 from __future__ import annotations
 
+import functools
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests.cli.test_commands import run as wbc_command
 from tests.repeats import repeats
 from wbc import robots
 from wbc.analysis import BodyRows, ExactModel, JointRows, certify
-from wbc.cli.app import app
 
-
-def run(*arguments: str | Path) -> tuple[int, str, str]:
-    """(exit code, standard output, standard error) of ``wbc analyse ARGUMENTS``."""
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["analyse", *map(str, arguments)])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.exit_code, result.stdout, result.stderr
+run = functools.partial(wbc_command, "coordinates", "analyse")
 
 
 def test_published_set_on_screen_and_in_a_file(tmp_path: Path) -> None:
@@ -79,19 +74,41 @@ def test_minutes_are_kept_where_the_locus_takes_long() -> None:
     assert "  open     " in out or "end3: incomplete" in out
 
 
+def eight_joints(file: Path, axes: Sequence[np.ndarray], places: Sequence[np.ndarray]) -> Path:
+    """A chain of turning joints j1 ... about axes and at places in the links l0 ... before them."""
+    text = '<link name="l0"/>'
+    for k, (axis, at) in enumerate(zip(axes, places, strict=True)):
+        text += f'<link name="l{k + 1}"/><joint name="j{k + 1}" type="continuous"><parent link="l{k}"/>'
+        text += f'<child link="l{k + 1}"/><origin xyz="{at[0]} {at[1]} {at[2]}"/>'
+        text += f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/></joint>'
+    file.write_text(f'<robot name="eight">{text}</robot>')
+    return file
+
+
+@pytest.mark.parametrize("seed", range(18, 18 + repeats(1)))
+def test_minutes_count_formulas(seed: int, tmp_path: Path) -> None:
+    """Eight joints about coordinate axes: of the first seed branches are found soon, and writing them takes minutes."""
+    rng, axes, places = np.random.default_rng(seed), [], []
+    for _ in range(8):
+        axes.append(np.eye(3)[rng.integers(3)])
+        places.append(np.round(rng.uniform(-0.4, 0.4, 3) * (rng.random(3) < 0.5), 2))
+    file = eight_joints(tmp_path / "eight.urdf", axes, places)
+    began = time.monotonic()
+    code, out, _ = run(file, "--approximate", "--frame", "l8", "--lock", "j5", "--lock", "j8", "--minutes", 0.06)
+    assert code == 0
+    assert "j5, j8: 8 x 8" in out
+    assert seed != 18 or "formulas were not written within the minutes" in out
+    # 3.6 s, and what a shared machine may hold up
+    assert time.monotonic() - began < 9.0
+
+
 @pytest.mark.parametrize("seed", range(repeats(2)))
 def test_minutes_are_kept_where_the_jacobian_takes_long(seed: int, tmp_path: Path) -> None:
     """Eight joints about axes that are nobody's: their exact Jacobian alone takes a minute. That is said after 1.2 s,
     and a certificate says that nothing is decided.
     """
-    rng, text = np.random.default_rng(seed), '<link name="l0"/>'
-    for k in range(8):
-        axis, at = rng.normal(size=3), rng.uniform(-0.4, 0.4, 3)
-        text += f'<link name="l{k + 1}"/><joint name="j{k + 1}" type="continuous"><parent link="l{k}"/>'
-        text += f'<child link="l{k + 1}"/><origin xyz="{at[0]} {at[1]} {at[2]}"/>'
-        text += f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/></joint>'
-    file = tmp_path / "eight.urdf"
-    file.write_text(f'<robot name="eight">{text}</robot>')
+    rng = np.random.default_rng(seed)
+    file = eight_joints(tmp_path / "eight.urdf", rng.normal(size=(8, 3)), rng.uniform(-0.4, 0.4, (8, 3)))
     began = time.monotonic()
     code, out, err = run(file, "--approximate", "--frame", "l8", "--lock", "j1", "--lock", "j5", "--minutes", 0.02)
     assert code == 2

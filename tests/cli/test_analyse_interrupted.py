@@ -1,4 +1,4 @@
-"""``wbc analyse --certify --resume`` as a process that is interrupted, and what goes on from its file."""
+"""``wbc coordinates analyse --certify --resume`` as a process that is interrupted, and what goes on from its file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,17 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool
     background of a shell that ignores SIGINT the same with SIGTERM.
     """
     begun, states = tmp_path / "begun", tmp_path / "states"
-    command = ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--resume", str(states), "--data"]
+    command = [
+        "coordinates",
+        "analyse",
+        "spherical_4r",
+        "--set",
+        "elbow, beta",
+        "--certify",
+        "--resume",
+        str(states),
+        "--data",
+    ]
     cut, whole = tmp_path / "cut.json", tmp_path / "whole.json"
     child = subprocess.Popen(
         [*(IN_BACKGROUND if background else ()), sys.executable, "-c", CHILD, str(begun), *command, str(cut)],
@@ -65,12 +75,7 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool
     assert 0.0 < first["left"] < 1.0
     (kept,) = states.iterdir()
     assert CliRunner().invoke(app, [*command, str(whole)]).exit_code == 0
-    assert (
-        CliRunner()
-        .invoke(app, ["analyse", "spherical_4r", "--set", "elbow, beta", "--certify", "--data", str(cut)])
-        .exit_code
-        == 0
-    )
+    assert CliRunner().invoke(app, ["coordinates", *command[1:6], "--data", str(cut)]).exit_code == 0
     resumed, fresh = (json.loads(file.read_text())["sets"][0]["certificate"] for file in (whole, cut))
     assert resumed["verdict"] == fresh["verdict"] == "complete"
     assert resumed["left"] == fresh["left"] == 0.0

@@ -1,4 +1,4 @@
-"""``wbc robot NAME --collisions`` as a user types it."""
+"""``wbc robots pairs NAME`` as a user types it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def rows(text: str) -> list[list[str]]:
 
 
 def test_shapes_and_pairs_are_listed() -> None:
-    code, out, err = run("robot", "ur5", "--collisions", "--samples", "500")
+    code, out, err = run("robots", "pairs", "ur5", "--samples", "500")
     assert (code, err) == (0, "")
     lines = rows(out)
     assert ["forearm_link", "capsule", "radius", "64.2,", "length", "388.7", "37.9"] in lines
@@ -30,20 +30,20 @@ def test_shapes_and_pairs_are_listed() -> None:
 
 def test_pairs_are_saved_edited_and_shown(tmp_path: Path) -> None:
     file = tmp_path / "pairs.toml"
-    code, _, err = run("robot", "panda", "--samples", "50", "--save", file)
+    code, _, err = run("robots", "pairs", "panda", "--samples", "50", "--save", file)
     assert code == 0
     assert "written to" in err
     kept = wbc.robots.read_self_pairs(file, wbc.robots.load("panda")).kept
     edited = file.read_text().replace("keep = true,", "keep = false,", 1)
     file.write_text(edited)
-    code, out, _ = run("robot", "panda", "--pairs", file)
+    code, out, _ = run("robots", "pairs", "panda", "--pairs", file)
     assert code == 0
     assert f"{len(kept) - 1} of 55 pairs kept (50 configurations" in out
-    code, _, err = run("robot", "panda", "--samples", "50", "--save", file)
+    code, _, err = run("robots", "pairs", "panda", "--samples", "50", "--save", file)
     assert code == 2
     assert "perhaps edited by hand" in err
     assert file.read_text() == edited
-    code, _, _ = run("robot", "panda", "--samples", "50", "--save", file, "--force")
+    code, _, _ = run("robots", "pairs", "panda", "--samples", "50", "--save", file, "--force")
     assert code == 0
     assert file.read_text() != edited
 
@@ -53,7 +53,9 @@ def test_an_srdf_file_and_exact_shapes(tmp_path: Path) -> None:
         '<robot name="r"><disable_collisions link1="LF_FOOT" link2="RF_FOOT" reason="User"/>'
         '<disable_collisions link1="LF_FOOT" link2="gone"/></robot>'
     )
-    code, out, _ = run("robot", "anymal_b", "--shapes", "exact", "--samples", "0", "--srdf", tmp_path / "r.srdf")
+    code, out, _ = run(
+        "robots", "pairs", "anymal_b", "--shapes", "exact", "--samples", "0", "--srdf", tmp_path / "r.srdf"
+    )
     assert code == 0
     assert ["LF_FOOT", "RF_FOOT", "dropped", "srdf:", "User", "-"] in rows(out)
     assert "box" in out
@@ -63,9 +65,9 @@ def test_an_srdf_file_and_exact_shapes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["kinova", "--collisions"], "no link of this robot has shapes"),
+        (["kinova"], "no link of this robot has shapes"),
         (["ur5", "--samples", "-1"], "samples: expected 0 or more"),
-        (["ur5", "--collisions", "--shapes", "ft"], "shapes: unknown name, did you mean 'fit'?"),
+        (["ur5", "--shapes", "ft"], "shapes: unknown name, did you mean 'fit'?"),
         (["ur5", "--srdf", "gone.srdf"], "there is no such file"),
         (["ur5", "--pairs", "gone.toml"], "pairs: cannot be read"),
         (["ur5", "--pairs", "gone.toml", "--samples", "3"], "leave out --samples"),
@@ -73,7 +75,7 @@ def test_an_srdf_file_and_exact_shapes(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_one_line(arguments: list[str], message: str) -> None:
-    code, out, err = run("robot", *arguments)
+    code, out, err = run("robots", "pairs", *arguments)
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1

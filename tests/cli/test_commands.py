@@ -5,21 +5,21 @@ from __future__ import annotations
 import functools
 import json
 import os
-import pathlib
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from typer.testing import CliRunner
 
 import wbc
 from wbc import style, track
-from wbc.cli import bench, console, session
-from wbc.cli.app import COMMANDS, app, command
-from wbc.errors import UnknownNameError, WbcError
+from wbc.cli import session
+from wbc.cli.app import COMMANDS, app, command, options_class
+from wbc.cli.reading import fields_of
 from wbc.track.plots import save_picture
 
 FAST = ["--backend", "vm", "--rate", "50", "--duration", "0.5", "--no-plots"]
@@ -33,28 +33,40 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
     return result.exit_code, result.stdout, result.stderr
 
 
-def test_help_names_every_command() -> None:
-    code, out, _ = run("--help")
-    assert code == 0
-    for name in ("robots", "robot", "walk", "plans", "track", "demo", "replay", "export", "ik", "docs", "bench"):
-        assert f" {name} " in out
-    code, out, _ = run("track", "--help")
-    assert code == 0
-    for option in ("--path", "--sphere", "--solver", "--rate", "--duration", "--backend", "--log"):
-        assert option in out
+MODES = [(name, mode) for name, entry in COMMANDS.items() for mode in entry.modes]
+
+
+def test_help_names_every_command_in_one_line() -> None:
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["--help"])
+    rows = [row.strip("│ ") for row in result.stdout.splitlines()]
+    for name, entry in COMMANDS.items():
+        assert any(row.startswith(f"{name} ") and row.endswith(entry.line) for row in rows), name
+    assert len(rows) < 40
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_list_of_commands_says_what_their_own_help_says(name: str) -> None:
-    """The list does not import the commands."""
-    first = str(command(name).help).split("\n\n")[0]
-    assert " ".join(first.split()) == COMMANDS[name].line
+def test_help_of_a_command_names_its_modes(name: str) -> None:
+    code, out, _ = run(name, "--help")
+    assert code == 0
+    for mode in COMMANDS[name].modes:
+        line = " ".join(str(command(name, mode).help).split("\n\n")[0].split())
+        assert line in " ".join(out.split())
+        assert not mode or f"wbc {name} {mode}: {line}" in out
+
+
+@pytest.mark.parametrize(("name", "mode"), MODES)
+def test_every_option_says_what_it_is_and_in_which_unit(name: str, mode: str) -> None:
+    """Numbers with a fraction have a unit in brackets; [1] is that of a ratio."""
+    for field in fields_of(options_class(name, mode)):
+        assert field.said.help, field.name
+        assert float not in (field.one, *get_args(field.one)) or re.search(r"\[[^\]]+\]", field.said.help), field.name
 
 
 def test_an_unknown_command_names_the_nearest() -> None:
     code, out, err = run("rbots")
     assert (code, out) == (2, "")
     assert "Did you mean 'robots'" in err
+    assert "mode: unknown name, did you mean 'path'?" in run("walk", "pth")[2]
 
 
 def test_version() -> None:
@@ -73,9 +85,8 @@ def test_play_says_how_long_a_page_may_be_silent(
     given: tuple[str, ...], taken: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: dict[str, Any] = {}
-    monkeypatch.setattr("wbc.cli.play.run", lambda *_, **options: seen.update(options))
-    monkeypatch.setattr("wbc.cli.viewing.compiled", lambda stack, backend: None)
-    assert run("play", "panda", *given)[0] == 0
+    monkeypatch.setattr("wbc.viewer.run", lambda *_, **options: seen.update(options))
+    assert run("view", "play", "panda", "--backend", "vm", *given)[0] == 0
     assert seen["silence"] == taken
 
 
@@ -97,13 +108,13 @@ def test_robots_without_a_match_names_the_nearest() -> None:
 
 
 def test_robot_shows_limits_and_frames() -> None:
-    code, out, _ = run("robot", "panda")
+    code, out, _ = run("robots", "show", "panda")
     assert code == 0
     row = next(line for line in out.splitlines() if line.startswith("panda_joint4"))
     assert row.split() == ["panda_joint4", "rad", "-3.072", "-0.0698", "2.175", "12.5", "87", "-2.356"]
     assert "panda_hand_tcp" in out
     assert "Franka" in out
-    code, out, _ = run("robot", "talos", "--no-frames")
+    code, out, _ = run("robots", "show", "talos", "--no-frames")
     assert code == 0
     assert "floating base" in out
 
@@ -112,7 +123,7 @@ def test_robot_shows_limits_and_frames() -> None:
 def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
-    code, out, err = run("track", "panda", *FAST, *ball, "--log", kind, "--output", folder)
+    code, out, err = run("track", "panda", *FAST, *ball, "--log", kind, "--out", folder)
     assert (code, err) == (0, "")
     assert {p.name for p in folder.iterdir()} == {f"log.{kind}", "summary.json", "ticks.npz", "report.html"}
     log = track.load(folder)
@@ -125,14 +136,14 @@ def test_track_leaves_a_run_folder(kind: str, tmp_path: Path) -> None:
 
 
 def test_an_obstacle_in_the_arm_at_the_start_is_said(tmp_path: Path) -> None:
-    code, _, err = run("track", *FAST, "--sphere", "0.3,0,0.5,0.1", "--output", tmp_path)
+    code, _, err = run("track", *FAST, "--sphere", "0.3,0,0.5,0.1", "--out", tmp_path)
     assert code == 0
     assert "warning: at the start panda_hand is -" in err
 
 
 def test_track_of_a_position_alone_lets_the_hand_turn(tmp_path: Path) -> None:
     options = ["--kind", "position", "--path", "line", "--plane", "off", *FAST]
-    assert run("track", "ur5", *options, "--output", tmp_path / "run")[0] == 0
+    assert run("track", "ur5", *options, "--out", tmp_path / "run")[0] == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert "rotation_error" not in summary
     assert summary["position_error"]["max"] < 0.05
@@ -141,7 +152,7 @@ def test_track_of_a_position_alone_lets_the_hand_turn(tmp_path: Path) -> None:
 def test_track_solvers_agree(tmp_path: Path) -> None:
     logs = []
     for solver in ("daqp", "qpoases"):
-        code, _, _ = run("track", *FAST, "--solver", solver, "--output", tmp_path / solver)
+        code, _, _ = run("track", *FAST, "--solver", solver, "--out", tmp_path / solver)
         assert code == 0
         logs.append(track.load(tmp_path / solver))
     assert logs[1].meta["solver"] == "qpoases"
@@ -151,7 +162,7 @@ def test_track_solvers_agree(tmp_path: Path) -> None:
 def test_track_follows_a_file_after_an_approach(tmp_path: Path) -> None:
     file = tmp_path / "way.csv"
     file.write_text("t,x,y,z,qx,qy,qz,qw\n0,0.4,0.1,0.5,1,0,0,0\n1,0.4,-0.1,0.5,1,0,0,0\n")
-    code, _, err = run("track", "--path", file, *FAST, "--output", tmp_path / "run")
+    code, _, err = run("track", "--path", file, *FAST, "--out", tmp_path / "run")
     assert (code, err) == (0, "")
     log = track.load(tmp_path / "run")
     assert log.meta["path"] == "way"
@@ -162,7 +173,7 @@ def test_track_follows_a_file_after_an_approach(tmp_path: Path) -> None:
 
 def test_track_with_holds_and_start(tmp_path: Path) -> None:
     start = ",".join(str(x) for x in wbc.robots.load("ur5").neutral + 0.1)
-    code, _, _ = run("track", "ur5", "--start", start, "--plane", "off", *FAST, "--output", tmp_path / "ur5")
+    code, _, _ = run("track", "ur5", "--start", start, "--plane", "off", *FAST, "--out", tmp_path / "ur5")
     assert code == 0
     assert track.load(tmp_path / "ur5")["q.shoulder_pan_joint"][0] == pytest.approx(
         wbc.robots.load("ur5").neutral[0] + 0.1
@@ -172,7 +183,7 @@ def test_track_with_holds_and_start(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["robot", "pandda"], "robot: unknown name, did you mean 'panda'?"),
+        (["robots", "show", "pandda"], "robot: unknown name, did you mean 'panda'?"),
         (["track", "pandda"], "robot: unknown name, did you mean 'panda'?"),
         (["track", "--path", "circel"], "path: unknown name, did you mean 'circle'?"),
         (["track", "--path", "none.csv"], "path: there is no such file"),
@@ -188,13 +199,13 @@ def test_track_with_holds_and_start(tmp_path: Path) -> None:
         (["view", "ticks.npz"], "what: there is no such file or folder (got"),
         (["view", "first_/run"], "what: there is no such file or folder, did you mean 'first_/runs'?"),
         (["replay", "first_/run"], "recording: cannot be read: No such file or directory, did you mean 'first_/runs'?"),
-        (["check", "first"], "run: there is no such folder, did you mean 'first_'?"),
-        (["plans", "none.json", "none.json"], "plan: there is no such file"),
+        (["walk", "check", "first"], "run: there is no such folder, did you mean 'first_'?"),
+        (["walk", "compare", "none.json", "none.json"], "plan: there is no such file"),
         (["study", "none.yaml"], "study: there is no such file"),
         (["study", "--resume", "first"], "resume: there is no such folder, did you mean 'first_'?"),
-        (["drive", "ur5", "--rates", "none.csv"], "path: cannot be read"),
+        (["coordinates", "drive", "ur5", "--rates", "none.csv"], "path: cannot be read"),
         (["ik", "ur5", "--targets", "none.csv"], "targets: there is no such file"),
-        (["walk", "--commands", "none.csv"], "file: cannot be read"),
+        (["walk", "drive", "none.csv"], "file: cannot be read"),
         (["track", "--frame", "panda_hand_tpc"], "did you mean 'panda_hand_tcp'?"),
         (["track", "--solver", "dapq"], "solver: unknown name, did you mean 'daqp'?"),
         (["track", "--backend", "nativ"], "backend: unknown name, did you mean 'native'?"),
@@ -222,7 +233,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
     (tmp_path / "first_" / "runs").mkdir(parents=True)
     options: list[str] = []
     if arguments[0] == "track":
-        defaults = {"--output": "run", "--backend": "vm", "--duration": "0.2"}
+        defaults = {"--out": "run", "--backend": "vm", "--duration": "0.2"}
         options = ["--no-plots", *(x for pair in defaults.items() if pair[0] not in arguments for x in pair)]
     code, out, err = run(*arguments, *options)
     assert (code, out) == (2, "")
@@ -234,21 +245,21 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 
 def test_a_run_is_not_written_over_by_accident(tmp_path: Path) -> None:
-    assert run("track", *FAST, "--output", tmp_path)[0] == 0
+    assert run("track", *FAST, "--out", tmp_path)[0] == 0
     before = (tmp_path / "log.parquet").stat().st_mtime_ns
-    code, _, err = run("track", *FAST, "--output", tmp_path)
+    code, _, err = run("track", *FAST, "--out", tmp_path)
     assert code == 2
     assert "use --force" in err
     assert (tmp_path / "log.parquet").stat().st_mtime_ns == before
-    assert run("track", *FAST, "--log", "npz", "--output", tmp_path, "--force")[0] == 0
+    assert run("track", *FAST, "--log", "npz", "--out", tmp_path, "--force")[0] == 0
     assert {p.name for p in tmp_path.iterdir()} == {"log.npz", "summary.json", "ticks.npz", "report.html"}
 
 
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    code, _, err = run("track", *FAST, "--output", tmp_path / "file" / "run")
+    code, _, err = run("track", *FAST, "--out", tmp_path / "file" / "run")
     assert code == 2
-    assert "output: cannot be written" in err
+    assert "out: cannot be written" in err
 
 
 def test_default_folder_is_under_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -277,7 +288,7 @@ def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr("wbc.track.scene.SUPERSAMPLING", 1)
     monkeypatch.setattr("wbc.track.render.SHADOW_MAP", 300)
     handler = signal.getsignal(signal.SIGINT)
-    code, out, _ = run("demo", "--backend", "vm", "--rate", "50", "--output", tmp_path)
+    code, out, _ = run("track", "demo", "--backend", "vm", "--rate", "50", "--out", tmp_path)
     assert code == 130
     assert "interrupted, 9 of 600 ticks" in out
     log = track.load(tmp_path)
@@ -292,7 +303,7 @@ def test_interrupt_leaves_a_valid_run_folder(tmp_path: Path, monkeypatch: pytest
 
 def test_interrupt_before_the_first_tick_leaves_an_empty_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session.Stopper, "__call__", lambda self: True)
-    code, out, _ = run("demo", "--backend", "vm", "--output", tmp_path)
+    code, out, _ = run("track", "demo", "--backend", "vm", "--out", tmp_path)
     assert code == 130
     assert "interrupted, 0 of 2400" in out
     assert len(track.load(tmp_path)) == 0
@@ -305,36 +316,3 @@ def test_second_interrupt_is_not_held_back() -> None:
         assert stopper()
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
-
-
-@pytest.mark.parametrize(("first", "module"), [([], "bench"), (["time-laws"], "bench.time_laws")])
-def test_bench_becomes_the_module_of_the_repository(
-    first: list[str], module: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In the place of the command, so that Ctrl-C and kill reach the benchmark, which has something to say yet."""
-
-    class Replaced(BaseException):
-        pass
-
-    def fake(program: str, command: list[str]) -> None:
-        assert (program, command) == (sys.executable, [sys.executable, "-m", module, "--problems", "3"])
-        assert (pathlib.Path.cwd() / "bench" / "__main__.py").is_file()
-        raise Replaced
-
-    monkeypatch.setattr(bench.os, "execv", fake)
-    monkeypatch.chdir("/")
-    with pytest.raises(Replaced):
-        run("bench", *first, "--problems", "3")
-
-
-def test_bench_without_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "ROOT", tmp_path)
-    code, _, err = run("bench")
-    assert code == 2
-    assert "from a clone of the repository" in err
-
-
-def test_errors_are_of_one_family() -> None:
-    assert issubclass(console.OutputError, WbcError)
-    assert issubclass(bench.BenchError, WbcError)
-    assert issubclass(UnknownNameError, WbcError)

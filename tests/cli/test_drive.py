@@ -1,24 +1,22 @@
-"""``wbc drive`` as a user types it."""
+"""``wbc coordinates drive`` as a user types it."""
 
 from __future__ import annotations
 
 import csv
+import functools
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from wbc.cli.app import app
+from tests.cli.test_commands import run as wbc_command
+from wbc.log import load
 
-
-def run(*arguments: str | Path) -> tuple[int, str, str]:
-    """(exit code, standard output, standard error) of ``wbc drive ARGUMENTS``."""
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["drive", *map(str, arguments)])
-    return result.exit_code, result.stdout, result.stderr
+run = functools.partial(wbc_command, "coordinates", "drive")
 
 
 def test_a_file_of_orders(tmp_path: Path) -> None:
@@ -31,6 +29,15 @@ def test_a_file_of_orders(tmp_path: Path) -> None:
     assert "1 changes of pairs" in out
     assert "tip | beta (changing), solved" in err
     assert len(log.read_text().splitlines()) == 51
+    given = ("--rates", orders, "--mode", "M4", "--at", at, "--out", tmp_path / "run", "--backend", "vm")
+    assert run("spherical_4r", *given)[0] == 0
+    assert {"log.csv", "log.npz", "report.html"} <= {file.name for file in (tmp_path / "run").iterdir()}
+    columns, written = load(tmp_path / "run"), list(csv.DictReader(log.open()))
+    assert columns.units["v.joint2"] == "rad/s"
+    for name, head in (("q.joint1", "q joint1"), ("v.joint3", "v joint3"), ("met.0", "met 1"), ("lost", "lost")):
+        np.testing.assert_allclose(columns[name], [float(row[head]) for row in written], rtol=1e-5)
+    assert columns["pair.tip | beta"].any()
+    assert columns["pair.changing"].any()
 
 
 #: Pair and rates of a mode, and joints that may move
@@ -125,6 +132,7 @@ CHILD = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from wbc.cli.app import app
+from wbc.log import load
 app()
 """
 
@@ -134,7 +142,7 @@ def test_an_interrupted_drive_writes_its_log(tmp_path: Path) -> None:
     orders, log = tmp_path / "orders.csv", tmp_path / "log.csv"
     orders.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,,0.01\n1000\n")
     given = ("--rates", orders, "--at", "0.3,0.5,-0.7,1.1", "--realtime", "--log", log, "--backend", "vm")
-    command = [sys.executable, "-c", CHILD, "drive", "spherical_4r", *map(str, given)]
+    command = [sys.executable, "-c", CHILD, "coordinates", "drive", "spherical_4r", *map(str, given)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stderr is not None

@@ -1,4 +1,4 @@
-"""What shells and programs ask of the command line: completion, JSON, 80 columns, and quiet ends."""
+"""What shells and programs ask of the command line: completion, JSON, and quiet ends."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def run(*arguments: str) -> str:
 def test_results_as_json() -> None:
     table = json.loads(run("robots", "panda", "--json"))
     assert "panda" in {row["name"] for row in table}
-    panda = json.loads(run("robot", "panda", "--json"))
+    panda = json.loads(run("robots", "show", "panda", "--json"))
     assert (panda["nv"], panda["roles"]["tip"], len(panda["limits"]["velocity"])) == (7, "panda_hand_tcp", 7)
     assert panda["limits"]["acceleration"][0] == 15.0
     # JSON has no infinity
-    assert json.loads(run("robot", "so100", "--json"))["limits"]["acceleration"][0] is None
-    modes = json.loads(run("modes", "spherical_4r", "--json"))
+    assert json.loads(run("robots", "show", "so100", "--json"))["limits"]["acceleration"][0] is None
+    modes = json.loads(run("coordinates", "modes", "spherical_4r", "--json"))
     assert modes["M4"]["pairs"]
     assert "missing" in modes["M6"]
     reached, missed = ["--target", "0.4,0.2,0.5"], ["--target", "3,0,0"]
@@ -48,7 +48,7 @@ def test_results_as_json() -> None:
 
 def test_commands_print_only_where_data_is_kept() -> None:
     """What every command says goes through :mod:`wbc.cli.console`, so that ``--json`` has it."""
-    own = {"app.py", "console.py", "results.py"}
+    own = {"app.py", "console.py"}
     folder = Path(completion.__file__).parent
     found = [
         f"{path.name}: {line.strip()}"
@@ -59,7 +59,8 @@ def test_commands_print_only_where_data_is_kept() -> None:
     ]
     assert found == []
     for name, entry in COMMANDS.items():
-        assert entry.in_clone or any("--json" in option.opts for option in command(name).params), name
+        for mode in entry.modes:
+            assert entry.in_clone or any("--json" in option.opts for option in command(name, mode).params), name
 
 
 def test_the_shell_completes_robots_files_and_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,19 +77,15 @@ def test_the_shell_completes_robots_files_and_frames(tmp_path: Path, monkeypatch
     done = subprocess.run(WBC, env={**os.environ, **words}, capture_output=True, text=True, check=False)
     assert {"panda_hand", "panda_hand_tcp"} <= set(done.stdout.split()), done.stderr
     assert all(word.startswith("panda_h") for word in done.stdout.split())
-
-
-def test_help_fits_in_80_columns_and_has_no_colours_in_a_pipe() -> None:
-    done = subprocess.run(
-        [*WBC, "--help"], env={**os.environ, "COLUMNS": "80"}, capture_output=True, text=True, check=False
-    )
-    assert max(len(line) for line in done.stdout.splitlines()) <= 80
-    assert "\x1b" not in done.stdout
+    for line, found in (("wbc walk dr", {"drive"}), ("wbc robots sh", {"show"}), ("wbc walk drive --pl", {"--plant"})):
+        words |= {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+        done = CliRunner(env=words).invoke(app, prog_name="wbc", complete_var="_WBC_COMPLETE")
+        assert set(done.stdout.split()) == found, done.stderr
 
 
 def test_what_needs_a_clone_is_hidden_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     hidden = {name for name, entry in COMMANDS.items() if entry.in_clone}
-    assert hidden == {"bench", "docs"}
+    assert hidden == {"docs"}
     assert not {name for name, one in CommandGroup().commands.items() if one.hidden}
     monkeypatch.setattr(Path, "is_file", lambda _: False)
     assert {name for name, one in CommandGroup().commands.items() if one.hidden} == hidden
@@ -103,7 +100,9 @@ def processor_time(process: int) -> float:
 @pytest.mark.parametrize("wait", [0.5, 1.0])
 def test_ctrl_c_while_a_command_starts_is_quiet(wait: float) -> None:
     """After so many seconds of its processor time, whatever else the machine does."""
-    process = subprocess.Popen([*WBC, "robot", "talos"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [*WBC, "robots", "show", "talos"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     while process.poll() is None and processor_time(process.pid) < wait:
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)

@@ -19,7 +19,7 @@ POINTS = f"0 180 0 0 0 90 0\n10\n{LINE}\n"
 
 
 def test_a_published_run_has_printed_norms_beside(tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
+    done = RUN.invoke(app, ["published", "ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
     assert done.exit_code == 0
     assert "0.103820" in done.output
     assert "0.311383  0.3113" in done.output
@@ -29,7 +29,7 @@ def test_a_published_run_has_printed_norms_beside(tmp_path: Path) -> None:
     with (tmp_path / "norms.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == 195
     assert (tmp_path / "norms.png").stat().st_size > 5000
-    again = RUN.invoke(app, ["ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
+    again = RUN.invoke(app, ["published", "ikor", "--case", "1", "--config", "3x7", "--out", str(tmp_path)])
     assert again.exit_code == 2
     assert "--force" in again.output
 
@@ -40,7 +40,9 @@ def test_a_run_from_files(resolver: str, tmp_path: Path) -> None:
     points.write_text(POINTS)
     spheres.write_text("-0.5 -0.356 0.55 0.08\n0 0 0 0\n")
     files = ["--trajectory", str(points), "--spheres", str(spheres), "--out", str(out)]
-    done = RUN.invoke(app, ["ikor", *files, "--method", "3", "--resolver", resolver, "--ahead", "--margin", "0.002"])
+    done = RUN.invoke(
+        app, ["published", "ikor-run", *files, "--method", "3", "--resolver", resolver, "--ahead", "--margin", "0.002"]
+    )
     assert done.exit_code == 0, done.output
     figures = json.loads((out / "summary.json").read_text())
     assert (figures["stop"], figures["steps"]) == ("all points done", 10)
@@ -49,17 +51,17 @@ def test_a_run_from_files(resolver: str, tmp_path: Path) -> None:
 
 
 def test_a_line_and_a_jacobian(tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["ikor", "--line", "-0.8,-0.356,0.6", "--out", str(tmp_path / "run")])
+    done = RUN.invoke(app, ["published", "ikor-run", "--line", "-0.8,-0.356,0.6", "--out", str(tmp_path / "run")])
     assert done.exit_code == 0, done.output
     assert len((tmp_path / "run" / "CheezyAngles").read_text().splitlines()) == 10
     data = tmp_path / "FSP_data"
     data.write_text("2 3\n1 0 0\n0 1 1\n0.5\n0.25\n")
-    done = RUN.invoke(app, ["ikor", "--jacobian", str(data)])
+    done = RUN.invoke(app, ["published", "ikor-space", str(data)])
     assert done.exit_code == 0
     assert "blocked: rank 2, 2 vectors" in done.output
     assert "0.50000000   0.12500000   0.12500000" in done.output
     data.write_text("2 3\n1 0 0\n0 1\n0.5\n0.25\n")
-    assert "FSP_data:3" in RUN.invoke(app, ["ikor", "--jacobian", str(data)]).output
+    assert "FSP_data:3" in RUN.invoke(app, ["published", "ikor-space", str(data)]).output
 
 
 def test_a_planar_arm_goes_round_a_polygon_on_an_arc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,7 +81,7 @@ def test_a_planar_arm_goes_round_a_polygon_on_an_arc(tmp_path: Path, monkeypatch
         "--margin",
         "0.01",
     ]
-    done = RUN.invoke(app, ["ikor", *way, *files])
+    done = RUN.invoke(app, ["published", "ikor-run", *way, *files])
     assert done.exit_code == 0, done.output
     figures = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (figures["stop"], 0.01 < figures["clearance"] < 0.2) == ("all points done", True)
@@ -95,8 +97,8 @@ def test_a_line_between_poses_by_weights_and_a_criterion(tmp_path: Path) -> None
         "heavy": ["--weights", "1,1,1,9,1,1,1"],
         "calm": ["--criterion", "acceleration"],
     }.items():
-        ends = ["--from", "-0.7,-0.3,0.5", "--line", "-0.8,-0.2,0.6,30,10,0", *more]
-        done = RUN.invoke(app, ["ikor", *ends, "--rows", "x,y,z", "--out", str(tmp_path / name)])
+        ends = ["--start", "-0.7,-0.3,0.5", "--line", "-0.8,-0.2,0.6,30,10,0", *more]
+        done = RUN.invoke(app, ["published", "ikor-run", *ends, "--rows", "x,y,z", "--out", str(tmp_path / name)])
         assert done.exit_code == 0, done.output
         runs[name] = np.loadtxt(tmp_path / name / "CheezyAngles")
     same = [run[0] for run in runs.values()]
@@ -111,7 +113,7 @@ def test_switches_and_a_course_beyond_the_published_length(tmp_path: Path) -> No
     points, out = tmp_path / "TrajectoryPts", tmp_path / "run"
     rows = "\n".join(f"{-1.49 + 1e-4 * k} -0.356 {0.935 - 1e-4 * k}" for k in range(1, 1101))
     points.write_text(f"0 180 0 0 0 90 0 0 0 0\n1100\n{rows}\n")
-    way = ["ikor", "--base", "holonomic", "--trajectory", str(points)]
+    way = ["published", "ikor-run", "--base", "holonomic", "--trajectory", str(points)]
     done = RUN.invoke(app, [*way, "--out", str(tmp_path / "short")])
     assert done.exit_code == 1
     assert "100 points left out" in done.output
@@ -128,12 +130,14 @@ def test_an_operators_rates_and_a_film(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(film, "MOST", 2)
     rates, out = tmp_path / "rates.csv", tmp_path / "run"
     rates.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,tool,0.05\n0.1,base,0,0,0,0.1\n0.2,\n")
-    done = RUN.invoke(app, ["ikor", "--rates", str(rates), "--base", "holonomic", "--film", "gif", "--out", str(out)])
+    done = RUN.invoke(
+        app, ["published", "ikor-run", "--rates", str(rates), "--base", "holonomic", "--film", "gif", "--out", str(out)]
+    )
     assert done.exit_code == 0, done.output
     assert len((out / "CheezyAngles").read_text().splitlines()) == 11
     assert (out / "film.gif").stat().st_size > 5000
     rates.write_text("time,pair,r1,r2,r3,r4,r5,r6\n0,arm,0.05\n1,\n")
-    done = RUN.invoke(app, ["ikor", "--rates", str(rates), "--out", str(tmp_path / "other")])
+    done = RUN.invoke(app, ["published", "ikor-run", "--rates", str(rates), "--out", str(tmp_path / "other")])
     assert done.exit_code == 2
     assert "arm" in done.output
     assert "tool" in done.output
@@ -142,7 +146,7 @@ def test_an_operators_rates_and_a_film(tmp_path: Path, monkeypatch: pytest.Monke
 def test_a_published_run_with_what_was_not_published(tmp_path: Path) -> None:
     spheres = tmp_path / "sphere_data"
     spheres.write_text("-0.5 -0.356 0.55 0.08\n")
-    arguments = ["ikor", "--case", "1", "--config", "3x7", "--consistent", "--step-limit", "0.2"]
+    arguments = ["published", "ikor", "--case", "1", "--config", "3x7", "--consistent", "--step-limit", "0.2"]
     done = RUN.invoke(app, [*arguments, "--spheres", str(spheres), "--method", "2", "--out", str(tmp_path / "run")])
     assert done.exit_code == 0, done.output
     with (tmp_path / "run" / "norms.csv").open() as stream:
@@ -154,7 +158,7 @@ def test_a_published_run_with_what_was_not_published(tmp_path: Path) -> None:
 def test_a_bad_line_is_named(tmp_path: Path) -> None:
     points = tmp_path / "TrajectoryPts"
     points.write_text(POINTS.replace("10\n", "10\n-0.88 O.1 0.6\n", 1))
-    done = RUN.invoke(app, ["ikor", "--trajectory", str(points), "--out", str(tmp_path / "run")])
+    done = RUN.invoke(app, ["published", "ikor-run", "--trajectory", str(points), "--out", str(tmp_path / "run")])
     assert done.exit_code == 2
     assert "TrajectoryPts:3" in done.output
     assert "O.1" in done.output
@@ -164,17 +168,8 @@ def test_a_bad_line_is_named(tmp_path: Path) -> None:
 def test_a_run_that_ends_early_says_why(tmp_path: Path) -> None:
     points = tmp_path / "TrajectoryPts"
     points.write_text("0 0 0 0\n1\n2.0 0 0\n")
-    arguments = [
-        "ikor",
-        "--robot",
-        "planar",
-        "--rows",
-        "x,y",
-        "--trajectory",
-        str(points),
-        "--out",
-        str(tmp_path / "run"),
-    ]
+    way = ["--trajectory", str(points), "--out", str(tmp_path / "run")]
+    arguments = ["published", "ikor-run", "--robot", "planar", "--rows", "x,y", *way]
     done = RUN.invoke(app, arguments)
     assert done.exit_code == 1
     assert "the task contradicts itself" in done.output
@@ -182,23 +177,8 @@ def test_a_run_that_ends_early_says_why(tmp_path: Path) -> None:
 
 def test_explore_panda(tmp_path: Path) -> None:
     at = "0.3,0.2,0.1,-1.8,0.2,1.9,0.4"
-    done = RUN.invoke(
-        app,
-        [
-            "explore",
-            "panda",
-            "--at",
-            at,
-            "--seeds",
-            "0",
-            "--to",
-            "0.5,0.3,0.5",
-            "--points",
-            "8",
-            "--out",
-            str(tmp_path),
-        ],
-    )
+    way = ["--seeds", "0", "--to", "0.5,0.3,0.5", "--points", "8", "--out", str(tmp_path)]
+    done = RUN.invoke(app, ["ik", "explore", "panda", "--start", at, *way])
     assert done.exit_code == 0, done.output
     assert "rank 6, 1 self-motions" in done.output
     figures = json.loads((tmp_path / "summary.json").read_text())
@@ -209,11 +189,11 @@ def test_explore_panda(tmp_path: Path) -> None:
     assert (tmp_path / "self_motion.png").stat().st_size > 5000
     assert (tmp_path / "law.npz").exists()
     kept = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    again = RUN.invoke(app, ["explore", "panda", "--at", at, "--seeds", "0", "--out", str(tmp_path)])
+    again = RUN.invoke(app, ["ik", "explore", "panda", "--start", at, "--seeds", "0", "--out", str(tmp_path)])
     assert (again.exit_code, "--force" in again.output) == (2, True)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == kept
     # Forced, nothing is left of the run before
-    done = RUN.invoke(app, ["explore", "panda", "--at", at, "--seeds", "0", "--out", str(tmp_path), "--force"])
+    done = RUN.invoke(app, ["ik", "explore", "panda", "--start", at, "--seeds", "0", "--out", str(tmp_path), "--force"])
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in tmp_path.iterdir()) == ["self_motion.npz", "self_motion.png", "summary.json"]
 
@@ -221,30 +201,27 @@ def test_explore_panda(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["explore", "pnda"], "panda"),
-        (["explore", "panda", "--kind", "place"], "position"),
-        (["explore", "panda", "--rates", "1,2"], "shape"),
-        (["explore", "panda", "--rates", "1,x"], "numbers"),
-        (["ikor", "--case", "4"], "valid: 1, 2, 3"),
-        (["ikor", "--line", "1,2"], "X,Y,Z"),
-        (["ikor", "--case", "1", "--line", "1,2,3"], "not several"),
-        (["ikor", "--config", "3x7", "--line", "1,2,3"], "not several"),
-        (["ikor", "--case", "1", "--base", "car"], "belong to a trajectory"),
-        (["ikor", "--line", "-0.8,-0.3,0.6", "--film", "mov"], "gif"),
-        (["ikor", "--case", "1", "--resolver", "stack"], "consistent"),
-        (["ikor", "--case", "1", "--weights", "1"], "belong to a trajectory"),
-        (["ikor", "--from", "1,2,3"], "expected a line"),
-        (["ikor", "--line", "1,2,3", "--from", "1,2"], "X,Y,Z"),
-        (["ikor", "--arc", "1,2"], "X,Y,DEGREES"),
-        (["ikor", "--line", "1,2,3", "--weights", "1,2"], "shape (7,)"),
-        (["ikor", "--line", "1,2,3", "--weights", "1,1,1,0,1,1,1"], "above 0"),
-        (["ikor", "--line", "1,2,3", "--criterion", "torqe"], "torque"),
-        (["ikor", "--line", "1,2,3", "--switch", "4"], "POINT:"),
-        (["ikor", "--line", "1,2,3", "--switch", "4:base=off"], "platform"),
-        (["ikor", "--line", "1,2,3", "--switch", "4:platform=of"], "off"),
-        (["explore", "panda", "--to", "1,2"], "X,Y,Z"),
-        (["ikor", "--trajectory", "no_such_file"], "no_such_file"),
-        (["ikor", "--robot", "hermes", "--trajectory", "x"], "hermes"),
+        (["ik", "explore", "pnda"], "panda"),
+        (["ik", "explore", "panda", "--kind", "place"], "position"),
+        (["ik", "explore", "panda", "--rates", "1,2"], "shape"),
+        (["ik", "explore", "panda", "--rates", "1,x"], "numbers"),
+        (["published", "ikor", "--case", "4"], "valid: 1, 2, 3"),
+        (["published", "ikor-run", "--line", "1,2"], "X,Y,Z"),
+        (["published", "ikor-run", "--arc", "0,0,9", "--line", "1,2,3"], "expected one of"),
+        (["published", "ikor-run", "--line", "-0.8,-0.3,0.6", "--film", "mov"], "gif"),
+        (["published", "ikor", "--case", "1", "--resolver", "stack"], "consistent"),
+        (["published", "ikor-run", "--start", "1,2,3"], "expected one of"),
+        (["published", "ikor-run", "--line", "1,2,3", "--start", "1,2"], "X,Y,Z"),
+        (["published", "ikor-run", "--arc", "1,2"], "X,Y,DEGREES"),
+        (["published", "ikor-run", "--line", "1,2,3", "--weights", "1,2"], "shape (7,)"),
+        (["published", "ikor-run", "--line", "1,2,3", "--weights", "1,1,1,0,1,1,1"], "above 0"),
+        (["published", "ikor-run", "--line", "1,2,3", "--criterion", "torqe"], "torque"),
+        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4"], "POINT:"),
+        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4:base=off"], "platform"),
+        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4:platform=of"], "off"),
+        (["ik", "explore", "panda", "--to", "1,2"], "X,Y,Z"),
+        (["published", "ikor-run", "--trajectory", "no_such_file"], "no_such_file"),
+        (["published", "ikor-run", "--robot", "hermes", "--trajectory", "x"], "hermes"),
     ],
 )
 def test_refused(arguments: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

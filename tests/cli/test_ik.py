@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import csv
+import functools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 import wbc
-from wbc.cli.app import app
+from tests.cli.test_commands import run as wbc_command
 
 DOWN = "0.4,0.2,0.5,1,0,0,0"
 GOAL = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.4, 0.2, 0.5]))
 
-
-def run(*arguments: str | Path) -> tuple[int, str, str]:
-    """(exit code, standard output, standard error) of ``wbc ik ARGUMENTS``."""
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["ik", *map(str, arguments)])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.exit_code, result.stdout, result.stderr
+run = functools.partial(wbc_command, "ik")
 
 
 def place(name: str, q: Any, frame: str) -> pin.SE3:
@@ -37,14 +31,6 @@ def printed(out: str, label: str) -> list[float]:
     """The configuration that a line of the output has."""
     line = next(line for line in out.splitlines() if line.startswith(f"q {label} "))
     return [float(x) for x in line.split()[2].split(",")]
-
-
-def test_help_has_an_example() -> None:
-    code, out, _ = run("--help")
-    assert code == 0
-    assert "wbc ik ur5 --target" in out
-    for option in ("--targets", "--branches", "--seed", "--budget", "--out", "--sphere", "--floor", "--frame"):
-        assert option in out
 
 
 def test_a_pose_is_reached() -> None:

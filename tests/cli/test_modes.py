@@ -1,20 +1,15 @@
-"""``wbc modes`` as a user types it."""
+"""``wbc coordinates`` as a user types it."""
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
-from typer.testing import CliRunner
-
-from wbc.cli.app import app
+from tests.cli.test_commands import run as wbc_command
 
 PAGE = Path(__file__).parents[2] / "docs" / "coordinates.md"
 
-
-def run(*arguments: str) -> tuple[int, str, str]:
-    """(exit code, standard output, standard error) of ``wbc modes ARGUMENTS``."""
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["modes", *arguments])
-    return result.exit_code, result.stdout, result.stderr
+run = functools.partial(wbc_command, "coordinates")
 
 
 def test_table_of_all_arms() -> None:
@@ -25,7 +20,7 @@ def test_table_of_all_arms() -> None:
 
 
 def test_one_arm() -> None:
-    code, out, _ = run("spdm")
+    code, out, _ = run("modes", "spdm")
     assert code == 0
     assert "M6 two arms: arm1_xi | the rest" in out
     assert "M7 carrier with held hands: no carrier" in out
@@ -38,4 +33,4 @@ def test_the_page_has_the_table() -> None:
 
 
 def test_unknown_arm() -> None:
-    assert run("srms")[0] == 2
+    assert run("modes", "srms")[0] == 2

@@ -17,21 +17,21 @@ from wbc.walking.checker.report import Finding, Report
 #: Run one after the other in one folder; those of walks, films, loops and long searches have tests of their own
 COMMANDS_RUN = (
     "robots",
-    "robot panda",
-    "robot ur5 --collisions --samples 20",
-    "modes",
-    "modes spherical_4r",
-    "advise spherical_4r --at 0.3,1.5,-0.7,1.1",
-    "analyse spherical_4r --set alpha",
-    "relative-motion --table 4.6 --out relative",
-    "ikor --case 1 --config 3x7 --out ikor",
+    "robots show panda",
+    "robots pairs ur5 --samples 20",
+    "coordinates",
+    "coordinates modes spherical_4r",
+    "coordinates advise spherical_4r --at 0.3,1.5,-0.7,1.1",
+    "coordinates analyse spherical_4r --set alpha",
+    "published relative-motion --table 4.6 --out relative",
+    "published ikor --case 1 --config 3x7 --out ikor",
     "ik ur5 --target 0.4,0.2,0.5 --target 3,0,0 --backend vm --budget 10 --restarts 2",
-    "explore panda --seeds 0 --out explore",
+    "ik explore panda --seeds 0 --out explore",
     "track ur5 --duration 0.05 --rate 100 --backend vm --no-plots --out track",
     "replay track",
-    "drive spherical_4r --rates rates.csv --backend vm",
+    "coordinates drive spherical_4r --rates rates.csv --backend vm",
     "study manipulability.yaml --out study",
-    "export ur5 --output export --backend vm",
+    "export ur5 --out export --backend vm",
 )
 STUDY = "scenario: manipulability\nparameters: {robot: ur5, samples: 3}\n"
 
@@ -61,12 +61,14 @@ def test_a_terminal_gets_80_columns_and_a_program_json(
     # What is copied, such as a path or joint positions, stays one word
     wide = [row for row in text.splitlines() if len(row) > 80 and len(row.split()) > 1]
     assert wide == []
-    other = line.replace("--out ", "--out json_").replace("--output ", "--output json_")
+    other = line.replace("--out ", "--out json_")
     out, _ = printed(f"{other} --json")
     assert json.loads(out)
 
 
-@pytest.mark.parametrize("line", [*(f"{name} --help" for name in COMMANDS), "robots", "robot panda"])
+@pytest.mark.parametrize(
+    "line", [*(f"{name} {mode} --help" for name, entry in COMMANDS.items() for mode in entry.modes), "--help", "robots"]
+)
 def test_a_pipe_gets_no_colours(line: str) -> None:
     out, err = printed(line)
     assert "\x1b" not in out + err
@@ -77,7 +79,7 @@ def test_a_pipe_gets_no_colours(line: str) -> None:
 
 
 def test_lines_stay_whole_in_a_pipe() -> None:
-    out, _ = printed("robot walker")
+    out, _ = printed("robots show walker")
     assert "limit" in next(row for row in out.splitlines() if row.startswith("acceleration:"))
     assert max(map(len, out.splitlines())) > 80
 

@@ -1,4 +1,4 @@
-"""``wbc relative-motion``: what it prints, writes and refuses."""
+"""``wbc published relative-motion``: what it prints, writes and refuses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RUN = CliRunner(env={"COLUMNS": "200"})
 
 
 def test_a_table_row_by_row(tmp_path: Path) -> None:
-    words = ["relative-motion", "--table", "4.6", "--solves", "8", "--out", str(tmp_path)]
+    words = ["published", "relative-motion", "--table", "4.6", "--solves", "8", "--out", str(tmp_path)]
     done = RUN.invoke(app, words)
     assert done.exit_code == 0, done.output
     last = done.output.splitlines()[5].split()
@@ -30,7 +30,7 @@ def test_a_table_row_by_row(tmp_path: Path) -> None:
     again = RUN.invoke(app, words)
     assert again.exit_code == 2
     assert "--force" in again.output
-    bad = RUN.invoke(app, ["relative-motion", "--table", "4.2"])
+    bad = RUN.invoke(app, ["published", "relative-motion", "--table", "4.2"])
     assert bad.exit_code == 2
     assert "valid: 4.3" in bad.output
 
@@ -44,7 +44,7 @@ def test_a_table_row_by_row(tmp_path: Path) -> None:
     ],
 )
 def test_parts_of_the_system(words: tuple[str, ...], shown: list[str], tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["relative-motion", *words, "--out", str(tmp_path)])
+    done = RUN.invoke(app, ["published", "relative-motion", *words, "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert all(text in done.output for text in shown)
     with (tmp_path / f"{words[0]}.csv").open() as stream:
@@ -56,14 +56,14 @@ def test_parts_of_the_system(words: tuple[str, ...], shown: list[str], tmp_path:
     ("words", "named"),
     [
         (("meassuring",), "did you mean 'measuring'"),
-        (("measuring", "--angles", "1,2"), "four numbers"),
+        (("measuring", "--angles", "1,2"), "4 numbers"),
         (("master-slave", "--backlash", "-1"), "backlash"),
         (("master-slave", "--carried", "0.5"), "B: expected"),
         (("holding", "--period", "0"), "period"),
     ],
 )
 def test_bad_words_are_named(words: tuple[str, ...], named: str, tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["relative-motion", *words, "--out", str(tmp_path / "run")])
+    done = RUN.invoke(app, ["published", "relative-motion", *words, "--out", str(tmp_path / "run")])
     assert done.exit_code == 2
     assert named in done.output
     assert not (tmp_path / "run" / "summary.json").exists()

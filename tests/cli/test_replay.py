@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.cli.test_commands import FAST, run
+from tests.record.test_recording import write
 from tests.stack import small
 from wbc import Recording, track
 from wbc.cli import session
-from wbc.record.recording import Writer
+from wbc.log import FileWriter
 from wbc.tasks import Expression
 
 
@@ -21,7 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a moving ball, a floor, and a swinging elbow."""
     place = tmp_path_factory.mktemp("run")
     ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
-    assert run("track", "panda", *FAST, *ball, "--output", place)[0] == 0
+    assert run("track", "panda", *FAST, *ball, "--out", place)[0] == 0
     return place
 
 
@@ -41,9 +42,7 @@ def test_a_difference_is_named_and_exits_with_1(folder: Path, tmp_path: Path) ->
     made = Recording(folder / "ticks.npz")
     rows = np.concatenate(list(made.chunks()))
     rows[7, made.parts["v"].start + 2] += 0.125
-    writer = Writer(tmp_path / "changed.npz", made.about, made.stack_pickle, False)
-    writer.write(rows.tobytes())
-    writer.close()
+    write(tmp_path / "changed.npz", made, rows)
     code, out, _ = run("replay", tmp_path / "changed.npz")
     assert code == 1
     assert "1 of 25 ticks differ; the first is tick 7, by 0.125" in out
@@ -67,7 +66,7 @@ def test_a_run_that_ends_early_or_is_killed(folder: Path, tmp_path: Path, monkey
         return real(plan, progress, lambda: next(ticks, None) is None, compiled, plant=plant)
 
     monkeypatch.setattr(session, "track", short)
-    assert run("track", *FAST, "--output", tmp_path)[0] == 130
+    assert run("track", *FAST, "--out", tmp_path)[0] == 130
     code, out, err = run("replay", tmp_path)
     assert (code, err) == (0, "")
     assert "9 ticks: every command is bit-identical" in out
@@ -78,15 +77,15 @@ def test_a_run_that_ends_early_or_is_killed(folder: Path, tmp_path: Path, monkey
 
 
 def test_a_run_without_a_recording(tmp_path: Path) -> None:
-    assert run("track", *FAST, "--no-record", "--output", tmp_path)[0] == 0
+    assert run("track", *FAST, "--no-record", "--out", tmp_path)[0] == 0
     assert {p.name for p in tmp_path.iterdir()} == {"log.parquet", "summary.json", "report.html"}
     code, out, err = run("replay", tmp_path)
     assert (code, out) == (2, "")
     assert err.startswith("error: recording: cannot be read: No such file")
     # an older recording does not stay beside a new run
-    assert run("track", *FAST, "--force", "--output", tmp_path)[0] == 0
+    assert run("track", *FAST, "--force", "--out", tmp_path)[0] == 0
     assert (tmp_path / "ticks.npz").is_file()
-    assert run("track", *FAST, "--force", "--no-record", "--output", tmp_path)[0] == 0
+    assert run("track", *FAST, "--force", "--no-record", "--out", tmp_path)[0] == 0
     assert not (tmp_path / "ticks.npz").exists()
 
 
@@ -94,8 +93,8 @@ def test_a_full_disk_costs_the_recording_and_not_the_run(tmp_path: Path, monkeyp
     def full(*arguments: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Writer, "write", full)
-    assert run("track", *FAST, "--output", tmp_path)[0] == 0
+    monkeypatch.setattr(FileWriter, "write", full)
+    assert run("track", *FAST, "--out", tmp_path)[0] == 0
     assert len(track.load(tmp_path)) == 25
     assert len(Recording(tmp_path / "ticks.npz")["q"]) == 0
 

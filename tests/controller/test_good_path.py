@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tests.repeats import ALL, MORE
+
 PROGRAM = """
 import sys
 from tests.stack import small
@@ -25,7 +27,7 @@ assert "wbc.explain.losses" in sys.modules
 """
 
 
-@pytest.mark.parametrize("backend", ["vm", "native"])
+@pytest.mark.parametrize("backend", ["vm", "native"] if MORE >= ALL else ["native"])
 def test_nothing_of_it_is_even_loaded(backend: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(backend=backend)], capture_output=True, text=True, check=True

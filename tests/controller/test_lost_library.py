@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.soak.faults import corrupt, delete
+from tests.soak.faults import corrupt, delete
 from tests.stack import small
 from wbc.controller import core_of
 from wbc.native.library import load_library

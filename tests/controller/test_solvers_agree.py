@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.qp.reference import reference
 from tests.backends import IN_PYTHON
 from tests.controller.stacks import aim, controller, inside
+from tests.judges.exact_qp import reference
 from tests.qp.problems import quadprog_solution
+from tests.repeats import covering
 from wbc.api import Controller
 from wbc.controller import Status, core_of
 from wbc.qp import QPSolution
@@ -31,8 +32,7 @@ def every(builder: tuple[Any, ...]) -> dict[str, Controller]:
     return out | {"native osqp": controller(*builder, backend="native", solver="osqp")}
 
 
-@pytest.mark.parametrize("weight", WEIGHTS)
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize(("name", "weight"), covering(SETS, WEIGHTS))
 def test_solvers_agree_and_know_their_error(name: str, weight: float) -> None:
     builder, count, speed = SETS[name]
     controllers, rng = every(builder), np.random.default_rng(round(1 / weight))

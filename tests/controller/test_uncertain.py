@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
 
-from bench.soak import machines, stacks
-from bench.soak.levels import with_levels
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
+from tests.soak import machines, stacks
+from tests.soak.levels import with_levels
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
 from wbc.qp.polish import polish

@@ -10,7 +10,7 @@ import pytest
 from tests.published.arm_machine import STATE, Machine
 from wbc.coordinates import Coordinate, CoordinatePair, PairController, expressions, mode_pairs, parts
 from wbc.coordinates.control.conditioning import Conditioning
-from wbc.coordinates.control.easing import STATES, Easing
+from wbc.coordinates.control.easing import EASED_STATES, Easing
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.samples import states_of
 from wbc.robots import DHRow, from_dh
@@ -139,7 +139,7 @@ def test_thresholds_of_easing_are_parts_of_what_is_usual() -> None:
         found.append([control._easing.threshold(pair.name) for pair in pairs])
         for pair, least in zip(pairs, found[-1], strict=True):
             sigma = Conditioning(robot, [pair.rows], backend="vm").sigmas
-            usual = np.median([sigma(q)[0] for q in states_of(robot, STATES)])
+            usual = np.median([sigma(q)[0] for q in states_of(robot, EASED_STATES)])
             assert least == pytest.approx(min(0.01, 0.1 * usual), rel=1e-9)
     assert found[0] == pytest.approx(found[1], rel=1e-9)
     assert min(found[0]) < 0.01

@@ -157,7 +157,7 @@ def test_three_points_stand_for_a_pose() -> None:
         pose = BodyRows("tip", expressed=expressed)
         kin = Tracer(Kinematics(ROBOT.model))
         task = FollowRows(pose, metric=d)
-        spread = ca.Function("spread", [kin.q], [kin.expand(task.spread(kin))])(STATES[0]).full()
+        spread = ca.Function("spread", [kin.q], [kin.expand(task.spread(ROBOT, kin))])(STATES[0]).full()
         assert [row.label for row in task.rows(ROBOT)][:4] == ["xx", "xy", "xz", "yx"]
         own = np.block([[3 * np.eye(3), -d * pin.skew(one)], [d * pin.skew(one), 2 * d * d * np.eye(3)]])
         data = ROBOT.model.createData()

@@ -141,6 +141,8 @@ def test_an_ankle_keeps_its_loops() -> None:
     text = output("closed_loops")
     assert number("at most # degrees off", text) < 3.0
     assert number("loops open by at most # m", text) < 1e-9
+    # 5 N m about the ankle by two rods 0.05 m behind it
+    assert number("rods bear left # N", text) == pytest.approx(50.0, abs=15.0)
     check_picture(text)
 
 

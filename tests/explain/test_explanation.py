@@ -18,7 +18,7 @@ from tests.torque.problems import controller
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
 from wbc.errors import SolverError
-from wbc.explain.explanation import Bound, Contradiction, Give, Price, by_item, by_task
+from wbc.explain.explanation import Contradiction, ExplainedBound, Give, Price, by_item, by_task
 from wbc.explain.naming import Naming
 from wbc.explain.past import past_of
 from wbc.shapes import Sphere
@@ -203,7 +203,7 @@ def test_a_step_from_a_pickle_tells_everything_else(tick: Controller) -> None:
 
 
 def test_a_large_contradiction_names_its_largest_members_and_counts_the_rest() -> None:
-    bounds = tuple(Bound(f"item {k % 8}", f"row {k}", "upper", float(k), "rad/s") for k in range(40))
+    bounds = tuple(ExplainedBound(f"item {k % 8}", f"row {k}", "upper", float(k), "rad/s") for k in range(40))
     gives = tuple(Give(b, 1.0 + k) for k, b in enumerate(bounds))
     shares = tuple(1.0 / (1.0 + k) for k in range(40))
     text = str(Contradiction(bounds, gives, True, gives[0], shares))
@@ -232,8 +232,10 @@ def test_wrenches_among_what_binds_have_names() -> None:
 
 def test_many_bounds_are_told_by_item_and_many_prices_by_task() -> None:
     """A humanoid's torque tick has dozens of each: every bound is named once, of the prices the highest of a kind."""
-    bounds = tuple(Bound("foot", row, "equal", 0.0, unit) for unit, row in (("m/s^2", "x"), ("m/s^2", "y"), ("N", "z")))
-    motor = Bound("motors", "knee", "upper", 17.0, "N m")
+    bounds = tuple(
+        ExplainedBound("foot", row, "equal", 0.0, unit) for unit, row in (("m/s^2", "x"), ("m/s^2", "y"), ("N", "z"))
+    )
+    motor = ExplainedBound("motors", "knee", "upper", 17.0, "N m")
     assert by_item((*bounds, motor)) == "foot (x, y exactly 0 m/s^2; z exactly 0 N), motors (knee at most 17 N m)"
     prices = [Price(b, "hand", cost, "m/s^2") for b, cost in zip((*bounds, motor), (1.0, -2.0, 3.0, 4.0), strict=True)]
     told = (

@@ -23,13 +23,13 @@ def wbc(*arguments: str | Path) -> tuple[int, str]:
 def test_help_names_the_options() -> None:
     code, said = wbc("--help")
     assert code == 0
-    for option in ("--output", "--sphere", "--solver-source", "--solver-archive", "--iteration-cap", "--force"):
+    for option in ("--out", "--sphere", "--solver-source", "--solver-archive", "--iteration-cap", "--force"):
         assert option in said
 
 
 def test_the_example_closes_the_loop(tmp_path: Path) -> None:
     folder = tmp_path / "panda_tick"
-    code, said = wbc("panda", "--output", folder, "--states", "50")
+    code, said = wbc("panda", "--out", folder, "--states", "50")
     assert code == 0
     assert f"{folder}: panda, 7 degrees of freedom" in said
     build(folder)
@@ -46,7 +46,7 @@ def test_the_example_closes_the_loop(tmp_path: Path) -> None:
 def test_obstacles_and_the_cap_arrive(tmp_path: Path) -> None:
     places = ["--sphere", "0.4,0.2,0.3,0.1", "--sphere", "0.2,-0.5,0.4,0.1,0.1,0,0"]
     code, said = wbc(
-        "ur5", "--output", tmp_path / "out", *places, "--iteration-cap", "4", "--states", "20", "--backend", "native"
+        "ur5", "--out", tmp_path / "out", *places, "--iteration-cap", "4", "--states", "20", "--backend", "native"
     )
     assert code == 0, said
     values = (tmp_path / "out" / "values.h").read_text()
@@ -66,7 +66,7 @@ def test_obstacles_and_the_cap_arrive(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], wanted: str, tmp_path: Path) -> None:
-    code, said = wbc(*arguments, "--output", tmp_path / "out")
+    code, said = wbc(*arguments, "--out", tmp_path / "out")
     assert code == 2
     assert wanted in said
     assert not (tmp_path / "out").exists()

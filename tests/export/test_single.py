@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from bench.measured import cortex_m7
-from bench.single import (
+from tests.export.cases import panda
+from tests.export.single import (
     SINGLE,
     UNOPTIMISED,
     MissingProgramError,
@@ -24,7 +25,6 @@ from bench.single import (
     random_cases,
     ticks_here,
 )
-from tests.export.cases import panda
 from wbc.export.exporting import vectors
 from wbc.tick.outcome import STATUSES, Status
 

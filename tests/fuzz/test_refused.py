@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import wbc
-from bench.soak.arm import BOUNDS, ONE, TIP, Q, compiled, plain, robot, solvers
-from bench.soak.surface import impatient
+from tests.fuzz.arm import BOUNDS, ONE, TIP, Q, compiled, plain, robot, solvers
+from tests.fuzz.surface import impatient
 from wbc import analysis, coordinates, resolvers, shapes, tasks, teleop, track, trajectory
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.proximity import distances

@@ -1,6 +1,6 @@
 """Random calls of everything public: each answers, or refuses with a WbcError, in time; and objects work afterwards.
 
-The long form is the part ``calls`` of ``make soak``.
+A long run: ``make soak``.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import wbc
-from bench.soak.arm import robot
-from bench.soak.goods import Goods
-from bench.soak.hostile import spoiled
-from bench.soak.surface import MODULES, Callee, Hang, attempt, calls, impatient, surface
+from tests.fuzz.arm import robot
+from tests.fuzz.goods import Goods
+from tests.fuzz.hostile import spoiled
+from tests.fuzz.surface import MODULES, Callee, Hang, attempt, calls, impatient, surface
 from tests.repeats import repeats
 
 

@@ -163,9 +163,9 @@ def test_what_is_refused(regression: Regression) -> None:
 
 def test_command(tmp_path: Path) -> None:
     """It prints what was found and writes law, plot and figures; a robot on a moving base is refused in one line."""
-    run = CliRunner().invoke(app, ["identify", "double_pendulum", "--tries", "5", "--out", str(tmp_path)])
+    run = CliRunner().invoke(app, ["dynamics", "identify", "double_pendulum", "--tries", "5", "--out", str(tmp_path)])
     assert run.exit_code == 0, run.output
     assert "parameters can be known" in run.output
     assert {"identified.json", "motion.npz", "motion.png"} <= {file.name for file in tmp_path.iterdir()}
-    wrong = CliRunner().invoke(app, ["identify", "solo12", "--out", str(tmp_path / "b")])
+    wrong = CliRunner().invoke(app, ["dynamics", "identify", "solo12", "--out", str(tmp_path / "b")])
     assert wrong.exit_code == 2

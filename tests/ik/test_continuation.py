@@ -91,6 +91,9 @@ def test_a_closed_path_is_gone_all_the_way_round() -> None:
     found = ik.along({"hand": turned}, [0.0, 2.0 * np.pi], start)
     np.testing.assert_allclose(found.q[-1] - start, [2.0 * np.pi, 0, 0, 0, 0, 0], atol=1e-6)
     assert found.samples > 2.0 * np.pi / 0.02
+    # A hundred steps, of which the first is the longest
+    slowing = ik.along({"hand": lambda s: turned(0.5 * s * (2.0 - s))}, [0.0, 1.0], start)
+    assert slowing.moved == pytest.approx(0.5 * (1.0 - 0.99**2), rel=1e-3)
 
 
 def test_targets_are_also_sequences() -> None:

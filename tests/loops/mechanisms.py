@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -160,3 +160,22 @@ def random_linkage(seed: int) -> str:
 def _axis(rng: np.random.Generator, planar: bool) -> Array:
     axis = np.array([0.0, rng.choice([-1.0, 1.0]), 0.0]) if planar else rng.normal(size=3)
     return axis / np.linalg.norm(axis)
+
+
+#: Joints of the named mechanisms that motors drive: as many as they have motions, rods that turn about themselves aside
+MOTORS: Mapping[str, tuple[str, ...]] = {
+    "four_bar": ("motor",),
+    "ankle": ("left_motor", "right_motor"),
+    "gripper": ("left_motor",),
+    "delta": ("motor0", "motor1", "motor2"),
+    "jansen": ("motor",),
+    "parallelogram": ("joint0",),
+}
+
+
+def with_motors(text: str, motors: Sequence[str]) -> str:
+    """A mechanism that weighs, with motors at some joints."""
+    made = "".join(f'<motor joint="{name}"/>' for name in motors)
+    return text.replace('gravity="0 0 0"', 'gravity="0 0 -9.81"').replace(
+        "</mujoco>", f"<actuator>{made}</actuator></mujoco>"
+    )

@@ -15,9 +15,8 @@ import pytest
 import wbc
 from tests.loops.mechanisms import NAMED, four_bar, random_linkage
 from tests.repeats import repeats
-from wbc.errors import CommandError, DuplicateNameError, NotFiniteError, UnknownNameError, UnsupportedJointError
+from wbc.errors import DuplicateNameError, NotFiniteError, UnknownNameError, UnsupportedJointError
 from wbc.robot import JointCurve, Loop, LoopError, Robot
-from wbc.simulation import PinocchioPlant
 from wbc.validation import Array
 
 #: What a loop may be open by after a tick [m, rad]
@@ -205,8 +204,7 @@ def test_recordings_batches_and_clones_keep_them(tmp_path: Path) -> None:
         ),
         (lambda r: r.with_loops(JointCurve("turn", "moter", None, (0.0,))), UnknownNameError, "motor"),
         (lambda r: Loop("pin", "crank", "rocker", "wld"), UnknownNameError, "weld"),  # type: ignore[arg-type]
-        (lambda r: wbc.Stack(r, DT).compile(command="torque"), CommandError, "with_loops"),
-        (PinocchioPlant, UnsupportedJointError, "with_loops"),
+        (wbc.support.braking, UnsupportedJointError, "with_loops"),
         (lambda r: r.closed([np.nan] * 3), NotFiniteError, "q"),
     ],
 )
@@ -222,3 +220,48 @@ def test_loops_that_cannot_be_closed_are_refused_at_load() -> None:
     text = four_bar().replace("</worldbody>", far).replace("</equality>", loop)
     with pytest.raises(LoopError, match=r"open by 4.*reach"):
         wbc.robots.load(text)
+
+
+@pytest.mark.parametrize("solver", ["python", "osqp", "qpoases"])
+def test_other_solvers_keep_them_too(solver: str) -> None:
+    robot = limited(NAMED["ankle"])
+    assert opened(robot, NAMED["ankle"], walk(followed(robot).compile(solver=solver), 60)) < OPEN
+
+
+def test_assembly_modes_of_a_four_bar_are_those_of_its_circles() -> None:
+    """With the crank given the pin is where two circles meet: two modes, or none where they do not."""
+    robot = wbc.robots.load(four_bar())
+    modes = robot.assemblies({"motor": 0.3}, count=30)
+    assert len(modes) == 2
+    assert opened(robot, four_bar(), list(modes)) < OPEN
+    knee = np.array([robot.pose(q, "coupler").translation for q in modes])
+    np.testing.assert_allclose(knee[0], knee[1], atol=OPEN)
+    pins = np.array([robot.pose(q, "pin:a").translation for q in modes])
+    foot = np.array([0.5, 0.0, 0.0])
+    along = foot - knee[0]
+    gap, rod, rocker = (float(np.linalg.norm(v)) for v in (along, [0.45, 0.0, 0.1], [0.05, 0.0, -0.3]))
+    far = (gap**2 + rod**2 - rocker**2) / (2.0 * gap)
+    aside = np.cross(along / gap, [0.0, 1.0, 0.0]) * np.sqrt(rod**2 - far**2)
+    wanted = knee[0] + along / gap * far + np.outer([1.0, -1.0], aside)
+    assert min(np.abs(pins - wanted).max(), np.abs(pins[::-1] - wanted).max()) < 1e-9
+    assert robot.assemblies({"heel": 2.55}, count=10) == ()
+    with pytest.raises(UnknownNameError, match="motor"):
+        robot.assemblies({"moter": 0.3})
+
+
+def test_derivatives_go_along_the_loop() -> None:
+    """They are those of the tick itself, but for what rows bend by within it."""
+    robot = limited(NAMED["ankle"])
+    controller = followed(robot).compile()
+    q = walk(controller, 30)[-1]
+    target = robot.integrate(q, np.full(robot.nv, 0.02))
+
+    def answer(change: Array) -> wbc.Step:
+        controller.reset(q)
+        controller["posture"].target = pin.integrate(robot.model, target, change)
+        return controller.step(q)
+
+    slope = answer(np.zeros(robot.nv)).derivative("posture", "target")
+    h = 1e-5
+    found = [(answer(h * e).v - answer(-h * e).v) / (2.0 * h) for e in np.eye(robot.nv)]
+    np.testing.assert_allclose(slope, np.transpose(found), atol=2e-2 * np.abs(slope).max())

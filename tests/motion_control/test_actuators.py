@@ -14,7 +14,7 @@ from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError,
 from wbc.motion_control import Actuator, ActuatorSizing
 from wbc.motion_control.comparison import swing
 from wbc.motion_control.motion import Motion
-from wbc.published.newton_euler import Drive, Linearised, OneStep, simulate
+from wbc.published.newton_euler import DriveTrain, Linearised, OneStep, simulate
 from wbc.published.newton_euler.comparison import published_scenario
 from wbc.published.newton_euler.three_link import CONSTANT, MOTOR, RESISTANCE, arm
 from wbc.robot import Robot
@@ -84,7 +84,7 @@ def test_the_published_arm_at_its_bound_uses_the_voltage_that_there_is() -> None
 
         dt = 1.0 / s / 100
         law = Linearised(arm(), faster, dt, OneStep(3, np.diag([1e5 / dt**2] * 3 + [1e5] * 3)))
-        run = simulate(arm().model, law, faster, dt=dt, plant="motor", drive=Drive([MOTOR] * 3), substeps=4)
+        run = simulate(arm().model, law, faster, dt=dt, plant="motor", drive=DriveTrain([MOTOR] * 3), substeps=4)
         most = np.abs(run.voltages).max()
         assert most == pytest.approx(20.0, rel=0.01) if factor == 1.0 else most > 20.5
 

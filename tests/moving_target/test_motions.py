@@ -7,13 +7,13 @@ import pinocchio as pin
 import pytest
 
 from tests.evaluation import slope
-from wbc.moving_target.motions import Motion, Tumble, Waves, sea, swing, tumble
+from wbc.moving_target.motions import TargetMotion, Tumble, Waves, sea, swing, tumble
 
 MEAN = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.2])), np.array([0.5, 0.1, 0.3]))
 HEIGHTS = np.array([0.04, 0.05, 0.06, 0.07, 0.08, 0.09])
 
 
-def made(name: str, seed: int = 0) -> Motion:
+def made(name: str, seed: int = 0) -> TargetMotion:
     rng = np.random.default_rng(seed)
     if name == "tumble":
         return tumble(MEAN, rng, np.radians(3.0), 0.4, 0.01, 20.0)

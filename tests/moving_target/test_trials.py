@@ -18,13 +18,14 @@ from wbc.cli.app import app
 from wbc.moving_target import pictures
 from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.motions import swing
-from wbc.moving_target.study import Study, grasp, outcome, peg, trials
-from wbc.moving_target.trial import Bench, Trial, gap
+from wbc.moving_target.study import TargetStudy, grasp, outcome, peg, trials
+from wbc.moving_target.trial import Bench, TargetTrial, gap
+from wbc.track import scene
 
 RUN = CliRunner(env={"COLUMNS": "200"})
 
 
-def study(motion: str, **measurement: float) -> Study:
+def study(motion: str, **measurement: float) -> TargetStudy:
     return peg(wbc.robots.load("panda"), "panda_hand_tcp", motion, 1.5e-3, Measurement(**measurement))  # type: ignore[arg-type]
 
 
@@ -34,12 +35,12 @@ def bench() -> Bench:
 
 
 @cache
-def station_arm() -> Study:
+def station_arm() -> TargetStudy:
     return grasp(wbc.robots.load("ssrms"), "tip", "tumble", Measurement((5e-3, 1e-3)))
 
 
 @cache
-def trial(motion: str, kind: Knowledge) -> Trial:
+def trial(motion: str, kind: Knowledge) -> TargetTrial:
     return bench().run(study(motion).moves(0), kind, np.random.default_rng(0))
 
 
@@ -149,9 +150,14 @@ def test_the_command_leaves_a_folder(tmp_path: Path) -> None:
 
 def test_a_film_has_both_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two small pictures of the hand alone."""
-    one, hand = study("swing"), pictures.link_meshes(wbc.robots.load("panda"))[-1:]
-    for name, value in (("SIZE", (60, 40)), ("RAYS", 1), ("MOST", 2), ("link_meshes", lambda _: hand)):
-        monkeypatch.setattr(pictures, name, value)
+    one, hand = study("swing"), scene.link_meshes(wbc.robots.load("panda"))[-1:]
+    for module, name, value in (
+        (pictures, "SIZE", (60, 40)),
+        (pictures, "MOST", 2),
+        (scene, "SUPERSAMPLING", 1),
+        (scene, "link_meshes", lambda _: hand),
+    ):
+        monkeypatch.setattr(module, name, value)
     pair = {kind: trial("swing", kind) for kind in (Knowledge.NONE, Knowledge.TWIST)}
     file = pictures.film(one, pair, tmp_path / "film.gif")
     assert file is not None

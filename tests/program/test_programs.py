@@ -20,16 +20,16 @@ from wbc.program import (
     Grasp,
     Guard,
     HandReference,
-    Hold,
     Move,
     Operate,
-    Pose,
+    PoseTarget,
     Program,
     ProgramError,
     Release,
     Report,
     Retreat,
     Runner,
+    Wait,
 )
 from wbc.program.reference import ACCELERATION
 
@@ -133,7 +133,10 @@ abort: [{signal: force, above: 100}]
 
 def test_alternatives_are_tried_in_turn(controller: wbc.Controller) -> None:
     nothing = Approach("hand", (1.0, 0.0, 0.0), speed=0.1, until=(Guard("force", above=5.0),), at_most=0.03)
-    steps = (Alternatives(((nothing, Grasp("fingers")), (Move("hand", Pose((0.5, 0.0, 0.45))),))), Release("fingers"))
+    steps = (
+        Alternatives(((nothing, Grasp("fingers")), (Move("hand", PoseTarget((0.5, 0.0, 0.45))),))),
+        Release("fingers"),
+    )
     loop = Loop(Program(steps), controller, fingers=Fingers())
     assert loop.run().state == "succeeded"
     assert loop.words()[1] == ("steps.0.0.0 approach", "failed")
@@ -144,10 +147,10 @@ def test_alternatives_are_tried_in_turn(controller: wbc.Controller) -> None:
 @pytest.mark.parametrize(
     ("step", "reason"),
     [
-        (Move("hand", Pose((0.5, 0.3, 0.4)), timeout=0.3), "not done after 0.3 s, the hand is"),
+        (Move("hand", PoseTarget((0.5, 0.3, 0.4)), timeout=0.3), "not done after 0.3 s, the hand is"),
         (Grasp("fingers", timeout=0.5), "not done after 0.5 s, the gripper is empty"),
         (Approach("hand", (0, 0, 1), until=(Guard("force", above=5),), at_most=0.02), "nothing was met within 0.02 m"),
-        (Hold(until=(Guard("force", above=1e9),), unless=(Guard("elapsed", above=0.4),)), "elapsed above 0.4"),
+        (Wait(until=(Guard("force", above=1e9),), unless=(Guard("elapsed", above=0.4),)), "elapsed above 0.4"),
     ],
 )
 def test_failures_say_why_and_the_recovery_follows(controller: wbc.Controller, step: Move, reason: str) -> None:
@@ -161,7 +164,9 @@ def test_failures_say_why_and_the_recovery_follows(controller: wbc.Controller, s
 
 def test_an_abort_stops_the_hand_and_a_dead_sensor_aborts(controller: wbc.Controller) -> None:
     for value in (50.0, math.nan):
-        loop = Loop(Program((Move("hand", Pose((0.3, 0.3, 0.6))),), abort=(Guard("force", above=20),)), controller)
+        loop = Loop(
+            Program((Move("hand", PoseTarget((0.3, 0.3, 0.6))),), abort=(Guard("force", above=20),)), controller
+        )
         for _ in range(30):
             loop.tick()
         assert np.linalg.norm(loop.runner.hands["hand"].reference.twist) > 0.05
@@ -181,7 +186,7 @@ def test_a_dead_sensor_ends_no_approach(controller: wbc.Controller) -> None:
 
 
 def test_pauses_freeze_the_program_and_single_steps_end_in_one(controller: wbc.Controller) -> None:
-    steps = (Move("hand", Pose((0.5, 0.1, 0.4)), timeout=4.0), Retreat("hand", (0.0, 0.02, 0.0)), DOWN)
+    steps = (Move("hand", PoseTarget((0.5, 0.1, 0.4)), timeout=4.0), Retreat("hand", (0.0, 0.02, 0.0)), DOWN)
     loop = Loop(Program(steps), controller)
     loop.runner.resume(single=True)
     for _ in range(20):
@@ -220,7 +225,7 @@ def test_an_operator_moves_the_hand_until_the_twist_is_old(controller: wbc.Contr
 def test_weights_change_and_a_hand_that_wakes_up_stands_where_it_is(controller: wbc.Controller) -> None:
     controller["elbow"].weight = 0.0
     steps = (
-        Move("hand", Pose((0.5, 0.1, 0.4))),
+        Move("hand", PoseTarget((0.5, 0.1, 0.4))),
         Activate({"elbow": 1e-3}, seconds=0.1),
         Retreat("elbow", (0.0, 0.0, 0.0)),
     )
@@ -235,7 +240,7 @@ def test_weights_change_and_a_hand_that_wakes_up_stands_where_it_is(controller: 
 
 
 def test_guards_have_to_last(controller: wbc.Controller) -> None:
-    program = Program((Hold((Guard("force", above=1.0, lasting=0.1),)),))
+    program = Program((Wait((Guard("force", above=1.0, lasting=0.1),)),))
     runner = Runner(program, controller)
     for k in range(40):
         assert runner.tick(START, {"force": 2.0 * (k % 5 != 0)}).state == "running"
@@ -293,7 +298,7 @@ def test_a_straight_move_is_straight_and_as_fast_as_it_may_be() -> None:
         (lambda: Move("hand"), "Move.to: field required"),
         (lambda: Guard("force"), "Guard: expected either above or below"),
         (lambda: Guard("force", above=math.nan), "Guard.above"),
-        (lambda: Move("hand", Pose(quaternion=(1, 1, 0, 0))), "length 1"),
+        (lambda: Move("hand", PoseTarget(quaternion=(1, 1, 0, 0))), "length 1"),
         (lambda: Approach("hand", (0, 0, 0), until=(Guard("f", above=1),)), "expected a direction"),
         (lambda: Program(steps=[{"step": "moev"}]), r"Program.steps.0.step: unknown step \(got 'moev'\); valid: move"),
         (

@@ -51,7 +51,7 @@ class Height(Task):
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         return kin.position(self.frame)[2] - inputs["target"]
 '''
-EXPORT = "from wbc.tasks.height import Height as Height\n"
+EXPORT = "    from wbc.tasks.height import Height as Height\n"
 #: What the package does with it: a tick by name and by item, its values for type checkers, its page
 USE = """
 import wbc
@@ -80,6 +80,7 @@ def test_an_item_is_a_file_and_a_line(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "tasks", package / "tasks")
     (package / "tasks" / "height.py").write_text(ITEM)
     exported = package / "tasks" / "__init__.py"
-    exported.write_text(exported.read_text() + EXPORT)
+    before, after = exported.read_text().split("else:", 1)
+    exported.write_text(f"{before}{EXPORT}else:{after}")
     done = subprocess.run([sys.executable, "-c", USE], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

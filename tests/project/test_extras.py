@@ -13,15 +13,18 @@ from wbc.extras import EXTRAS
 
 #: Modules whose distribution is called otherwise
 DISTRIBUTIONS = {"flint": "python-flint", "py_trees": "py-trees", "yaml": "pyyaml", "zmq": "pyzmq"}
-#: What needs each extra
+#: What needs each extra; laws of motion need two packages, each for its own kind
+LEAST_TIME = "wbc.trajectory.time_optimal([[0.0], [1.0]], [1.0], [4.0])"
+JERK_LIMITED = "wbc.trajectory.online(1, 0.01, velocity=1.0, acceleration=1.0, jerk=1.0)"
 USES = {
     "analysis": "from wbc.analysis import ExactModel",
     "cluster": "from wbc.study import carrying_out; carrying_out.connected(2, None).__enter__()",
+    "laws": LEAST_TIME,
     "mujoco": "wbc.robots.load('<mujoco/>')",
     "osqp": "stack.compile(solver='osqp', backend='vm')",
     "plots": "from wbc import style; style.pyplot().__enter__()",
     "programs": "from wbc.program import Program",
-    "recordings": "from wbc.track import log; log._read_parquet(None)",
+    "recordings": "from wbc.log import log; log._read_parquet(None)",
     "studies": "from wbc.study import Study",
     "viewer": "wbc.viewer.show(controller)",
     "zeromq": "from wbc.viewer.zeromq import ZeroMqEnd; ZeroMqEnd('tcp://127.0.0.1:0', '', 1.0)",
@@ -56,14 +59,21 @@ def test_every_module_comes_from_its_extra_alone() -> None:
         for module in modules:
             name = DISTRIBUTIONS.get(module, module)
             assert any(line.startswith(name) for line in project["optional-dependencies"][extra]), (extra, module)
-            assert not any(line.startswith(name) for line in project["dependencies"])
+            # Where laws have their packages as wheels these come without an extra
+            plain = [line for line in project["dependencies"] if line.startswith(name)]
+            assert all("platform_machine" in line for line in plain)
+            assert bool(plain) is (extra == "laws")
 
 
-@pytest.mark.parametrize("last", [False, True], ids=["all", "cluster"])
+#: Those that leave nothing of what :data:`PLAIN` does
+LATER = ("cluster", "laws")
+
+
+@pytest.mark.parametrize("last", [False, True], ids=["all", "later"])
 def test_a_part_without_its_package_says_which_extra(last: bool, tmp_path: Path) -> None:
     """Studies that need a cluster are studies, which need packages of their own."""
     (tmp_path / "arm.urdf").write_text(URDF)
-    extras = [extra for extra in EXTRAS if (extra == "cluster") is last]
+    extras = [extra for extra in EXTRAS if (extra in LATER) is last]
     blocked = {module for extra in extras for module in EXTRAS[extra]} - {"matplotlib"}
     code = f"import sys\nsys.modules.update(dict.fromkeys({blocked}))\nimport wbc\n" + ("" if last else PLAIN)
     code += "".join(USE.format(use=USES[extra]) for extra in extras)
@@ -73,3 +83,10 @@ def test_a_part_without_its_package_says_which_extra(last: bool, tmp_path: Path)
     for extra, line in zip(extras, lines, strict=True):
         assert line.startswith("MissingPackageError")
         assert f"pip install 'wbc[{extra}]'" in line
+
+
+def test_jerk_limited_laws_say_which_package_they_need() -> None:
+    code = f"import sys\nsys.modules['ruckig'] = None\nimport wbc\n{USE.format(use=JERK_LIMITED)}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "ruckig" in done.stdout
+    assert "pip install 'wbc[laws]'" in done.stdout

@@ -16,6 +16,7 @@ from tests.project.layout import ROOT, module_name, nodes, relative, sources
 FLOORS = {
     "wbc.errors": 0,
     "wbc.extras": 0,
+    "wbc.cores": 0,
     "wbc.interrupts": 0,
     "wbc.lazy": 0,
     "wbc.pickling": 0,
@@ -25,6 +26,8 @@ FLOORS = {
     "wbc.style": 0,
     "wbc.terminal": 0,
     "wbc.estimation": 1,
+    "wbc.geometry": 1,
+    "wbc.log": 1,
     "wbc.native": 1,
     "wbc.symbolic": 1,
     "wbc.robot": 2,

@@ -18,9 +18,10 @@ BUDGETS = {
     "--help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
     "--version": (*HEAVY[2:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
     "robots": (*HEAVY[3:], "matplotlib", *UPPER, "wbc.coordinates", "flint"),
-    "modes": (*HEAVY[3:], "matplotlib", *UPPER, "flint"),
-    "walk --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
-    "plans --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
+    "coordinates": (*HEAVY[3:], "matplotlib", *UPPER, "flint"),
+    "ik --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
+    # Its requests check numbers and poses
+    "walk --help": (*HEAVY[3:], "matplotlib", *NUMBERS[4:], "casadi", "wbc.walking.loop", "wbc.robot", "wbc.tasks"),
 }
 
 

@@ -10,12 +10,13 @@ from wbc.cli.app import COMMANDS, command
 
 
 def options() -> Iterator[tuple[str, list[str]]]:
-    """(command, the names of one of its options) of every command."""
-    for name in COMMANDS:
-        for parameter in command(name).params:
-            if parameter.param_type_name == "option":
-                names = (*parameter.opts, *parameter.secondary_opts)
-                yield f"wbc {name}", [n for n in names if n.startswith("--")]
+    """(command, the names of one of its options) of every command and mode."""
+    for name, entry in COMMANDS.items():
+        for mode in entry.modes:
+            for parameter in command(name, mode).params:
+                if parameter.param_type_name == "option":
+                    names = (*parameter.opts, *parameter.secondary_opts)
+                    yield f"wbc {name}", [n for n in names if n.startswith("--")]
 
 
 def test_every_option_is_on_a_page_of_its_command() -> None:

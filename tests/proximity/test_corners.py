@@ -12,9 +12,10 @@ from tests.models import Y, arm
 from tests.proximity.world import Referee, buffers, link_bodies, place, robot, set_pose, things
 from wbc.errors import RangeError
 from wbc.proximity import FAR, Body, PairSensor
-from wbc.proximity.corners import HULL_CORNERS, corners_of, spread
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Sphere
+from wbc.shapes.convex import CORNERS as HULL_CORNERS
+from wbc.shapes.convex import spread
 
 CORNERS = 4
 
@@ -42,7 +43,7 @@ def truths(referee: Referee, pair: tuple[Body, Body], q: np.ndarray, pose: pin.S
         center = own.shape.points.mean(axis=0) if isinstance(own.shape, Convex) else np.zeros(3)
         ball = own.shape.radius if isinstance(own.shape, Capsule) else 0.0
         where, there = referee.pose(own, pose), referee.pose(other, pose)
-        for corner in corners_of(own.shape, center):
+        for corner in own.shape.row_corners():
             at = pin.SE3(np.eye(3), where.act(corner + center))
             out.append(coal_distance(Sphere(ball), at, other.shape, there, 1e-10))
     return np.sort(np.array(out))
@@ -143,12 +144,11 @@ def test_balls_have_no_corners_and_overlaps_no_normals() -> None:
 
 
 def test_corners_of_shapes() -> None:
-    zero = np.zeros(3)
-    assert len(corners_of(Box((0.1, 0.2, 0.3)), zero)) == 8
-    assert corners_of(Capsule(0.1, 0.4), zero) == pytest.approx(np.array([[0, 0, -0.2], [0, 0, 0.2]]))
-    rim = corners_of(Cylinder(0.1, 0.4), zero)
+    assert len(Box((0.1, 0.2, 0.3)).row_corners()) == 8
+    assert Capsule(0.1, 0.4).row_corners() == pytest.approx(np.array([[0, 0, -0.2], [0, 0, 0.2]]))
+    rim = Cylinder(0.1, 0.4).row_corners()
     assert np.hypot(rim[:, 0], rim[:, 1]) == pytest.approx(np.full(len(rim), 0.1))
-    assert len(corners_of(Sphere(0.1), zero)) == len(corners_of(HalfSpace(), zero)) == 0
+    assert len(Sphere(0.1).row_corners()) == len(HalfSpace().row_corners()) == 0
     points = np.random.default_rng(3).normal(size=(60, 3))
     chosen = spread(points, HULL_CORNERS)
     assert len(chosen) == HULL_CORNERS

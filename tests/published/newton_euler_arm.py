@@ -9,15 +9,15 @@ import pinocchio as pin
 
 from wbc.published.newton_euler import (
     Adaptive,
-    Arm,
     DecoupledArm,
     DecoupledTwo,
-    Drive,
+    DriveTrain,
     Linearised,
     Link,
     Nominal,
     Rigid,
-    Run,
+    SerialChain,
+    SimulatedRun,
     discretised,
     linear_model,
     simulate,
@@ -25,7 +25,7 @@ from wbc.published.newton_euler import (
 from wbc.published.newton_euler.three_link import MOTOR, arm, task, tip
 from wbc.validation import Array
 
-ARM, TASK, DRIVE, DT = arm(), task(), Drive([MOTOR] * 3), 0.01
+ARM, TASK, DRIVE, DT = arm(), task(), DriveTrain([MOTOR] * 3), 0.01
 #: As good as 20 to 2e-7 of the errors, but for a chattering joint
 SUBSTEPS = 4
 Q, R = 1e5 * np.eye(6), 0.01 * np.eye(3)
@@ -49,7 +49,7 @@ def referee() -> pin.Model:
     return model
 
 
-def random_arm(rng: np.random.Generator, n: int) -> Arm:
+def random_arm(rng: np.random.Generator, n: int) -> SerialChain:
     """Any axes, any levers, turning and sliding joints."""
     links = []
     for _ in range(n):
@@ -60,7 +60,7 @@ def random_arm(rng: np.random.Generator, n: int) -> Arm:
                 0.5 * rng.normal(size=3), 0.5 * rng.normal(size=3), bool(rng.random() < 0.3),
             )
         )  # fmt: skip
-    return Arm(tuple(links), rng.normal(size=3), rng.normal(size=3))
+    return SerialChain(tuple(links), rng.normal(size=3), rng.normal(size=3))
 
 
 def controller(name: str) -> Nominal | Linearised | Adaptive | DecoupledArm | DecoupledTwo:
@@ -76,12 +76,12 @@ def controller(name: str) -> Nominal | Linearised | Adaptive | DecoupledArm | De
 
 
 @cache
-def run(name: str, plant: str = "torque") -> Run:
+def run(name: str, plant: str = "torque") -> SimulatedRun:
     substeps = 20 if name == "decoupled two" else SUBSTEPS
     return simulate(referee(), controller(name), TASK, plant=plant, drive=DRIVE, substeps=substeps)
 
 
-def tip_error(found: Run) -> float:
+def tip_error(found: SimulatedRun) -> float:
     """Largest distance of the tip from where it should be [m]."""
     return max(float(np.linalg.norm(tip(q) - tip(TASK(t)[0]))) for q, t in zip(found.q, found.times, strict=True))
 

@@ -23,10 +23,10 @@ import wbc.published.ikor.driver
 from wbc.errors import InfeasibleError, RangeError, UnknownNameError, WbcError
 from wbc.published.ikor import (
     Code,
+    CourseRun,
     Driver,
     IkorFileError,
     Method,
-    Run,
     Settings,
     Stop,
     Trajectory,
@@ -63,7 +63,7 @@ FOREARM = [(-0.40, -0.356, 0.58, 0.08)]
 case = cache(case)
 
 
-def run(machine: Any, settings: Settings, trajectory: Trajectory, spheres: Any = ()) -> Run:
+def run(machine: Any, settings: Settings, trajectory: Trajectory, spheres: Any = ()) -> CourseRun:
     return Driver(machine, settings, spheres).run(trajectory)
 
 

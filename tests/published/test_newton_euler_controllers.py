@@ -34,11 +34,10 @@ from tests.published.newton_euler_arm import (
 from wbc.errors import BoundsError, RangeError, ShapeError, UnknownNameError
 from wbc.published.newton_euler import (
     Adaptive,
-    Arm,
     DecoupledArm,
     DecoupledTwo,
     Decoupling,
-    Drive,
+    DriveTrain,
     Estimator,
     External,
     Linearised,
@@ -47,6 +46,7 @@ from wbc.published.newton_euler import (
     Nominal,
     OneStep,
     Rigid,
+    SerialChain,
     discretised,
     equations,
     gain,
@@ -192,7 +192,7 @@ def test_n6_gears() -> None:
                   -rng.uniform(1, 9, 2) * [0, 1], gear)
             for gear in rng.uniform(1, 50, 3)
         ]  # fmt: skip
-        drive, (q, v, a) = Drive(motors), rng.normal(size=(3, 3))
+        drive, (q, v, a) = DriveTrain(motors), rng.normal(size=(3, 3))
         model = equations(ARM, q, v)
         A, B, p = drive.combined(model)
         u = drive.voltage(model, q, v, model.torque(a))
@@ -533,7 +533,7 @@ LINK = (2.0, np.array([0.1, 0.1, 0.1]), np.eye(3)[2], np.eye(3)[2], np.ones(3), 
         ("mass", lambda: Link(-1.0, *LINK[1:])),
         ("inertia", lambda: Link(2.0, np.array([0.1, 0.1, 0.3]), *LINK[2:])),
         ("axis", lambda: Link(*LINK[:2], np.zeros(3), *LINK[3:])),
-        ("links[0].lever", lambda: Arm((Link(*LINK[:4], np.eye(3)[2], np.ones(3)),), np.eye(3)[2], np.ones(3))),
+        ("links[0].lever", lambda: SerialChain((Link(*LINK[:4], np.eye(3)[2], np.ones(3)),), np.eye(3)[2], np.ones(3))),
         ("b", lambda: Motor(MOTOR.A, np.zeros(2), MOTOR.f)),
         ("gear", lambda: Motor(MOTOR.A, MOTOR.b, MOTOR.f, 0.0)),
         ("dt", lambda: discretised(MOTOR.A, 1.0)),
@@ -562,7 +562,7 @@ def test_more_bad_input() -> None:
     x, _, z = np.eye(3)
     needle = Link(1.0, np.full(3, 1e-30), z, z, z, z, reference=x)
     with pytest.raises(RangeError, match="singular"):
-        equations(Arm((Link(*LINK), needle), z, x), np.zeros(2), np.zeros(2)).acceleration(np.zeros(2))
+        equations(SerialChain((Link(*LINK), needle), z, x), np.zeros(2), np.zeros(2)).acceleration(np.zeros(2))
     s, t = ca.SX.sym("x", 2), ca.SX.sym("t")
     with pytest.raises(RangeError, match="no input reaches"):
         Decoupling(s, t, ca.vertcat(s[0], s[1]), ca.DM([0, 1]), s[0], ca.SX.zeros(1, 1), ((),))

@@ -12,8 +12,8 @@ import scipy.linalg
 import wbc
 from tests.published.newton_euler_arm import ARM, DT, TASK, tip_error
 from wbc.errors import RangeError, UnsupportedJointError
-from wbc.motion_control.comparison import Condition, compare, swing
-from wbc.published.newton_euler import Drive, Linearised, Motor, Nominal, Rigid, simulate
+from wbc.motion_control.comparison import TrialCondition, compare, swing
+from wbc.published.newton_euler import DriveTrain, Linearised, Motor, Nominal, Rigid, simulate
 from wbc.published.newton_euler.comparison import PUBLISHED, scenario_with_published
 from wbc.published.newton_euler.dynamics import ByRecursion
 from wbc.published.newton_euler.three_link import CONSTANT, ELECTRIC, HYDRAULIC, MOTOR, RESISTANCE
@@ -40,7 +40,7 @@ def test_a_mass_on_a_rail_moves_as_the_linear_system_does(motor: Motor) -> None:
     """Motor and mass are a linear system, solved exactly from the voltages; what z gives after a step is what was asked
     for, as far as the rate does not change within it.
     """
-    mass, drive = 5.0, Drive([motor])
+    mass, drive = 5.0, DriveTrain([motor])
     run = simulate(
         slider(mass), Pull(), lambda t: (np.zeros(1),) * 3, dt=0.004, steps=60, plant="motor", drive=drive, substeps=8
     )
@@ -53,7 +53,7 @@ def test_a_mass_on_a_rail_moves_as_the_linear_system_does(motor: Motor) -> None:
         x = both[:m, :m] @ x + both[:m, m] * u
         np.testing.assert_allclose(motor.gear * run.q[k + 1], x[:1], atol=1e-7 * max(1.0, abs(x[0])))
     # An endless mass stands still, and the torque that moves it is the one that was asked for
-    heavy = Drive([motor])
+    heavy = DriveTrain([motor])
     model = Rigid(slider(1e9)).equations(np.zeros(1), np.zeros(1))
     z = np.zeros(m - 2)
     asked = np.array([0.7])
@@ -81,11 +81,13 @@ def test_stall_and_free_run() -> None:
 def test_a_fast_armature_is_the_printed_motor() -> None:
     """As the time constant of the armature goes to zero the arm moves as with the motor of second order."""
     apart = []
-    exact = simulate(ARM.model, Nominal(ARM, TASK), TASK, steps=30, plant="motor", drive=Drive([MOTOR] * 3), substeps=4)
+    exact = simulate(
+        ARM.model, Nominal(ARM, TASK), TASK, steps=30, plant="motor", drive=DriveTrain([MOTOR] * 3), substeps=4
+    )
     for constant in (4e-3, 1e-3, 2.5e-4):
         motor = Motor.third_order(CONSTANT, RESISTANCE, constant * RESISTANCE, 1.0 / 29.0)
         run = simulate(
-            ARM.model, Nominal(ARM, TASK), TASK, steps=30, plant="motor", drive=Drive([motor] * 3), substeps=20
+            ARM.model, Nominal(ARM, TASK), TASK, steps=30, plant="motor", drive=DriveTrain([motor] * 3), substeps=20
         )
         apart.append(np.abs(run.q - exact.q).max())
     assert apart[0] > 2.0 * apart[1] > 4.0 * apart[2]
@@ -97,7 +99,7 @@ def test_the_linearised_controller_on_motors_of_third_order() -> None:
     """Under 1 mm on both, where nothing but the nominal torques leaves the line by 66 and 92 mm."""
     for motor, wanted in ((ELECTRIC, (0.462e-3, 65.6e-3)), (HYDRAULIC, (0.711e-3, 92.0e-3))):
         for law, off in zip((Linearised(ARM, TASK, DT), Nominal(ARM, TASK)), wanted, strict=True):
-            run = simulate(ARM.model, law, TASK, plant="motor", drive=Drive([motor] * 3), substeps=6)
+            run = simulate(ARM.model, law, TASK, plant="motor", drive=DriveTrain([motor] * 3), substeps=6)
             assert tip_error(run) == pytest.approx(off, rel=0.02)
 
 
@@ -109,7 +111,7 @@ def test_bad_motors() -> None:
         Motor(np.array([[0.0, 2.0], [0.0, -1.0]]), MOTOR.b, MOTOR.f)
     with pytest.raises(RangeError, match="does not move"):
         Motor(ELECTRIC.A * [[1, 1, 1], [1, 1, 0], [1, 1, 1]], ELECTRIC.b, ELECTRIC.f)
-    fast = Drive([Motor.third_order(CONSTANT, RESISTANCE, 1e-4 * RESISTANCE, 1.0 / 29.0)] * 3)
+    fast = DriveTrain([Motor.third_order(CONSTANT, RESISTANCE, 1e-4 * RESISTANCE, 1.0 / 29.0)] * 3)
     with pytest.raises(RangeError, match=r"at least 4[01]"):
         simulate(ARM.model, Nominal(ARM, TASK), TASK, plant="motor", drive=fast)
     with pytest.raises(RangeError, match="dt"):
@@ -146,11 +148,11 @@ def test_published_controllers_on_a_robot_of_today() -> None:
     scenario = scenario_with_published(wbc.robots.load("ur5"))
     names = ("nominal torque", "1 linearised", "1 with stiff weights", "2 on all joints", "3 adaptive")
     assert names == tuple(PUBLISHED)
-    found = {one.name: one for one in compare(scenario, Condition(rate=100.0), names)}
+    found = {one.name: one for one in compare(scenario, TrialCondition(rate=100.0), names)}
     assert not any(one.trial.away for one in found.values())
     assert found["1 with stiff weights"].largest < found["1 linearised"].largest < found["2 on all joints"].largest
     assert found["3 adaptive"].largest < 0.1 * found["nominal torque"].largest
-    fast = next(iter(compare(scenario, Condition(rate=1000.0), ["2 on all joints"]))).trial
+    fast = next(iter(compare(scenario, TrialCondition(rate=1000.0), ["2 on all joints"]))).trial
     rates = np.array([scenario.motion(t)[1] for t in fast.times])
     lag = (2.0 / 100.0 - 0.01) * rates
     assert np.abs(fast.errors - lag)[200:].max() < 0.15 * np.abs(lag).max()

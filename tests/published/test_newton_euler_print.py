@@ -27,21 +27,21 @@ from tests.published.newton_euler_arm import (
     step_model,
 )
 from wbc.errors import RangeError
-from wbc.published.newton_euler import Arm, Decoupling, Estimator, External, discretised, equations, gain
+from wbc.published.newton_euler import Decoupling, Estimator, External, SerialChain, discretised, equations, gain
 from wbc.published.newton_euler.counts import operations, printed_total
 from wbc.published.newton_euler.recursion import Inertial, inertial
 from wbc.published.newton_euler.three_link import GRAVITY, closed_form, tip
 from wbc.validation import Array
 
 
-def with_link(i: int, **changes: object) -> Arm:
+def with_link(i: int, **changes: object) -> SerialChain:
     """The arm with a number of the table as printed."""
     links = list(ARM.links)
     links[i] = replace(links[i], **changes)  # type: ignore[arg-type]
     return replace(ARM, links=tuple(links))
 
 
-def chained_tip(arm: Arm, q: Array) -> Array:
+def chained_tip(arm: SerialChain, q: Array) -> Array:
     """The tip from joint 1 by the vectors of the links."""
     rotations, *_ = arm.place(q)
     joints, centres = arm.positions(q)

@@ -12,8 +12,8 @@ import pytest
 
 from tests.published.three_arms import INCH, along, driven, hold_offsets
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
-from wbc.published.three_arm_walker import Calibration, PublishedWalker
-from wbc.published.three_arm_walker.commands import DestinationCommand, Line, joystick
+from wbc.published.three_arm_walker import PublishedWalker, WalkerCalibration
+from wbc.published.three_arm_walker.commands import DestinationCommand, Waypoints, joystick
 from wbc.published.three_arm_walker.machine.grid import frame
 
 
@@ -23,7 +23,7 @@ def hands_at(walker: PublishedWalker) -> list[Any]:
 
 def test_19_destinations() -> None:
     turn = np.radians(30.0)
-    line = Line(np.array([[13.0, 12.0, 0.0], [17.0, 12.0, turn], [17.0, 20.0, turn]]))
+    line = Waypoints(np.array([[13.0, 12.0, 0.0], [17.0, 12.0, turn], [17.0, 20.0, turn]]))
     assert line.times == pytest.approx([0.0, 30.0, 62.0], abs=1e-12)
     assert line.at(10.0)[1] == pytest.approx([0.13333, 0.0, np.radians(1.0)], abs=1e-5)
     assert line.at(40.0)[1] == pytest.approx([0.0, 0.25, 0.0], abs=1e-12)
@@ -230,13 +230,13 @@ def test_wrong_commands_change_nothing(call: Any, error: type[WbcError], field: 
 @pytest.mark.parametrize(
     ("options", "error", "field"),
     [
-        ({"hand_speed": 0.0}, RangeError, "Calibration.hand_speed"),
-        ({"shoulder_radius": np.inf}, NotFiniteError, "Calibration.shoulder_radius"),
-        ({"joint_rates": (1.0,) * 5}, ShapeError, "Calibration.joint_rates"),
-        ({"joint_rates": (1.0, 1.0, 0.0, 1.0, 1.0, 1.0)}, RangeError, "Calibration.joint_rates[2]"),
+        ({"hand_speed": 0.0}, RangeError, "WalkerCalibration.hand_speed"),
+        ({"shoulder_radius": np.inf}, NotFiniteError, "WalkerCalibration.shoulder_radius"),
+        ({"joint_rates": (1.0,) * 5}, ShapeError, "WalkerCalibration.joint_rates"),
+        ({"joint_rates": (1.0, 1.0, 0.0, 1.0, 1.0, 1.0)}, RangeError, "WalkerCalibration.joint_rates[2]"),
     ],
 )
 def test_wrong_calibrations_are_refused(options: dict[str, Any], error: type[WbcError], field: str) -> None:
     with pytest.raises(error) as caught:
-        Calibration(**options)
+        WalkerCalibration(**options)
     assert caught.value.field == field

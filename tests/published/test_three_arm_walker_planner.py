@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.published.three_arms import INCH
-from wbc.published.three_arm_walker import Calibration
+from wbc.published.three_arm_walker import WalkerCalibration
 from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
@@ -128,7 +128,7 @@ def test_09_lists_of_holds() -> None:
 )
 def test_10_swings(goal: Place, bounds: tuple[float, ...], duration: float) -> None:
     speed, acceleration, deviation, turning = bounds
-    known = Calibration(
+    known = WalkerCalibration(
         hand_speed=speed * INCH,
         hand_acceleration=acceleration * INCH,
         corner_deviation=deviation * INCH,
@@ -161,7 +161,7 @@ def test_10_long_swings_dip_below_the_surface(columns: int, clearance: float) ->
 def test_11_slow_rotations_stretch_the_swing() -> None:
     """Each straight part lasts as long as its rotation; the generator's five cases are tests of their own."""
     poses = swing_poses(frame(13, 12), (13, 12), (17, 12))
-    slow = BodyMotion(poses, Calibration(hand_angular_acceleration=0.05))
+    slow = BodyMotion(poses, WalkerCalibration(hand_angular_acceleration=0.05))
     turn = np.radians(20.0)
     assert slow.duration > 2.0 * np.sqrt(turn / 0.05)
     assert np.array_equal(slow.at(int(slow.duration / CYCLE) + 1)[0], poses[-1])
@@ -184,7 +184,7 @@ class OffTarget(IdealPlant):
 def test_12_hands_within_an_inch_grasp(offset: float, grasps: bool) -> None:
     plant = OffTarget(SHOULDERS, BODY)
     plant.offset = offset
-    gait = Gait(SHOULDERS, Terrain(), Calibration())
+    gait = Gait(SHOULDERS, Terrain(), WalkerCalibration())
     for k in range(3):
         plant.hands[k] = frame(*HELD[k])
         gait.places[k], gait.supporting[k] = HELD[k], True

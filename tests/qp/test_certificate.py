@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.qp.reference import reference
-from bench.qp.samples import SIZES, WEIGHTS, whole_body
+from tests.judges.exact_qp import reference
+from tests.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.repeats import repeats
 from wbc.qp import QP, QPSolution, certify, make_solver
 from wbc.qp.polish import polish

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.qp.samples import whole_body
+from tests.qp.samples import whole_body
 from wbc.qp import QP, independent, make_solver
 from wbc.qp.equalities import orthonormal, restore
 

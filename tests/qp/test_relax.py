@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from bench.qp.samples import whole_body
+from tests.qp.samples import whole_body
 from wbc.errors import BoundsError, ShapeError
 from wbc.qp import QP, make_solver
 from wbc.qp.relax import Relaxation, relax

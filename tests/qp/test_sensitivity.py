@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.qp.samples import whole_body
+from tests.qp.samples import whole_body
 from wbc.errors import SolverError
 from wbc.qp import QP, QPSolution, make_solver
 from wbc.qp.sensitivity import Sensitivity

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.qp.problems import RECORDS, quadprog_solution
+from tests.qp.samples import SIZES, WEIGHTS, whole_body
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, SolverError, UnknownNameError
 from wbc.qp import QP, available_solvers, certify, make_solver
 from wbc.qp.solvers.conic import Conic

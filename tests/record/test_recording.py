@@ -20,10 +20,11 @@ from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
+from wbc.log import FileWriter
 from wbc.record import recorder
 from wbc.record import recording as files
 from wbc.record.recorder import INPUTS
-from wbc.record.recording import RecordingError, Writer
+from wbc.record.recording import RecordingError
 from wbc.replaying import replayed
 from wbc.shapes import Box
 from wbc.tasks import Obstacle
@@ -76,8 +77,8 @@ def test_every_tick_again(
     builder: str, backend: str, solver: str, ticks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a controller of its own, from the file alone; in chunks whose ends fall anywhere."""
-    monkeypatch.setattr(files, "FEWEST", 7)
-    monkeypatch.setattr(files, "MOST", 7)
+    for name in ("FEWEST", "MOST"):
+        monkeypatch.setattr(f"wbc.record.recorder.{name}", 7)
     if builder == "sensed":
         one = sensed().compile(backend=backend)
     else:
@@ -235,7 +236,13 @@ def altered(source: Path, target: Path, tick: int, part: str, number: int, by: f
     made = Recording(source)
     rows = np.concatenate(list(made.chunks()))
     rows[tick, made.parts[part].start + number] += by
-    writer = Writer(target, made.about, made.stack_pickle, False)
+    write(target, made, rows)
+
+
+def write(target: Path, made: Recording, rows: np.ndarray, **changes: Any) -> None:
+    """A recording of these ticks, with other facts about it."""
+    writer = FileWriter(target, overwrite=True)
+    writer.begin(made.about | changes, made.attached)
     writer.write(rows.tobytes())
     writer.close()
 

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 import wbc
-from tests.record.test_recording import TOP, recorded
+from tests.record.test_recording import TOP, recorded, write
 from tests.stack import small
 from wbc import Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import PicklingError, UnknownNameError
-from wbc.record.recording import RecordingError, Writer
+from wbc.log import FileWriter
+from wbc.record.recording import RecordingError
 from wbc.tasks import Expression, Posture
 
 
@@ -41,10 +42,7 @@ def test_files_are_not_written_over_by_accident(tmp_path: Path) -> None:
 def rewritten(source: Path, target: Path, **changes: Any) -> Path:
     """The recording with other facts about it."""
     made = Recording(source)
-    writer = Writer(target, made.about | changes, made.stack_pickle, True)
-    for rows in made.chunks():
-        writer.write(rows.tobytes())
-    writer.close()
+    write(target, made, made.rows(), **changes)
     return target
 
 
@@ -123,7 +121,7 @@ class Trap:
         lambda p: Trap(os.mkdir, str(p)),
         lambda p: Trap(shutil.copytree, str(TOP / "requirements"), str(p)),
         lambda p: Trap(eval, f"__import__('os').mkdir({str(p)!r})"),
-        lambda p: Trap(wbc.record.recording.Writer, p, {"sizes": {"a": 1}}, None, False),
+        lambda p: Trap(FileWriter, p, False),
         lambda p: Trap(wbc.native.toolchain.compile_tick, {}, p),
     ],
 )

@@ -237,3 +237,12 @@ def test_what_a_model_says_of_its_base(caplog: pytest.LogCaptureFixture) -> None
     said = " ".join(record.getMessage() for record in caplog.records)
     assert "root_joint floats" in said
     assert "-inf to 4" in said
+
+
+@pytest.mark.parametrize("make", [pin.buildSampleModelManipulator, pin.buildSampleModelHumanoid])
+def test_sample_models_of_pinocchio_load(make: Callable[[], pin.Model]) -> None:
+    """Their lower efforts are the upper ones, with a positive sign."""
+    model = make()
+    robot = wbc.robots.load(model)
+    np.testing.assert_array_equal(robot.limits.effort[robot.base_nv :], model.upperEffortLimit[robot.base_nv :])
+    assert (robot.limits.effort > 0.0).all()

@@ -218,7 +218,7 @@ def check(model: mujoco.MjModel, robot: Robot, seed: int) -> None:
 
 @pytest.mark.parametrize("part", range(20))
 def test_a_random_text_is_what_mujoco_makes_of_it(part: int) -> None:
-    for seed in range(part, repeats(40), 20):
+    for seed in range(part, repeats(20), 20):
         found = loaded(seed)
         if found is not None:
             check(*found, seed)

@@ -21,7 +21,7 @@ BAD_URDFS = {
     "lost_child": (f'<robot name="r">{LINKS}{JOINT.format(child="c", limit="")}</robot>', "parser refused"),
     "not_xml": ('<robot name="r">', "not well-formed"),
     "empty": ("", "not well-formed"),
-    "html": ("<html><body/></html>", "neither URDF nor MJCF"),
+    "html": ("<html><body/></html>", "neither URDF, SDF nor MJCF"),
     "two_roots": ('<robot name="r"><link name="a"/><link name="b"/></robot>', "root"),
 }
 

@@ -14,14 +14,14 @@ import wbc.robots
 from tests import models
 from tests.distances import coal_distance
 from tests.robots.files import joints
-from wbc.errors import MissingShapeError, RangeError, RobotFileError, ShapeError
+from wbc.errors import MissingShapeError, NotFiniteError, RangeError, RobotFileError, ShapeError
+from wbc.geometry import segment_distances
 from wbc.robot import Limits, Robot
-from wbc.robot.geometry.segments import bounding_capsule, segment_distances
 from wbc.robot.pairs.collision_pairs import REASONS, find_self_pairs
 from wbc.robot.pairs.descent import Descent
 from wbc.robot.pairs.distances import Links
 from wbc.robot.sampling import configuration, draw
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
 
 HERE = pin.SE3.Identity()
 
@@ -42,7 +42,7 @@ def test_distances_of_segments_are_those_of_thin_capsules() -> None:
     ends[3, :, 20:50] = ends[2, :, 20:50]
     ends[3, :, 50:90] = ends[2, :, 50:90] + 2.0 * (ends[1] - ends[0])[:, 50:90]  # parallel
     ends[2, :, 90:120] = (ends[0] + ends[1])[:, 90:120] / 2  # crossing
-    measured = segment_distances(*ends)
+    measured = segment_distances(*ends.transpose(0, 2, 1))
     s, t = np.meshgrid(np.linspace(0, 1, 101), np.linspace(0, 1, 101))
     for k in range(ends.shape[2]):
         a, b, c, d = ends[:, :, k]
@@ -65,9 +65,9 @@ def test_distances_of_segments_are_those_of_thin_capsules() -> None:
     ],
     ids=repr,
 )
-def test_bounding_capsules_contain_their_shapes(shape: object) -> None:
+def test_bounding_capsules_contain_their_shapes(shape: Solid) -> None:
     place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.1, 0.2, -0.3]))
-    a, b, radius = bounding_capsule(PlacedShape(shape, place))  # type: ignore[arg-type]
+    a, b, radius = PlacedShape(shape, place).capsule()
     corners = {
         Box: lambda s: np.array(list(itertools.product(*[(-x / 2, x / 2) for x in s.size]))),
         Convex: lambda s: s.points,
@@ -109,7 +109,7 @@ def test_broad_and_narrow_phase_agree_with_coal_on_every_sample() -> None:
             least = np.inf
             for a, b in itertools.product(robot.shapes[first], robot.shapes[second]):
                 where = [data.oMf[robot.model.getFrameId(k)] * s.placement for k, s in ((first, a), (second, b))]
-                least = min(least, coal_distance(a.shape, where[0], b.shape, where[1]))
+                least = min(least, coal_distance(a.shape, where[0], b.shape, where[1], 1e-9))
             assert scenes.distance(first, second, n) == pytest.approx(least, abs=1e-6)
             assert bounds[n] <= least + 1e-6
             if links.is_exact(first, second):
@@ -350,3 +350,14 @@ def test_bad_arguments() -> None:
                 wbc.robots.find_self_pairs(robot, **{key: value})
     with pytest.raises(RobotFileError, match=r"gone\.srdf"):
         wbc.robots.find_self_pairs(robot, srdf="gone.srdf")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_distance_that_is_no_number_is_refused_by_name(monkeypatch: pytest.MonkeyPatch, value: float) -> None:
+    """NaN is no less than another distance: the pair was the least of none, and had no normal."""
+    robot = wbc.robots.load("panda", shapes="none")
+    first, second = (PlacedShape(shape, HERE) for shape in (Box((0.1, 0.2, 0.3)), Cylinder(0.1, 0.2)))
+    robot = robot.with_shapes({"panda_link1": [first], "panda_link5": [second]})
+    monkeypatch.setattr("wbc.robot.pairs.distances.distances", lambda *_: np.full((1, 7), value))
+    with pytest.raises(NotFiniteError, match=r"'panda_link1' and 'panda_link5'"):
+        find_self_pairs(robot, samples=3)

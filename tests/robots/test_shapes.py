@@ -17,9 +17,10 @@ import wbc.robots
 from tests.robots.files import example
 from wbc.errors import NotFiniteError, RobotFileError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.robot.geometry.fitting import around_cylinder, around_ellipsoid, fit_capsule
+from wbc.robot.geometry.fitting import fit_capsule
 from wbc.robot.geometry.hull import excess
 from wbc.shapes import Capsule, PlacedShape, Sphere
+from wbc.shapes.around import around_cylinder, around_ellipsoid
 
 
 def outside(shapes: tuple[PlacedShape, ...], points: np.ndarray) -> float:

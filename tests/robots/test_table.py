@@ -49,7 +49,7 @@ def test_rows_with_a_problem_are_listed_and_refused(name: str) -> None:
     assert name not in wbc.robots.names()
     with pytest.raises(RobotFileError) as caught:
         wbc.robots.load(name)
-    reason = {"ur3_xacro": "No name given for the robot", "cassie": "<sdf>"}[name]
+    reason = {"ur3_xacro": "No name given for the robot"}[name]
     assert reason in str(caught.value)
 
 
@@ -68,7 +68,7 @@ def test_robot_loads_as_its_row_says(name: str) -> None:
         assert np.isfinite(data.oMf[robot.model.getFrameId(frame)].homogeneous).all()
 
 
-@pytest.mark.parametrize("name", LOADABLE)
+@pytest.mark.parametrize("name", [name for name in LOADABLE if TABLE[name].file.endswith(".urdf")])
 def test_limits_are_those_of_the_file(name: str) -> None:
     robot = bare(name)
     elements = joints(example(TABLE[name].file))

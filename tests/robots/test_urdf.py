@@ -206,7 +206,7 @@ def test_links_that_the_parser_leaves_without_weight_are_said(tmp_path: Path, ca
 @pytest.mark.parametrize("axis", ["0 0 0", "1 1"])
 def test_the_command_line_names_the_file(tmp_path: Path, axis: str) -> None:
     path = write(tmp_path, joint("turn", "revolute", "a", "b", axis=axis))
-    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robot", str(path)])
+    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robots", "show", str(path)])
     assert result.exit_code == 2
     assert str(path) in result.stderr
     assert "turn" in result.stderr
@@ -214,6 +214,6 @@ def test_the_command_line_names_the_file(tmp_path: Path, axis: str) -> None:
 
 def test_the_command_line_names_the_file_of_a_circle(tmp_path: Path) -> None:
     path = write(tmp_path, joint("turn", "revolute", "a", "b", LIMIT + '<mimic joint="turn"/>'))
-    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robot", str(path)])
+    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robots", "show", str(path)])
     assert str(path) in result.stderr
     assert "circle (got 'turn')" in result.stderr

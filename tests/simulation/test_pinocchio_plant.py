@@ -25,7 +25,7 @@ from wbc.simulation import (
     RealTime,
     level,
 )
-from wbc.simulation.dynamics import Dynamics, step_midpoint, step_rk4
+from wbc.simulation.dynamics import ConstrainedDynamics, step_midpoint, step_rk4
 from wbc.simulation.ground import Distance
 from wbc.simulation.stability import largest_step
 from wbc.walking.holds.built_in import cylinder, plane
@@ -57,7 +57,11 @@ def test_integrators_have_their_order(step: object, order: int, root: str) -> No
     model.appendBodyToJoint(1, pin.Inertia.FromBox(3.0, 0.2, 0.5, 0.9), pin.SE3.Identity())
     model.addJoint(1, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.2])), "arm")
     model.appendBodyToJoint(2, pin.Inertia.FromBox(2.0, 0.1, 0.4, 0.2), pin.SE3(np.eye(3), np.array([0.2, 0.1, 0.0])))
-    dynamics, v0, tau = Dynamics(model, 20.0), np.random.default_rng(1).normal(size=model.nv), np.zeros(model.nv)
+    dynamics, v0, tau = (
+        ConstrainedDynamics(model, 20.0),
+        np.random.default_rng(1).normal(size=model.nv),
+        np.zeros(model.nv),
+    )
 
     def end(count: int) -> np.ndarray:
         q, v = pin.neutral(model), v0

@@ -12,9 +12,9 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
-from bench.soak.torque_stacks import followed as obeying
 from tests.random_robots import Drawn, random_model
 from tests.refusals import assert_refused
+from tests.soak.torque_stacks import followed as obeying
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.robot import Coupling, Robot
 from wbc.simulation import (

@@ -13,6 +13,7 @@ import wbc.robots
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.log import load
 from wbc.robot import Robot
 from wbc.robots import with_masses
 from wbc.simulation import Command, CommandKind, Encoders, GripKind, KinematicPlant, Motors, PinocchioPlant
@@ -240,9 +241,10 @@ def test_loads_are_written_as_they_are(tmp_path: Path) -> None:
     loop = begun(TorqueLoop(stack(), PinocchioPlant(ROBOT)), HANDS[:2])
     loop.advance(0.01)
     file = loop.watch.loads().save(tmp_path)
-    with np.load(file) as read:
-        assert read["rating"].tolist() == [loop.stack.rating.force, loop.stack.rating.torque]
-        assert np.isnan(read["force"][0]).tolist() == [False, False, True]
+    read = load(file)
+    assert read.meta["rating"] == {"force": loop.stack.rating.force, "torque": loop.stack.rating.torque}
+    assert np.isnan(read.array("force")[0]).tolist() == [False, False, True]
+    assert read.units["moment.2"] == "N m"
 
 
 def test_noisy_encoders_are_filtered() -> None:

@@ -33,7 +33,7 @@ def reports(controller: wbc.Controller, robot: Robot) -> list[np.ndarray]:
     return out
 
 
-@pytest.mark.parametrize(("levels", "soft"), [(False, False), (True, False), (False, True)])
+@pytest.mark.parametrize(("levels", "soft"), [(True, False), (False, True)])
 def test_the_bits_of_a_tick_that_is_compiled_for_one_stack(levels: bool, soft: bool) -> None:
     declared = stack(levels, soft)
     one, shared = declared.compile(backend="native"), declared.compile(backend="vm")

@@ -55,7 +55,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     gate.set()
 
 
-def rows_of(controller: Controller) -> rows.Rows:
+def rows_of(controller: Controller) -> rows.RowsLibrary:
     found = controller._artifact.rows
     assert found is not None
     return found

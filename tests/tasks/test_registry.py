@@ -15,7 +15,7 @@ import pytest
 
 from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.items import ITEMS, NO_VELOCITIES
-from tests.repeats import repeats
+from tests.repeats import covering, repeats
 from tests.tasks.robots import NAMES, random_configuration, robot
 from wbc.robot import Robot
 from wbc.tasks import Item, PitchPlane, Task, registry
@@ -65,8 +65,7 @@ def own_rows(item: Item) -> bool:
     return ITEMS[type(item).__name__].own_rows or (isinstance(item, PitchPlane) and item.commands_rate)
 
 
-@pytest.mark.parametrize("robot_name", NAMES)
-@pytest.mark.parametrize("class_name", SHIPPED)
+@pytest.mark.parametrize(("class_name", "robot_name"), covering(SHIPPED, NAMES))
 def test_rows_are_what_the_class_says(class_name: str, robot_name: str) -> None:
     machine, rate = robot(robot_name), ITEMS[class_name].rate
     rng = np.random.default_rng(zlib.crc32(f"{class_name} {robot_name}".encode()))

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from wbc.teleop.bilateral import Bilateral, Channels, Device, Link, Operator, Scheme, Wall
+from wbc.teleop.bilateral import Bilateral, Channel, Channels, Device, Operator, Scheme, Wall
 
 #: Control period [s]
 DT = 0.005
@@ -36,8 +36,8 @@ def drawn(rng: np.random.Generator, ticks: int) -> tuple[Bilateral, Operator, Wa
         gains = (10 ** rng.uniform(0, 4.5), 10 ** rng.uniform(-1, 3), 3 * rng.random(), rng.random())
         return Channels(*(float(gain) if there else 0.0 for gain, there in zip(gains, on, strict=True)))
 
-    def link() -> Link:
-        return Link(rng.uniform(0, 0.6), rng.uniform(0, 0.3) * (rng.random() < 0.5), 0.9 * rng.random())
+    def link() -> Channel:
+        return Channel(rng.uniform(0, 0.6), rng.uniform(0, 0.3) * (rng.random() < 0.5), 0.9 * rng.random())
 
     slave = dataclasses.replace(channels(), stiffness=10 ** rng.uniform(0, 4.5))
     system = Bilateral(Scheme(channels(), slave), device(), device(), link(), link(), DT)

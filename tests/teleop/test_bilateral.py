@@ -16,9 +16,9 @@ from tests.teleop.bilateral_runs import DT, drawn, reach
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.teleop.bilateral import (
     Bilateral,
+    Channel,
     Channels,
     Device,
-    Link,
     Operator,
     Port,
     Scheme,
@@ -34,7 +34,7 @@ from wbc.teleop.bilateral.stability import Side, absolute_stability
 
 DEVICE = Device(2.0, 15.0)
 SCHEMES = {"pp": position_position(), "pf": position_force(), "4c": four_channel()}
-LATE = Link(0.3)
+LATE = Channel(0.3)
 
 
 def test_no_gains_and_no_links_make_it_unstable() -> None:
@@ -71,7 +71,7 @@ def test_a_step_gives_out_what_there_is_and_not_less_than_it_can() -> None:
 
 def test_six_tenths_of_a_second_of_delay() -> None:
     """With jitter and losses: each scheme follows, touches and comes to rest, and forces are felt."""
-    broken, path = Link(0.3, 0.1, 0.3), reach(seconds=8.0)
+    broken, path = Channel(0.3, 0.1, 0.3), reach(seconds=8.0)
     systems = [Bilateral(scheme, DEVICE, DEVICE, broken, broken, DT) for scheme in SCHEMES.values()]
     run = run_bilateral(systems * 2, [Operator(path)] * 6, [Wall()] * 3 + [Wall(0.15)] * 3)
     assert (run.given <= run.taken + 1e-12).all()
@@ -91,7 +91,7 @@ def test_six_tenths_of_a_second_of_delay() -> None:
 
 
 def test_late_forces_without_passivity_control_are_unstable() -> None:
-    light, links = Device(2.0, 6.0), (Link(0.2), Link(0.2))
+    light, links = Device(2.0, 6.0), (Channel(0.2), Channel(0.2))
     free = Bilateral(SCHEMES["pf"], light, light, *links, DT, passivity=False, unchecked=True)
     kept = dataclasses.replace(free, passivity=True)
     run = run_bilateral([free, kept], [Operator(reach(), 100.0)] * 2, [Wall(0.15)] * 2)
@@ -127,10 +127,10 @@ def test_four_channels_move_as_one_mass() -> None:
 
 def test_links() -> None:
     rng = np.random.default_rng(0)
-    late = Link(0.05).newest(40, DT, rng)
+    late = Channel(0.05).newest(40, DT, rng)
     np.testing.assert_array_equal(late, np.maximum(np.arange(40) - 9, 0))
-    np.testing.assert_array_equal(Link().newest(5, DT, rng), [1, 2, 3, 4, 5])
-    broken = Link(0.02, 0.1, 0.5).newest(4000, DT, rng)
+    np.testing.assert_array_equal(Channel().newest(5, DT, rng), [1, 2, 3, 4, 5])
+    broken = Channel(0.02, 0.1, 0.5).newest(4000, DT, rng)
     assert (np.diff(broken) >= 0).all()
     assert (broken <= np.arange(4000) - 3).all() or broken[0] == 0
     # Half of the packets are lost and many are overtaken, so the newest one is older than the delay
@@ -175,7 +175,7 @@ def test_what_is_accepted_without_passivity_control_is_stable() -> None:
             "4c": four_channel(stiffness, damping, min(share, 0.5)),
         }[scheme]
         devices = [Device(2.0, rng.uniform(6, 80)) for _ in range(2)]
-        links = Link(delay * DT), Link(delay * DT)
+        links = Channel(delay * DT), Channel(delay * DT)
         try:
             Bilateral(made, *devices, *links, DT, passivity=False)
             accepted = True
@@ -221,7 +221,7 @@ def test_the_known_bound_on_delayed_springs_is_within_what_is_accepted() -> None
         parts = zip((ratio, 1 / ratio), K, strict=True)
         devices = [Device(2.0, 1.01 * least * part + 5.0 + k * DT / 2) for part, k in parts]
         scheme = Scheme(Channels(K[0]), Channels(K[1]))
-        Bilateral(scheme, *devices, Link(n[0] * DT), Link(n[1] * DT), DT, passivity=False)
+        Bilateral(scheme, *devices, Channel(n[0] * DT), Channel(n[1] * DT), DT, passivity=False)
 
 
 @pytest.mark.parametrize(
@@ -230,13 +230,13 @@ def test_the_known_bound_on_delayed_springs_is_within_what_is_accepted() -> None
         (lambda: Bilateral(SCHEMES["pp"], Device(2.0, 4.9), DEVICE, dt=DT), r"master.damping: .*fest \* dt / 2 = 5"),
         (lambda: Bilateral(SCHEMES["pp"], DEVICE, Device(0.2, 15.0), dt=DT), r"slave.mass: .*_damped \* dt = 0.25"),
         (lambda: Bilateral(SCHEMES["pp"], DEVICE, DEVICE, LATE, LATE, DT, False), "2 poles outside the unit circle"),
-        (lambda: Bilateral(position_position(100.0, 0.0), DEVICE, DEVICE, Link(0.1), Link(0.1), DT, False),
+        (lambda: Bilateral(position_position(100.0, 0.0), DEVICE, DEVICE, Channel(0.1), Channel(0.1), DT, False),
          r"Llewellyn's bound 2 Re Y11 Re Y22 .* is broken at 0.546 Hz"),
         (lambda: Bilateral(SCHEMES["4c"], DEVICE, DEVICE, LATE, LATE, DT, False), "or use passivity=True"),
-        (lambda: Bilateral(SCHEMES["pp"], DEVICE, DEVICE, Link(0.1, 0.1), LATE, DT, False), "only a constant delay"),
+        (lambda: Bilateral(SCHEMES["pp"], DEVICE, DEVICE, Channel(0.1, 0.1), LATE, DT, False), "only a constant delay"),
         (lambda: Scheme(Channels(), Channels(damping=3.0)), "positions drift apart"),
-        (lambda: Link(loss=1.0), "nothing would arrive"),
-        (lambda: Link(11.0), r"Link.delay: expected a value in \[0, 10\]"),
+        (lambda: Channel(loss=1.0), "nothing would arrive"),
+        (lambda: Channel(11.0), r"Channel.delay: expected a value in \[0, 10\]"),
         (lambda: Device(mass=0.0), "Device.mass"),
         (lambda: Channels(local_force=1.5), "Channels.local_force"),
         (lambda: run_bilateral(Bilateral(SCHEMES["pp"], DEVICE, DEVICE, dt=DT), Operator(reach()), Wall(0, 3e3)),
@@ -279,7 +279,7 @@ def test_two_robots_by_hand() -> None:
     master = FollowingArm(panda, "panda_hand_tcp", dt=DT, backend="vm")
     slave = FollowingArm(station, "tip", dt=DT, q=bent, scale=2.0, backend="vm")
     q0 = master.q
-    link = Link(0.05, 0.02, 0.2)
+    link = Channel(0.05, 0.02, 0.2)
     system = Bilateral(SCHEMES["4c"], DEVICE, DEVICE, link, link, DT)
     path = reach(0.05, 2.0, 3, 1)[::2]
     run = run_bilateral(system, Operator(path), Wall(0.02), arms=(master, slave))
@@ -299,7 +299,7 @@ def test_two_robots_by_joints_that_lag_and_stop_at_a_limit() -> None:
     robot = wbc.robots.load("planar_3r", position_lower=-1.0, position_upper=[0.1, 1.0, 1.0], acceleration=np.inf)
     master = FollowingArm(wbc.robots.load("planar_3r"), dt=DT, q=np.full(3, 0.5), backend="vm")
     slave = FollowingArm(robot, dt=DT, q=np.zeros(3), plant=LaggingPlant(robot, 0.02, 5, 0.0), backend="vm")
-    system = Bilateral(SCHEMES["pp"], DEVICE, DEVICE, Link(0.05), Link(0.05), DT)
+    system = Bilateral(SCHEMES["pp"], DEVICE, DEVICE, Channel(0.05), Channel(0.05), DT)
     run = run_bilateral(system, Operator(reach(0.3, 2.4, 3)[::2]), Wall(), arms=(master, slave))
     assert slave.q[0] == pytest.approx(0.1, abs=5e-3)
     np.testing.assert_allclose(slave.q, run.slave[-1, 0], atol=0.01)

@@ -15,7 +15,6 @@ import wbc
 from tests.backends import way
 from wbc.api import Controller
 from wbc.robot import Robot
-from wbc.robot.sources.files import example_data_folder
 from wbc.shapes import Box, PlacedShape
 from wbc.simulation import Command, CommandKind, MujocoPlant, mujoco_model
 
@@ -24,8 +23,6 @@ DT, BEGINS, LASTS, SECONDS = 0.002, 0.05, 0.1, 1.2
 FRICTION, G = 0.6, 9.81
 #: What the rotor of a G1's joint adds to its inertia, as in MuJoCo Menagerie's unitree_g1 [kg m^2]
 ROTOR = 0.01
-#: The robot with what its own SRDF says of its rotors, 1e-5 kg m^2 behind gears of 100; a URDF has no place for them
-TALOS, TALOS_ROTORS = "talos with rotors", "talos_data/srdf/talos.srdf"
 #: A robot whose centre of mass is below this share of its height has fallen
 FALLEN = 0.75
 
@@ -52,21 +49,16 @@ class Stand:
 
 @cache
 def stand(name: str) -> Stand:
-    """TALOS, also with its rotors, or a G1 with limits of acceleration; soles of the G1 are about its contact spheres,
-    and its joints have the rotors that its description leaves out: without them 1 N m turns its feet by 4500 rad/s^2,
-    and one of TALOS by 250.
+    """TALOS or a G1 with limits of acceleration; soles of the G1 are about its contact spheres, and its joints have the
+    rotors that its description leaves out: without them 1 N m turns its feet by 4500 rad/s^2.
     """
-    robot = wbc.robots.load(name.split()[0])
-    model = robot.model.copy()
-    if name.startswith("talos"):
-        if name == TALOS:
-            pin.loadRotorParameters(model, str(example_data_folder() / TALOS_ROTORS), False)
-            model.armature = model.rotorInertia * model.rotorGearRatio**2
-            robot = wbc.robots.load(model)
+    robot = wbc.robots.load(name)
+    if name == "talos":
         soles, half = ("left_sole_link", "right_sole_link"), (0.1, 0.06)
         return Stand(
             robot.with_limits(acceleration=40.0), soles, half, "torso_2_link", "gripper_right_fingertip_1_link"
         )
+    model = robot.model.copy()
     model.armature = np.where(np.arange(model.nv) < 6, 0.0, ROTOR)
     robot = wbc.robots.load(model)
     for side in ("left", "right"):

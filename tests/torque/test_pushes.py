@@ -10,7 +10,7 @@ import pytest
 
 from tests.backends import IN_PYTHON
 from tests.repeats import repeats
-from tests.torque.pushes import DT, TALOS, Outcome, Peer, controller, pushed, stand
+from tests.torque.pushes import DT, Outcome, Peer, controller, pushed, stand
 from wbc import Policy
 from wbc.api import Controller
 from wbc.controller import Step, core_of
@@ -36,22 +36,22 @@ def row(found: list[Outcome]) -> str:
     return f"{len(found)} | {len(fell)} | {lost} | {max(rates):.2f} | {sum(rate > FAST for rate in rates)}"
 
 
-@pytest.mark.parametrize(("name", "by_mass"), [(TALOS, False), ("g1", True), ("g1", False)])
+@pytest.mark.parametrize(("name", "by_mass"), [("talos", False), ("g1", True), ("g1", False)])
 def test_pushes_are_held_within_limits_of_torque_and_velocity(name: str, by_mass: bool) -> None:
-    """With bounds on accelerations before contacts 6 of 10 fell, and joints ran at 90 times their limits; without its
-    rotors TALOS' ankles ran at 3.5 times theirs. ``by_mass``: pushes of TALOS less by the robots' masses. Of 100
-    that TALOS stood one had a joint at 1.26 of its limit.
+    """With bounds on accelerations before contacts 6 of 10 fell, and joints ran at 90 times their limits; at 1.26 times
+    where an arm ran into its stop, as its motor had a third of the deceleration that was counted on. ``by_mass``:
+    pushes of TALOS less by the robots' masses.
     """
     tick, mine, others = controller(name), list[Outcome](), list[Outcome]()
-    mass = [pin.computeTotalMass(stand(each).robot.model) for each in (name, TALOS)]
-    for k in range(repeats(2 if name == TALOS else 1)):
+    mass = [pin.computeTotalMass(stand(each).robot.model) for each in (name, "talos")]
+    for k in range(repeats(2 if name == "talos" else 1)):
         impulse = drawn(k) * (mass[0] / mass[1] if by_mass else 1.0)
         tick.reset(stand(name).robot.neutral)
         mine.append(pushed(name, lambda q, v: tick.step(q, v).torque, impulse))
         others.append(pushed(name, Peer(stand(name)).torque, impulse))
         print(k, impulse.round(1), mine[-1], others[-1], row(mine), row(others), sep=" : ", flush=True)
     assert all(one.torque <= 1.0 for one in mine)
-    assert sum(one.rate > FAST for one in mine) <= len(mine) // 50
+    assert all(one.rate <= FAST for one in mine)
     assert not any(one.fell and one.inside >= HELD for one in mine)
     assert sum(one.fell for one in mine) <= sum(one.fell for one in others)
 
@@ -81,14 +81,41 @@ def test_limits_of_motion_give_way_and_wrenches_do_not() -> None:
         assert step.certificate.violation <= 1e-6
 
 
-def test_states_beyond_limits_have_an_answer() -> None:
-    """Of these ticks 14 of 40 braked: wrenches cost so little that the search took rounding for a contradiction."""
+@pytest.mark.parametrize("speed", [2.0, 4.0])
+def test_states_beyond_limits_have_an_answer(speed: float) -> None:
+    """Of these ticks 14 of 40 braked: wrenches cost so little that the search took rounding for a contradiction. At
+    twice the speed 8 did: its answers missed torques by 1e-3 N m, and no refinement went on from there.
+    """
     tick, rng = controller("talos").clone(), np.random.default_rng(5)
     tick.policy, robot = Policy(chain=("cold",)), tick.stack.robot
-    for _ in range(40):
-        v = rng.standard_normal(robot.nv) * np.where(np.arange(robot.nv) < 6, 0.6, 2.0)
+    for _ in range(20):
+        v = rng.standard_normal(robot.nv) * speed * np.where(np.arange(robot.nv) < 6, 0.3, 1.0)
         tick.reset(robot.neutral)
         assert tick.step(robot.neutral, v).status == "relaxed"
+
+
+@pytest.mark.parametrize(
+    ("joint", "upper"), [("torso_2_joint", True), ("head_2_joint", False), ("arm_left_5_joint", True)]
+)
+def test_joints_stop_before_their_limits_with_what_their_motors_have(joint: str, upper: bool) -> None:
+    """Thrown from end to end: of 40 rad/s^2 these motors have 28 to 38, and joints went up to 7.5 rad beyond."""
+    tick = controller("talos").clone()
+    robot, q = tick.stack.robot, tick.stack.robot.neutral.copy()
+    i = robot.dof_names.index(joint)
+    at, ends = robot.position_index[i], [robot.limits.position_lower[i], robot.limits.position_upper[i]]
+    begin, end = ends if upper else ends[::-1]
+    q[at], v = 0.95 * begin + 0.05 * end, np.zeros(robot.nv)
+    tick.reset(q)
+    tick["hand"].enabled, tick["chest"].enabled = False, not joint.startswith("torso")
+    tick["posture"].weight = 10.0
+    tick["posture"].set(target=np.where(np.arange(robot.nq) == at, end, q), stiffness=400.0, damping=10.0)
+    fastest = 0.0
+    for _ in range(500):
+        step = tick.step(q, v)
+        q, v = robot.integrate(q, v + 0.5 * DT * step.a, DT), v + DT * step.a
+        assert ends[0] <= q[at] <= ends[1]
+        fastest = max(fastest, abs(v[i]))
+    assert fastest > 0.5 * min(1.0, robot.limits.velocity[i])
 
 
 def test_back_ends_relax_alike() -> None:
@@ -105,9 +132,9 @@ def test_back_ends_relax_alike() -> None:
 def test_a_joint_beyond_its_limit_of_velocity_is_brought_back_within_the_tick() -> None:
     """At the limit of acceleration, 40 rad/s^2, it went on while the body turned under it: to 3.5 times its limit."""
     tick = controller("talos")
-    robot, joint = tick.stack.robot, tick.stack.robot.dof_names.index("head_2_joint")
+    robot, joint = tick.stack.robot, tick.stack.robot.dof_names.index("head_1_joint")
     v = np.zeros(robot.nv)
-    v[joint] = 1.2 * robot.limits.velocity[joint]
+    v[joint] = 1.1 * robot.limits.velocity[joint]
     tick.reset(robot.neutral)
     step = tick.step(robot.neutral, v)
     assert step.status == "solved"

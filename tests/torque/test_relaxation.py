@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from bench.soak import machines
-from bench.soak.torque_stacks import strong, torque_stack
-from bench.soak.torques import Needed
 from tests.backends import IN_PYTHON, way
+from tests.soak import machines
+from tests.soak.torque_stacks import strong, torque_stack
+from tests.soak.torques import Needed
 from tests.torque.problems import controller
 from wbc import Status
 from wbc.api import Controller

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.track.path import Approach, SplinePath, TimedPath, smooth_step
+from wbc.track.path import ApproachedPath, SplinePath, TimedPath, smooth_step
 from wbc.track.presets import PRESETS, preset
 
 START = pin.SE3(pin.utils.rotate("x", math.pi), np.array([0.4, 0.1, 0.5]))
@@ -34,7 +34,7 @@ def spline(seed: int) -> SplinePath:
 PATHS: dict[str, TimedPath] = {
     "spline0": spline(0),
     "spline1": spline(1),
-    "approach": Approach(START, spline(2), 1.5),
+    "approach": ApproachedPath(START, spline(2), 1.5),
 } | {name: preset(name, START, 5.0).path for name in PRESETS}
 
 

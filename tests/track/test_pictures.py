@@ -15,9 +15,9 @@ import pytest
 from matplotlib.image import imread
 
 import wbc
+from tests.distances import coal_pose, coal_shape
 from wbc import track
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
-from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
 from wbc.track import render
 from wbc.track.plots import save_picture, save_plots
@@ -53,7 +53,7 @@ def test_sphere_covers_its_disc_and_has_its_depth() -> None:
     both = seen & np.isfinite(expected) & (root > 0.02)
     assert both.sum() > 800
     np.testing.assert_allclose(layer.depth[both], expected[both], atol=5e-3)
-    normals = layer.normal[both]
+    normals = layer.normals[layer.owner[both]]
     points = CAMERA.eye + rays[both] * layer.depth[both][:, None]
     outward = (points - np.array([0.0, 0.0, 1.0])) / 0.5
     assert np.abs(np.sum(normals * outward, axis=1)).min() > 0.99
@@ -64,8 +64,8 @@ def test_nearer_surfaces_hide_farther_ones() -> None:
     far = render.sphere(np.array([0.0, 0.0, 1.0]), 0.5, (0.0, 0.0, 1.0))
     for meshes in ([near, far], [far, near]):
         layer = render.draw(meshes, CAMERA)
-        assert tuple(layer.colour[60, 80]) == RED
-        assert tuple(layer.colour[60 - 20, 80]) == (0.0, 0.0, 1.0)
+        assert tuple(layer.colours[layer.owner[60, 80]]) == RED
+        assert tuple(layer.colours[layer.owner[60 - 20, 80]]) == (0.0, 0.0, 1.0)
 
 
 def test_a_ball_throws_its_shadow_along_the_light() -> None:
@@ -148,6 +148,30 @@ def test_a_scene_shows_what_was_added(tmp_path: Path) -> None:
     assert np.array_equal(still, drawn(0.0))
 
 
+def test_a_film_shows_what_moves_before_and_behind_what_stands_still() -> None:
+    robot = wbc.robots.from_dh([wbc.robots.DHRow(a=0.5)])
+    scene, wide = track.Scene(robot), Box((0.1, 1.0, 1.0))
+    scene.add_shape(wide, pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), colour=PATH)
+    frame = scene.film(CAMERA)
+
+    def red(x: float, y: float = 0.0) -> np.ndarray:
+        scene.add_shape(Sphere(0.2), pin.SE3(np.eye(3), np.array([x, y, 1.0])), colour=RED)
+        picture = frame().astype(int)
+        return np.asarray(picture[..., 0] - picture[..., 2] > 60)
+
+    ahead, aside, empty = red(1.0), red(0.0, 0.9), frame()
+    rows, columns = np.nonzero(ahead)
+    assert abs(rows.mean() - 59.5) < 1.0
+    assert abs(columns.mean() - 79.5) < 1.0
+    radius = 60.0 / math.tan(math.radians(20.0)) * 0.2 / 3.0
+    assert ahead.sum() == pytest.approx(math.pi * radius**2, rel=0.1)
+    assert np.nonzero(aside)[1].min() > 100
+    assert red(-1.0).sum() == 0
+    # What was drawn in one picture is not in the next, and what stands still stays as it was
+    assert np.array_equal(frame(), empty)
+    assert (empty[60, 80] < 250).any()
+
+
 def test_simplified_meshes_stay_near_the_fine_ones() -> None:
     fine = render.sphere(np.array([0.2, 0.1, 0.0]), 0.5, RED).triangles
     assert simplified(fine, 0.0) is fine
@@ -200,19 +224,17 @@ def test_surface_of_every_solid(shape: Solid) -> None:
     """Corners lie on the surface that Coal sees, and the triangles reach as far as it does along every direction."""
     place = pin.SE3(pin.exp3(np.array([0.3, -0.5, 0.7])), np.array([0.1, 0.2, -0.3]))
     points = render.triangles(PlacedShape(shape, place)).reshape(-1, 3)
-    geometry = geometry_of(shape)
-    where = place * geometry.offset
-    there = coal.Transform3s(where.rotation, where.translation)
+    geometry, there = coal_shape(shape), coal_pose(place)
     request = coal.DistanceRequest()
     request.enable_signed_distance = True
     # Coal errs for a ball on the middle of a cylinder's end
     off_axis = np.linalg.norm(place.rotation[:, :2].T @ (points - place.translation).T, axis=0) > 1e-6
     for point in points[off_axis][:: max(1, len(points) // 50)]:
         dot = coal.Transform3s(np.eye(3), point)
-        gap = coal.distance(coal.Sphere(0.01), dot, geometry.geometry, there, request, coal.DistanceResult())
+        gap = coal.distance(coal.Sphere(0.01), dot, geometry, there, request, coal.DistanceResult())
         assert gap == pytest.approx(-0.01, abs=1e-6)
     for direction in np.concatenate([np.eye(3), -np.eye(3)]):
         far = pin.SE3(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), -direction).matrix(), 9.0 * direction)
         plane, wall = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), coal.Transform3s(far.rotation, far.translation)
-        gap = coal.distance(geometry.geometry, there, plane, wall, request, coal.DistanceResult())
+        gap = coal.distance(geometry, there, plane, wall, request, coal.DistanceResult())
         assert 9.0 - (points @ direction).max() == pytest.approx(gap, abs=2e-3)

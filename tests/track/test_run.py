@@ -12,11 +12,11 @@ import pytest
 
 import wbc
 from wbc import track
-from wbc.cli.demo import plan as demo_plan
 from wbc.errors import MissingShapeError, UnknownNameError, WbcError
+from wbc.log import LogFileError
 from wbc.shapes import PlacedShape
 from wbc.track.clearance import clearances, self_clearances
-from wbc.track.log import LogFileError
+from wbc.track.demo import demo as demo_plan
 from wbc.track.setup import ElbowSwing, MovingObstacle
 from wbc.track.summary import save_summary, summarise
 

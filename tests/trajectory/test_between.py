@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wbc.trajectory.laws.between import highest
+from wbc.trajectory.laws.between import bounds, highest, slopes
 
 
 def waves(seed):
@@ -17,6 +17,14 @@ def waves(seed):
         return (size * np.sin(rate * t[..., None, None] + phase)).sum(axis=-1)
 
     return start, value
+
+
+def test_between_two_samples_a_function_may_rise_at_twice_the_steepest_slope() -> None:
+    """At slopes of 1 from 0 to 1 within 2 s: up to 1.5; at slopes of 2 from 1 to 1 within 1 s: up to 2."""
+    span, values = np.array([2.0]), np.array([[[0.0], [1.0], [1.0]]])
+    assert slopes(span, values) == [[1.0]]
+    assert bounds(span, values[:, :2], np.array([[0.5]])) == [[1.5]]
+    assert bounds(span, values, np.array([[1.0]])) == [[2.0]]
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -91,7 +91,19 @@ def test_smooth_laws_and_the_place_that_is_named(seed: int) -> None:
     assert law.certificate.satisfied == (law.certificate.ratio <= 1.0 + 1e-6)
 
 
-@cache
+@given(seeds)
+@settings(max_examples=5)
+def test_derivatives_along_time_are_the_slopes_of_those_before_them(seed: int) -> None:
+    """The chain rule by differences: what certificates and the dense samples above are both made of."""
+    law, h = ragged(seed, 4, 3), 1e-5
+    pieces, places = LawPieces.of(law.path, law.timing), np.linspace(0.1, 0.9, 5)
+    for order in (1, 2, 3):
+        below, above = (pieces.at(law.path, law.timing, order - 1, places + side * h) for side in (-1.0, 1.0))
+        slope = (above - below) / (2.0 * h * pieces.span[:, None, None])
+        found = pieces.at(law.path, law.timing, order, places)
+        np.testing.assert_allclose(found, slope, rtol=0.0, atol=1e-5 * max(1.0, np.abs(slope).max()))
+
+
 @cache
 def pose_laws() -> list[Law]:
     random = np.random.default_rng(3)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.time_laws.families import FAMILIES, drawn
 from tests.repeats import repeats
 from tests.trajectory.families import judged
+from tests.trajectory.random_motions import FAMILIES, drawn
 
-#: Members of a family; `wbc bench time-laws --full` judges 10^6
+#: Members of a family; `python -m bench.time_laws --full` judges 10^6
 MANY = repeats(200)
 
 

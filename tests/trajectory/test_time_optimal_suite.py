@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.time_laws.suite import INSTANCES, PROBLEMS
+from tests.trajectory.suite import INSTANCES, PROBLEMS
 from wbc.trajectory import time_optimal
 
 #: Of the straight moves, twice the square root of distance over acceleration

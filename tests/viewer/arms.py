@@ -11,7 +11,7 @@ import wbc
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.controller.step import state_of
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 
 DT, ACCELERATION = 0.01, 6.0
 BALL = pin.SE3(np.eye(3), np.array([0.45, 0.4, 0.5]))
@@ -43,7 +43,7 @@ def fresh() -> Controller:
     return out
 
 
-def states(ticks: int) -> list[State]:
+def states(ticks: int) -> list[SharedTick]:
     """Of a hand that goes up by 0.2 m."""
     controller, out = fresh(), []
     q = controller.stack.robot.neutral
@@ -52,7 +52,7 @@ def states(ticks: int) -> list[State]:
     controller["hand"].target = target
     for k in range(ticks):
         step = controller.step(q)
-        out.append(State(k + 1, k * DT, state_of(step)))
+        out.append(SharedTick(k + 1, k * DT, state_of(step)))
         q = controller.stack.robot.integrate(q, step.v, DT)
     return out
 

@@ -18,7 +18,7 @@ from wbc.controller.step import state_of
 from wbc.viewer import Viewer, show
 from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.drawing import FIELD, GIZMO, viewpoint
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 from wbc.viewer.tick import Tick
 
 PICTURES = Path(__file__).parents[2] / "build" / "viewer"
@@ -65,7 +65,7 @@ def view() -> tuple[np.ndarray, np.ndarray]:
     """Eye and target of that camera, from a tick at rest."""
     controller = arms.fresh()
     step = controller.step(controller.stack.robot.neutral)
-    return viewpoint(controller, Tick(controller, State(1, arms.DT, state_of(step))))
+    return viewpoint(controller, Tick(controller, SharedTick(1, arms.DT, state_of(step))))
 
 
 def pixel(page: Page, point: np.ndarray) -> tuple[float, float]:

@@ -22,7 +22,7 @@ LONGEST = 240.0
 
 
 class Playing(threading.Thread):
-    """One kind of play, as ``wbc play`` starts it."""
+    """One kind of play, as ``wbc view play`` starts it."""
 
     def __init__(self, begin: Callable[..., None], *given: Any) -> None:
         super().__init__()

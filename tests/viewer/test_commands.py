@@ -1,4 +1,4 @@
-"""``wbc play`` and ``wbc view`` as a user types them, as far as they go without a browser."""
+"""``wbc view`` as a user types them, as far as they go without a browser."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_any_robot_has_sliders(name: str) -> None:
 
 
 def test_what_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
-    code, _, err = run("play", "pnda")
+    code, _, err = run("view", "play", "pnda")
     assert (code, "panda" in err) == (2, True)
     code, _, err = run("view", "pnda")
     assert (code, "panda" in err) == (2, True)
@@ -47,7 +47,7 @@ def test_what_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
     assert (code, "neither a recording nor replay.html" in err) == (2, True)
     code, _, err = run("view", "panda", "--export", str(tmp_path / "page.html"))
     assert (code, "only runs are exported" in err) == (2, True)
-    code, _, err = run("play", "--zeromq", "tcp://0.0.0.0:5555", "--no-browser", "--backend", "vm")
+    code, _, err = run("view", "play", "--zeromq", "tcp://0.0.0.0:5555", "--no-browser", "--backend", "vm")
     assert (code, "this machine" in err) == (2, True)
 
 
@@ -85,7 +85,7 @@ def test_a_recording_is_played_and_sought(tmp_path: Path, monkeypatch: pytest.Mo
         looker.append(threading.Thread(target=look, args=(url,)))
         looker[0].start()
 
-    monkeypatch.setattr("wbc.cli.viewing.say", say)
+    monkeypatch.setattr("wbc.cli.view.show", say)
     code, _, err = run("view", str(tmp_path), "--no-browser", "--seconds", "6")
     assert code == 0, err
     looker[0].join()

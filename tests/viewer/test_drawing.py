@@ -14,9 +14,9 @@ import wbc
 from wbc.api import Controller
 from wbc.controller.step import state_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, PointContact, Posture
-from wbc.viewer.bodies import Mesh
+from wbc.viewer.bodies import DrawnMesh
 from wbc.viewer.drawing import AMBER, BLUE, GREEN, GREY, PURPLE, RED, Drawing, size
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
@@ -39,7 +39,7 @@ class Scene:
 
 
 def tick_of(controller: Controller, q: np.ndarray) -> Tick:
-    return Tick(controller, State(1, 0.0, state_of(controller.step(q))))
+    return Tick(controller, SharedTick(1, 0.0, state_of(controller.step(q))))
 
 
 @functools.cache
@@ -130,19 +130,21 @@ def test_a_force_is_an_arrow_along_it_from_its_contact() -> None:
 
 def test_a_note_marks_reserved_and_gone_holds_and_draws_the_ways_of_hands() -> None:
     controller, scene = standing().clone(), Scene()
-    empty = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
+    empty = DrawnMesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
     places = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.0, 1.0, 0]])
-    around = Scenery((), empty, ("a", "b", "c"), places, (0.0, 0.0, 1.0), "panda_link0", ("arm1",))
+    around = Scenery((), empty, ("a", "b", "c"), places, (0.0, 0.0, 1.0), "panda_link0", ("arm1",), {})
     drawing = Drawing(scene, controller, scenery=around)  # type: ignore[arg-type]
     ways = [[[0.0, 0, 0], [0.5, 0, 0.2], [1.0, 0, 0]], [[0.0, 0, 0], [0.0, 1.0, 0]]]
-    drawing.note({"reserved": ["b"], "gone": ["c"], "ways": ways})
+    drawing.note({"reserved": ["b"], "gone": ["c"], "held": ["a"], "ways": ways})
     assert scene.nodes["/holds/reserved b"].color == BLUE
     assert scene.nodes["/holds/reserved b"].position == pytest.approx(places[1])
     assert scene.nodes["/holds/gone c"].color == RED
+    assert scene.nodes["/holds/held a"].color == AMBER
     lines = scene.nodes["/lines/swings"]
     assert lines.points.shape == (3, 2, 3)
     assert [tuple(colour[0]) for colour in lines.colors] == [PURPLE, PURPLE, GREY]
     drawing.note({"reserved": [], "gone": ["c"], "ways": []})
     assert not scene.nodes["/holds/reserved b"].visible
+    assert not scene.nodes["/holds/held a"].visible
     assert scene.nodes["/holds/gone c"].visible
     assert not lines.visible

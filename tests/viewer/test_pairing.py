@@ -13,8 +13,8 @@ from wbc.robots import load
 from wbc.teleop import Teleoperation
 from wbc.validation import Array
 from wbc.viewer import MessageError
-from wbc.viewer.link import State
-from wbc.viewer.operating import FASTEST, PairOperation, pairing_of
+from wbc.viewer.link import SharedTick
+from wbc.viewer.operating import OPERATED_SPEED, PairOperation, pairing_of
 from wbc.viewer.pairing import PairWatch
 from wbc.viewer.tick import Tick
 
@@ -48,7 +48,7 @@ def test_what_is_commanded_moves_and_a_swap_holds_it(begun: tuple[PairOperation,
     start = robot.pose(q, tip).translation
     q, seen = driven(operation, q, {"type": "drive", "rates": [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]}, 60)
     # Joints that start within their accelerations are not there at once
-    assert seen[-1].met == pytest.approx([0, 0, 0.5 * FASTEST[0], 0, 0, 0], abs=1e-6)
+    assert seen[-1].met == pytest.approx([0, 0, 0.5 * OPERATED_SPEED[0], 0, 0, 0], abs=1e-6)
     moved = robot.pose(q, tip).translation - start
     assert moved[2] > 0.02
     # Nobody renews it: it comes to rest
@@ -111,7 +111,7 @@ def test_a_page_is_told_the_pair_and_warned_before_its_locus(begun: tuple[PairOp
     for name in ("gamma | xi", "xi | alpha"):
         operation.obey({"type": "pair", "name": name})
         q, seen = driven(operation, q, None, 1)
-        told = watch.told(Tick(session.control.controller, State(1, 0.0, state_of(seen[-1].step))))
+        told = watch.told(Tick(session.control.controller, SharedTick(1, 0.0, state_of(seen[-1].step))))
         assert told["pair"] == name
         assert told["sigma"] == pytest.approx(seen[-1].sigma, rel=1e-6)
         assert not told["warning"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from wbc.viewer import timeline as module
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 from wbc.viewer.timeline import BETWEEN, Timeline
 
 
-def made(count: int, step: float = 0.1) -> list[State]:
-    return [State(k + 1, k * step, b"x") for k in range(count)]
+def made(count: int, step: float = 0.1) -> list[SharedTick]:
+    return [SharedTick(k + 1, k * step, b"x") for k in range(count)]
 
 
 def number(timeline: Timeline) -> int:
@@ -59,7 +59,7 @@ def test_a_live_loop_is_followed_looked_back_at_and_followed_again() -> None:
     shown = timeline.state()
     assert shown is not None
     assert 5.0 - 2 * BETWEEN < shown.time <= 5.0
-    timeline.add(State(2000, 12.0, b"x"))
+    timeline.add(SharedTick(2000, 12.0, b"x"))
     assert timeline.state() == shown
     timeline.back()
     assert number(timeline) == 2000
@@ -68,12 +68,12 @@ def test_a_live_loop_is_followed_looked_back_at_and_followed_again() -> None:
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST", 100)
+    monkeypatch.setattr(module, "MEMORY", 100)
     timeline = Timeline()
     for k in range(1000):
-        timeline.add(State(k + 1, float(k), b"x"))
+        timeline.add(SharedTick(k + 1, float(k), b"x"))
         assert len(timeline._states) <= 101
     assert timeline.end == 999.0
     # A loop that begins anew has no past
-    timeline.add(State(1, 0.0, b"x"))
+    timeline.add(SharedTick(1, 0.0, b"x"))
     assert (timeline.begin, timeline.end) == (0.0, 0.0)

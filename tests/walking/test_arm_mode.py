@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import pi, sin
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 import wbc
 from wbc.errors import UnknownNameError
 from wbc.robots import Walker
+from wbc.robots.walker_data import spaced_radius
 from wbc.walking import Structure
 from wbc.walking.body_path import grid_path
 from wbc.walking.checker import Rules, check_walk
@@ -111,7 +111,7 @@ def test_refusals_say_why_and_nothing_moves(walk: Walk) -> None:
 
 def test_a_log_ends_at_rest_where_an_arm_was_turning_upright(machine: Walker, tmp_path: Path) -> None:
     """A hand that leans where it stands turns upright meanwhile; its first task is refused at once."""
-    six = wbc.robots.walker(6, machine.data.shoulder_radius * sin(pi / 3) / sin(pi / 6))
+    six = wbc.robots.walker(6, spaced_radius(6, machine.data.shoulder_radius))
     site = Site("truss", fraction=0.33149961941237777, seed=271)
     tasks = (arm_task("rate 0,0,0.0594,0,0,0 for 1.17"),)
     run = perform_walk(ArmRequest(site, "L3,9", ("L1,16",), arm="arm5", tasks=tasks), six)

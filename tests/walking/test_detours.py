@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import wbc
-from bench.walk.reference import Rules, fewest_along
+from tests.judges.fewest_along import fewest_along
 from tests.repeats import ALL, MORE
 from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_columns, remove_rows
@@ -45,7 +45,7 @@ def ends(path: BodyPath) -> np.ndarray:
 
 def confirm(machine: Walker, structure: Structure, path: BodyPath, every: int) -> None:
     """Exact breadth-first search over all grips along the poses finds one: arms clear, joints within their limits."""
-    assert fewest_along(machine, structure, path.poses[::every], Rules()) is not None
+    assert fewest_along(machine, structure, path.poses[::every]) is not None
 
 
 def test_over_a_trench_the_body_turns_or_goes_down(machine: Walker, structure: Structure) -> None:

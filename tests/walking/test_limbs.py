@@ -13,7 +13,7 @@ import pytest
 import wbc
 from wbc.robot import DHRow
 from wbc.robots import Margins, Walker, WalkerArm, WalkerData
-from wbc.robots.link_tree import Link, build_model
+from wbc.robots.link_tree import TreeLink, build_model
 from wbc.robots.walker_arms import BODY, chain
 from wbc.validation import Array
 from wbc.walking import Hold, PlaneSurface, Structure, cylinder
@@ -166,11 +166,11 @@ def numeric_walker() -> Walker:
     """A body with three such arms, 0.3 m from its middle."""
     rows = [DHRow(a, alpha, d, lower=-LIMIT, upper=LIMIT, velocity=RATE) for a, alpha, d in ROWS]
     seeds = np.array([[0.28, 3.0, 1.56, 0.15, 1.57, 0.0], [0.28, 3.05, 2.01, 2.8, -1.57, 0.0]])
-    limb, arms, links = NumericLimb.of(wbc.robots.from_dh(rows).model, seeds), list[WalkerArm](), list[Link]()
+    limb, arms, links = NumericLimb.of(wbc.robots.from_dh(rows).model, seeds), list[WalkerArm](), list[TreeLink]()
     for k in range(3):
         name, out = f"arm{k + 1}", pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
         base = pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * out
-        links += [Link(f"{name}_base", BODY, base), *chain(name, f"{name}_base", rows, f"{name}_hand")]
+        links += [TreeLink(f"{name}_base", BODY, base), *chain(name, f"{name}_base", rows, f"{name}_hand")]
         joints = tuple(f"{name}_joint{j}" for j in range(1, 7))
         some = slice(7 + 6 * k, 13 + 6 * k), slice(6 + 6 * k, 12 + 6 * k)
         arms.append(WalkerArm(name, base, joints, *some, f"{name}_base", f"{name}_hand", ()))

@@ -136,13 +136,7 @@ def test_from_the_command_line(file: Path, made: Plan, tmp_path: Path) -> None:
     assert least["least"] < 0.7 * made.path.duration
     joint, part = max(least["binding"].items(), key=lambda item: item[1])
     assert f"{least['least']:.2f} s ({least['factor']:.2f} of the plan; {joint} binds {100 * part:.0f} %)" in shown
-    code, _, err = run("walk", "--resume", tmp_path / "run", *bare[1:], "--least-time", "--out", tmp_path / "other")
-    assert code == 2
-    assert "least-time" in err
     assert differences(made, read_plan(tmp_path / "run" / "plan.json")) == []
     code, _, err = run("walk", "--plan", file, *bare, "--remove-rows", "9-12", "--out", tmp_path / "other")
     assert code == 2
     assert not (tmp_path / "other").exists()
-    code, _, err = run("walk", "--plan", file, "--resume", tmp_path / "run", "--out", tmp_path / "other")
-    assert code == 2
-    assert "a run that is gone on with keeps its own" in err

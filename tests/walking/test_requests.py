@@ -12,8 +12,8 @@ import pytest
 from wbc.errors import RangeError, ShapeError, StructureFileError, UnknownNameError, WbcError
 from wbc.walking.log.log import WalkLogError
 from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site, TwoEndedRequest
-from wbc.walking.run.request import PublishedRequest, Request, read_request, record_of, request_of
-from wbc.walking.run.resume_mode import read_resume
+from wbc.walking.run.records import record_of, request_of
+from wbc.walking.run.request import PublishedRequest, Request
 from wbc.walking.run.session import mode_of
 
 REQUESTS = [
@@ -59,29 +59,16 @@ def test_texts_are_parsed_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "kind"),
-    [
-        ({}, PathRequest),
-        ({"mode": "destination", "free_start": True}, PathRequest),
-        ({"planner": "published"}, PublishedRequest),
-        ({"commands": "keyboard"}, DriveRequest),
-        ({"mode": "arm", "tasks": ["hold 13,12"]}, ArmRequest),
-        ({"robot": "two-ended", "points": ["14,0,4"]}, TwoEndedRequest),
-    ],
-)
-def test_options_make_the_request_of_their_mode(options: dict[str, Any], kind: type[Any]) -> None:
-    assert type(read_request(**options)) is kind
-
-
-def test_records_of_older_logs_are_read() -> None:
-    texts = {"structure": "cylinder", "mode": "velocity", "speed": 0.1, "start": "13,9", "points": ["13,13"]}
-    texts |= {"rows": "", "planner": "free", "commands": "", "tasks": [], "robot": "three-armed", "gait": "any"}
-    assert request_of(texts) == PathRequest(start="13,9", points=("13,13",), speed=0.1)
-
-
-@pytest.mark.parametrize(
     "record",
-    [None, 3, {"kind": "fly"}, {"kind": "path"}, {"speed": "fast"}, {"kind": "path", "site": {"hue": 1}}],
+    [
+        None,
+        3,
+        {"start": "13,9", "mode": "velocity"},
+        {"kind": "fly"},
+        {"kind": "path"},
+        {"speed": "fast"},
+        {"kind": "path", "site": {"hue": 1}},
+    ],
 )
 def test_what_is_no_record_is_refused(record: object) -> None:
     with pytest.raises(WalkLogError, match="what the run was asked to do"):
@@ -97,7 +84,7 @@ def test_what_is_no_record_is_refused(record: object) -> None:
         (lambda: PathRequest(points=("13,99",)), RangeError, r"place 2\.A"),
         (lambda: PathRequest("plane", points=(3,)), ShapeError, "place 2"),
         (lambda: PathRequest(site=3), ShapeError, "site"),
-        (lambda: PathRequest(objective="fast"), UnknownNameError, "mode"),
+        (lambda: PathRequest(objective="fast"), UnknownNameError, "objective"),
         (lambda: PathRequest(speed=0.0), RangeError, "speed"),
         (lambda: PublishedRequest("plane"), RangeError, "cylinder"),
         (ArmRequest, RangeError, "do"),
@@ -105,8 +92,7 @@ def test_what_is_no_record_is_refused(record: object) -> None:
         (lambda: TwoEndedRequest(start=("1",)), ShapeError, "two holds"),
         (lambda: TwoEndedRequest(goal=(1.0, 2.0)), ShapeError, "to"),
         (lambda: TwoEndedRequest(gait="gallop"), UnknownNameError, "gait"),
-        (lambda: read_resume("nowhere@3"), RangeError, "FOLDER@SECONDS"),
-        (lambda: read_request(robot="crab"), UnknownNameError, "robot"),
+        (lambda: ResumeRequest("run", "late"), ShapeError, "time in s"),  # type: ignore[arg-type]
     ],
 )
 def test_bad_requests_are_named(make: Any, error: type[WbcError], match: str) -> None:
@@ -114,12 +100,14 @@ def test_bad_requests_are_named(make: Any, error: type[WbcError], match: str) ->
         make()
 
 
-def test_a_resumed_run_is_named_by_folder_and_time(tmp_path: Path) -> None:
-    assert read_resume(str(tmp_path)) == ResumeRequest(tmp_path)
-    assert read_resume(f"{tmp_path}@2.5", ("13,9",)) == ResumeRequest(tmp_path, 2.5, ("13,9",))
-    odd = tmp_path / "a@home"
-    odd.mkdir()
-    assert read_resume(str(odd)) == ResumeRequest(odd)
+def test_a_goal_of_the_two_ended_arm_is_a_hold_or_a_place() -> None:
+    assert TwoEndedRequest(goal="4").to() == TwoEndedRequest(goal="4")
+    assert TwoEndedRequest().to(("14,0,4",)) == TwoEndedRequest(goal=(14.0, 0.0, 4.0))
+    for goals in (("9",), ("1,2",), ("3", "4")):
+        with pytest.raises((UnknownNameError, ShapeError)):
+            TwoEndedRequest().to(goals)
+    with pytest.raises(UnknownNameError, match="'9'"):
+        TwoEndedRequest(start=("1", "9")).to()
 
 
 def test_modes_refuse_what_they_do_not_do(machine: Any) -> None:

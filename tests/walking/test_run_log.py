@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,9 @@ import pytest
 
 import wbc
 from tests.walking.honest import MACHINE, honest, structure
+from wbc import log as logs
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
+from wbc.log import LogFileError
 from wbc.walking.log.log import CLOSED, FILE, OPEN, WalkLog, WalkLogError
 from wbc.walking.log.recorder import LogRecorder
 
@@ -102,8 +103,11 @@ def test_a_log_comes_back_from_its_file(tmp_path: Path) -> None:
             np.testing.assert_array_equal(getattr(again, field.name), getattr(log, field.name))
             assert type(getattr(again, field.name)) is type(getattr(log, field.name))
     assert again.meta["robot_digest"] == MACHINE.data.digest
+    columns = logs.load(tmp_path)
+    np.testing.assert_array_equal(columns.array("q"), log.q)
+    assert columns.units["q.arm1_joint1"] == "rad"
     with np.load(tmp_path / FILE, allow_pickle=False) as data:
-        assert set(data.files) == {field.name for field in fields(WalkLog)} | {"format"}
+        np.testing.assert_array_equal(data["v.arm2_joint3"], log.v[:, log.joints.index("arm2_joint3")])
 
 
 BAD: list[tuple[str, Any, type[WbcError], str]] = [
@@ -160,33 +164,33 @@ def test_files_that_are_no_logs_are_refused(tmp_path: Path) -> None:
     log, _ = honest()
     with pytest.raises(WalkLogError, match=r"no run\.npz"):
         WalkLog.load(tmp_path)
-    with pytest.raises(WalkLogError, match="no such file"):
+    with pytest.raises(LogFileError, match="no such file"):
         WalkLog.load(tmp_path / "other.npz")
-    with pytest.raises(WalkLogError, match="cannot be written"):
-        log.save(tmp_path / "no folder" / "run.npz")
-    file = log.save(tmp_path)
-    with np.load(file) as data:
-        good = {name: data[name] for name in data.files}
     (tmp_path / "text.npz").write_text("nothing")
-    with pytest.raises(WalkLogError, match="no log of a walk"):
-        WalkLog.load(tmp_path / "text.npz")
+    with pytest.raises(LogFileError, match="cannot be written"):
+        log.save(tmp_path / "text.npz" / "run.npz")
+    file = log.save(tmp_path)
     (tmp_path / "half.npz").write_bytes(file.read_bytes()[:2000])
-    with pytest.raises(WalkLogError, match="no log of a walk"):
-        WalkLog.load(tmp_path / "half.npz")
-    meta = {key: value for key, value in json.loads(str(good["meta"])).items() if key != "dt"}
+    for name in ("text.npz", "half.npz"):
+        with pytest.raises(LogFileError, match="no log of this package"):
+            WalkLog.load(tmp_path / name)
+    good = logs.load(file)
+    meta = {key: value for key, value in good.meta.items() if key != "dt"}
     for change, message in (
-        ({"format": np.array(2)}, "format 1"),
-        ({"format": None}, "format 1"),
-        ({"hand_state": None}, "run.hand_state.*lacks"),
-        ({"meta": np.array("{")}, "run.meta"),
-        ({"meta": np.array(json.dumps(meta))}, "meta.dt"),
-        ({"q": good["q"][1:]}, "WalkLog.q"),
-        ({"t": good["t"].astype(complex)}, "WalkLog.t"),
+        ({"meta": {**good.meta, "format": 1}}, "format 2"),
+        ({"meta": {}}, "format 2"),
+        ({"meta": meta}, "meta.dt"),
+        ({"meta": {**good.meta, "arms": "abc"}}, "run.hand_state.a.*lacks"),
+        ({"tables": {}}, "run.holds.*lacks"),
+        ({"columns": {k: v for k, v in good.columns.items() if k != "hand_state.arm1"}}, "run.hand_state.arm1.*lacks"),
+        ({"columns": {**good.columns, "q.arm1_joint1": good["q.arm1_joint1"][1:]}}, "WalkLog.q"),
+        ({"columns": {**good.columns, "t": good["t"].astype(complex)}}, "WalkLog.t"),
+        ({"tables": {**good.tables, "holds": good.tables["holds"][:, :5]}}, "WalkLog.holds"),
+        ({"tables": {**good.tables, "presence": np.zeros(3)}}, "WalkLog.presence"),
     ):
-        arrays = {name: value for name, value in {**good, **change}.items() if value is not None}
-        np.savez(tmp_path / "bad.npz", **arrays)
+        bad = logs.save(replace(good, **change), tmp_path, "npz", "bad")
         with pytest.raises(WbcError, match=message):
-            WalkLog.load(tmp_path / "bad.npz")
+            WalkLog.load(bad)
 
 
 def test_a_recorder_refuses_what_does_not_fit_and_keeps_what_it_has() -> None:

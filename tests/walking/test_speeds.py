@@ -20,7 +20,7 @@ from wbc.walking.planner.slower import check_stance
 from wbc.walking.report.folder import rules_of
 from wbc.walking.run.path_mode import PathMode
 from wbc.walking.run.places import over_holds
-from wbc.walking.run.request import read_request
+from wbc.walking.run.request import PathRequest, Site
 from wbc.walking.run.session import perform
 
 
@@ -116,7 +116,7 @@ def test_a_stance_does_not_depend_on_speed(machine: Walker, structure: Structure
 
 
 def test_the_summary_says_that_a_walk_was_slower(machine: Walker, tmp_path: Path) -> None:
-    request = read_request(start="13,9", points=["13,10"], speed=0.8, mode="destination", rigid=True)
+    request = PathRequest(Site(rigid=True), "13,9", ("13,10",), 0.8, objective="destination")
     run = perform(PathMode(request, machine), backend="vm")
     assert run.outcome == "arrived"
     assert [figure.text for figure in run.more if figure.key == "slower"] == [run.plan.note if run.plan else ""]

@@ -7,10 +7,11 @@ import pytest
 
 from wbc.errors import WbcError
 from wbc.robots import Walker
-from wbc.viewer.bodies import Mesh
-from wbc.viewer.climbing import FASTEST, WalkOperation, scenery_of
+from wbc.viewer.bodies import DrawnMesh
+from wbc.viewer.climbing import BODY_SPEED, WalkOperation
 from wbc.viewer.messages import RATE_LASTS
 from wbc.viewer.scenery import Scenery
+from wbc.viewer.walks import scenery_of
 from wbc.walking import Structure
 from wbc.walking.loop.stack import DT, WalkStack
 from wbc.walking.loop.state import Tick
@@ -52,7 +53,7 @@ def test_a_body_goes_while_it_is_steered_and_stops_when_nobody_says_so(begun: Be
         operation.obey({"type": "steer", "rates": [0.0, 1.0, 0.0]})
         ticks(operation, now, 10)
     gone = float(operation.drive.steering.axis @ (walk.q[:3] - begin))
-    assert 0.01 < gone < 0.8 * FASTEST[1] * 1.2
+    assert 0.01 < gone < 0.8 * BODY_SPEED[1] * 1.2
     ticks(operation, now, round((RATE_LASTS + 0.6) / walk.dt))
     assert not operation.drive.command.any()
     assert walk.pace == 0.0
@@ -78,7 +79,11 @@ def test_a_hold_that_was_clicked_is_gone_to_on_a_straight_course(begun: Begun) -
     operation, _ = begun
     walk = operation.drive.walk
     steering, here = operation.drive.steering, walk.q[:3]
-    scenery = scenery_of(walk)
+    scenery = scenery_of(walk.walker, walk.structure, walk.q)
+    # Every arm in its own colour, with the pieces that join its shapes
+    colours = {arm.name: scenery.dress[arm.links[0]][1] for arm in walk.walker.arms}
+    assert len(set(colours.values())) == len(walk.walker.arms)
+    assert all(len(scenery.dress[arm.links[0]][0]) > 100 for arm in walk.walker.arms)
     hold = min(range(len(scenery.holds)), key=lambda k: abs(float(steering.axis @ (scenery.places[k] - here)) - 0.8))
     # A ray from outside through the stud is a click
     off = scenery.places[hold] - steering.origin
@@ -89,7 +94,7 @@ def test_a_hold_that_was_clicked_is_gone_to_on_a_straight_course(begun: Begun) -
     operation.obey({"type": "go", "hold": scenery.holds[hold]})
     operation.steer()
     course = operation.drive.command
-    assert np.linalg.norm(course) == pytest.approx(FASTEST[0], rel=1e-6)
+    assert np.linalg.norm(course) == pytest.approx(BODY_SPEED[0], rel=1e-6)
     assert course[1] > 0.0
     assert course[2] == 0.0
     operation.stop("because")
@@ -200,7 +205,7 @@ def test_what_does_not_fit_is_refused(begun: Begun, message: dict, said: str) ->
 
 
 def test_a_click_beside_all_holds_is_none() -> None:
-    empty = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
-    scenery = Scenery((), empty, ("a", "b"), np.array([[0.0, 0, 0], [1.0, 0, 0]]), (0.0, 0.0, 1.0), "body", ("arm1",))
+    empty = DrawnMesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
+    scenery = Scenery((), empty, ("a", "b"), np.array([[0.0, 0, 0], [1.0, 0, 0]]), (0.0, 0.0, 1.0), "body", (), {})
     assert scenery.hit(np.array([0.5, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])) is None
     assert scenery.hit(np.array([0.9, 0.0, 1.0]), np.array([0.0, 0.0, -3.0])) == "b"

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bench.walk.structures import surface_of
+from tests.walking.trials.structures import surface_of
 from wbc.clearance import Motion, Pair, Sweeper, SweptBody, SweptScene, Tree, TriangleMesh
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 from wbc.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere

@@ -6,7 +6,7 @@ from math import pi, radians
 
 import pytest
 
-from bench.walk.reference import Rules, fewest_along
+from tests.judges.fewest_along import fewest_along
 from wbc.robots import Walker
 from wbc.walking import Structure
 from wbc.walking.body_path import BodyPath, grid_path
@@ -16,8 +16,8 @@ from wbc.walking.planner.planner import plan_walk
 INCH = 0.0254
 #: Over a patch of 8 x 8 holds, from and to in (T, A)
 WAYS = {"diagonal": ((11, 10), (14, 13)), "+T": ((10.5, 11.5), (14.5, 11.5))}
-#: What the planner keeps of limits and reach
-ROOM = Rules(angle_room=radians(2.0), reach_room=0.3 * INCH)
+#: What the planner keeps of limits [rad] and reach [m]
+ROOM = radians(2.0), 0.3 * INCH
 #: After a third of a turn each arm is where the next one was
 BEFORE = {"arm1": "arm3", "arm2": "arm1", "arm3": "arm2"}
 
@@ -40,7 +40,7 @@ def planned(machine: Walker, holds: Structure, way: BodyPath) -> Plan:
 @pytest.mark.parametrize("name", sorted(WAYS))
 def test_as_few_regrasps_as_an_exact_search(machine: Walker, patch: Structure, name: str) -> None:
     way = path(name)
-    fewest = fewest_along(machine, patch, way.poses[::10], ROOM)
+    fewest = fewest_along(machine, patch, way.poses[::10], *ROOM)
     plan = planned(machine, patch, way)
     assert len(plan.regrasps) == fewest == 3
     # With a hold less the fewest cannot be less: the hold that the first hand went to is gone

@@ -19,6 +19,7 @@ from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task, rank, singular_values
 from wbc.analysis.loci.budget import Budget, processor_seconds
+from wbc.analysis.loci.child import Child, Report
 from wbc.analysis.loci.loci import STRICT, UNDECIDED, Loci, LocusSearch
 from wbc.analysis.loci.made_within import made_within
 from wbc.analysis.rows import Rows, checked
@@ -28,10 +29,14 @@ from wbc.validation import Array
 
 #: Random points on a branch that are tried for a witness
 TRIES = 40
-#: What the exact method gets before numbers are asked as well [s], and least minutes of a certificate
-HEAD, _LEAST = 1.0, 1e-6
-#: What is left for points of branches where the search has taken all the time [s]
-_AFTER = 1.0
+#: Time that the exact method has alone before numbers are asked as well [s]
+HEAD = 1.0
+#: Least time of a certificate [min]
+_LEAST = 1e-6
+#: Part of the time that the search may take
+_SEARCH = 0.9
+#: What is left at least for points of branches [s]
+_AFTER = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +125,8 @@ def analyse(
     if not made_within(model, rows, budget.seconds):
         text = f"expected more: the exact Jacobian of {model.robot.nv} joints takes longer"
         raise RangeError("minutes", budget.minutes, text)
-    found, certificate, done = _searched(model, wanted, added, algorithm, budget, certificate, progress)
+    search = budget.part(_SEARCH)
+    found, certificate, done = _searched(model, wanted, added, algorithm, search, certificate, progress)
     witness = None
     if certificate is not None and certificate.witness is not None:
         at = certificate.witness
@@ -213,23 +219,29 @@ def find_witness(
     Args:
         configuration: of the robot, from a number for each joint of the arithmetic that found the branches.
     """
-    numeric, rng = NumericRows(robot), np.random.default_rng(0)
-    until = time.monotonic() + max(budget.seconds, _AFTER)
-    for branch in found.algorithmic:
-        best: RankWitness | None = None
-        for _ in range(TRIES):
-            if time.monotonic() > until:
-                return best
-            point = real_point(found.exact.half, branch, rng)
-            if point is None:
-                continue
-            q = configuration(point)
-            J_T, J_R = numeric.value(task, q), numeric.value(rows, q)
-            if rank(J_T) < J_T.shape[0] or rank(J_R) == robot.nv:
-                continue
-            sigma, every = singular_values(J_T), singular_values(J_R)
-            if best is None or sigma[-1] > best.task[-1]:
-                best = RankWitness(q, branch, sigma, every)
-        if best is not None:
-            return best
-    return None
+
+    def work(report: Report) -> None:
+        numeric, rng = NumericRows(robot), np.random.default_rng(0)
+        for number, branch in enumerate(found.algorithmic):
+            farthest = 0.0
+            for _ in range(TRIES):
+                point = real_point(found.exact.half, branch, rng)
+                if point is None:
+                    continue
+                q = configuration(point)
+                J_T, J_R = numeric.value(task, q), numeric.value(rows, q)
+                if rank(J_T) < J_T.shape[0] or rank(J_R) == robot.nv:
+                    continue
+                sigma = singular_values(J_T)
+                if sigma[-1] > farthest:
+                    farthest = float(sigma[-1])
+                    report((number, q, sigma, singular_values(J_R)))
+            if farthest > 0.0:
+                return
+
+    with Child(work, max(budget.seconds, _AFTER)) as child:
+        child.wait()
+    if not child.reports:
+        return None
+    number, q, own, every = child.reports[-1]
+    return RankWitness(q, found.algorithmic[number], own, every)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
@@ -14,10 +13,11 @@ from wbc import validation
 from wbc.batch import numbers
 from wbc.batch.batch_step import BatchStep
 from wbc.batch.derivatives import Derivatives
-from wbc.batch.engine import Clones, Compiled, Engine, Given
+from wbc.batch.engine import BatchEngine, Clones, Compiled, Given
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
 from wbc.controller.together import main_input
+from wbc.cores import cores
 from wbc.errors import RangeError, ShapeError, SolverError
 from wbc.stack.codegen import unit_groups
 from wbc.stack.layout import Slot
@@ -56,11 +56,11 @@ class Batch:
         if controller.policy.escape:
             raise SolverError("batch", controller.policy, "a batch has no escape; set a policy without it")
         self.count, self.changes = count, 0
-        self.threads = min(count, threads or len(os.sched_getaffinity(0)))
+        self.threads = min(count, threads or cores())
         #: a controller for the checks of values
         self._core = core_of(controller.clone())
         self._memory, self._layout = self._core.context.memory, self._core.layout
-        self._engine: Engine
+        self._engine: BatchEngine
         if isinstance(core.tick, NativeTick):
             self._engine = Compiled(controller, count, self.threads)
         else:

@@ -20,7 +20,7 @@ from wbc.validation import Array
 _CODES = np.array([list(Status).index(status) for status in STATUSES], np.int8)
 
 
-class Owner(Protocol):
+class StepOwner(Protocol):
     """What a step needs of its batch."""
 
     inputs: Array
@@ -39,7 +39,7 @@ class BatchStep:
         v: velocities [n, nv], as of :attr:`wbc.Step.v`.
     """
 
-    def __init__(self, reports: Array, owner: Owner, context: Context) -> None:
+    def __init__(self, reports: Array, owner: StepOwner, context: Context) -> None:
         reports.flags.writeable = False
         self._reports, self._context, self._owner, self._changes = reports, context, owner, owner.changes
         self.command: Array = reports[:, : context.nv]
@@ -102,6 +102,16 @@ class BatchStep:
             name: variables[:, span] * p[:, layout.blocks[name].slots[CLOSED].span]
             for name, span in layout.forces.items()
         }
+
+    @property
+    def loop_forces(self) -> Mapping[str, Array]:
+        """What keeps each closed loop closed by its name [n, k], as of :attr:`wbc.Step.loop_forces`.
+
+        Raises:
+            CommandError: the stack does not command torques.
+        """
+        self._require_torque("loop_forces")
+        return self._context.loop_forces(self._part("v"))
 
     def _require_torque(self, field: str) -> None:
         if self._context.command != "torque":

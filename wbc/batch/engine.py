@@ -20,8 +20,10 @@ from wbc.validation import Array
 
 #: Robots from which on a second thread is worth waking
 _SMALL = 64
-#: Numbers of ``wbc_shared``, and what ``wbc_tick_many`` returns where robots are left (``native/many.h``)
-_SHARED, _MORE = 32, 2
+#: Numbers in ``wbc_shared`` (``native/many.h``)
+_SHARED = 32
+#: What ``wbc_tick_many`` returns while robots are left (``native/many.h``)
+_MORE = 2
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def _table(given: list[Given]) -> np.ndarray:
     return np.array([value.row for value in given], np.int64).reshape(-1, 5)
 
 
-class Engine(Protocol):
+class BatchEngine(Protocol):
     """Ticks all robots of a batch."""
 
     def fit(self, given: list[Given]) -> bool:

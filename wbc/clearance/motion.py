@@ -15,8 +15,10 @@ from wbc.errors import ContinuityError, RangeError, ShapeError
 from wbc.rotations import matrices
 from wbc.validation import Array
 
-#: Highest degree of the polynomials; what rounding may leave between two of them, in parts of the greatest scalar
-DEGREE, JUMP = 7, 1e-12
+#: Highest degree of the polynomials
+DEGREE = 7
+#: What rounding may leave between two of them, in parts of the greatest scalar
+JUMP = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

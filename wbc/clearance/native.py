@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.clearance.motion import Motion
-from wbc.clearance.scene import SweptScene, TriangleMesh, sizes_of
-from wbc.errors import CompileError
+from wbc.clearance.scene import SweptScene
+from wbc.geometry.kernel import HEADERS, ShapeTable, checked
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
-from wbc.proximity.native import SOURCES as SHAPES
-from wbc.shapes import Convex
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
@@ -26,8 +24,8 @@ _INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs",
 _ARRAYS = (
     *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
     *("parent", "kind", "coordinate", "place", "axis", "pose", "deviation"),
-    *("body_frame", "body_place", "body_pose", "line", "world_line", "shape", "hull", "size", "points"),
-    *("chain", "chain_length", "moved", "stamp", "tree", "box", "triangle"),
+    *("body_frame", "body_place", "body_pose", "line", "world_line", "shape"),
+    *("chain", "chain_length", "moved", "stamp"),
     *("first", "second", "stop_first", "stop_second", "required"),
     *(
         "exempt_start",
@@ -42,11 +40,11 @@ _ARRAYS = (
         "list",
     ),
 )
-#: TriangleMesh of a leaf of a tree of boxes; how often a motion is halved at most, in ``native/sweep.c`` and to its
-LEAF, HALVINGS = 4, 128
+#: How often a motion is halved at most, in ``native/sweep.c`` and to its knots
+HALVINGS = 128
 
 
-class _Sweep(ctypes.Structure):
+class _SweepStruct(ctypes.Structure):
     """``sweep_t`` of ``native/sweep.h``."""
 
     _fields_ = [
@@ -62,12 +60,9 @@ def library() -> ctypes.PyDLL:
     """The compiled code.
 
     Raises:
-        CompileError: as of :func:`wbc.proximity.native.library`.
+        CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
-    found = load_library(kernel(_SOURCES / "sweep.c", SHAPES))
-    found.wbc_sweep_size.restype = ctypes.c_longlong
-    if found.wbc_sweep_size() != ctypes.sizeof(_Sweep):
-        raise CompileError("wbc_sweep_size", found.wbc_sweep_size(), f"expected {ctypes.sizeof(_Sweep)} bytes")
+    found = checked(load_library(kernel(_SOURCES / "sweep.c", HEADERS)), wbc_sweep_size=_SweepStruct)
     found.wbc_sweep.argtypes = [ctypes.c_void_p, ctypes.c_int]
     found.wbc_sweep_at.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_void_p]
     return found
@@ -93,8 +88,9 @@ class NativeSweep:
         tree = scene.tree.frames
         axes = [[*frame.axis, frame.scale, frame.offset] for frame in tree]
         self._arrays: dict[str, Array] = {}
+        self._table = ShapeTable([body.shape for body in scene.bodies])
         self._hold(
-            **_shapes(scene), parent=[f.parent for f in tree], kind=[int(f.moves) for f in tree],
+            parent=[f.parent for f in tree], kind=[int(f.moves) for f in tree],
             coordinate=[f.coordinate for f in tree], place=scene.tree.places, axis=np.array(axes).reshape(-1, 5),
             pose=np.zeros((frames, 12)), deviation=np.zeros((frames, 4)), body_frame=scene.frame,
             body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12),
@@ -105,9 +101,10 @@ class NativeSweep:
             list=np.zeros(HALVINGS * max(pairs, 1), dtype=np.int32), low=self.low, high=self.high, when=self.when,
             chosen=self._chosen,
         )  # fmt: skip
-        self._sweep = _Sweep(
+        self._sweep = _SweepStruct(
             frames=frames, bodies=bodies, pairs=pairs, depth=depth, scalars=len(scene.tree.coordinates),
-            frees=len(scene.tree.free), **{name: array.ctypes.data for name, array in self._arrays.items()},
+            frees=len(scene.tree.free), shape=self._table.address,
+            **{name: array.ctypes.data for name, array in self._arrays.items()},
         )  # fmt: skip
         self._at = ctypes.c_void_p(ctypes.addressof(self._sweep))
         self._motion: Motion | None = None
@@ -141,10 +138,8 @@ class NativeSweep:
             "parent",
             "kind",
             "coordinate",
-            "hull",
             "chain",
             "chain_length",
-            "tree",
             "stop_first",
             "stop_second",
         )
@@ -170,43 +165,3 @@ class NativeSweep:
         self._hold(**new)
         for name in new:
             setattr(self._sweep, name, self._arrays[name].ctypes.data)
-
-
-def _shapes(scene: SweptScene) -> dict[str, Any]:
-    """Shapes, hulls' points and trees of boxes, as native/sweep.h has them."""
-    hull, points, tree, box, triangle = [], list[Array](), list[list[int]](), list[Array](), list[Array]()
-    for body, center in zip(scene.bodies, scene.center, strict=True):
-        shape, start, count = body.shape, 0, 0
-        if isinstance(shape, Convex):
-            filled = np.vstack([shape.points, np.tile(shape.points[-1], (-len(shape.points) % 8, 1))]) - center
-            start, count = sum(len(p) // 3 for p in points), len(filled)
-            points.append(filled.T.ravel())
-        elif isinstance(shape, TriangleMesh):
-            start, count = len(tree), len(shape.corners) if shape.solid else 0
-            _grow(shape.corners, np.arange(len(shape.corners)), tree, box, triangle)
-        hull.append([start, count])
-    return {
-        "shape": scene.kind,
-        "hull": np.array(hull).reshape(-1, 2),
-        "size": np.array([sizes_of(body.shape) for body in scene.bodies]).reshape(-1, 6),
-        "points": np.concatenate([np.zeros(0), *points]),
-        "tree": np.array(tree).reshape(-1, 2),
-        "box": np.array(box).reshape(-1, 6),
-        "triangle": np.array(triangle).reshape(-1, 24),
-    }
-
-
-def _grow(corners: Array, rows: Any, tree: list[list[int]], box: list[Array], triangle: list[Array]) -> int:
-    """A tree of boxes over some triangles, halved across the longest side; returns the number of its root."""
-    mine, here = corners[rows], len(tree)
-    low, high = mine.min(axis=(0, 1)), mine.max(axis=(0, 1))
-    tree.append([0, 0])
-    box.append(np.concatenate([low, high]))
-    if len(rows) <= LEAF:
-        tree[here] = [-1 - len(triangle), -len(triangle) - len(rows)]
-        triangle += [np.vstack([face, np.tile(face[-1], (5, 1))]).T.ravel() for face in mine]
-        return here
-    order = np.argsort(mine.mean(axis=1)[:, int(np.argmax(high - low))])
-    half = len(rows) // 2
-    tree[here] = [_grow(corners, rows[order[k]], tree, box, triangle) for k in (slice(half), slice(half, None))]
-    return here

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -10,117 +9,20 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.clearance.tree import Moves, Tree
-from wbc.clearance.triangles import least_distances, point_distances, within
+from wbc.clearance.triangle_mesh import TriangleMesh
+from wbc.clearance.walls import CylinderInside, EndlessCylinder
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
 from wbc.robot import Robot
-from wbc.robot.geometry.coal_shapes import sphere_round
-from wbc.robot.geometry.meshes import read_mesh
-from wbc.robot.geometry.segments import bounding_capsule
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Solid, Sphere
+from wbc.shapes import HalfSpace, Solid
+from wbc.shapes.solid import why_apart
 from wbc.validation import Array
-
-
-@dataclass(frozen=True)
-class CylinderInside:
-    """The wall round the endless cylinder of ``radius`` [m] about z: distances count from the wall inwards."""
-
-    radius: float
-
-    def __post_init__(self) -> None:
-        radius = validation.scalar("CylinderInside.radius", self.radius, low=0.0, open_low=True, unit="m")
-        object.__setattr__(self, "radius", radius)
-
-
-@dataclass(frozen=True)
-class EndlessCylinder:
-    """Points within ``radius`` [m] of the z axis."""
-
-    radius: float
-
-    def __post_init__(self) -> None:
-        radius = validation.scalar("EndlessCylinder.radius", self.radius, low=0.0, open_low=True, unit="m")
-        object.__setattr__(self, "radius", radius)
-
-
-@dataclass(frozen=True, eq=False)
-class TriangleMesh:
-    """A surface of triangles.
-
-    Where the core of a body (of a capsule its segment) goes through the surface, the distance is what the ball on the
-    core gives, -radius. A body whose core is wholly within a solid is as deep in it as its farthest point is below the
-    surface next to the core.
-
-    Attributes:
-        corners: [n, 3, 3] m.
-        solid: the surface is closed and its corners go round it one way, so that it has an inside; else it is a sheet,
-            and what begins behind it is not seen.
-
-    Raises:
-        ShapeError, NotFiniteError: not n x 3 x 3 finite numbers; a solid whose surface is open or turns over.
-    """
-
-    corners: Array
-    solid: bool = False
-
-    def __post_init__(self) -> None:
-        corners = validation.real_array("TriangleMesh.corners", self.corners)
-        if corners.ndim != 3 or corners.shape[1:] != (3, 3) or not len(corners):
-            raise ShapeError("TriangleMesh.corners", np.shape(self.corners), "expected n x 3 x 3, n at least 1")
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "solid", validation.flag("TriangleMesh.solid", self.solid))
-        if self.solid:
-            _, row = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-            ring = row.reshape(-1, 3)
-            edges = np.concatenate([ring[:, [k, (k + 1) % 3]] for k in range(3)])
-            edges = edges[edges[:, 0] != edges[:, 1]]
-            one, other = (np.unique(edges[:, order], axis=0) for order in ([0, 1], [1, 0]))
-            if len(one) != len(edges) or not np.array_equal(one, other):
-                raise ShapeError("TriangleMesh.solid", True, "the surface is open, or its triangles turn over")
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str], scale: float = 1.0, solid: bool = True) -> TriangleMesh:
-        """The surface in a file (STL, OBJ, DAE), its lengths times ``scale``.
-
-        Raises:
-            RobotFileError: a file that cannot be read. RangeError: no scale. ShapeError: as of the class.
-        """
-        factor = validation.scalar("scale", scale, low=0.0, open_low=True)
-        mesh = read_mesh(validation.file_path("path", path), np.full(3, factor))
-        return cls(mesh.vertices[mesh.triangles], solid)
-
-    def distance(self, points: Array) -> Array:
-        """Distance [m] of points ``[..., 3]`` in the surface's frame; within a solid it is negative."""
-        at = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        out = point_distances(self.corners, at)
-        if self.solid:
-            out = np.where(self._within(at), -out, out)
-        return np.asarray(out.reshape(np.shape(points)[:-1]))
-
-    def segment_distance(self, a: Array, b: Array) -> Array:
-        """Distance [m] of the segments from ``a`` to ``b``, ``[..., 3]`` each in the surface's frame.
-
-        0 where one goes through the surface; of one wholly within a solid less the distance from the surface.
-        """
-        start, end = (np.asarray(x, dtype=np.float64).reshape(-1, 3) for x in (a, b))
-        out = least_distances(self.corners, start, end)
-        if self.solid:
-            out = np.where(self._within(start), -out, out)
-        return np.asarray(out.reshape(np.shape(a)[:-1]))
-
-    def _within(self, points: Array) -> NDArray[np.bool_]:
-        low, high = (bound(self.corners, axis=(0, 1)) for bound in (np.min, np.max))
-        out: NDArray[np.bool_] = np.all((points >= low) & (points <= high), axis=1)
-        out[out] = within(self.corners, points[out])
-        return out
-
 
 #: Those that have no end, and are fixed in the world
 Unbounded = HalfSpace | CylinderInside | EndlessCylinder
-Shape = Solid | Unbounded | TriangleMesh
+Shape = Solid | TriangleMesh | Unbounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,10 +72,6 @@ class Exemption:
     until: float = inf
 
 
-#: What a shape is in native/sweep.h
-SUM, HULL, PLANE, INSIDE, OUTSIDE, TRIANGLES = range(6)
-
-
 def bodies_of(robot: Robot) -> list[SweptBody]:
     """The collision shapes of a robot's links, by the link's name; from a link's second on with ", body 2" and so
     on.
@@ -204,8 +102,7 @@ class SweptScene:
 
     Attributes:
         tree, bodies, pairs: as given.
-        kind: of the bodies' shapes. frame: numbers of their frames, -1: the world. place: poses on them, moved to the
-            shapes' centres. center: of those in the shapes' frames.
+        frame: numbers of the bodies' frames, -1: the world. place: poses on them, moved to the shapes' centres.
         line: [bodies, 8]: ends of a capsule about the body in its frame, its radius, and the radius about the ends of
             what turns with the body: 0 where its core is all, more where there is a grasp point.
         chain: frames with joints from the body's on, up to the world.
@@ -231,10 +128,8 @@ class SweptScene:
                 raise DuplicateNameError("bodies", body.name, "two of this name")
             self.number[body.name] = k
         placed = [self._place(body) for body in self.bodies]
-        self.kind = np.array([_kind(body.shape) for body in self.bodies], dtype=np.int32)
-        self.frame = np.array([frame for frame, _, _ in placed], dtype=np.int32)
-        self.place = [pose for _, pose, _ in placed]
-        self.center = [center for _, _, center in placed]
+        self.frame = np.array([frame for frame, _ in placed], dtype=np.int32)
+        self.place = [pose for _, pose in placed]
         self.line = np.array([_line(body, *self._on_frame(body)) for body in self.bodies]).reshape(-1, 8)
         moving = {k for k, frame in enumerate(tree.frames) if frame.moves != Moves.FIXED}
         self.chain = [[f for f in tree.up(int(frame)) if f in moving] for frame in self.frame]
@@ -247,8 +142,8 @@ class SweptScene:
         self._rows = {end: k for k, end in enumerate(ends)}
         self.first, self.second = (np.array([end[k] for end in ends], dtype=np.int32) for k in (0, 1))
         for pair, (i, j) in zip(self.pairs, ends, strict=True):
-            if max(self.kind[i], self.kind[j]) >= PLANE and min(self.kind[i], self.kind[j]) >= PLANE:
-                raise ShapeError("pairs", (pair.first, pair.second), "one of the two must be a solid")
+            if reason := why_apart(self.bodies[i].shape, self.bodies[j].shape):
+                raise ShapeError("pairs", (pair.first, pair.second), reason)
             validation.scalar(f"required of {pair.first} and {pair.second}", pair.required, unit="m")
         self.required = np.array([float(pair.required) for pair in self.pairs])
         self.stops = np.array([self._stops(*end) for end in ends], dtype=np.int32).reshape(-1, 2)
@@ -297,14 +192,13 @@ class SweptScene:
             return link, link
         return link * validation.pose(f"{body.name}.placement", body.placement), link
 
-    def _place(self, body: SweptBody) -> tuple[int, pin.SE3, Array]:
+    def _place(self, body: SweptBody) -> tuple[int, pin.SE3]:
         if not isinstance(body.shape, Shape):
             raise ShapeError(
                 f"{body.name}.shape", body.shape, "expected a solid, a surface of triangles or one without end"
             )
         frame, _ = self.tree.link(f"{body.name}.link", body.link)
-        center = sphere_round(body.shape)[0] if isinstance(body.shape, Convex) else np.zeros(3)
-        return frame, self._on_frame(body)[0] * pin.SE3(np.eye(3), center), center
+        return frame, self._on_frame(body)[0] * pin.SE3(np.eye(3), body.shape.center)
 
     def _stops(self, i: int, j: int) -> tuple[int, int]:
         """What carries both moves neither against the other."""
@@ -313,45 +207,13 @@ class SweptScene:
         return sum(f not in both for f in one), sum(f not in both for f in other)
 
 
-def _kind(shape: Shape) -> int:
-    kinds: tuple[tuple[Any, int], ...] = (
-        (Convex, HULL), (HalfSpace, PLANE), (CylinderInside, INSIDE), (EndlessCylinder, OUTSIDE),
-        (TriangleMesh, TRIANGLES),
-    )  # fmt: skip
-    return next((number for kind, number in kinds if isinstance(shape, kind)), SUM)
-
-
-def sizes_of(shape: Shape) -> list[float]:
-    """Half sides [3], disc, ball and radius of the sphere about the centre of native/shapes.h; of shapes without end
-    the radius in place of the disc.
-    """
-    if isinstance(shape, (Sphere, Capsule)):
-        half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
-        return [0.0, 0.0, half, 0.0, shape.radius, half]
-    if isinstance(shape, Box):
-        return [*(side / 2 for side in shape.size), 0.0, 0.0, float(np.linalg.norm(shape.size)) / 2]
-    if isinstance(shape, Cylinder):
-        return [0.0, 0.0, shape.length / 2, shape.radius, 0.0, float(np.hypot(shape.radius, shape.length / 2))]
-    if isinstance(shape, TriangleMesh):
-        middle = np.linalg.norm(shape.corners, axis=2).max()
-        return [0.0, 0.0, 0.0, 0.0, 0.0, float(middle)]
-    if isinstance(shape, Convex):
-        return [0.0, 0.0, 0.0, 0.0, 0.0, sphere_round(shape)[1]]
-    return [0.0, 0.0, 0.0, 0.0 if isinstance(shape, HalfSpace) else shape.radius, 0.0, 0.0]
-
-
 def _line(body: SweptBody, shape: pin.SE3, link: pin.SE3) -> Array:
     if isinstance(body.shape, Unbounded):
         return np.zeros(8)
-    if isinstance(body.shape, TriangleMesh):
-        points = body.shape.corners.reshape(-1, 3)
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        a = b = shape * middle
-        radius = float(np.linalg.norm(points - middle, axis=1).max())
-    else:
-        a, b, radius = bounding_capsule(PlacedShape(body.shape, shape))
+    a, b, radius = body.shape.capsule()
+    a, b = shape * a, shape * b
     # The ball on a core is the same however it is turned
-    most = 0.0 if isinstance(body.shape, (Sphere, Capsule)) else radius
+    most = 0.0 if body.shape.is_round else radius
     if body.grasp is not None:
         x, span = link * validation.real_array(f"{body.name}.grasp", body.grasp, (3,)), b - a
         part = np.clip((x - a) @ span / max(span @ span, 1e-300), 0.0, 1.0)

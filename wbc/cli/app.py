@@ -9,171 +9,131 @@ import functools
 import importlib
 import pathlib
 import sys
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from wbc import __version__
-from wbc.errors import WbcError
+from wbc.errors import UnknownNameError, WbcError
 
-#: Exit codes besides 0 and 1, which commands give
-BAD_INPUT, INTERRUPTED = 2, 130
+#: Exit code after bad input
+BAD_INPUT = 2
+#: Exit code after Ctrl-C
+INTERRUPTED = 130
 
 
 class Listed(NamedTuple):
-    """A command: module of this package and function, its line in the list of commands, settings of its parser, and
-    whether it works in a clone of the repository alone.
+    """A command.
+
+    Attributes:
+        line: in the list of commands.
+        modes: name -> module of this package and class in it; the first is that of a command without a name of one, and
+            the only one has no name.
+        in_clone: it works in a clone of the repository alone.
     """
 
-    module: str
-    function: str
     line: str
-    settings: dict[str, bool] | None = None
+    modes: Mapping[str, str]
     in_clone: bool = False
 
 
 COMMANDS = {
-    "robots": Listed("robot.robots", "table", "List the robots that load by name."),
-    "robot": Listed(
-        "robot.robots", "show", "Show a robot: joints, limits, frames, shapes and where the numbers come from."
-    ),
-    "track": Listed("track", "track", "Follow a timed Cartesian path, and leave a log, plots and a summary."),
-    "demo": Listed(
-        "demo",
-        "demo",
-        "Do the main job: a Panda follows a timed path round an obstacle with its elbow plane commanded.",
-    ),
-    "moving-target": Listed(
-        "moving_target",
-        "moving_target",
-        "Work on an object that moves, with and without compensation, and leave figures, plots and a film.",
-    ),
-    "play": Listed(
-        "play", "play", "Open a robot in the browser: drag its targets and the obstacles, and read what holds it back."
-    ),
-    "view": Listed("view", "view", "Show a robot with its joints on sliders, or a run with its time on one."),
-    "walk": Listed(
-        "walking.walk",
-        "walk",
-        "Walk on a structure of holds with three arms, or end over end, and leave log, "
-        "plan, check, pictures and a page.",
-    ),
-    "check": Listed(
-        "walking.walk",
-        "check",
-        "Check the walk in a run's folder; exit code 4 if it violates anything.",
-    ),
-    "plans": Listed(
-        "walking.walk", "plans", "Show what two plans do differently, one line each; exit code 1 if there is anything."
-    ),
-    "replay": Listed("replay", "replay", "Do the ticks of a recording again and compare every bit of their commands."),
-    "export": Listed(
-        "export",
-        "export",
-        "Write one control cycle of a robot, QP solver included, as C99 with a header, build files and a check.",
+    "robots": Listed(
+        "Robots by name: all, one, or links that must not touch.",
+        {"list": "robots.Names", "show": "robots.RobotShow", "pairs": "robots.RobotPairs"},
     ),
     "ik": Listed(
-        "ik.ik",
-        "ik",
-        "Find joint positions that put a frame at a pose or a position, clear of obstacles and within the limits.",
+        "Find joint positions for poses; explore all that serve one.",
+        {"solve": "ik.Solve", "explore": "explore.Explore"},
     ),
-    "ikor": Listed(
-        "ikor",
-        "ikor",
-        "Run the published driver of redundant arms: its own trajectories, "
-        "printed norms beside, or one from its files.",
+    "track": Listed(
+        "Follow a timed path; leave a log, plots and a summary.", {"path": "track.Track", "demo": "track.Demo"}
     ),
-    "relative-motion": Listed(
-        "relative_motion",
-        "relative_motion",
-        "Compensation of relative motion as published: its straight lines, or another part of its system.",
+    "walk": Listed(
+        "Walk on holds; drive, resume and check walks.",
+        {
+            "path": "walk.WalkPath",
+            "drive": "walk.DriveWalk",
+            "arm": "walk.WalkArm",
+            "two-ended": "walk.TwoEnded",
+            "published": "walk.Published",
+            "resume": "walk.Resume",
+            "check": "walk.CheckWalk",
+            "compare": "walk.Compare",
+        },
     ),
-    "compare-controllers": Listed(
-        "compare_controllers",
-        "compare_controllers",
-        "Controllers of torques beside each other, on the published arm or on any robot.",
+    "view": Listed(
+        "See and drive robots, and see runs, in the browser.",
+        {"show": "view.ViewShow", "play": "view.Play", "pairs": "view.ViewPairs", "climb": "view.Climb"},
     ),
-    "identify": Listed("identify", "identify", "Find the inertias of a simulated robot from a motion that shows much."),
-    "explore": Listed(
-        "explore",
-        "explore",
-        "Show all rates that serve a frame, the self-motion of the arm there, and its best configuration.",
+    "coordinates": Listed(
+        "Pairs of coordinates: modes, advice, loci, driving.",
+        {
+            "modes": "coordinates.modes.Modes",
+            "advise": "coordinates.advise.Advise",
+            "survey": "coordinates.advise.Survey",
+            "restrictions": "coordinates.advise.Restrictions",
+            "analyse": "coordinates.analyse.Analyse",
+            "drive": "coordinates.drive.DriveArm",
+        },
     ),
-    "analyse": Listed(
-        "analysis.analyse",
-        "analyse_",
-        "Say where task and constraint coordinates lose rank, and whether they always suffice.",
+    "moving-target": Listed("Work on an object that moves, compensated or not.", {"": "moving_target.MovingTarget"}),
+    "dynamics": Listed(
+        "Compare controllers, size motors, identify inertias.",
+        {"controllers": "dynamics.Controllers", "motors": "dynamics.SizedMotors", "identify": "dynamics.Identify"},
     ),
-    "advise": Listed(
-        "analysis.advise",
-        "advise",
-        "Say which pairs are well conditioned at a configuration, where the next locus is, and which pair to use.",
+    "published": Listed(
+        "Published methods: redundant arms, relative motion.",
+        {
+            "ikor": "published.ikor.Cases",
+            "ikor-run": "published.ikor.RunFiles",
+            "ikor-space": "published.ikor.Space",
+            "relative-motion": "published.relative_motion.RelativeMotion",
+        },
     ),
-    "modes": Listed(
-        "analysis.modes",
-        "modes",
-        "Say in which modes arms can be commanded: how many pairs, or what is missing; of one robot, which pairs.",
-    ),
-    "drive": Listed(
-        "drive",
-        "drive",
-        "Drive an arm by rates: the pair of coordinates that is chosen, at most six "
-        "rates at a time, 50 times a second.",
-    ),
-    "study": Listed(
-        "study",
-        "study",
-        "Many trials of a scenario, over parameters and seeds, on this machine or a cluster.",
-    ),
-    "bench": Listed(
-        "bench",
-        "bench",
-        "Compare with pink, mink and placo on the same problems (needs the repository).",
-        {"allow_extra_args": True, "ignore_unknown_options": True},
-        in_clone=True,
-    ),
-    "docs": Listed(
-        "docs",
-        "docs",
-        "Write what the code declares into the pages of tasks and constraints (needs the repository).",
-        in_clone=True,
-    ),
+    "study": Listed("Do many trials of a scenario, here or on a cluster.", {"": "study.Trials"}),
+    "export": Listed("Write one control cycle, QP solver included, as C99.", {"": "export.Export"}),
+    "replay": Listed("Do the ticks of a recording again, bit for bit.", {"": "replay.ReplayRun"}),
+    "docs": Listed("Write pages from what the code declares (in a clone).", {"": "docs.Docs"}, in_clone=True),
 }
 
 
+def options_class(name: str, mode: str) -> Any:
+    """The dataclass of a mode, imported."""
+    module, _, options = COMMANDS[name].modes[mode].rpartition(".")
+    return getattr(importlib.import_module(f"wbc.cli.{module}"), options)
+
+
 @functools.cache
-def command(name: str) -> Any:
-    """A command with its options."""
+def command(name: str, mode: str = "") -> Any:
+    """A command with the options of one of its modes, "" for the first."""
+    from wbc.cli.reading import parser
+
     entry = COMMANDS[name]
-    function = getattr(importlib.import_module(f"wbc.cli.{entry.module}"), entry.function)
-    single = typer.Typer(add_completion=False, rich_markup_mode="rich")
-    single.command(name, context_settings=entry.settings)(function)
-    made = typer.main.get_command(single)
-    if not any("--json" in option.opts for option in made.params) and not entry.in_clone:
-        made.params += [option for option in typer.main.get_command(_with_json).params if "--json" in option.opts]
+    first = next(iter(entry.modes))
+    mode = mode or first
+    made = parser(f"{name} {mode}".strip(), options_class(name, mode), as_json=not entry.in_clone)
+    if mode and mode == first:
+        lines = (f"wbc {name} {one}: {options_class(name, one).__doc__.splitlines()[0]}" for one in entry.modes)
+        made.epilog = "\n\n".join(["Modes, each with a --help of its own:", *lines])
+        _complete_modes(made, entry.modes)
     return made
 
 
-def _wants_data(wanted: bool) -> None:
-    if wanted:
-        from wbc.cli import results
+def _complete_modes(made: Any, modes: Iterable[str]) -> None:
+    """The shell completes the names of modes in the place of the first argument."""
+    asked = next((param for param in made.params if param.param_type_name == "argument"), made)
+    before = asked.shell_complete
+    # The click that typer brings, or the one that is installed beside it
+    click = importlib.import_module(TyperCommand.__mro__[1].__module__.replace(".core", ".shell_completion"))
 
-        results.collect()
+    def completed(ctx: Any, incomplete: str) -> list[Any]:
+        names = [click.CompletionItem(name) for name in modes if name.startswith(incomplete)]
+        return [*names, *before(ctx, incomplete)]
 
-
-#: Its option is added to commands that print lines and tables
-_with_json = typer.Typer(add_completion=False)
-
-
-@_with_json.command()
-def _printed(
-    as_json: Annotated[
-        bool,
-        typer.Option("--json", callback=_wants_data, expose_value=False, help="Print lines and tables as JSON."),
-    ] = False,
-) -> None:
-    """Nothing: only its option is used."""
+    asked.shell_complete = completed
 
 
 class CommandGroup(TyperGroup):
@@ -188,8 +148,17 @@ class CommandGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that was asked for, imported."""
-        name, found, rest = super().resolve_command(ctx, args)
-        return name, found and command(str(name)), rest
+        given, found, rest = super().resolve_command(ctx, args)
+        if not found:
+            return given, found, rest
+        name = str(given)
+        modes = COMMANDS[name].modes
+        mode = rest.pop(0) if rest and rest[0] in modes else ""
+        chosen = command(name, mode)
+        placed = any(param.param_type_name == "argument" for param in chosen.params)
+        if rest and not mode and not placed and not rest[0].startswith("-") and not ctx.resilient_parsing:
+            raise UnknownNameError("mode", rest[0], modes)
+        return f"{name} {mode}".strip(), chosen, rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
@@ -208,11 +177,8 @@ class CommandGroup(TyperGroup):
         try:
             return super().invoke(ctx)
         finally:
-            if (results := sys.modules.get("wbc.cli.results")) is not None:
-                from wbc.cli.console import print_json
-
-                for found in results.taken():
-                    print_json(found)
+            if (console := sys.modules.get("wbc.cli.console")) is not None:
+                console.print_kept()
 
 
 app = typer.Typer(
@@ -235,8 +201,4 @@ def _version(wanted: bool) -> None:
 def wbc(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print it.")] = False,
 ) -> None:
-    """Whole-body control: declarative tasks, one QP, one native tick.
-
-    [bold]wbc walk[/bold] has a three-armed robot walk on a structure of holds, [bold]wbc demo[/bold] a Panda follow a
-    timed path round an obstacle.
-    """
+    """Whole-body control: declarative tasks, one QP, one native tick."""

@@ -24,7 +24,7 @@ def frames(ctx: Any, incomplete: str) -> list[str]:
     from wbc.errors import WbcError
     from wbc.robots import load
 
-    name = ctx.params.get("robot") or ctx.params.get("name") or "panda"
+    name = ctx.params.get("robot") or "panda"
     try:
         return [frame for frame in load(name, shapes="none").frame_names if frame.startswith(incomplete)]
     except WbcError:

@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-import pathlib
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from wbc import pages
-from wbc.cli.bench import ROOT
-from wbc.cli.console import out
 from wbc.errors import WbcError
-from wbc.pages import stub
-
-FOLDER = ROOT / "docs" / "tasks"
 
 
 class DocsError(WbcError):
     """There are no pages: they are part of the repository, not of the installed package."""
 
 
-def docs(
-    check: Annotated[bool, typer.Option("--check", help="Write nothing; exit code 1 where a page is stale.")] = False,
-    folder: Annotated[pathlib.Path, typer.Option(help="Where the pages are.")] = FOLDER,
-) -> None:
-    """Write what the code declares into the pages of tasks and constraints (needs the repository)."""
-    if not folder.is_dir():
-        raise DocsError("folder", str(folder), "no such folder; run it from a clone of the repository")
-    names = pages.stale(folder) + stub.stale() if check else pages.update(folder) + stub.update()
-    for name in names:
-        out().print(f"{'stale' if check else 'written'}: {name}")
-    if check and names:
-        raise typer.Exit(1)
+@dataclass(frozen=True)
+class Docs:
+    """Write pages from what the code declares (in a clone).
+
+    The pages of tasks and constraints, and the types of their values.
+    """
+
+    check: Annotated[bool, "Write nothing; exit code 1 where a page is stale."] = False
+    folder: Annotated[Path, "Where the pages are. Default: those of the clone."] = (
+        Path(__file__).resolve().parents[2] / "docs" / "tasks"
+    )
+
+    def run(self) -> int:
+        from wbc import pages
+        from wbc.cli.console import say
+        from wbc.pages import stub
+
+        if not self.folder.is_dir():
+            raise DocsError("folder", str(self.folder), "no such folder; run it from a clone of the repository")
+        check = self.check
+        names = pages.stale(self.folder) + stub.stale() if check else pages.update(self.folder) + stub.update()
+        for name in names:
+            say(f"{'stale' if check else 'written'}: {name}")
+        return int(check and bool(names))

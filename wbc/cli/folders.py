@@ -17,7 +17,6 @@ def run_folder(
     written: Sequence[str],
     force: bool = False,
     *,
-    field: str = "out",
     clear: bool = True,
     made: bool = True,
 ) -> Path:
@@ -25,7 +24,7 @@ def run_folder(
 
     Args:
         wanted: None: a new one. written: names, or patterns, of all files that such a run writes.
-        force: write into a folder that has such a file. field: the option, for errors.
+        force: write into a folder that has such a file.
         clear: False: the files of an earlier run stay until :func:`filled` has those of the new one.
         made: False: a new folder is not made yet: whoever is killed before there is something in it leaves none.
 
@@ -37,7 +36,7 @@ def run_folder(
         there = [file for pattern in written for file in folder.glob(pattern)]
         if there and not force:
             reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
-            raise OutputError(field, str(folder), reason)
+            raise OutputError("out", str(folder), reason)
         known = folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
         for file in there if clear else ():
@@ -49,7 +48,7 @@ def run_folder(
         if not made and not known:
             folder.rmdir()
     except (OSError, ValueError) as error:
-        raise OutputError(field, str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
+        raise OutputError("out", str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
     return folder
 
 

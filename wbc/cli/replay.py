@@ -3,72 +3,68 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn
-from rich.table import Table
+from wbc.cli.console import OutputError
+from wbc.cli.reading import Option
 
-from wbc import record, replaying, validation
-from wbc.cli.console import OutputError, err, out
-from wbc.cli.session import RECORDING, STRIDE
+if TYPE_CHECKING:
+    from wbc.record import Recording
 
 #: Exit code of a replay whose commands are not those of the recording
 DIFFERS = 1
 
-BACKENDS = ("as recorded", "auto", "native", "vm")
+Trust = Annotated[bool, "Run code from the recording: items and functions that are not wbc's."]
 
 
-def replay(
-    run: Annotated[Path, typer.Argument(help="A run folder of `wbc track`, or a recording.")],
-    backend: Annotated[str, typer.Option(help="native, vm, auto, or as recorded.")] = BACKENDS[0],
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Run code from the recording: items and functions that are not wbc's.")
-    ] = False,
-    table: Annotated[
-        Path | None, typer.Option(help="Write the recording as CSV: times, joints, residuals, margins and inputs.")
-    ] = None,
-) -> None:
-    """Do the ticks of a recording again and compare every bit of their commands.
+@dataclass(frozen=True)
+class ReplayRun:
+    """Do the ticks of a recording again, bit for bit.
 
     Exit code 1 if a command differs. The stack comes from the recording, and without --trust only what this package
     declares is read from it.
     """
-    validation.one_of("backend", backend, BACKENDS)
-    recording = record.Recording(run / RECORDING if run.is_dir() else run)
-    if table is not None:
-        save_table(recording, table)
-    console = err()
-    bar = Progress(
-        TextColumn("replaying"),
-        BarColumn(pulse_style="cyan"),
-        TextColumn("{task.completed} ticks"),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        refresh_per_second=5,
-    )
-    with bar:
-        stage = bar.add_task("ticks", total=None)
 
-        def progress(ticks: int) -> None:
-            if ticks % STRIDE == 0:
-                bar.update(stage, completed=ticks)
+    recording: Annotated[Path, Option("A run folder of `wbc track`, or a recording.", placed=True)]
+    backend: Annotated[Literal["as recorded", "auto", "native", "vm"], "How ticks are compiled."] = "as recorded"
+    trust: Trust = False
+    table: Annotated[Path | None, "Write the recording as CSV: times, joints, residuals, margins and inputs."] = None
 
-        chosen = None if backend == BACKENDS[0] else backend
-        found = replaying.replay(recording, backend=chosen, trust=trust, progress=progress)
-    report(recording, found)
-    for note in found.notes:
-        console.print(f"[yellow]note[/yellow]: {escape(note)}", soft_wrap=True)
-    if not found.complete:
-        console.print("[yellow]note[/yellow]: the recording was not closed; its last ticks may be missing")
-    if not found.identical:
-        raise typer.Exit(DIFFERS)
+    def run(self) -> int:
+        from wbc import record, replaying
+        from wbc.cli.console import progress_bar, show_figures, tell
+        from wbc.cli.session import RECORDING, STRIDE
+
+        recording = record.Recording(self.recording / RECORDING if self.recording.is_dir() else self.recording)
+        if self.table is not None:
+            save_table(recording, self.table)
+        with progress_bar() as bar:
+            stage = bar.add_task("replaying", total=None)
+
+            def progress(ticks: int) -> None:
+                if ticks % STRIDE == 0:
+                    bar.update(stage, description=f"replaying, {ticks} ticks")
+
+            chosen = None if self.backend == "as recorded" else self.backend
+            found = replaying.replay(recording, backend=chosen, trust=self.trust, progress=progress)
+        about = recording.about
+        rows = {
+            "stack": ", ".join(f"{name} ({kind})" for name, kind in about["items"]),
+            "recorded": f"{found.ticks} ticks, dt {about['dt']:g} s, {about['solver']} ({about['backend']})",
+            "replayed": f"{about['solver']} ({found.backend})",
+            "result": str(found),
+        }
+        show_figures(f"{about['robot']}: {recording.path}", rows.items())
+        for note in found.notes:
+            tell(note, "note")
+        if not found.complete:
+            tell("the recording was not closed; its last ticks may be missing", "note")
+        return 0 if found.identical else DIFFERS
 
 
-def save_table(recording: record.Recording, file: Path) -> None:
+def save_table(recording: Recording, file: Path) -> None:
     """A row a tick; the head has the units.
 
     Raises:
@@ -82,17 +78,3 @@ def save_table(recording: record.Recording, file: Path) -> None:
             writer.writerows(zip(*columns.values(), strict=True))
     except OSError as error:
         raise OutputError("table", str(file), f"cannot be written: {error.strerror}") from error
-
-
-def report(recording: record.Recording, found: replaying.Replay) -> None:
-    """Print what was replayed and what came of it."""
-    about = recording.about
-    table = Table(title=f"{about['robot']}: {recording.path}", title_justify="left", title_style="bold")
-    table.box, table.show_header, table.pad_edge = None, False, False
-    table.add_column(style="cyan", no_wrap=True)
-    table.add_column()
-    table.add_row("stack", escape(", ".join(f"{name} ({kind})" for name, kind in about["items"])))
-    table.add_row("recorded", f"{found.ticks} ticks, dt {about['dt']:g} s, {about['solver']} ({about['backend']})")
-    table.add_row("replayed", f"{about['solver']} ({found.backend})")
-    table.add_row("result", escape(str(found)))
-    out().print(table)

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import typer
-from rich.markup import escape
 from rich.progress import Progress
-from rich.table import Table
 
-from wbc import validation
 from wbc.api import Controller
-from wbc.cli.console import err, out, progress_bar
+from wbc.cli.console import progress_bar, show_figures, tell
 from wbc.cli.folders import filled, run_folder
+from wbc.cli.output import TrackOutput
 from wbc.extras import MissingPackageError
 from wbc.interrupts import interrupts
+from wbc.log import FORMATS, Log, save
 from wbc.record.recording import Recording, RecordingError
 from wbc.simulation import Plant
-from wbc.track.log import FORMATS, Log, save
 from wbc.track.plots import save_picture, save_plots
 from wbc.track.report import conflicts, save_report
 from wbc.track.run import track
@@ -33,17 +29,6 @@ INTERRUPTED = 130
 RECORDING = "ticks.npz"
 #: Ticks between two moves of the progress bar, so that the bar costs nothing
 STRIDE = 25
-
-
-@dataclass(frozen=True)
-class Output:
-    """What to write: ``folder`` (None: a new one under runs/), whether over a run that is there, and which files."""
-
-    folder: Path | None = None
-    force: bool = False
-    log: str = "parquet"
-    plots: bool = True
-    record: bool = True
 
 
 class Stopper:
@@ -69,17 +54,15 @@ class Stopper:
             yield
 
 
-def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
+def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> int:
     """Do a plan on a plant, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
 
     Raises:
         WbcError: bad input; nothing is written then but an empty folder.
     """
-    validation.one_of("log", output.log, FORMATS)
     written = (*(f"log.{kind}" for kind in FORMATS), RECORDING, "summary.json", "report.html", "replay.html")
-    name = f"{plan.robot.name}-{plan.label}"
-    folder = run_folder(output.folder, name, written, output.force, field="output")
-    stopper, console = Stopper(), err()
+    folder = run_folder(output.out, f"{plan.robot.name}-{plan.label}", written, output.force)
+    stopper = Stopper()
     with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
         recording = folder / RECORDING if output.record else None
@@ -94,11 +77,11 @@ def perform(plan: PathRun, output: Output, plant: Plant | None = None) -> None:
                 if output.plots:
                     files += _drawn(plan, log, fresh, bar, stage)
                 files += _pages(log, figures, fresh, recording, output.plots, bar, stage)
-    report(plan, log, figures, folder, files)
+    title = f"{plan.robot.name} follows {plan.label} with {plan.frame}"
+    show_figures(title, ((figure.label, figure.text) for figure in figures), folder, files)
     for warning in start_warnings(log):
-        console.print(f"[yellow]warning[/yellow]: {escape(warning)}", soft_wrap=True)
-    if log.meta["interrupted"]:
-        raise typer.Exit(INTERRUPTED)
+        tell(warning, "warning")
+    return INTERRUPTED if log.meta["interrupted"] else 0
 
 
 def _tracked(
@@ -160,16 +143,3 @@ def start_warnings(log: Log) -> list[str]:
         f"at the start {link} is {1e3 * gap:.0f} mm from an obstacle, the margin is {1e3 * margin:g} mm"
         for link, gap in close.items()
     ]
-
-
-def report(plan: PathRun, log: Log, figures: list[Figure], folder: Path, files: list[Path]) -> None:
-    """Print the summary."""
-    console = out()
-    title = f"{plan.robot.name} follows {plan.label} with {plan.frame}"
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False)
-    table.add_column(style="cyan", no_wrap=True)
-    table.add_column()
-    for figure in figures:
-        table.add_row(figure.label, escape(figure.text))
-    console.print(table)
-    console.print(f"[bold]{escape(str(folder))}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

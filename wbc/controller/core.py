@@ -16,7 +16,7 @@ from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Step
 from wbc.controller.together import Plan, Together
-from wbc.controller.watch import Braking, Watch
+from wbc.controller.watch import BrakingAuthority, Watch
 from wbc.errors import SolverError
 from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
@@ -110,7 +110,7 @@ class Core:
         #: sensors with the handles of their items
         self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
         self._escape: Escape | None = None
-        self._braking = Braking(stack, layout)
+        self._braking = BrakingAuthority(stack, layout)
         self.follow(self.fallback.policy)
         self.tick.dt[0] = stack.dt
         self.tick.q[:] = stack.robot.neutral

@@ -12,8 +12,12 @@ from wbc.tick.buffers import Buffers
 from wbc.tick.context import Context
 from wbc.validation import Array
 
-#: Joints slower than this rest; how fast the way out is gone [rad/s, characteristic lengths per second]; how long [s]
-_RESTS, _SPEED, _LONGEST = 1e-3, 0.2, 2.0
+#: Joints slower than this rest [rad/s, characteristic lengths per second]
+_RESTS = 1e-3
+#: Speed along the way out [rad/s, characteristic lengths per second]
+_SPEED = 0.2
+#: How long a way out takes at most [s]
+_LONGEST = 2.0
 #: Moved by this, another configuration may have a way out [rad, m]
 _MOVED = 1e-3
 #: Errors below this are none [rad, characteristic lengths]

@@ -21,10 +21,16 @@ from wbc.tasks.base import Item
 from wbc.tick.buffers import Buffers
 from wbc.validation import LARGEST, Array
 
-_ARRAY, _FLOAT = np.ndarray, np.dtype(np.float64)
-_MATRIX, _SE3 = (4, 4), pin.SE3
-#: What a value is that native code can check, as in ``native/values.h``
-NUMBERS, POSE, CONFIGURATION = 0, 1, 2
+_ARRAY = np.ndarray
+_FLOAT = np.dtype(np.float64)
+_MATRIX = (4, 4)
+_SE3 = pin.SE3
+#: Kind of a value that native code checks (``native/values.h``): any finite numbers
+NUMBERS = 0
+#: The same: the matrix of a pose
+POSE = 1
+#: The same: a configuration of the robot
+CONFIGURATION = 2
 
 
 class Owner(Protocol):

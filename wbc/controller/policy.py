@@ -8,7 +8,6 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
-from wbc.qp.factor import load
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -97,7 +96,6 @@ class Fallback:
 
     def prepare(self) -> None:
         """Import and make what the policy may need: importing takes longer than a tick may."""
-        load()
         for name in ("daqp", *self._policy.chain):
             if name != "cold":
                 self._link(name)

@@ -78,7 +78,7 @@ class Step:
 
     @property
     def torque(self) -> Array:
-        """Torques of the joints [N m, N], nv, read-only; 0 for a floating base and for the followers of couplings.
+        """Torques of the joints [N m, N], nv, read-only; 0 where no motor is: floating base, passive joints, followers.
 
         Raises:
             CommandError: the stack does not command torques.
@@ -99,6 +99,17 @@ class Step:
         return {
             name: variables[span] * p[layout.blocks[name].slots[CLOSED].span] for name, span in layout.forces.items()
         }
+
+    @property
+    def loop_forces(self) -> Mapping[str, Array]:
+        """Force, or force and moment, that keep each closed loop closed, by the loop's name: on its second frame from
+        its first, in the axes of the first [N, N m]; of a joint on a curve, on that joint.
+
+        Raises:
+            CommandError: the stack does not command torques.
+        """
+        self._require("loop_forces", "torque")
+        return self._context.loop_forces(self._part("v"))
 
     def _require(self, field: str, *commands: str) -> None:
         command = self._context.command

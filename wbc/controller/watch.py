@@ -47,7 +47,7 @@ class Watch:
         fallback: Fallback,
         sensors: list[tuple[Sensor, Handle]],
         drifts: list[int],
-        braking: Braking,
+        braking: BrakingAuthority,
     ) -> None:
         self._call, self._forget, self._tick, self._fallback = call, forget, tick, fallback
         self._sensors, self._drifts, self._braking, self._said = sensors, drifts, braking, False
@@ -91,7 +91,7 @@ class Watch:
             self._said = True
 
 
-class Braking:
+class BrakingAuthority:
     """What margins count on: a part of the joints' accelerations in calm stacks, see docs/reach.md; else any.
 
     Attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -12,7 +13,9 @@ from wbc import validation
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
 from wbc.coordinates.expressions import DRIFT, REFERENCE
-from wbc.coordinates.rows import KINDS, Coordinate
+from wbc.coordinates.pair import is_pose
+from wbc.coordinates.rows import Coordinate
+from wbc.coordinates.rows import coordinates as checked_coordinates
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
@@ -27,7 +30,8 @@ FASTEST_RETURN = 0.05
 class FollowRows(Task):
     """Coordinates follow a commanded rate as well as they can: A(q) v = speed                 [m/s, rad/s]
 
-    With ``metric`` d, for all six rows of a frame, three points at a distance d along the frame's axes follow their
+    Several of them are the rows of one task, so that a scaled one keeps the direction of the whole command. With
+    ``metric`` d, for all six rows of a frame, three points at a distance d along the frame's axes follow their
     velocities instead, nine rows in m/s, so that the answer does not depend on the unit of length:
 
         v_i = v + omega x d_i,    sum_i |v_i|^2 = e'We,  W = [3 I, -d [1]x; d [1]x, 2 d^2 I]  in the frame's axes
@@ -41,26 +45,28 @@ class FollowRows(Task):
     #: Made by pairs, so it is not in the table of items
     abstract: ClassVar[bool] = True
 
-    coordinate: Coordinate
+    coordinates: tuple[Coordinate, ...]
     metric: float | None = None
 
-    def __post_init__(self) -> None:
-        validation.instance("coordinate", self.coordinate, KINDS, "a coordinate, such as BodyRows")
-        if self.metric is None:
-            return
-        d = validation.scalar("metric", self.metric, low=0.0, open_low=True, unit="m")
-        object.__setattr__(self, "metric", d)
-        one = self.coordinate
-        if not (isinstance(one, BodyRows) and len(one.translation + one.rotation) == 6):
-            raise RangeError("metric", str(self.coordinate), "three points stand for all six rows of a frame only")
+    def __init__(
+        self, coordinates: Coordinate | Sequence[Coordinate], metric: float | None = None, gain: float | None = None
+    ) -> None:
+        given = checked_coordinates("coordinates", coordinates)
+        if metric is not None:
+            metric = validation.scalar("metric", metric, low=0.0, open_low=True, unit="m")
+            if not any(map(is_pose, given)):
+                raise RangeError("metric", metric, "three points stand for all six rows of a frame only")
+        for field, value in (("coordinates", given), ("metric", metric), ("gain", gain)):
+            object.__setattr__(self, field, value)
 
     def validate(self, robot: Robot) -> None:
         """See :func:`expressions.check`."""
-        expressions.check(robot, "task", self.coordinate)
+        for one in self.coordinates:
+            expressions.check(robot, "task", one)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``offset`` and ``speed``, see the class."""
-        given = expressions.labels(robot, self.coordinate)
+        given = [row for one in self.coordinates for row in expressions.labels(robot, one)]
         zero, unit = np.zeros(len(given)), ", ".join(dict.fromkeys(r.unit for r in given))
         rates = ", ".join(f"{u}/s" for u in unit.split(", "))
         return (
@@ -69,29 +75,40 @@ class FollowRows(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """The coordinates' rows, or x, y, z of three points."""
-        if self.metric is None:
-            return expressions.labels(robot, self.coordinate)
-        return tuple(Row(f"{point}{axis}", "m") for point in "xyz" for axis in "xyz")
+        """The coordinates' rows, of poses with a metric x, y, z of three points."""
+        points = [Row(f"{point}{axis}", "m") for point in "xyz" for axis in "xyz"]
+        given = [points if self._spreads(one) else expressions.labels(robot, one) for one in self.coordinates]
+        if len(given) == 1:
+            return tuple(given[0])
+        named = zip(self.coordinates, given, strict=True)
+        return tuple(Row(f"{one} {row.label}", row.unit) for one, rows in named for row in rows)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """-offset, so that the rows ask for speed + gain offset."""
-        return ca.SX(-self.spread(kin) @ inputs["offset"])
+        return ca.SX(-self.spread(robot, kin) @ inputs["offset"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """A(q)."""
-        return self.spread(kin) @ expressions.matrix(robot, kin, self.coordinate)
+        matrices = (expressions.matrix(robot, kin, one) for one in self.coordinates)
+        return self.spread(robot, kin) @ ca.vertcat(*matrices)
 
-    def spread(self, kin: Tracer) -> ca.SX:
+    def spread(self, robot: Robot, kin: Tracer) -> ca.SX:
         """From the rows to those that are served: S of S A(q) v."""
-        if self.metric is None:
-            return ca.SX(1)
-        assert isinstance(self.coordinate, BodyRows)
+        return ca.SX(ca.diagcat(*(self._spread(robot, kin, one) for one in self.coordinates)))
+
+    def _spreads(self, one: Coordinate) -> bool:
+        return self.metric is not None and is_pose(one)
+
+    def _spread(self, robot: Robot, kin: Tracer, one: Coordinate) -> ca.SX:
+        if not self._spreads(one):
+            return ca.SX.eye(len(expressions.labels(robot, one)))
+        assert isinstance(one, BodyRows)
+        assert self.metric is not None
         # Where the frame's axes are as seen from those of the rows
-        turn = kin.rotation(self.coordinate.frame)
-        if self.coordinate.expressed is not None:
-            turn = kin.rotation(self.coordinate.expressed).T @ turn
-        order = [*self.coordinate.translation, *(3 + k for k in self.coordinate.rotation)]
+        turn = kin.rotation(one.frame)
+        if one.expressed is not None:
+            turn = kin.rotation(one.expressed).T @ turn
+        order = [*one.translation, *(3 + k for k in one.rotation)]
         whole = [ca.horzcat(ca.SX.eye(3), -ca.skew(self.metric * turn[:, k])) for k in range(3)]
         return ca.SX(ca.vertcat(*whole)[:, order])
 

@@ -29,8 +29,10 @@ Kind = Literal["rigid", "similarity", "affine"]
 KINDS = ("rigid", "similarity", "affine")
 #: Least singular value of the Jacobian with columns of unit length, below which data do not tell parameters apart
 EXCITED = 1e-3
-#: Steps, and the relative change at which they end
-STEPS, SETTLED = 50, 1e-12
+#: Gauss-Newton steps at most
+STEPS = 50
+#: Relative change of the parameters at which the steps end
+SETTLED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

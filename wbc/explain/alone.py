@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.explain.past import Past, kept_rows, rows_of
+from wbc.explain.past import PastTick, kept_rows, rows_of
 from wbc.stack.layout import Block
 from wbc.stack.tables import stops
 from wbc.tasks.mechanism import Mechanism
@@ -19,8 +19,10 @@ Mask = NDArray[np.bool_]
 
 #: Errors below this are zero [rad, characteristic lengths]
 MET = 1e-5
-#: Starts of a search after the first two, which are the tick's configuration and one beside it; steps of each
-_STARTS, _STEPS = 16, 40
+#: Starts of a search after the first two, which are the tick's configuration and one beside it
+_STARTS = 16
+#: Steps from each start
+_STEPS = 40
 #: How far the second start is from the first [rad, characteristic lengths]
 _ASIDE = 0.05
 #: A search ends where all starts came equally near, and these are so many; the first two count as one
@@ -63,7 +65,7 @@ class Rates:
 
 
 @dataclass(frozen=True, eq=False)
-class Nearest:
+class NearestAnswer:
     """The nearest configuration that a search found, the error there, and how many starts it had."""
 
     q: Array
@@ -82,7 +84,7 @@ class Alone:
     Targets stand still: whatever an input says of the rate of another is zero here.
     """
 
-    def __init__(self, past: Past, block: Block) -> None:
+    def __init__(self, past: PastTick, block: Block) -> None:
         self._past, self.block = past, block
         self._tick = past.tick.twin()
         self._tick.state[:] = past.tick.state
@@ -200,7 +202,7 @@ class Alone:
         for seed in range(_STARTS if anywhere else 0):
             yield robot.random(seed)
 
-    def nearest(self, limited: bool = True, own: bool = False) -> Nearest:
+    def nearest(self, limited: bool = True, own: bool = False) -> NearestAnswer:
         """The nearest configuration, from all starts or until one of them meets the target.
 
         What is held stays held: then there are no random starts, unless ``own`` lets everything go but the mechanism.
@@ -217,7 +219,7 @@ class Alone:
             agreed = len(found) > _AGREED and max(found) < best[0] * (1.0 + 1e-3)
             if np.abs(e).max(initial=0.0) < MET or agreed:
                 break
-        return Nearest(best[1], best[2], len(found))
+        return NearestAnswer(best[1], best[2], len(found))
 
     def escape(self, q: Array) -> tuple[float, Array]:
         """(least curvature of |e|^2 / 2, the step of length 1 along it) within what limits and equality rows leave.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.explain.explanation import Bound, Contradiction, Explanation, Give, Residue
+from wbc.explain.explanation import Contradiction, ExplainedBound, Explanation, Give, Residue
 from wbc.explain.losses import groups, losses, prices
 from wbc.explain.naming import Naming
-from wbc.explain.past import Past
+from wbc.explain.past import PastTick
 from wbc.explain.reasons import reasons
-from wbc.qp.conflict import TOLERANCE, Conflict, Infeasibility, diagnose
+from wbc.qp.conflict import MET, Conflict, Infeasibility, diagnose
 from wbc.qp.problem import QP
 from wbc.stack.layout import Block, rate_unit
 from wbc.tick.buffers import BENDS
@@ -22,7 +22,7 @@ _NONE = Residue(np.inf, "", "")
 class Explainer:
     """Explains one past tick."""
 
-    def __init__(self, past: Past) -> None:
+    def __init__(self, past: PastTick) -> None:
         self.past = past
         self.naming = Naming(past)
 
@@ -91,17 +91,17 @@ class Explainer:
         may = [k for k in range(len(bounds)) if np.isfinite(needed[k]) and not bounds[k].actuator]
         cheapest = alone[min(may or range(len(bounds)), key=lambda k: needed[k])]
         # of a minimal set, what one bound alone has to give is inverse to its multiplier in the proof
-        pushes = 1.0 / np.maximum(conflict.within, TOLERANCE)
+        pushes = 1.0 / np.maximum(conflict.within, MET)
         shares = tuple(float(push) for push in pushes / max(float(pushes.sum()), 1e-300))
         return Contradiction(bounds, tuple(g for g in alone if np.isfinite(g.amount)), enough, cheapest, shares)
 
-    def _violated(self, row: int, v: Array) -> Bound:
+    def _violated(self, row: int, v: Array) -> ExplainedBound:
         """The bound of a row that v misses, or is nearer to missing."""
         qp = self.past.qp
         at = float(qp.rows_at(v)[row])
         return self.naming.bound(row, at - qp.upper[row] > qp.lower[row] - at)
 
-    def _binding(self, row: int, multiplier: float, v: Array) -> Bound:
+    def _binding(self, row: int, multiplier: float, v: Array) -> ExplainedBound:
         """The active bound; one that a relaxation holds may have a multiplier of the other sign."""
         qp, at = self.past.qp, v[row] if row < self.past.layout.variables else 0.0
         upper = multiplier > 0.0

@@ -10,13 +10,17 @@ from wbc.explain.reason import Reason, amount
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
-#: The text names each member of a conflict up to this many; of larger ones so many items, and so many rows of each
-_LONG, _GROUPS, _MEMBERS = 12, 6, 3
+#: Conflicts of up to this many members are told member by member
+_LONG = 12
+#: Items that are named of a larger conflict
+_GROUPS = 6
+#: Rows that are named of each of those items
+_MEMBERS = 3
 #: More prices are told task by task
 _PRICES = 24
 
 
-def listed(bounds: tuple[Bound, ...]) -> str:
+def listed(bounds: tuple[ExplainedBound, ...]) -> str:
     """Bounds as text, joint limits of one kind together."""
     groups: dict[tuple[str, str], list[str]] = {}
     for bound in bounds:
@@ -27,7 +31,7 @@ def listed(bounds: tuple[Bound, ...]) -> str:
     return ", ".join([*plain, *(f"{item} ({kind}: {', '.join(rows)})" for (item, kind), rows in groups.items())])
 
 
-def summary(bounds: tuple[Bound, ...], shares: tuple[float, ...]) -> str:
+def summary(bounds: tuple[ExplainedBound, ...], shares: tuple[float, ...]) -> str:
     """Many bounds as text, by item: those with the largest shares, the rest counted."""
     groups: dict[str, list[int]] = {}
     for k in sorted(range(len(bounds)), key=lambda k: -shares[k]):
@@ -45,7 +49,7 @@ def summary(bounds: tuple[Bound, ...], shares: tuple[float, ...]) -> str:
     return ", ".join(parts)
 
 
-def by_item(bounds: tuple[Bound, ...]) -> str:
+def by_item(bounds: tuple[ExplainedBound, ...]) -> str:
     """Many bounds as text, all of them: those of an item together, its rows of one value too."""
     items: dict[str, dict[str, list[str]]] = {}
     for bound in bounds:
@@ -72,7 +76,7 @@ def by_task(prices: tuple[Price, ...]) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Bound:
+class ExplainedBound:
     """A lower or upper bound of a row or of a degree of freedom, or the value of an equality.
 
     Attributes:
@@ -115,7 +119,7 @@ class Bound:
 class Give:
     """By how much a bound is relaxed, or would have to be [unit]; inf: no amount is enough."""
 
-    bound: Bound
+    bound: ExplainedBound
     amount: float
 
     def __str__(self) -> str:
@@ -137,7 +141,7 @@ class Contradiction:
             rows count in radians and ``stack.length``. The text of a large set names the largest first.
     """
 
-    bounds: tuple[Bound, ...]
+    bounds: tuple[ExplainedBound, ...]
     alone: tuple[Give, ...]
     enough: bool
     cheapest: Give
@@ -205,7 +209,7 @@ class Price:
     better off with the limit.
     """
 
-    bound: Bound
+    bound: ExplainedBound
     task: str
     amount: float
     unit: str
@@ -252,7 +256,7 @@ class Explanation:
     conflicts: tuple[Contradiction, ...]
     least: tuple[Give, ...]
     gave_way: tuple[Give, ...]
-    binding: tuple[Bound, ...]
+    binding: tuple[ExplainedBound, ...]
     losses: tuple[Loss, ...]
     prices: tuple[Price, ...]
     primal: Residue

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.explain.explanation import Bound, Loss, Price, Share
-from wbc.explain.past import Frozen, Past
+from wbc.explain.explanation import ExplainedBound, Loss, Price, Share
+from wbc.explain.past import Frozen, PastTick
 from wbc.qp.problem import QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
@@ -15,11 +15,13 @@ from wbc.stack.layout import Block, rate_unit
 from wbc.tasks._direction import Direction
 from wbc.validation import Array
 
-#: Losses and regained parts below this share of what was requested, and below this rate, are not named [rad/s, m/s]
-_SHARE, _LEAST = 1e-3, 1e-6
+#: Losses and regained parts below this share of what was requested are not named
+_SHARE = 1e-3
+#: Losses and regained parts below this rate are not named [rad/s, m/s]
+_LEAST = 1e-6
 
 
-class Group:
+class RowGroup:
     """Rows of one task that share a unit: J v - w is what they miss."""
 
     def __init__(self, block: Block, unit: str, J: Array, desired: Array) -> None:
@@ -35,7 +37,7 @@ class Group:
         return np.asarray(missing @ self.J / np.linalg.norm(missing))
 
 
-class SoftGroup(Group):
+class SoftGroup(RowGroup):
     """Rows of one soft constraint that share a unit: what they miss is how far A v is outside their bounds."""
 
     def __init__(self, block: Block, unit: str, A: Array, lower: Array, upper: Array) -> None:
@@ -54,9 +56,9 @@ class SoftGroup(Group):
         return np.asarray(missing @ self.J / np.linalg.norm(missing))
 
 
-def groups(past: Past) -> list[Group]:
+def groups(past: PastTick) -> list[RowGroup]:
     """Rows that count of every task and of every soft constraint that is on, by unit."""
-    out: list[Group] = []
+    out: list[RowGroup] = []
     for block in past.layout.of_form("task"):
         if not past.is_on(block):
             continue
@@ -65,13 +67,13 @@ def groups(past: Past) -> list[Group]:
         for unit in dict.fromkeys(row.unit for row in block.rows):
             mine = np.array([row.unit == unit for row in block.rows]) & counts
             if mine.any():
-                out.append(Group(block, rate_unit(unit, past.layout.command), J[mine], desired[mine]))
+                out.append(RowGroup(block, rate_unit(unit, past.layout.command), J[mine], desired[mine]))
     return [*out, *_soft_groups(past)]
 
 
-def _soft_groups(past: Past) -> list[Group]:
+def _soft_groups(past: PastTick) -> list[RowGroup]:
     """The same of soft constraints; what keeps the direction of a task asks for nothing of its own."""
-    out: list[Group] = []
+    out: list[RowGroup] = []
     nv = past.layout.variables
     for block in past.layout.of_form("margins", "rows"):
         if block.entry.price is None or isinstance(block.entry.item, Direction) or not past.is_on(block):
@@ -84,7 +86,7 @@ def _soft_groups(past: Past) -> list[Group]:
     return out
 
 
-def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> tuple[Loss, ...]:
+def losses(past: PastTick, found: list[RowGroup], v: Array, culprits: list[Block]) -> tuple[Loss, ...]:
     """Every task that misses something, and what it would regain without each of the culprits."""
     short = [g for g in found if g.lost(v) > max(_LEAST, _SHARE * float(np.linalg.norm(g.desired)))]
     if not short:
@@ -107,7 +109,9 @@ def losses(past: Past, found: list[Group], v: Array, culprits: list[Block]) -> t
     return tuple(out)
 
 
-def prices(past: Past, found: list[Group], answer: Relaxed, bounds: dict[int, Bound]) -> tuple[Price, ...]:
+def prices(
+    past: PastTick, found: list[RowGroup], answer: Relaxed, bounds: dict[int, ExplainedBound]
+) -> tuple[Price, ...]:
     """Of every active bound and every task that misses something, from the active set of an optimum: of one QP, or of
     all levels; none where a level has none.
     """
@@ -134,7 +138,7 @@ def prices(past: Past, found: list[Group], answer: Relaxed, bounds: dict[int, Bo
     return tuple(out)
 
 
-def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
+def _of_one(past: PastTick, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]:
     """(command, row -> dv / db of the bound that holds it, zero where it holds nothing)."""
     wide, n = past.qp.with_slacks(), past.qp.n
     one = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
@@ -145,7 +149,7 @@ def _of_one(past: Past, answer: Relaxed) -> tuple[Array, Callable[[int], Array]]
     return answer.x[:n], slope
 
 
-def _of_levels(past: Past, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:
+def _of_levels(past: PastTick, frozen: Frozen) -> tuple[Array, Callable[[int], Array]]:
     """The same with strict levels."""
     first = Sensitivity(frozen.qp, QPSolution(frozen.first.x, frozen.first.multipliers, "solved"))
     dofs, numbers = past.layout.dof_scales(past.stack), frozen.numbers(past.tick.qp(), frozen.first.x)

@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from wbc.explain.explanation import Bound
-from wbc.explain.past import Past
+from wbc.explain.explanation import ExplainedBound
+from wbc.explain.past import PastTick
 from wbc.stack.codegen import row_orders, row_units
 from wbc.stack.layout import Block, rate_unit
 from wbc.tasks._direction import Direction
@@ -19,7 +19,7 @@ from wbc.validation import Array
 class Naming:
     """Bounds by their row of [1; A]: simple bounds first, then general rows."""
 
-    def __init__(self, past: Past) -> None:
+    def __init__(self, past: PastTick) -> None:
         self._past, self._nv = past, past.layout.variables
         self.orders = row_orders(past.layout)
         #: what counts as one radian a second: the characteristic length for metres [n + m]
@@ -46,7 +46,7 @@ class Naming:
         """Whether a general row is one of those that keep the direction of a scaled task."""
         return row >= self._nv and isinstance(self.general[row - self._nv][0].entry.item, Direction)
 
-    def bound(self, row: int, upper: bool) -> Bound:
+    def bound(self, row: int, upper: bool) -> ExplainedBound:
         """A bound by name, with its value in the QP."""
         past, block, qp = self._past, self.owner(row, upper), self._past.qp
         value = float((qp.upper if upper else qp.lower)[row])
@@ -58,16 +58,18 @@ class Naming:
         actuator = order == SacrificeOrder.ACTUATOR
         robot = past.stack.robot
         if robot.nv <= row < self._nv:
-            return Bound(item, past.layout.variable(row)[0], which, value, past.layout.variable(row)[1])
+            return ExplainedBound(item, past.layout.variable(row)[0], which, value, past.layout.variable(row)[1])
         if row < self._nv:
             unit = rate_unit(robot.dof_units[row], past.layout.command)
             kind = self._kind(block, row, value) if past.layout.command == "velocity" else ""
-            return Bound(item, robot.dof_names[row], which, value, unit, kind, None, actuator and kind != "position")
+            return ExplainedBound(
+                item, robot.dof_names[row], which, value, unit, kind, None, actuator and kind != "position"
+            )
         own, k = self.general[row - self._nv]
         label = own.rows[k]
         margin = float(past.part("margin")[own.margin_start + k]) if own.form == "margins" else None
         unit = rate_unit(label.unit, past.layout.command)
-        return Bound(item, label.label, which, value, unit, "", margin, actuator)
+        return ExplainedBound(item, label.label, which, value, unit, "", margin, actuator)
 
     def _kind(self, block: Block | None, row: int, value: float) -> str:
         """Which of the limits of a :class:`JointLimits` gives a bound its value."""

@@ -42,7 +42,7 @@ class Frozen:
     sizes: Array
 
 
-class Past:
+class PastTick:
     """Buffers as the tick found them, the QP that it solved, and the same with items switched off.
 
     Attributes:
@@ -147,8 +147,8 @@ class Past:
         return rows_of(self, self.tick, block)
 
 
-def rows_of(past: Past, tick: CompiledTick, block: Block) -> tuple[Array, Array]:
-    """:meth:`Past.task_rows` from the buffers of any tick of the same code.
+def rows_of(past: PastTick, tick: CompiledTick, block: Block) -> tuple[Array, Array]:
+    """:meth:`PastTick.task_rows` from the buffers of any tick of the same code.
 
     A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
     """
@@ -187,7 +187,7 @@ def kept_rows(tick: CompiledTick, block: Block) -> tuple[Array, Array]:
     return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.desired[span], 0.0)
 
 
-def past_of(data: bytes, context: Context) -> Past:
+def past_of(data: bytes, context: Context) -> PastTick:
     """The tick of a step again, in memory of its own.
 
     Raises:
@@ -195,4 +195,4 @@ def past_of(data: bytes, context: Context) -> Past:
     """
     if context.assembly is None:
         raise SolverError("step", None, "comes from a pickle; ask in the process that made it")
-    return Past(data, context.stack, context.layout, context.assembly)
+    return PastTick(data, context.stack, context.layout, context.assembly)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from wbc.explain.alone import MET, SINGULAR, Alone, Nearest
-from wbc.explain.explanation import Bound, Loss
-from wbc.explain.past import Past, rows_of
+from wbc.explain.alone import MET, SINGULAR, Alone, NearestAnswer
+from wbc.explain.explanation import ExplainedBound, Loss
+from wbc.explain.past import PastTick, rows_of
 from wbc.explain.reason import Reason
 from wbc.explain.way_out import FLAT, LOST
 from wbc.stack.layout import Block
@@ -25,21 +25,25 @@ _MOVES = 3.0
 _ASKS = 1e-6
 
 
-def reasons(past: Past, v: Array, binding: tuple[Bound, ...], losses: tuple[Loss, ...]) -> tuple[Reason, ...]:
+def reasons(
+    past: PastTick, v: Array, binding: tuple[ExplainedBound, ...], losses: tuple[Loss, ...]
+) -> tuple[Reason, ...]:
     """One for every task with a gain that is on and is no scaled one."""
     out = []
     for block in past.layout.of_form("task"):
         if past.is_on(block) and block.share < 0 and "gain" in block.slots:
-            found = _Finder(past, block, v).reason(binding, [loss for loss in losses if loss.task == block.entry.name])
+            found = _ReasonFinder(past, block, v).reason(
+                binding, [loss for loss in losses if loss.task == block.entry.name]
+            )
             if found is not None:
                 out.append(found)
     return tuple(out)
 
 
-class _Finder:
+class _ReasonFinder:
     """Finds the reason of one task."""
 
-    def __init__(self, past: Past, block: Block, v: Array) -> None:
+    def __init__(self, past: PastTick, block: Block, v: Array) -> None:
         self.past, self.block, self.alone = past, block, Alone(past, block)
         self.q = past.tick.q.copy()
         self.here = self.alone.at(self.q)
@@ -54,7 +58,7 @@ class _Finder:
         self.asked[idle] = -self.gain * self.here.e[idle]
         self.rates = self.here.J @ (v[: past.layout.nv] / past.layout.dof_scales(past.stack)[: past.layout.nv])
 
-    def reason(self, binding: tuple[Bound, ...], losses: list[Loss]) -> Reason | None:
+    def reason(self, binding: tuple[ExplainedBound, ...], losses: list[Loss]) -> Reason | None:
         """The reason; None where the error is zero and the task moves."""
         off, asks = float(np.abs(self.here.e).max(initial=0.0)), float(np.linalg.norm(self.asked))
         if off < MET and asks < _ASKS:
@@ -69,7 +73,7 @@ class _Finder:
             return self._say("slow")
         return self._moving(share, binding, losses)
 
-    def _moving(self, share: float, binding: tuple[Bound, ...], losses: list[Loss]) -> Reason:
+    def _moving(self, share: float, binding: tuple[ExplainedBound, ...], losses: list[Loss]) -> Reason:
         """A task that can be met and is not served."""
         names = self._holders(binding, losses)
         only = [bound for bound in binding if str(bound) in names]
@@ -94,7 +98,7 @@ class _Finder:
         """How fast the error falls."""
         return float(-self.here.e @ rates / max(float(np.linalg.norm(self.here.e)), 1e-12))
 
-    def _holders(self, binding: tuple[Bound, ...], losses: list[Loss]) -> tuple[str, ...]:
+    def _holders(self, binding: tuple[ExplainedBound, ...], losses: list[Loss]) -> tuple[str, ...]:
         """What the task would regain something without: of constraints the bounds that push, else all that push."""
         to = sorted(((s.amount, s.item) for loss in losses for s in loss.to), reverse=True)
         names: list[str] = []
@@ -117,7 +121,7 @@ class _Finder:
         out = self._say("singular")
         return replace(out, singular=least, direction=direction, lost=self._norms(lost), restores=restores)
 
-    def _out_of_reach(self, found: Nearest) -> Reason:
+    def _out_of_reach(self, found: NearestAnswer) -> Reason:
         robot, item = self.past.stack.robot, self.block.entry.item
         index, near = robot.position_index, found.q
         at = np.where(index >= 0, near[np.maximum(index, 0)], np.nan)

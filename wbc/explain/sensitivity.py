@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import SolverError
-from wbc.explain.past import Frozen, Past
+from wbc.explain.past import Frozen, PastTick
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity
@@ -22,7 +22,7 @@ _STEP = 1e-6
 Moves = Callable[[int, float], None]
 
 
-def derivative(past: Past, name: str, value: str | None) -> Array:
+def derivative(past: PastTick, name: str, value: str | None) -> Array:
     """dv/dx [nv, k] at the tick, for x = q, v, or a run-time value of an item; see :meth:`wbc.Step.derivative`.
 
         H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
@@ -44,7 +44,7 @@ def derivative(past: Past, name: str, value: str | None) -> Array:
     return _of_one(past, answer, moves, count)[: past.layout.nv]
 
 
-def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
+def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> Array:
     """Of one level, or of the first."""
     wide, variables = past.qp.with_slacks(), past.layout.variables
     n, size = wide.n, wide.lower.size
@@ -61,7 +61,7 @@ def _of_one(past: Past, answer: Relaxed, moves: Moves, count: int) -> Array:
     return sensitivity.change(force, offset)[:variables]
 
 
-def _of_levels(past: Past, frozen: Frozen, moves: Moves, count: int) -> Array:
+def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Array:
     """With strict levels: differences of their optimum, the rows that push at each and its rank being what they are."""
     dofs = past.layout.dof_scales(past.stack)
     first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.variables, count))
@@ -77,7 +77,7 @@ def _of_levels(past: Past, frozen: Frozen, moves: Moves, count: int) -> Array:
     return out
 
 
-def _moved(past: Past, moves: Moves, k: int, by: float) -> QP:
+def _moved(past: PastTick, moves: Moves, k: int, by: float) -> QP:
     """The QP of displaced inputs."""
     state = past.tick.state.copy()
     moves(k, by)
@@ -90,7 +90,7 @@ def _slope(ends: list[QP], part: str) -> Array:
     return np.asarray((getattr(ends[0], part) - getattr(ends[1], part)) / (2.0 * _STEP))
 
 
-def _moves(past: Past, name: str, value: str | None) -> tuple[Moves, int]:
+def _moves(past: PastTick, name: str, value: str | None) -> tuple[Moves, int]:
     """What displaces the k-th entry of a value by a small number, and how many entries there are."""
     tick, model, nv = past.tick, past.stack.robot.model, past.layout.nv
 
@@ -110,7 +110,7 @@ def _moves(past: Past, name: str, value: str | None) -> tuple[Moves, int]:
     return _input(past, block.slots[value])
 
 
-def _weight(past: Past, block: Block) -> Moves:
+def _weight(past: PastTick, block: Block) -> Moves:
     """The item's weight, by its logarithm: d/d(ln w)."""
 
     def move(k: int, by: float) -> None:
@@ -119,7 +119,7 @@ def _weight(past: Past, block: Block) -> Moves:
     return move
 
 
-def _input(past: Past, slot: Slot) -> tuple[Moves, int]:
+def _input(past: PastTick, slot: Slot) -> tuple[Moves, int]:
     """An input along its tangent space: poses by a twist (linear; angular) in the axes that they are given in."""
     numbers, kind = past.tick.p[slot.span], slot.input.kind
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.explain.alone import MET, SINGULAR, Alone
-from wbc.explain.past import Past
+from wbc.explain.past import PastTick
 from wbc.validation import Array
 
 #: Share of a task's error that lies where no joint serves it, from which on the task is lost
@@ -16,7 +16,7 @@ FLAT = 1e-6
 SERVED = 0.05
 
 
-def way_out(past: Past, way: Array | None) -> Array | None:
+def way_out(past: PastTick, way: Array | None) -> Array | None:
     """The step of unit length [nv] along which the first lost task's |e|^2 / 2 has its most negative curvature,
 
         J'J + d(e'J)/dq,      e the error where it is lost

@@ -19,12 +19,18 @@ from wbc.stack.declaration import Declaration
 from wbc.trajectory import Law, time_optimal
 from wbc.validation import Array
 
-#: Steps of a trace [rad or m], how many at most each way, and how often one is halved before the curve ends
-STEP, MOST, HALVINGS = 0.05, 2000, 8
+#: Step of a trace [rad or m]
+STEP = 0.05
+#: Steps of a trace each way, at most
+MOST = 2000
+#: How often a step is halved before the curve ends
+HALVINGS = 8
 #: A change of branch is looked at in steps of a joint of so much [rad or m]
 CLEAR = 0.1
-#: Configurations of a population differ by this at least; others are looked for so far beside them [rad or m]
-APART, BESIDE = 0.02, 0.15
+#: Configurations of a population differ by this at least [rad or m]
+APART = 0.02
+#: Distance beside a configuration at which others are looked for [rad or m]
+BESIDE = 0.15
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,10 @@ from wbc import style
 from wbc.explore.explorer import Piece
 from wbc.robot import Robot
 
-#: Colours of windows in which a joint is beyond its limits, and in which a margin does not hold, as of an obstacle
-LIMIT, MARGIN = "0.8", "tab:orange"
+#: Colour of windows in which a joint is beyond its limits
+LIMIT = "0.8"
+#: Colour of windows in which a margin does not hold, as of an obstacle
+MARGIN = "tab:orange"
 
 
 def save_pieces(robot: Robot, pieces: Sequence[Piece], file: pathlib.Path, best: np.ndarray | None = None) -> None:

@@ -19,8 +19,12 @@ from wbc.tasks import inputs as run_time
 from wbc.tasks.base import Constraint, Task
 from wbc.validation import Array
 
-#: A goal is met to this [m or rad], after so many Newton steps at most, none longer than this
-MET, ITERATIONS, STRIDE = 1e-10, 30, 0.5
+#: A goal is met to this [m or rad]
+MET = 1e-10
+#: Newton steps towards a goal, at most
+ITERATIONS = 30
+#: Longest Newton step [rad or m]
+STRIDE = 0.5
 #: A singular value is zero below this share of the largest
 RANK = 1e-7
 
@@ -67,7 +71,7 @@ class StackRows:
                 margins.append(entry)
         self.goals = tuple(entry.name for entry in chosen)
         self._tasks, self._holds, self._margins = (
-            [_Item(self.robot, e, q, values.get(e.name, {})) for e in some] for some in (chosen, held, margins)
+            [_CompiledItem(self.robot, e, q, values.get(e.name, {})) for e in some] for some in (chosen, held, margins)
         )
         self._still = np.vstack((_held_rows(self.robot), np.eye(self.robot.nv)[still]))
         limits = self.robot.limits
@@ -155,7 +159,7 @@ class StackRows:
         return self.moved(pin.neutral(self.robot.model), rng.uniform(low, high))
 
 
-class _Item:
+class _CompiledItem:
     """An item's rows, compiled for CasADi's virtual machine, with its inputs: e and J of a task, h of margins, and of
     a hold, J v = -gain e, both with a gain of 1.
     """

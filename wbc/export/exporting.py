@@ -24,12 +24,14 @@ RUN = 20
 #: Answers of other solvers than the native one count where their own bound on the error is below this [rad/s, m/s]
 CERTAIN = 1e-10
 #: States that are tried for each that is wanted
-PATIENCE = 4
+TRIES = 4
 
 
-#: How far an export's commands may be from those of the tick that it is [rad/s, m/s], and from those of another solver:
-#: the native tick refines answers whose error it cannot bound by a tenth of that
-SAME, SIMILAR = 1e-9, 1e-6
+#: How far an export's commands may be from those of the tick that it is [rad/s, m/s]: the native tick refines answers
+#: whose error it cannot bound by a tenth of that
+SAME = 1e-9
+#: How far an export's commands may be from those of another solver [rad/s, m/s]
+SIMILAR = 1e-6
 
 
 def export(
@@ -80,7 +82,7 @@ def vectors(controller: CompiledStack, count: int, seed: int = 0) -> Array:
     core, model = core_of(controller), controller.stack.robot.model
     rows: list[Array] = []
     start = core.tick.p.copy()
-    for k in range(PATIENCE * count):
+    for k in range(TRIES * count):
         if len(rows) == count:
             break
         if k % RUN == 0:

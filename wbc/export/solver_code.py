@@ -88,7 +88,7 @@ def _read(path: pathlib.Path) -> bytes:
         raise SolverSourceError("solver_source", str(path), f"cannot be read: {error.strerror}") from error
 
 
-class _Links(html.parser.HTMLParser):
+class _PageLinks(html.parser.HTMLParser):
     """Addresses that a page of an index names."""
 
     def __init__(self) -> None:
@@ -103,7 +103,7 @@ def _fetch() -> bytes:
     """The archive from the index."""
     index = os.environ.get("PIP_INDEX_URL") or "https://pypi.org/simple"
     page = f"{index.rstrip('/')}/daqp/"
-    links = _Links()
+    links = _PageLinks()
     links.feed(_get(page).decode(errors="replace"))
     for link in links.found:
         address = urllib.parse.urldefrag(urllib.parse.urljoin(page, link)).url

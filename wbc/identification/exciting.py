@@ -23,12 +23,18 @@ from wbc.identification.regression import Regression
 from wbc.trajectory import Law, MotionLimits, Timing, spline_path
 from wbc.validation import Array
 
-#: Samples of a motion in the search; of the first random ones so many are tried
-INSTANTS, FIRST = 60, 20
-#: Part of the limits that a motion uses, and the accelerations of joints that have no limit [rad/s^2, m/s^2]
-SHARE, ACCELERATION = 0.8, 10.0
-#: Size of random steps, as a part of the joints' ranges, and how it shrinks where nothing is found
-STEP, SHRINK = 0.3, 0.9
+#: Samples of a motion in the search
+INSTANTS = 60
+#: Random motions that are tried first
+FIRST = 20
+#: Part of the limits that a motion uses
+SHARE = 0.8
+#: Acceleration of joints that have no limit [rad/s^2, m/s^2]
+ACCELERATION = 10.0
+#: Size of the first random steps, as a part of the joints' ranges
+STEP = 0.3
+#: Factor by which random steps shrink where nothing better is found
+SHRINK = 0.9
 #: Half the range of joints without limits [rad, m]
 FREE = 1.5
 
@@ -82,7 +88,7 @@ def exciting_motion(
     half = np.where(known, (limits.position_upper - limits.position_lower) / 2.0, FREE)
     half = SHARE * np.minimum(half, np.pi)
     base = identifiable(regression, seed=seed)
-    search = _Search(regression, base, sigma)
+    search = _Excitation(regression, base, sigma)
 
     def judged(points: Array) -> tuple[float, Law | None]:
         tick()
@@ -111,7 +117,7 @@ def exciting_motion(
     return ExcitingMotion(law, base_parameters(regression.matrix(*law.at(times))), score, first)
 
 
-class _Search:
+class _Excitation:
     """What a spline through waypoints shows."""
 
     def __init__(self, regression: Regression, base: BaseParameters, sigma: Array) -> None:

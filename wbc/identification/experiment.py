@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -26,9 +27,14 @@ from wbc.simulation import Command, CommandKind, Motors, PinocchioPlant
 from wbc.trajectory import Law
 from wbc.validation import Array
 
-#: Rate of the encoders [1/s], cut-off of the filter [Hz], rate of samples whose noise is independent behind it [1/s],
-#: and what its ends spoil [s]
-RATE, CUT, KEPT, EDGE = 250.0, 8.0, 16.0, 0.3
+#: Rate of the encoders [1/s]
+RATE = 250.0
+#: Cut-off frequency of the filter [Hz]
+CUT = 8.0
+#: Rate of samples whose noise is independent behind the filter [1/s]
+KEPT = 16.0
+#: Time at each end that the filter spoils [s]
+EDGE = 0.3
 #: Poles of the computed torque that follows the motion [1/s]
 POLE = 20.0
 #: Viscous and Coulomb friction and noise of the torques, each by the inertia that a joint moves [1/s, 1/s^2, 1/s^2]
@@ -52,6 +58,29 @@ class Experiment:
     found: Identified
     check: Array
     errors: Array
+
+    @property
+    def deviations(self) -> float:
+        """Root of the mean square of the errors of the base parameters, in standard deviations."""
+        return float(np.sqrt((self.errors**2).mean()))
+
+    def data(self) -> dict[str, Any]:
+        """Numbers for a file: of the motion, the fit and its check, and the inertias that were found."""
+        motion, found, model = self.motion, self.found, self.found.robot.model
+        bodies = zip(list(model.names)[1:], list(model.inertias)[1:], strict=True)
+        return {
+            "robot": self.true.name,
+            "parameters": len(found.parameters),
+            "base": found.base.count,
+            "condition": found.base.condition,
+            "score": motion.score,
+            "first": motion.first,
+            "duration": motion.law.duration,
+            "deviations": self.deviations,
+            "model": self.check[1].tolist(),
+            "fit": self.check[0].tolist(),
+            "inertias": {str(name): np.array(body.toDynamicParameters()).tolist() for name, body in bodies},
+        }
 
 
 def changed(robot: Robot, far: float = FAR, seed: int = 0) -> Robot:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import InfeasibleError, RangeError
-from wbc.ik.engine import Engine
+from wbc.ik.engine import SearchEngine
 from wbc.ik.search import FOUND, Query, SearchResult
 from wbc.ik.solution import Ending, Solution
 from wbc.tasks import Damping, Momentum
@@ -20,7 +20,7 @@ APART = 0.01
 
 #: Configurations are compared where the goals are met within this [m, rad], if they can be: near a singular one the
 #: tolerance leaves them farther apart
-CLOSELY = 1e-9
+BRANCH_TOLERANCE = 1e-9
 
 #: A direction is free where the rows' squares move it by less than this, against the direction that they move most
 _FREE = 1e-6
@@ -64,10 +64,10 @@ class Branches:
 class Gathering:
     """Branches of one call: what was found, and how to tell whether it is new."""
 
-    def __init__(self, engine: Engine, first: Array, tolerance: float) -> None:
+    def __init__(self, engine: SearchEngine, first: Array, tolerance: float) -> None:
         self._engine, self._first = engine, first
         self._query: Query = engine.query(engine.goals, tolerance, 0, 0)
-        self._fine: Query = engine.query(engine.goals, min(tolerance, CLOSELY), 0, 0)
+        self._fine: Query = engine.query(engine.goals, min(tolerance, BRANCH_TOLERANCE), 0, 0)
         robot = engine.stack.robot
         coupled = {i for c in robot.couplings for i in (c.leader, c.follower)}
         turning = [u == "rad" and i not in coupled for i, u in enumerate(robot.dof_units)]
@@ -143,7 +143,7 @@ class Gathering:
 
 
 def branches(
-    engine: Engine, first: Array, most: int, seed: int, seconds: float, restarts: int, tolerance: float
+    engine: SearchEngine, first: Array, most: int, seed: int, seconds: float, restarts: int, tolerance: float
 ) -> Branches:
     """Descents from a configuration and from random ones, until there are as many branches as wanted."""
     _refuse_free_directions(engine, first)
@@ -170,7 +170,7 @@ def branches(
     return Branches(solutions, hits, descents, perf_counter() - begin, complete)
 
 
-def _refuse_free_directions(engine: Engine, first: Array) -> None:
+def _refuse_free_directions(engine: SearchEngine, first: Array) -> None:
     """Answers are points only where the rows of all tasks, holds and couplings leave no direction free."""
     weight = (engine.tick.weight > 0.0) * engine.core.row_costs
     for block in engine.core.layout.of_form("task"):

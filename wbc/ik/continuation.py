@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wbc.controller.step import Step
 from wbc.errors import ContinuityError, InfeasibleError
-from wbc.ik.engine import Engine
+from wbc.ik.engine import SearchEngine
 from wbc.ik.search import FOUND
 from wbc.validation import Array
 
@@ -47,7 +47,7 @@ class PathBranch:
 
 
 def branch(
-    engine: Engine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float, smooth: bool
+    engine: SearchEngine, aim: Callable[[float], None], s: Array, first: Array, tolerance: float, smooth: bool
 ) -> PathBranch:
     """The branch at coordinates, from a configuration at which the search of the first one begins; ``smooth``: targets
     go straight from one coordinate to the next, and no step is too long.
@@ -69,7 +69,7 @@ class Tracker:
     """
 
     def __init__(
-        self, engine: Engine, aim: Callable[[float], None], tolerance: float, longest: float = math.inf
+        self, engine: SearchEngine, aim: Callable[[float], None], tolerance: float, longest: float = math.inf
     ) -> None:
         self._engine, self._aim, self._longest = engine, aim, longest
         self._query = engine.query(engine.goals, tolerance, 0, 0)

@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
-from wbc.qp.factor import load
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration
@@ -20,12 +19,33 @@ from wbc.tick.native import CompiledTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
-#: As in ``native/converge.h``
-STRIDE, SHORT_STRIDE, EASE, PATIENCE, PROGRESS = 1.0, 0.2, 0.03, 3, 0.8
-DESCENT, SETTLING, AT_REST, GAINED, RETURNS, CLOSELY, SEEKING = 60, 200, 1e-7, 1e-9, 5, 0.01, 0.9
+#: The constants from here to SEEKING are those of ``native/converge.h``: longest step of a descent [s of the rates]
+STRIDE = 1.0
+#: Longest step while the stack settles [s of the rates]
+SHORT_STRIDE = 0.2
+#: Damping of a step, per cost of the goals that are left
+EASE = 0.03
+#: Steps in a row without progress that end a descent
+PATIENCE = 3
+#: Factor by which the cost has to fall for a step to be progress
+PROGRESS = 0.8
+#: Steps of a descent at most
+DESCENT = 60
+#: Steps of settling at most
+SETTLING = 200
+#: A robot whose fastest degree of freedom is slower than this has settled [rad/s, characteristic lengths per second]
+AT_REST = 1e-7
+#: Share of the cost that a step of settling has to gain for another to follow
+GAINED = 1e-9
+#: Ticks by which goals are brought back after a step of settling
+RETURNS = 5
+#: Part of the tolerances to which they are brought back
+CLOSELY = 0.01
+#: Part of the time that the search for the goals may take; the rest is for settling
+SEEKING = 0.9
 
 
-class Search:
+class DescentSearch:
     """The search on the buffers of an assembly; ``sense`` measures what items want measured at the tick's q."""
 
     def __init__(self, assembly: CompiledTick, stack: Declaration, layout: Layout, sense: Callable[[], None]) -> None:
@@ -36,8 +56,6 @@ class Search:
         self._dofs = layout.dof_scales(stack)
         self._units = np.concatenate([self._dofs, np.array(row_units(stack, layout))])
         self._best, self._cost, self._ticks = assembly.q.copy(), np.inf, 0
-        # What the first tick would import takes longer than many ticks, which budgets are for
-        load()
 
     @np.errstate(over="ignore", invalid="ignore")
     def run(self, query: Query, seconds: float) -> SearchResult:

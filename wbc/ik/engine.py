@@ -12,7 +12,7 @@ from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.core import Core
 from wbc.controller.handle import Handle
 from wbc.controller.step import Step
-from wbc.ik.descent import Search
+from wbc.ik.descent import DescentSearch
 from wbc.ik.search import FOUND, NativeSearch, Query, SearchResult
 from wbc.ik.solution import Ending
 from wbc.ik.starts import Starts
@@ -35,8 +35,8 @@ _MOVED = 1e-6
 _KEPT = 16
 
 
-class Sensing:
-    """What items want measured with Coal before a tick that no controller steps: their sensors, writing into its
+class ItemSensing:
+    """What items want measured before a tick that no controller steps: their sensors, writing into its
     parameters; false where there are none.
     """
 
@@ -60,7 +60,7 @@ class Sensing:
                 sensor.sense(self._tick.q)
 
 
-class Engine:
+class SearchEngine:
     """A timeless stack with the memory of its tick; see :class:`wbc.InverseKinematics`.
 
     Attributes:
@@ -87,12 +87,12 @@ class Engine:
         self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
         self._switches: bytes | None = None
         self._limits = np.zeros(0), np.zeros(0)
-        self._sensing = Sensing(self.core, self.tick)
-        self.search: NativeSearch | Search
+        self._sensing = ItemSensing(self.core, self.tick)
+        self.search: NativeSearch | DescentSearch
         if isinstance(tick, NativeTick) and not self._sensing:
             self.search = NativeSearch(tick)
         else:
-            self.search = Search(self.tick, self.stack, layout, self._sensing.sense)
+            self.search = DescentSearch(self.tick, self.stack, layout, self._sensing.sense)
         self._table: tuple[int, Array] = (0, np.zeros((0, layout.nq)))
         self._queries: dict[Any, Query] = {}
         self._weights = b""

@@ -16,11 +16,11 @@ from wbc.controller.handles import Handles
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.branches import Branches, branches
 from wbc.ik.continuation import PathBranch, branch
-from wbc.ik.engine import Engine, ending
+from wbc.ik.engine import SearchEngine, ending
 from wbc.ik.moving_targets import MovingTargets
 from wbc.ik.reach import beyond_reach
 from wbc.ik.search import EXHAUSTED, FOUND, NativeSearch, search_many
-from wbc.ik.solution import Batch, Ending, Solution
+from wbc.ik.solution import BatchSolution, Ending, Solution
 from wbc.ik.timeless import TICK
 from wbc.stack.declaration import Declaration
 from wbc.tick.native import NativeTick
@@ -29,8 +29,10 @@ from wbc.validation import Array
 #: Share of the time that is kept for the question which goals contradict each other
 ASKING = 0.2
 
-#: Most random configurations, which are made before a search, and most threads
-RESTARTS, THREADS = 10**6, 1024
+#: Most random configurations; they are made before a search
+RESTARTS = 10**6
+#: Most threads
+THREADS = 1024
 
 
 class InverseKinematics(Handles):
@@ -55,7 +57,7 @@ class InverseKinematics(Handles):
     """
 
     def __init__(self, stack: Declaration, goals: Iterable[str] | None = None, backend: str = "auto") -> None:
-        self._engine = Engine(stack, goals, backend)
+        self._engine = SearchEngine(stack, goals, backend)
         self.stack, self.goals = self._engine.stack, self._engine.goals
         self.backend = self._engine.controller.backend
         super().__init__(self._engine.core.handles, stack)
@@ -134,7 +136,7 @@ class InverseKinematics(Handles):
         tolerance: float = 1e-5,
         workers: int | None = None,
         nearest: bool = True,
-    ) -> Batch:
+    ) -> BatchSolution:
         """:meth:`solve` for many targets, in threads that run at the same time.
 
         Args:
@@ -195,7 +197,7 @@ class InverseKinematics(Handles):
         descents, spent = np.zeros(total), np.zeros(total)
         for k, f in zip(sought.tolist(), found, strict=True):
             statuses[k], descents[k], spent[k] = ending(f), float(f.descents + (f.ending > EXHAUSTED)), f.seconds
-        return Batch(engine.within_limits(answers), tuple(statuses), descents, spent)
+        return BatchSolution(engine.within_limits(answers), tuple(statuses), descents, spent)
 
     def along(
         self,

@@ -13,8 +13,10 @@ from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.tasks import EndEffector
 from wbc.validation import Array
 
-#: Passes in which points move along their axes, and how far rounding may carry a distance [m]
-PASSES, ROUNDING = 30, 1e-9
+#: Passes in which points move along their axes
+PASSES = 30
+#: How far rounding may carry a distance [m]
+ROUNDING = 1e-9
 
 
 def beyond_reach(robot: Robot, entry: Entry, tolerance: float) -> Callable[[Array], np.ndarray] | None:

@@ -13,8 +13,14 @@ import numpy as np
 from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
-#: How a search ended, as in ``native/converge.h``
-FOUND, EXHAUSTED, OUT_OF_TIME, REFUSED = 0, 1, 2, 3
+#: How a search ended, as in ``native/converge.h``: with a configuration that meets every tolerance
+FOUND = 0
+#: The same: every restart was used
+EXHAUSTED = 1
+#: The same: the time was used
+OUT_OF_TIME = 2
+#: The same: an input was refused
+REFUSED = 3
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class BatchSolution:
     """Answers of :meth:`wbc.InverseKinematics.solve_batch`, one for each target.
 
     Attributes:

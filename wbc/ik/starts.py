@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+# At import, and not at the first search: numpy loads it when it is first named
+from numpy.random import default_rng
+
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -41,7 +44,7 @@ class Starts:
 
     def table(self, count: int, seed: int) -> Array:
         """count x nq numbers; the first ones do not depend on the count."""
-        random = np.random.default_rng(seed)
+        random = default_rng(seed)
         out = np.tile(np.asarray(pin.neutral(self._robot.model)), (count, 1))
         share = random.random((count, len(self._joints)))
         for k, (q, width, low, high) in enumerate(self._joints):

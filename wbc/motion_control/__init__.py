@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.motion_control.actuators import Actuator, ActuatorSizing, Bound
+    from wbc.motion_control.actuators import Actuator, ActuatorSizing, Bound, read_actuators
     from wbc.motion_control.adaptive import AdaptiveControl
     from wbc.motion_control.computed_torque import ComputedTorque
     from wbc.motion_control.impedance import Impedance
@@ -32,6 +32,7 @@ __all__ = [
     "Trial",
     "largest_step",
     "loaded",
+    "read_actuators",
     "run_trial",
 ]
 

@@ -9,8 +9,8 @@ in the mass m of the load. So rows are polynomials of second degree in s, affine
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from math import inf
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import RangeError, UnsupportedJointError
+from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnsupportedJointError
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion
 from wbc.motion_control.trial import loaded
 from wbc.robot import Robot
@@ -53,6 +53,32 @@ class Actuator:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             validation.scalar(f"Actuator.{name}", value, low=0.0, open_low=name not in ("inertia", "friction"))
+
+
+def read_actuators(robot: Robot, texts: Sequence[str]) -> dict[str, Actuator]:
+    """Joint -> motor, from texts such as ``"1,48,0.05,0.4,100"`` or ``"elbow=0.5,48,0.05,0.4"``: the fields of
+    :class:`Actuator` in their order, at least four; a text without a joint is for all joints that have none.
+
+    Raises:
+        ShapeError: a text that is none of these. UnknownNameError: no such joint. DuplicateNameError: two motors of one
+            joint, or two for all others. NotFiniteError, RangeError: as of :class:`Actuator`.
+    """
+    found: dict[str, Actuator] = {}
+    for text in validation.items("motor", texts, "texts"):
+        joint, _, numbers = text.rpartition("=")
+        try:
+            values = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            values = []
+        if not 4 <= len(values) <= len(fields(Actuator)):
+            raise ShapeError("motor", text, "expected 4 to 7 numbers with commas, such as elbow=0.5,48,0.05,0.4")
+        if joint:
+            validation.one_of("motor", joint, robot.dof_names)
+        if joint in found:
+            raise DuplicateNameError("motor", text, f"two motors of {joint or 'all other joints'}")
+        found[joint] = Actuator(*values)
+    others = found.pop("", None)
+    return (dict.fromkeys(robot.dof_names, others) if others is not None else {}) | found
 
 
 class Bound(NamedTuple):

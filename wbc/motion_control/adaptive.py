@@ -37,12 +37,16 @@ from wbc.symbolic import Kinematics, TwoVelocityDynamics
 from wbc.symbolic.two_velocities import PER_BODY
 from wbc.validation import Array
 
-#: Part of the robot's mass, and of its characteristic length, that an unknown load is expected to have at most
-LOAD, REACH = 0.1, 0.1
+#: Part of the robot's mass that an unknown load is expected to have at most
+LOAD = 0.1
+#: Part of the robot's characteristic length at which an unknown load is expected at most
+REACH = 0.1
 #: An estimate keeps this part of S in every direction, so that its mass matrix is regular
 LEAST = 1e-4
-#: Samples of the motion at which its largest gain is looked for, and over which time [s]
-SAMPLES, HORIZON = 20, 2.0
+#: Samples of the motion at which its largest gain is looked for
+SAMPLES = 20
+#: Time over which they are spread [s]
+HORIZON = 2.0
 #: Torques and accelerations are averaged over this time before they are compared, as velocities are noisy [s]
 WINDOW = 0.05
 #: How much the past counts beside the error of now, beta: what noise of encoders of 1e-5 bears
@@ -101,7 +105,7 @@ class AdaptiveControl:
         self._law, self._regressor = self._functions()
         if memory != float("inf"):
             memory = validation.scalar("memory", memory, low=0.0, unit="s")
-        self._past = Past(PER_BODY * len(self.learn), memory)
+        self._past = TorqueHistory(PER_BODY * len(self.learn), memory)
         self.information = Information(
             PER_BODY * len(self.learn), validation.scalar("torque_noise", torque_noise, low=0.0, open_low=True)
         )
@@ -252,7 +256,7 @@ class AdaptiveControl:
             self._phi[at : at + PER_BODY] = parameters(P)
 
 
-class Past:
+class TorqueHistory:
     """Torques that acted, gathered over windows of time: Lambda and b."""
 
     def __init__(self, count: int, memory: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +24,22 @@ from wbc.validation import Array
 Maker = Callable[[Robot, Motion, float], TorqueController]
 #: Both poles of a controller are at this, or at half a radian a step where that is lower [1/s]
 FASTEST = 100.0
-#: Part of a robot's mass that its unknown payload has, how much heavier links are, and noise of encoders [rad, m]
-PAYLOAD, HEAVIER, NOISE = 0.1, 1.2, 1e-5
-#: Of :func:`swing`: parts of ranges and of limits of speed that it uses; half the range of unbounded joints [rad, m]
-RANGE, SPEED, FREE = 0.35, 0.4, 1.0
-#: The same where a joint has not the effort: amplitudes are made so many times smaller, unless holding takes more
-SMALLER, SPARE = 0.7, 0.9
+#: Part of a robot's mass that its unknown payload has
+PAYLOAD = 0.1
+#: Factor by which links are heavier than the controller believes
+HEAVIER = 1.2
+#: Standard deviation of the encoders' noise [rad, m]
+NOISE = 1e-5
+#: Part of the joints' ranges that :func:`swing` uses
+RANGE = 0.35
+#: Part of the limits of speed that :func:`swing` uses
+SPEED = 0.4
+#: Half the range that :func:`swing` gives unbounded joints [rad, m]
+FREE = 1.0
+#: Factor by which amplitudes shrink where a joint has not the effort
+SMALLER = 0.7
+#: Part of the effort above which holding still leaves too little, so that smaller amplitudes do not help
+SPARE = 0.9
 
 
 def poles(dt: float) -> float:
@@ -59,7 +69,7 @@ FLOATING = ("computed torque", "adaptive, last link", "adaptive, all links", "to
 
 
 @dataclass(frozen=True)
-class Condition:
+class TrialCondition:
     """What a controller does not know, and how often it is asked.
 
     Attributes:
@@ -83,7 +93,7 @@ class Condition:
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
+class ControlScenario:
     """What is compared.
 
     Attributes:
@@ -113,7 +123,7 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparisonRow:
     """One controller under one condition.
 
     Attributes:
@@ -123,7 +133,7 @@ class Compared:
     """
 
     name: str
-    condition: Condition
+    condition: TrialCondition
     trial: Trial
     microseconds: float
     mass: tuple[float, float] | None
@@ -139,15 +149,36 @@ class Compared:
         last = self.trial.tip[-max(1, len(self.trial.tip) // 10) :]
         return float("inf") if self.trial.away else float(np.sqrt((last**2).mean()))
 
+    @property
+    def learned(self) -> str:
+        """What is claimed of the payload: nothing that the motion does not show to a tenth, or to 50 g."""
+        if self.mass is None:
+            return ""
+        value, deviation = self.mass
+        shown = 2.0 * deviation <= max(0.1 * abs(value), 0.05)
+        return f"{value:.4g} kg +- {deviation:.1g}" if shown else "not shown by this motion"
+
+    def data(self) -> dict[str, object]:
+        """Numbers for a file; what is not finite is left out."""
+        row: dict[str, object] = {"name": self.name, **asdict(self.condition), "ran_away": self.trial.away}
+        row["microseconds"] = self.microseconds
+        if not self.trial.away:
+            row |= {"tip_mm": 1e3 * self.largest, "end_mm": 1e3 * self.residual}
+            row["torques"] = abs(self.trial.torques).max(axis=0).tolist()
+        if self.mass is not None:
+            value, deviation = self.mass
+            row |= {"payload_kg": value, "deviation_kg": deviation if deviation < float("inf") else None}
+        return row
+
 
 def compare(
-    scenario: Scenario,
-    condition: Condition,
+    scenario: ControlScenario,
+    condition: TrialCondition,
     only: Sequence[str] = (),
     *,
     plant: str = "pinocchio",
     tick: Callable[[], None] = lambda: None,
-) -> Iterator[Compared]:
+) -> Iterator[ComparisonRow]:
     """The controllers one by one.
 
     Raises:
@@ -165,7 +196,7 @@ def compare(
         )  # fmt: skip
         learned = law.mass(law.learn[-1]) if isinstance(law, AdaptiveControl) else None
         spent = 1e6 * float(np.median(trial.seconds)) if len(trial.seconds) else float("inf")
-        yield Compared(name, condition, trial, spent, learned)
+        yield ComparisonRow(name, condition, trial, spent, learned)
 
 
 def swing(robot: Robot, seconds: float, seed: int = 0) -> Motion:
@@ -221,19 +252,19 @@ def _overloads(robot: Robot, motion: Motion, seconds: float) -> bool:
     return False
 
 
-def scenario_of(robot: Robot, seconds: float = 2.0) -> Scenario:
+def scenario_of(robot: Robot, seconds: float = 2.0) -> ControlScenario:
     """A swing of any robot on a fixed or floating base, with the controllers of this package."""
     mass = float(f"{PAYLOAD * sum(body.mass for body in robot.model.inertias):.2g}")
-    return Scenario(robot, swing(robot, seconds), seconds, CONTROLLERS, mass)
+    return ControlScenario(robot, swing(robot, seconds), seconds, CONTROLLERS, mass)
 
 
-def standard_conditions(payload: float) -> tuple[Condition, ...]:
+def standard_conditions(payload: float) -> tuple[TrialCondition, ...]:
     """As modelled, with a payload [kg], with heavier links, with noise; each at 100 Hz and at 1 kHz."""
-    kinds = Condition(), Condition(payload), Condition(heavier=HEAVIER), Condition(noise=NOISE)
+    kinds = TrialCondition(), TrialCondition(payload), TrialCondition(heavier=HEAVIER), TrialCondition(noise=NOISE)
     return tuple(replace(kind, rate=rate) for kind in kinds for rate in (100.0, 1000.0))
 
 
-def save_plot(found: Sequence[Compared], title: str, path: Path) -> None:
+def save_plot(found: Sequence[ComparisonRow], title: str, path: Path) -> None:
     """Distances of the tip, and torques of the three joints that need the largest, over time."""
     runs = [one for one in found if len(one.trial.torques)]
     largest = np.array([np.abs(one.trial.torques).max(axis=0) for one in runs])

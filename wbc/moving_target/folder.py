@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from wbc.moving_target.knowledge import Knowledge
-from wbc.moving_target.study import Outcome, Study
-from wbc.moving_target.trial import Trial
+from wbc.moving_target.study import Outcome, TargetStudy
+from wbc.moving_target.trial import TargetTrial
 
 SUMMARY = "summary.json"
 """What was asked and what came of it."""
@@ -23,7 +23,10 @@ WRITTEN = (SUMMARY, "trials.csv", "first.npz", "error.png", "object.png", "trial
 
 
 def save(
-    study: Study, done: Mapping[Knowledge, list[Trial]], figures: Mapping[Knowledge, Outcome], folder: pathlib.Path
+    study: TargetStudy,
+    done: Mapping[Knowledge, list[TargetTrial]],
+    figures: Mapping[Knowledge, Outcome],
+    folder: pathlib.Path,
 ) -> list[pathlib.Path]:
     """Write them; returns the files."""
     s = study.scenario

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.estimation import DropoutPolicy, FrameMotion, PoseFilter, PoseStream, StreamState
-from wbc.moving_target.motions import Motion
+from wbc.moving_target.motions import TargetMotion
 from wbc.validation import Array
 
 #: Measurements begin this long before the trial, as long as a filter takes to settle [s]
@@ -54,7 +54,7 @@ class Known:
     def __init__(
         self,
         knowledge: Knowledge,
-        motion: Motion,
+        motion: TargetMotion,
         measurement: Measurement,
         process: tuple[float, float],
         policy: DropoutPolicy,

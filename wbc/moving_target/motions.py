@@ -15,15 +15,17 @@ from wbc.estimation import FrameMotion
 from wbc.rotations import quaternion
 from wbc.validation import Array
 
-#: Components of a sea, and the band that they lie in, in parts of the peak frequency
-COMPONENTS, BAND = 24, (0.6, 2.5)
+#: Harmonic components of a sea
+COMPONENTS = 24
+#: Band that the components lie in, in parts of the peak frequency
+BAND = (0.6, 2.5)
 #: Half the step of the difference that gives angular accelerations [s]
 STEP = 1e-4
 #: Accuracy of a tumble
 TOLERANCE = 1e-12
 
 
-class Motion(Protocol):
+class TargetMotion(Protocol):
     """A frame over time."""
 
     def at(self, t: float) -> FrameMotion:

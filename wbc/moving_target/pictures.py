@@ -11,13 +11,12 @@ from PIL import Image, ImageDraw
 
 from wbc import style
 from wbc.moving_target.knowledge import Knowledge
-from wbc.moving_target.study import Study
-from wbc.moving_target.trial import Trial
-from wbc.shapes import Box, Cylinder, PlacedShape
+from wbc.moving_target.study import TargetStudy
+from wbc.moving_target.trial import TargetTrial
+from wbc.shapes import Box, Cylinder, Solid
 from wbc.track import render
 from wbc.track.film import save_film
-from wbc.track.scene import link_meshes, simplified
-from wbc.validation import Array
+from wbc.track.scene import Colour, Scene
 
 COLOURS = dict(zip(Knowledge, style.CYCLE, strict=False))
 LABELS = {
@@ -27,13 +26,25 @@ LABELS = {
     Knowledge.LATE: "measured pose, late",
     Knowledge.ESTIMATED: "measured, filtered, predicted",
 }
-#: Width and height of one half of the film [pixels], rays along each side of one, pictures a second, and at most
-SIZE, RAYS, FRAMES_PER_SECOND, MOST = (360, 360), 2, 5, 40
-#: Colours of the robot, the object, the tool and the hole
-LINK, OBJECT, TOOL, MOUTH = (0.88, 0.89, 0.91), (0.80, 0.66, 0.45), (0.12, 0.37, 0.66), (0.16, 0.14, 0.13)
+#: Width and height of one half of the film [pixels]
+SIZE = (360, 360)
+#: Rays along each side of a pixel
+RAYS = 2
+#: Pictures of the film a second [1/s]
+FRAMES_PER_SECOND = 5
+#: Pictures of the film, at most
+MOST = 40
+#: Colour of the robot
+LINK = (0.88, 0.89, 0.91)
+#: Colour of the object
+OBJECT = (0.80, 0.66, 0.45)
+#: Colour of the tool
+TOOL_COLOUR = (0.12, 0.37, 0.66)
+#: Colour of the hole
+MOUTH = (0.16, 0.14, 0.13)
 
 
-def plot(study: Study, done: Mapping[Knowledge, list[Trial]], folder: pathlib.Path) -> list[pathlib.Path]:
+def plot(study: TargetStudy, done: Mapping[Knowledge, list[TargetTrial]], folder: pathlib.Path) -> list[pathlib.Path]:
     """Errors and object of the first trial, and all trials' worst errors; returns the files."""
     first = {kind: trials[0] for kind, trials in done.items() if trials}
     files = [folder / name for name in ("error.png", "object.png", "trials.png")]
@@ -56,7 +67,7 @@ def plot(study: Study, done: Mapping[Knowledge, list[Trial]], folder: pathlib.Pa
     return files
 
 
-def _object(plt: object, study: Study, end: float, file: pathlib.Path) -> None:
+def _object(plt: object, study: TargetStudy, end: float, file: pathlib.Path) -> None:
     """How the object of the first trial moves, from where it is at first."""
     motion, times = study.moves(0), np.linspace(0.0, end, 400)
     first = motion.at(0.0).pose
@@ -75,7 +86,7 @@ def _object(plt: object, study: Study, end: float, file: pathlib.Path) -> None:
     plt.close(figure)  # type: ignore[attr-defined]
 
 
-def _trials(plt: object, study: Study, done: Mapping[Knowledge, list[Trial]], file: pathlib.Path) -> None:
+def _trials(plt: object, study: TargetStudy, done: Mapping[Knowledge, list[TargetTrial]], file: pathlib.Path) -> None:
     """Largest error of each trial while working; filled: done."""
     figure, panel = plt.subplots(figsize=(9, 4), layout="constrained")  # type: ignore[attr-defined]
     rng = np.random.default_rng(0)
@@ -95,16 +106,16 @@ def _trials(plt: object, study: Study, done: Mapping[Knowledge, list[Trial]], fi
 
 
 def film(
-    study: Study,
-    pair: Mapping[Knowledge, Trial],
+    study: TargetStudy,
+    pair: Mapping[Knowledge, TargetTrial],
     file: pathlib.Path,
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> pathlib.Path | None:
     """Trials side by side as an MP4 where an encoder is installed, else a GIF; None if ``stop`` ended it."""
     robot, scale = study.scenario.robot, study.scenario.size
-    links = [(name, simplified(mesh, 0.1 * scale)) for name, mesh in link_meshes(robot)]
-    camera = _camera(study, scale)
+    scene = Scene(robot, detail=0.1 * scale, colours={"*": LINK})
+    shot = scene.film(_camera(study, scale))
     end = max(float(trial.t[-1]) for trial in pair.values())
     times = np.linspace(0.0, end, int(np.clip(end * FRAMES_PER_SECOND, 2, MOST)))
     frames: list[Image.Image] = []
@@ -116,7 +127,8 @@ def film(
             row = min(int(np.searchsorted(trial.t, t)), len(trial.t) - 1)
             over = t >= trial.t[-1]
             ending = "" if not over else " - done" if trial.success else f" - {trial.reason}"
-            picture = Image.fromarray(_drawn(study, links, trial, row, camera, scale))
+            scene.add_robot(trial.q[row], pieces=_pieces(study, trial, row, scale))
+            picture = Image.fromarray(shot())
             ImageDraw.Draw(picture).text((8, 8), f"{LABELS[kind]}\n{trial.t[row]:5.2f} s{ending}", fill=(34, 39, 46))
             halves.append(np.asarray(picture))
         frames.append(Image.fromarray(np.concatenate(halves, axis=1)))
@@ -125,7 +137,7 @@ def film(
     return save_film(frames, file, min(25.0, len(times) / max(end, 1e-9)), 128)
 
 
-def _camera(study: Study, scale: float) -> render.Camera:
+def _camera(study: TargetStudy, scale: float) -> render.Camera:
     """Beside the goal as it is at first, across the way in, a little from above."""
     goal = study.moves(0).at(0.0).pose * study.scenario.goal
     inward = goal.rotation[:, 2]
@@ -134,37 +146,20 @@ def _camera(study: Study, scale: float) -> render.Camera:
     direction = side / np.linalg.norm(side) + 0.35 * up
     target = goal.translation - 0.8 * scale * inward
     away = 16.0 * scale * direction / np.linalg.norm(direction)
-    return render.Camera(target + away, target, np.radians(24.0), RAYS * SIZE[0], RAYS * SIZE[1])
+    return render.Camera(target + away, target, np.radians(24.0), *SIZE)
 
 
-def _drawn(
-    study: Study, links: list[tuple[str, Array]], trial: Trial, row: int, camera: render.Camera, scale: float
-) -> np.ndarray:
-    """One picture, [height, width, 3] bytes."""
-    s, robot = study.scenario, study.scenario.robot
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, trial.q[row])
-    meshes = []
-    for name, mesh in links:
-        pose = data.oMf[robot.model.getFrameId(name)]
-        meshes.append(render.ColouredMesh(mesh @ pose.rotation.T + pose.translation, LINK))
-    tool = data.oMf[robot.model.getFrameId(s.tip)] * s.tool
-    goal = pin.XYZQUATToSE3(trial.goal[row])
-    back = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.4 * scale]))
-    radius = 0.15 * scale
-    meshes.append(_piece(Cylinder(radius, 0.8 * scale), tool * back, TOOL))
+def _pieces(study: TargetStudy, trial: TargetTrial, row: int, scale: float) -> list[tuple[Solid, pin.SE3, Colour]]:
+    """The tool, and a piece of the object round the hole."""
+    s, radius = study.scenario, 0.15 * scale
+    tool, goal = s.robot.pose(trial.q[row], s.tip) * s.tool, pin.XYZQUATToSE3(trial.goal[row])
     thick = max(s.lead, 0.4 * scale)
-    below = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.5 * thick - s.lead]))
-    meshes.append(_piece(Box((5.0 * scale, 5.0 * scale, thick)), goal * below, OBJECT))
-    mouth = pin.SE3(np.eye(3), np.array([0.0, 0.0, -s.lead]))
-    meshes.append(_piece(Cylinder(1.5 * radius, 0.02 * scale), goal * mouth, MOUTH))
-    layer = render.draw(meshes, camera)
-    seen, colours = render.shade(layer, camera, None)
-    image = np.ones((camera.height, camera.width, 3))
-    image[seen] = colours
-    return np.asarray(np.clip(255.0 * render.reduced(image, RAYS), 0, 255), dtype=np.uint8)
+    return [
+        (Cylinder(radius, 0.8 * scale), tool * _along(-0.4 * scale), TOOL_COLOUR),
+        (Box((5.0 * scale, 5.0 * scale, thick)), goal * _along(0.5 * thick - s.lead), OBJECT),
+        (Cylinder(1.5 * radius, 0.02 * scale), goal * _along(-s.lead), MOUTH),
+    ]
 
 
-def _piece(shape: Box | Cylinder, pose: pin.SE3, colour: tuple[float, float, float]) -> render.ColouredMesh:
-    mesh = render.triangles(PlacedShape(shape, pin.SE3.Identity()))
-    return render.ColouredMesh(mesh @ pose.rotation.T + pose.translation, colour)
+def _along(z: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))

@@ -12,24 +12,29 @@ import pinocchio as pin
 from wbc import validation
 from wbc.estimation import DropoutPolicy
 from wbc.moving_target.knowledge import Knowledge, Measurement
-from wbc.moving_target.motions import Motion, sea, swing, tumble
-from wbc.moving_target.trial import HAND, WORK, Bench, Scenario, Trial
-from wbc.program import Approach, Guard, Hold, Move, Pose, Program, Retreat
+from wbc.moving_target.motions import TargetMotion, sea, swing, tumble
+from wbc.moving_target.trial import HAND, WORK, Bench, TargetScenario, TargetTrial
+from wbc.program import Approach, Guard, Move, PoseTarget, Program, Retreat, Wait
 from wbc.robot import Robot
 from wbc.simulation import Plant
 from wbc.validation import Array
 
-MOTIONS, JOBS = ("sea", "tumble", "swing", "rest"), ("peg", "grasp")
-#: Of a sea: significant heights along x, y, z [m] and about them [rad], and its peak period [s]
-SIGNIFICANT, PERIOD = (0.04, 0.04, 0.06, 0.07, 0.07, 0.07), 6.0
+MOTIONS = ("sea", "tumble", "swing", "rest")
+JOBS = ("peg", "grasp")
+#: Significant heights of a sea along x, y, z [m] and about them [rad]
+SIGNIFICANT = (0.04, 0.04, 0.06, 0.07, 0.07, 0.07)
+#: Peak period of a sea [s]
+PERIOD = 6.0
 #: Of a tumble: rate [rad/s]
 RATE = float(np.radians(3.0))
-#: How long a tool has to be aligned before it goes in [s], and what ends every program
-STEADY, LOST = 0.25, Guard(signal="lost", above=0.5)
+#: How long a tool has to be aligned before it goes in [s]
+STEADY = 0.25
+#: What ends every program
+LOST = Guard(signal="lost", above=0.5)
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class TargetStudy:
     """Trials of one scenario on one kind of motion.
 
     Attributes:
@@ -38,7 +43,7 @@ class Study:
             object [m/s]. severity: what heights and rates are multiplied by.
     """
 
-    scenario: Scenario
+    scenario: TargetScenario
     motion: str
     home: pin.SE3
     spread: tuple[float, float]
@@ -46,7 +51,7 @@ class Study:
     drift: float
     severity: float = 1.0
 
-    def moves(self, seed: int) -> Motion:
+    def moves(self, seed: int) -> TargetMotion:
         """The motion of one trial."""
         rng = np.random.default_rng((seed, 0))
         place, turn = rng.uniform(-1.0, 1.0, (2, 3))
@@ -84,50 +89,50 @@ class Outcome:
     reasons: dict[str, int]
 
 
-def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Measurement, **more: float) -> Study:
+def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Measurement, **more: float) -> TargetStudy:
     """A peg into a hole of 40 mm in a table below the tool, from 25 mm before it and out again, ``clearance`` all round
     [m].
     """
     tool = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.05]))
     goal = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.10, 0.05, -0.04]))
-    touches, before = (Guard(signal="wall", below=0.0),), Pose(position=(0, 0, -0.065), quaternion=(0, 0, 0, 1))
+    touches, before = (Guard(signal="wall", below=0.0),), PoseTarget(position=(0, 0, -0.065), quaternion=(0, 0, 0, 1))
     aligned = Guard(signal="aside", below=0.75 * clearance, lasting=STEADY)
     slow, within = (0.06, 0.5), (5e-3, 0.02)
     program = Program(
         steps=(
             Move(hand=HAND, to=before, speed=slow, within=within, timeout=8),
-            Hold(until=(aligned,), name="align", timeout=3),
+            Wait(until=(aligned,), name="align", timeout=3),
             _approach(0.03, 0.038, 0.07, touches),
-            Hold(until=(Guard(signal="elapsed", above=0.5),), name="stay", unless=touches),
+            Wait(until=(Guard(signal="elapsed", above=0.5),), name="stay", unless=touches),
             Retreat(hand=HAND, by=(0, 0, -0.065), speed=slow, within=within, unless=touches, timeout=5),
         ),
         abort=(LOST,),
     )
-    scenario = Scenario(
+    scenario = TargetScenario(
         robot, tip, tool, robot.neutral, goal, program, lead=0.04, clearance=clearance, size=0.065, timeout=15.0,
         measurement=measurement,
     )  # fmt: skip
     return _placed(scenario, motion, np.array([0.0, 0.0, 0.12]), (0.03, 0.1), 0.15, 0.005, **more)
 
 
-def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more: float) -> Study:
+def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more: float) -> TargetStudy:
     """A grapple fixture on a free body, a twentieth of the arm's length before the tool: the tool comes within a
     fiftieth, goes on to the fixture and holds, within 20 mm and 1 degree.
     """
     length = robot.characteristic_length
     near, turned = 0.02 * length, Guard(signal="tilt", above=float(np.radians(1.0)))
-    before = Pose(position=(0, 0, -near), quaternion=(0, 0, 0, 1))
+    before = PoseTarget(position=(0, 0, -near), quaternion=(0, 0, 0, 1))
     aligned, off = Guard(signal="aside", below=0.01, lasting=STEADY), Guard(signal="off", above=0.02)
     program = Program(
         steps=(
             Move(hand=HAND, to=before, speed=(0.12, 0.03), within=(0.05, 0.02), timeout=20),
-            Hold(until=(aligned,), name="align", timeout=10),
+            Wait(until=(aligned,), name="align", timeout=10),
             _approach(0.1, -0.005, 1.05 * near, (turned,)),
-            Hold(until=(Guard(signal="elapsed", above=1.0),), name="stay", unless=(off, turned)),
+            Wait(until=(Guard(signal="elapsed", above=1.0),), name="stay", unless=(off, turned)),
         ),
         abort=(LOST,),
     )
-    scenario = Scenario(
+    scenario = TargetScenario(
         robot, tip, pin.SE3.Identity(), nimble(robot, tip, 0.05 * length), pin.SE3.Identity(), program, lead=0.0,
         clearance=0.02, size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
         policy=DropoutPolicy(1.0, 2.0),
@@ -142,14 +147,14 @@ def _approach(speed: float, depth: float, at_most: float, unless: tuple[Guard, .
 
 
 def _placed(
-    scenario: Scenario,
+    scenario: TargetScenario,
     motion: str,
     ahead: Array,
     spread: tuple[float, float],
     lever: float,
     drift: float,
     **more: float,
-) -> Study:
+) -> TargetStudy:
     """The object where its goal is ``ahead`` of the tool at first, in the tool's axes."""
     validation.one_of("motion", motion, MOTIONS)
     robot = scenario.robot
@@ -157,7 +162,7 @@ def _placed(
     pin.framesForwardKinematics(robot.model, data, scenario.start)
     tool = data.oMf[robot.model.getFrameId(scenario.tip)] * scenario.tool
     home = tool * pin.SE3(np.eye(3), ahead) * scenario.goal.inverse()
-    return Study(scenario, motion, home, spread, lever, drift, **more)
+    return TargetStudy(scenario, motion, home, spread, lever, drift, **more)
 
 
 def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: float = 18.0) -> Array:
@@ -203,9 +208,9 @@ def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: fl
 
 
 def trials(
-    study: Study, runs: int, kinds: Iterable[Knowledge], plant: Plant | None = None, backend: str = "auto",
-    told: Callable[[Knowledge, int, Trial], None] | None = None, stop: Callable[[], bool] | None = None,
-) -> dict[Knowledge, list[Trial]]:  # fmt: skip
+    study: TargetStudy, runs: int, kinds: Iterable[Knowledge], plant: Plant | None = None, backend: str = "auto",
+    told: Callable[[Knowledge, int, TargetTrial], None] | None = None, stop: Callable[[], bool] | None = None,
+) -> dict[Knowledge, list[TargetTrial]]:  # fmt: skip
     """Trials 0 to ``runs`` with each knowledge, on the same motions; fewer where ``stop`` says so.
 
     Args:
@@ -214,7 +219,7 @@ def trials(
     Raises:
         WbcError: a bad scenario; PlantError from the plant.
     """
-    bench, out = Bench(study.scenario, plant, backend), {kind: list[Trial]() for kind in kinds}
+    bench, out = Bench(study.scenario, plant, backend), {kind: list[TargetTrial]() for kind in kinds}
     for seed in range(runs):
         motion = study.moves(seed)
         for kind, done in out.items():
@@ -226,7 +231,7 @@ def trials(
     return out
 
 
-def outcome(knowledge: Knowledge, done: list[Trial]) -> Outcome:
+def outcome(knowledge: Knowledge, done: list[TargetTrial]) -> Outcome:
     """The figures of some trials, at least one."""
     good = [trial for trial in done if trial.success]
     sizes = [np.linalg.norm(trial.error[trial.working, :3], axis=1) for trial in done]

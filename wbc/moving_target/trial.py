@@ -21,19 +21,25 @@ import pinocchio as pin
 from wbc.api import Controller, Stack
 from wbc.estimation import DropoutPolicy, FrameMotion
 from wbc.moving_target.knowledge import Knowledge, Known, Measurement
-from wbc.moving_target.motions import Motion
+from wbc.moving_target.motions import TargetMotion
 from wbc.program import Program, Runner
 from wbc.robot import Robot
 from wbc.simulation import Connection, Plant
 from wbc.tasks import EndEffector, JointLimits, MovingFrame, Posture
 from wbc.validation import Array
 
-#: Names in the stack, and of the step with which the work begins
-TOOL, HAND, GOAL, WORK = "tool of the trial", "tool", "goal", "go in"
+#: Name of the tool's frame
+TOOL = "tool of the trial"
+#: Name of the hand's task in the stack
+HAND = "tool"
+#: Name of the goal's frame in the stack
+GOAL = "goal"
+#: Name of the program's step with which the work begins
+WORK = "go in"
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
+class TargetScenario:
     """What is to be done, and with what.
 
     Attributes:
@@ -65,7 +71,7 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class TargetTrial:
     """What happened, tick by tick.
 
     Attributes:
@@ -105,7 +111,7 @@ class Bench:
         WbcError: a frame or configuration that the robot has not.
     """
 
-    def __init__(self, scenario: Scenario, plant: Plant | None = None, backend: str = "auto") -> None:
+    def __init__(self, scenario: TargetScenario, plant: Plant | None = None, backend: str = "auto") -> None:
         self.scenario = scenario
         self.robot = scenario.robot.with_frame(TOOL, scenario.tip, scenario.tool)
         self._plant = plant
@@ -117,7 +123,7 @@ class Bench:
         self._data = self.robot.model.createData()
         self._tool = self.robot.model.getFrameId(TOOL)
 
-    def run(self, motion: Motion, knowledge: Knowledge, rng: np.random.Generator) -> Trial:
+    def run(self, motion: TargetMotion, knowledge: Knowledge, rng: np.random.Generator) -> TargetTrial:
         """One trial; the object moves as ``motion`` says. Deterministic for one state of ``rng``.
 
         Raises:
@@ -152,7 +158,7 @@ class Bench:
         # Without the figures, which differ from trial to trial
         told = re.split(r" \(|, ", report.reason)[0] or "not done in time"
         reason = "" if success else f"{report.step.partition(' ')[2]}: {told}"
-        return Trial(t, q, command, off, known_off, rates, goals, success, reason, float(t[-1]), began)
+        return TargetTrial(t, q, command, off, known_off, rates, goals, success, reason, float(t[-1]), began)
 
     def _place(self, believed: FrameMotion) -> None:
         """The goal, which the object carries, is the moving frame."""

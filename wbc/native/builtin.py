@@ -9,7 +9,7 @@ from typing import Any
 _NO_ARGUMENTS = 4
 
 
-class _Method(ctypes.Structure):
+class _MethodDef(ctypes.Structure):
     """``PyMethodDef``."""
 
     _fields_ = (
@@ -21,9 +21,9 @@ class _Method(ctypes.Structure):
 
 
 _make = ctypes.pythonapi.PyCFunction_NewEx
-_make.restype, _make.argtypes = ctypes.py_object, [ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p]
+_make.restype, _make.argtypes = ctypes.py_object, [ctypes.POINTER(_MethodDef), ctypes.py_object, ctypes.c_void_p]
 #: Python keeps the addresses of these
-_methods: dict[int, _Method] = {}
+_methods: dict[int, _MethodDef] = {}
 
 
 def builtin(function: Any, argument: int) -> Callable[[], int]:
@@ -33,6 +33,6 @@ def builtin(function: Any, argument: int) -> Callable[[], int]:
         function: of a loaded library that is never unloaded.
     """
     address = ctypes.cast(function, ctypes.c_void_p).value or 0
-    method = _methods.setdefault(address, _Method(b"call", address, _NO_ARGUMENTS, None))
+    method = _methods.setdefault(address, _MethodDef(b"call", address, _NO_ARGUMENTS, None))
     made: Callable[[], int] = _make(ctypes.byref(method), argument, None)
     return made

@@ -19,6 +19,7 @@ import os
 import pathlib
 import shutil
 import stat
+import sys
 import tempfile
 import threading
 import time
@@ -117,7 +118,7 @@ def _problem(base: pathlib.Path, name: str, library: bool) -> str:
         return "others may write to it"
     if info.st_uid not in (os.getuid(), 0):
         return "it belongs to another user"
-    if library and os.statvfs(base).f_flag & os.ST_NOEXEC:
+    if library and sys.platform == "linux" and os.statvfs(base).f_flag & os.ST_NOEXEC:
         return "its file system is mounted noexec"
     if not os.access(base, os.R_OK | os.W_OK | os.X_OK) and not _valid(base / name):
         return "it cannot be written to"

@@ -11,12 +11,12 @@ import pathlib
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from importlib import metadata
 
 import casadi as ca
 
@@ -45,6 +45,9 @@ COMMON_FLAGS = (
     "-w",
 )
 
+#: What makes a shared library; names of the interpreter that loads it are found when it is loaded, which the linker of
+#: macOS has to be told
+_SHARED = ("-shared",) if sys.platform == "linux" else ("-shared", "-Wl,-undefined,dynamic_lookup")
 #: Priority of compilers that work behind (nice)
 _LOW = 10
 #: What needs no compiler
@@ -156,7 +159,7 @@ def machine() -> str:
 
 def solver_version() -> str:
     """Of the casadi wheel, whose DAQP is linked."""
-    return metadata.version("casadi")
+    return str(ca.CasadiMeta.version())
 
 
 def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = False) -> None:
@@ -221,7 +224,7 @@ def _compile_visible(
     with _written(files) as (cc, place):
         # What it exports must be seen by who loads the library
         flags = [f for f in common if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        command = [*_command(cc), *flags, *optimisation, "-shared", next(iter(files)), "-lm", "-o", str(output)]
+        command = [*_command(cc), *flags, *optimisation, *_SHARED, next(iter(files)), "-lm", "-o", str(output)]
         _run(command, place, behind)
 
 
@@ -258,9 +261,10 @@ def _written(files: Mapping[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
 
 def _with_solver(cc: str, output: pathlib.Path) -> tuple[str, ...]:
     """What links a shared library with DAQP, of which nothing is seen from outside."""
-    # zig's linker knows no such option, and -Bsymbolic is enough
+    # zig's linker knows no such option, and -Bsymbolic is enough; a library of macOS finds its own names without both
     hidden = () if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)
-    return ("-shared", *hidden, "-Wl,-Bsymbolic", str(library()), "-lm", "-o", str(output))
+    inside = (*hidden, "-Wl,-Bsymbolic") if sys.platform == "linux" else ()
+    return (*_SHARED, *inside, str(library()), "-lm", "-o", str(output))
 
 
 def _output(command: list[str]) -> str:

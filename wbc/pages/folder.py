@@ -12,7 +12,7 @@ INDEX = "README.md"
 #: A page of this project that a docstring names, with a heading of it
 PAGE = re.compile(r"\bdocs/(\w+\.md)((?:#[\w-]+)?)")
 #: What stands above the tables of the index
-HEAD = """# Tasks and constraints
+INDEX_HEAD = """# Tasks and constraints
 
 A page an item, made from its docstring by `make docs`. [Your own tasks](expression.md) have the same rights.
 
@@ -79,7 +79,7 @@ def index() -> str:
             if issubclass(cls, Task) is wanted
         ]
         lists.append("\n".join([f"## {title}\n", *lines]))
-    return HEAD + "\n" + "\n\n".join(lists) + "\n"
+    return INDEX_HEAD + "\n" + "\n\n".join(lists) + "\n"
 
 
 def stale(folder: Path) -> list[str]:

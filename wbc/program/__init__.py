@@ -16,14 +16,14 @@ if TYPE_CHECKING:
         Approach,
         Grasp,
         Guard,
-        Hold,
         Move,
         Operate,
-        Pose,
+        PoseTarget,
         Program,
         ProgramError,
         Release,
         Retreat,
+        Wait,
     )
 else:
     __getattr__ = lazy.attach(__name__, __file__)
@@ -37,16 +37,16 @@ __all__ = [
     "Gripper",
     "Guard",
     "HandReference",
-    "Hold",
     "Move",
     "Operate",
-    "Pose",
+    "PoseTarget",
     "Program",
     "ProgramError",
     "Release",
     "Report",
     "Retreat",
     "Runner",
+    "Wait",
 ]
 
 

@@ -45,7 +45,7 @@ class Surroundings(Protocol):
         """A step has ended."""
 
 
-class Watch:
+class GuardWatch:
     """Guards over time: which of them holds, for as long as it has to."""
 
     def __init__(self, guards: Sequence[Guard], runner: Surroundings, cautious: bool) -> None:
@@ -78,11 +78,11 @@ class Watch:
 class Leaf(Behaviour):
     """A step at work. :meth:`begin` runs once, :meth:`aim` then and after each pause, :meth:`advance` every tick."""
 
-    def __init__(self, step: steps.Step, runner: Surroundings, name: str) -> None:
+    def __init__(self, step: steps.ProgramStep, runner: Surroundings, name: str) -> None:
         super().__init__(name)
         self.runner, self._step = runner, step
-        self._unless = Watch(step.unless, runner, cautious=True)
-        self._until = Watch(getattr(step, "until", ()), runner, cautious=False)
+        self._unless = GuardWatch(step.unless, runner, cautious=True)
+        self._until = GuardWatch(getattr(step, "until", ()), runner, cautious=False)
         self._started, self._begun = 0.0, False
 
     def initialise(self) -> None:
@@ -142,7 +142,7 @@ class Leaf(Behaviour):
         return Status.FAILURE
 
 
-class Motion(Leaf):
+class MotionLeaf(Leaf):
     """To a pose: :class:`Move` and :class:`Retreat`."""
 
     def __init__(self, step: steps.Move | steps.Retreat, runner: Surroundings, name: str) -> None:
@@ -220,7 +220,7 @@ class Operating(Leaf):
         self.runner.hands[self._asked.hand].reference.stop()
 
 
-class Gripping(Leaf):
+class GripLeaf(Leaf):
     """:class:`Grasp` and :class:`Release`."""
 
     def __init__(self, step: steps.Grasp | steps.Release, runner: Surroundings, name: str) -> None:
@@ -256,14 +256,14 @@ class Weighing(Leaf):
         return Status.SUCCESS if self.runner.time - self._started >= self._asked.seconds else Status.RUNNING
 
 
-_KINDS: dict[type[steps.Step], type[Leaf]] = {
-    steps.Move: Motion,
-    steps.Retreat: Motion,
+_LEAVES: dict[type[steps.ProgramStep], type[Leaf]] = {
+    steps.Move: MotionLeaf,
+    steps.Retreat: MotionLeaf,
     steps.Approach: Approaching,
     steps.Operate: Operating,
-    steps.Hold: Leaf,
-    steps.Grasp: Gripping,
-    steps.Release: Gripping,
+    steps.Wait: Leaf,
+    steps.Grasp: GripLeaf,
+    steps.Release: GripLeaf,
     steps.Activate: Weighing,
 }
 
@@ -278,4 +278,4 @@ def _tree(step: AnyStep, runner: Surroundings, place: str) -> Behaviour:
     if isinstance(step, steps.Alternatives):
         tries = [in_order(some, runner, f"{place}.{k}") for k, some in enumerate(step.tries)]
         return Selector(name, True, tries)
-    return _KINDS[type(step)](step, runner, name)
+    return _LEAVES[type(step)](step, runner, name)

@@ -10,13 +10,18 @@ import pinocchio as pin
 from wbc.trajectory import online
 from wbc.validation import Array
 
-#: Accelerations [m/s^2, rad/s^2] and jerks [m/s^3, rad/s^3] along each axis
-ACCELERATION, JERK = (1.0, 5.0), (20.0, 100.0)
-#: An axis along which a straight motion does not lead has this share of the speed: from rest it is not used, and from a
-#: motion it takes the hand back to the line
-ACROSS, ACROSS_MOVING = 1e-3, 0.3
-#: A drift takes the orientation of the moment for R_0 after this angle [rad]; step of a difference along x [s]
-FARTHEST, _SMALL = 2.0, 1e-6
+#: Accelerations along each axis [m/s^2, rad/s^2]
+ACCELERATION = (1.0, 5.0)
+#: Jerks along each axis [m/s^3, rad/s^3]
+JERK = (20.0, 100.0)
+#: Share of the speed that an axis has along which a straight motion from rest does not lead, so that it is not used
+ACROSS = 1e-3
+#: The same where the motion begins from another motion: it takes the hand back to the line
+ACROSS_MOVING = 0.3
+#: Angle after which a drift takes the orientation of the moment for R_0 [rad]
+FARTHEST = 2.0
+#: Step of a difference along x [s]
+_SMALL = 1e-6
 
 
 class HandReference:

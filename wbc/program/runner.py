@@ -88,7 +88,7 @@ class Runner:
         dt = controller.stack.dt
         self.hands = {str(name): ProgramHand(controller, str(name), dt) for name in hands}
         self._dt, self._needed = dt, _signals(program, flat)
-        self._abort = leaves.Watch(program.abort, self, cautious=True)
+        self._abort = leaves.GuardWatch(program.abort, self, cautious=True)
         self._tree = leaves.in_order(program.steps, self, "steps")
         self._recovery = leaves.in_order(program.recovery, self, "recovery") if program.recovery else None
         self._state: State = "running"

@@ -68,7 +68,7 @@ class Guard(Declared):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Pose(Declared):
+class PoseTarget(Declared):
     """Where a hand is to be, in the reference frame of its task.
 
     Attributes:
@@ -79,7 +79,7 @@ class Pose(Declared):
     quaternion: tuple[float, float, float, float] | None = None
 
     @model_validator(mode="after")
-    def _unit(self) -> Pose:
+    def _unit(self) -> PoseTarget:
         if self.quaternion is not None and abs(sum(x * x for x in self.quaternion) - 1.0) > 1e-6:
             raise ValueError("quaternion: expected x, y, z, w of length 1")
         return self
@@ -95,7 +95,7 @@ class Pose(Declared):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Step(Declared):
+class ProgramStep(Declared):
     """What all steps have in common.
 
     Attributes:
@@ -109,7 +109,7 @@ class Step(Declared):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Move(Step):
+class Move(ProgramStep):
     """A hand goes straight to a pose, and is there when its measured error is within the tolerance.
 
     Attributes:
@@ -119,13 +119,13 @@ class Move(Step):
 
     step: Literal["move"] = Field(default="move", kw_only=True)
     hand: str
-    to: Pose
+    to: PoseTarget
     speed: tuple[PositiveFloat, PositiveFloat] = (0.1, 0.5)
     within: tuple[PositiveFloat, PositiveFloat] = (1e-3, 1e-2)
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Retreat(Step):
+class Retreat(ProgramStep):
     """A hand moves by a distance along its own axes.
 
     Attributes:
@@ -141,7 +141,7 @@ class Retreat(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Approach(Step):
+class Approach(ProgramStep):
     """A hand moves in one direction until a guard holds, and fails if none does over the whole distance.
 
     Attributes:
@@ -165,7 +165,7 @@ class Approach(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Operate(Step):
+class Operate(ProgramStep):
     """An operator moves a hand by twists in its reference frame, see :meth:`Runner.operate`.
 
     Where that frame is a moving one, the operator commands motion relative to the object and the controller adds the
@@ -184,7 +184,7 @@ class Operate(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Hold(Step):
+class Wait(ProgramStep):
     """Every hand keeps its pose in its reference frame, until a guard holds.
 
     Attributes:
@@ -196,7 +196,7 @@ class Hold(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Grasp(Step):
+class Grasp(ProgramStep):
     """A gripper closes; done when it says that it holds."""
 
     step: Literal["grasp"] = Field(default="grasp", kw_only=True)
@@ -204,7 +204,7 @@ class Grasp(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Release(Step):
+class Release(ProgramStep):
     """A gripper opens; done when it says that it is open."""
 
     step: Literal["release"] = Field(default="release", kw_only=True)
@@ -212,7 +212,7 @@ class Release(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Activate(Step):
+class Activate(ProgramStep):
     """Weights of tasks change smoothly; 0 switches a task off. Done when they are there.
 
     Attributes:
@@ -225,7 +225,7 @@ class Activate(Step):
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Alternatives(Step):
+class Alternatives(ProgramStep):
     """The first list of steps that succeeds; fails when all have."""
 
     step: Literal["alternatives"] = Field(default="alternatives", kw_only=True)
@@ -233,7 +233,7 @@ class Alternatives(Step):
 
 
 AnyStep = Annotated[
-    Move | Retreat | Approach | Operate | Hold | Grasp | Release | Activate | Alternatives, Field(discriminator="step")
+    Move | Retreat | Approach | Operate | Wait | Grasp | Release | Activate | Alternatives, Field(discriminator="step")
 ]
 
 
@@ -281,14 +281,14 @@ class Program(Declared):
 for _recursive in (Alternatives, Program):
     rebuild_dataclass(_recursive)  # type: ignore[arg-type]
 
-_KINDS: tuple[type[Any], ...] = (Move, Retreat, Approach, Operate, Hold, Grasp, Release, Activate, Alternatives)
+_KINDS: tuple[type[Any], ...] = (Move, Retreat, Approach, Operate, Wait, Grasp, Release, Activate, Alternatives)
 _STEPS: dict[str, type[Any]] = {one.__name__.lower(): one for one in _KINDS}
 #: What an unknown field may belong to, by the name that stands before it in an error's place
 _PARTS: dict[str, type[Any]] = {
     **_STEPS,
     **{one.__name__: one for one in _KINDS},
     **dict.fromkeys(("Guard", "until", "unless", "abort"), Guard),
-    **dict.fromkeys(("Pose", "to"), Pose),
+    **dict.fromkeys(("PoseTarget", "to"), PoseTarget),
     "Program": Program,
 }
 

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
-from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.shapes import Shape
+from wbc.shapes.solid import names_of_shapes, why_apart
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ OBSTACLE = "obstacle"
 
 #: More pairs than this are refused: every tick bounds all of them.
 MAX_PAIRS = 10_000
-
-_SHAPES = (Sphere, Capsule, Box, Cylinder, Convex, HalfSpace)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +49,8 @@ class Body:
         for field in ("name", "frame"):
             if not isinstance(getattr(self, field), str):
                 raise ShapeError(f"Body.{field}", getattr(self, field), "expected a name")
-        shape: Any = self.shape
-        if not isinstance(shape, _SHAPES):
-            raise ShapeError("Body.shape", shape, "this is no shape", [kind.__name__ for kind in _SHAPES])
+        if not isinstance(self.shape, Shape):
+            raise ShapeError("Body.shape", self.shape, "this is no shape", names_of_shapes())
         object.__setattr__(self, "placement", validation.pose("Body.placement", self.placement))
 
 
@@ -64,7 +62,7 @@ def checked_pairs(field: str, robot: Robot, pairs: Any, moving: frozenset[str]) 
     """The pairs as a list, with every frame known.
 
     Raises:
-        ShapeError: not pairs of bodies, a body with itself, or two half-spaces.
+        ShapeError: not pairs of bodies, a body with itself, or neither of the two a convex solid.
         UnknownNameError: a frame that neither the robot has nor moves from outside.
         RangeError: more than :data:`MAX_PAIRS`.
         DuplicateNameError: a name of something that moves from outside is also a frame of the robot.
@@ -82,8 +80,8 @@ def checked_pairs(field: str, robot: Robot, pairs: Any, moving: frozenset[str]) 
         first, second = pair
         if first is second:
             raise ShapeError(where, first.name, "a body has no distance to itself")
-        if isinstance(first.shape, HalfSpace) and isinstance(second.shape, HalfSpace):
-            raise ShapeError(where, (first.name, second.name), "two half-spaces have no distance")
+        if reason := why_apart(first.shape, second.shape):
+            raise ShapeError(where, (first.name, second.name), reason)
         for body in (first, second):
             if body.frame in moving and body.frame in frames:
                 raise DuplicateNameError(f"{where}.frame", body.frame, "the robot has a frame of this name")

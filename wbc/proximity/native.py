@@ -4,55 +4,50 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wbc.errors import CompileError
+from wbc.geometry.kernel import HEADERS, ShapeTable, Tolerance, checked
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
-from wbc.proximity.corners import NEAR, corners_of
+from wbc.proximity.corners import NEAR
 from wbc.proximity.missing import Screws
 from wbc.proximity.rows import PairRows
-from wbc.proximity.scene import TIE, TRUST, PairScene
-from wbc.shapes import FAR, Box, Capsule, Convex, Cylinder, HalfSpace, Shape, Sphere
+from wbc.proximity.scene import PairScene
+from wbc.shapes import FAR
 from wbc.symbolic.joint_steps import JointStep, joint_steps, place
 from wbc.validation import Array
 
 #: Where the C is that measures
 SOURCES = Path(__file__).parent / "native"
 
-#: Shapes that are no farther apart than this, without the balls that are added to them, overlap; in parts of the
-#: robot's characteristic length.
-TOUCH = 1e-10
 #: A pair keeps its row until another one is closer by this share of its distance ...
 KEEP_SHARE = 0.1
 #: ... and by this share of the robot's characteristic length.
 KEEP_LENGTH = 0.005
-#: Points of hulls that ``native/shapes.h`` takes at a time.
-LANES = 8
 #: What rounding may do to bounds, in the same parts.
 OFF = 1e-12
 
 _INTEGERS = ("joints", "steps", "bodies", "pairs", "rows", "corners", "width", "nv", "has_pose", "has_velocity")
-_LENGTHS = ("far", "touch", "tie", "trust", "keep_share", "keep_length", "off", "near")
+_LENGTHS = ("keep_share", "keep_length", "off", "near")
 _ARRAYS = (
     *("q", "joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
-    *("body_joint", "body_place", "body_pose", "kind", "hull", "size", "points", "corner", "corner_count"),
+    *("body_joint", "body_place", "body_pose", "shape", "corner", "corner_count"),
     *("first", "second", "outward", "pair_side", "most", "answer", "doubtful", "has_row", "is_measured", "urgent"),
     *("score", "least", "row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side"),
     *("pose", "velocity", "margin", "rate", "screws", "v", "braking", "joint_v", "joint_twist", "speed"),
 )
 
 
-class _Scene(ctypes.Structure):
+class _SceneStruct(ctypes.Structure):
     """``scene_t`` of ``native/scene.h``."""
 
     _fields_ = [
         *((name, ctypes.c_int) for name in _INTEGERS),
+        ("far", ctypes.c_double),
+        ("how", Tolerance),
         *((name, ctypes.c_double) for name in _LENGTHS),
         *((name, ctypes.c_void_p) for name in _ARRAYS),
         ("measured", ctypes.c_int),
@@ -64,12 +59,9 @@ def library() -> ctypes.PyDLL:
     """The compiled sensor.
 
     Raises:
-        CompileError: it was not compiled ahead, and there is no compiler, or it fails; or it is of another layout.
+        CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
-    found = load_library(kernel(SOURCES / "sensor.c"))
-    found.wbc_scene_size.restype = ctypes.c_longlong
-    if found.wbc_scene_size() != ctypes.sizeof(_Scene):
-        raise CompileError("wbc_scene_size", found.wbc_scene_size(), f"expected {ctypes.sizeof(_Scene)} bytes")
+    found = checked(load_library(kernel(SOURCES / "sensor.c", HEADERS)), wbc_scene_size=_SceneStruct)
     for name in ("wbc_sense", "wbc_measure"):
         getattr(found, name).argtypes = [ctypes.c_void_p]
         getattr(found, name).restype = None
@@ -109,13 +101,14 @@ class Sensing:
             names = ("distance", "drift", "line", "side", "pair_side", "most", "margin", "rate", "pose", "velocity")
             arrays |= {name: getattr(rows, name) for name in names if getattr(rows, name) is not None}
         # Held, since the structure has their addresses only
+        self._table = ShapeTable([body.shape for body in scene.bodies])
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         assert rows is None or all(self._arrays[n] is arrays[n] for n in ("distance", "drift", "line", "side"))
-        self._scene = _Scene(
+        self._scene = _SceneStruct(
             joints=scene.robot.model.njoints, steps=len(arrays["step_q"]), bodies=len(scene.bodies), pairs=pairs,
             rows=count, corners=0 if rows is None else rows.corners, width=arrays["corner"].shape[1],
             nv=scene.robot.nv, has_pose=bool(scene.moving.any()), has_velocity="velocity" in arrays, far=FAR,
-            touch=TOUCH * length, tie=TIE * length, trust=TRUST * length, keep_share=KEEP_SHARE,
+            how=Tolerance.of(length), shape=self._table.address, keep_share=KEEP_SHARE,
             keep_length=KEEP_LENGTH * length, off=OFF * length, near=NEAR * length,
             **{name: array.ctypes.data for name, array in self._arrays.items()},
         )  # fmt: skip
@@ -184,13 +177,10 @@ def _kinematics(scene: PairScene) -> dict[str, Array]:
 
 
 def _bodies(scene: PairScene) -> dict[str, Array]:
-    count, shapes = len(scene.bodies), [body.shape for body in scene.bodies]
-    corners = [corners_of(shape, center) for shape, center in zip(shapes, scene.centers, strict=True)]
+    count, corners = len(scene.bodies), [body.shape.row_corners() for body in scene.bodies]
     corner = np.zeros((count, max(1, *(len(points) for points in corners)), 3))
     for k, points in enumerate(corners):
         corner[k, : len(points)] = points
-    hulls = {k: _filled(s.points - scene.centers[k]) for k, s in enumerate(shapes) if isinstance(s, Convex)}
-    start = np.cumsum([0, *(len(hulls.get(k, ())) for k in range(count))])
     outside = scene.robot.model.njoints
     joints = [outside if moves else joint for joint, moves in zip(scene.joints, scene.moving, strict=True)]
     return {
@@ -198,33 +188,6 @@ def _bodies(scene: PairScene) -> dict[str, Array]:
         "body_place": np.array([place(pose) for pose in scene.places]),
         "body_pose": np.zeros((count, 12)),
         "speed": np.zeros(count),
-        "kind": np.array([_kind(shape) for shape in shapes], dtype=np.int32),
-        "hull": np.stack([start[:-1], np.diff(start)], axis=1).astype(np.int32),
-        "size": np.array([[*_size(s), r] for s, r in zip(shapes, scene.radii, strict=True)]),
-        "points": np.concatenate([np.zeros(0), *(points.T.ravel() for points in hulls.values())]),
         "corner": corner,
         "corner_count": np.array([len(points) for points in corners], dtype=np.int32),
     }
-
-
-def _filled(points: Array) -> Array:
-    """The last point again, up to a multiple of what the loop takes at a time."""
-    return np.vstack([points, np.tile(points[-1], (-len(points) % LANES, 1))])
-
-
-def _kind(shape: Shape) -> int:
-    return 2 if isinstance(shape, HalfSpace) else int(isinstance(shape, Convex))
-
-
-def _size(shape: Shape) -> Iterator[float]:
-    """Half sides, disc and ball of which the shape is the sum; zeros for hulls and half-spaces."""
-    sizes: Any = (0.0,) * 5
-    if isinstance(shape, Sphere):
-        sizes = (0.0, 0.0, 0.0, 0.0, shape.radius)
-    elif isinstance(shape, Capsule):
-        sizes = (0.0, 0.0, shape.length / 2, 0.0, shape.radius)
-    elif isinstance(shape, Box):
-        sizes = (*(side / 2 for side in shape.size), 0.0, 0.0)
-    elif isinstance(shape, Cylinder):
-        sizes = (0.0, 0.0, shape.length / 2, shape.radius, 0.0)
-    yield from sizes

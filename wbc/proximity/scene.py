@@ -9,7 +9,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.proximity.body import Body, Pair, joint_of
-from wbc.robot.geometry.coal_shapes import sphere_round
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 if TYPE_CHECKING:
@@ -17,11 +16,6 @@ if TYPE_CHECKING:
 
 #: Numbers of pairs or bodies
 Index = NDArray[np.intp]
-
-#: How far a distance may be above what its normal proves, in parts of the robot's characteristic length.
-TRUST = 1e-5
-#: Clearances closer than this are equal, in the same parts.
-TIE = 1e-9
 
 
 class PairScene:
@@ -32,9 +26,7 @@ class PairScene:
         first, second: numbers of the bodies A and B of every pair.
         moving: whether a body moves from outside.
         joints: numbers of the joints that carry the bodies; 0 for those that none moves.
-        centers: centres of spheres round the bodies, in the frames of their shapes [m].
-        radii: of those spheres [m]; infinite for a half-space, whose centre lies on its boundary.
-        places: poses of the shapes, moved to those centres, on the joint or in what moves from outside.
+        places: poses of the shapes, moved to their centres, on the joint or in what moves from outside.
         outward: of every pair 1 if only B moves from outside, -1 if only A.
     """
 
@@ -46,10 +38,8 @@ class PairScene:
         self.second: Index = np.array([number[b] for _, b in pairs], dtype=np.intp)
         self.moving = np.array([body.frame in outside for body in self.bodies])
         self.joints = [joint_of(robot, body, outside) for body in self.bodies]
-        found = [sphere_round(body.shape) for body in self.bodies]
-        self.centers = [center for center, _ in found]
-        self.radii = np.array([radius for _, radius in found])
-        self.places = [self._on_joint(k) * pin.SE3(np.eye(3), self.centers[k]) for k in range(len(found))]
+        centers = [body.shape.center for body in self.bodies]
+        self.places = [self._on_joint(k) * pin.SE3(np.eye(3), center) for k, center in enumerate(centers)]
         self.outward = self.moving[self.second].astype(float) - self.moving[self.first].astype(float)
 
     def _on_joint(self, k: int) -> pin.SE3:

@@ -26,8 +26,10 @@ from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
 
 _CORRECTIONS = 4
-#: Fits of the multipliers, and roundings of an entry in a Householder factorisation (Higham 2002, lemma 19.3)
-_FITS, _TILT = 2, 12.0
+#: Fits of the multipliers
+_FITS = 2
+#: Roundings of an entry in a Householder factorisation (Higham 2002, lemma 19.3)
+_TILT = 12.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,9 +19,14 @@ from wbc.qp.problem import QP
 from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array
 
-#: Bounds that are missed by no more than this count as met; the weight of |x|^2 against |slack|^2; steps at most, and
-#: the change of the slack at which they end
-TOLERANCE, PROXIMAL, STEPS, SETTLED = 2e-9, 1e-6, 30, 1e-12
+#: Bounds that are missed by no more than this count as met [rad/s, characteristic lengths per second]
+MET = 2e-9
+#: Weight of |x|^2 against |slack|^2
+PROXIMAL = 1e-6
+#: Steps at most
+STEPS = 30
+#: Change of the slack at which the steps end
+SETTLED = 1e-12
 #: Multipliers below this share of the largest one are rounding
 _PUSHING = 1e-6
 _Mask = NDArray[np.bool_]
@@ -78,7 +83,7 @@ def diagnose(qp: QP, limit: int = 4) -> Infeasibility:
     found: list[Conflict] = []
     low, high = chosen[0].copy(), chosen[1].copy()
     slack, multipliers = whole
-    while np.abs(slack).max(initial=0.0) > TOLERANCE and len(found) < limit:
+    while np.abs(slack).max(initial=0.0) > MET and len(found) < limit:
         members = search.irreducible((low, high), multipliers)
         if not members:
             break
@@ -122,7 +127,7 @@ class _ConflictSearch:
 
     def contradictory(self, members: list[RowBound]) -> bool:
         """No x meets all of these bounds."""
-        lower, upper = self.bounds(self.only(members), TOLERANCE)
+        lower, upper = self.bounds(self.only(members), MET)
         if (self.dead & ((lower > 0.0) | (upper < 0.0))).any():
             return True
         scale = np.concatenate((np.ones(self.n), self.norms[self.n :]))

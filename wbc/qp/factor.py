@@ -8,7 +8,6 @@ where H has weights of 1 beside weights of 1e-6.
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -40,12 +39,15 @@ class Factor:
     """
 
     def __init__(self, qp: QP) -> None:
-        factor, info = _lapack().dpotrf(qp.H, lower=0, clean=1)
-        self.definite = info == 0 and bool(np.isfinite(factor).all())
+        try:
+            self.R: Array = np.linalg.cholesky(qp.H).T.astype(np.float64, copy=False)
+        except np.linalg.LinAlgError:
+            self.definite = False
+            return
+        self.definite = bool(np.isfinite(self.R).all())
         if not self.definite:
             return
-        self.R: Array = factor
-        self.inverse: Array = _lapack().dtrtri(factor, lower=0)[0]
+        self.inverse: Array = _upper_solve(self.R, np.eye(qp.n))
         self.rows: Array = np.vstack((self.inverse, qp.A @ self.inverse))
         self.norms: Array = np.sqrt(np.einsum("ij,ij->i", self.rows, self.rows))
         self.wide_H: Wide = qp.H.astype(np.longdouble)
@@ -113,27 +115,23 @@ class ActiveRows:
         """(dy, mu) with dy + M_S' mu = force and M_S dy = offset: one step of the active-set KKT system."""
         if self.index.size == 0:
             return force, np.zeros(0)
-        along = _lapack().dtrtrs(self.T, offset, lower=0, trans=1)[0]
+        along = _upper_solve(self.T.T[::-1, ::-1], offset[::-1])[::-1]
         inside = self.Q.T @ force
         dy = force + self.Q @ (along - inside)
-        mu = _lapack().dtrtrs(self.T, inside - along, lower=0)[0]
+        mu = _upper_solve(self.T, inside - along)
         return dy, mu
 
     def inverse_norm(self) -> float:
         """Frobenius norm of T^-1, at least 1 / (smallest singular value of M_S)."""
         if self.index.size == 0:
             return 0.0
-        return float(np.linalg.norm(_lapack().dtrtri(self.T, lower=0)[0]))
+        return float(np.linalg.norm(_upper_solve(self.T, np.eye(self.index.size))))
 
 
-def load() -> None:
-    """Import LAPACK now, where the first factor must not wait for it."""
-    _lapack()
+def _upper_solve(T: Array, b: Array) -> Array:
+    """T^-1 b for an upper triangular T [n, n] without a zero on its diagonal.
 
-
-@functools.cache
-def _lapack() -> Any:
-    """LAPACK of scipy, imported at first use: the compiled tick does without it."""
-    from scipy.linalg import lapack
-
-    return lapack
+    The elimination of such a matrix exchanges no rows and its other factor is the identity, so what numpy does is
+    the substitution; a solver for triangular matrices would be scipy's, whose import takes longer than most sessions.
+    """
+    return np.linalg.solve(T, b).astype(np.float64, copy=False)

@@ -24,7 +24,7 @@ ROUNDS = 60
 REFINEMENTS = 2
 
 #: A bound counts as violated beyond this times (1 + |bound|); a multiplier as wrong beyond this times the largest force
-TOLERANCE = 1e-12
+POLISHED = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,7 +103,7 @@ def _wrong_signs(qp: QP, held: NDArray[np.int8], lam: Array) -> Array:
     """How far multipliers point the wrong way, 0 where they are right or within rounding [n + m]."""
     wrong = np.where(held == 1, -lam, np.where(held == -1, lam, 0.0))
     scale = np.abs(lam).max(initial=0.0) + np.abs(qp.g).max(initial=0.0)
-    return np.where(wrong > TOLERANCE * scale, wrong, 0.0)
+    return np.where(wrong > POLISHED * scale, wrong, 0.0)
 
 
 def _violations(qp: QP, x: Array) -> Array:
@@ -111,4 +111,4 @@ def _violations(qp: QP, x: Array) -> Array:
     beyond = qp.violation(x)
     bound = np.where(np.isfinite(qp.upper), np.abs(qp.upper), 0.0)
     bound = np.maximum(bound, np.where(np.isfinite(qp.lower), np.abs(qp.lower), 0.0))
-    return np.where(beyond > TOLERANCE * (1.0 + bound), beyond, 0.0)
+    return np.where(beyond > POLISHED * (1.0 + bound), beyond, 0.0)

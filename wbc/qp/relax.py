@@ -32,11 +32,12 @@ STEPS = 30
 SETTLED = 1e-12
 
 #: Violations up to this (per unit of the row) count as none; rows of finished classes get this much tolerance
-TOLERANCE = 1e-9
+GIVEN_WAY = 1e-9
 
-#: Variables beyond this times what counts as 1 are none, and by how much a sum of rows has to be broken for a proof
-#: that they contradict each other, per largest multiplier
-FAR_AWAY, _BROKEN = 1e6, 1e-6
+#: Variables beyond this times what counts as 1 are no answer
+FAR_AWAY = 1e6
+#: By how much a sum of rows has to be broken, per largest multiplier, for a proof that they contradict each other
+_BROKEN = 1e-6
 
 #: Rows and bounds whose multiplier exceeds this share of the largest one stay active in the later classes
 _PUSHING = 1e-6
@@ -230,7 +231,7 @@ class Relaxation:
         """
         last = self._final.solve(work, warm=False)
         iterations, rows = last.iterations, np.flatnonzero(work.lower[self.n :] == work.upper[self.n :])
-        for tolerance in (TOLERANCE, np.inf):
+        for tolerance in (GIVEN_WAY, np.inf):
             if last.solved or not rows.size:
                 break
             if tolerance == np.inf:
@@ -276,12 +277,12 @@ class Relaxation:
         s = np.zeros(m)
         s[rows] = stage.x[n + rows]
         x = np.clip(stage.x[:n], work.lower[:n], work.upper[:n])
-        given = rows[np.abs(s[rows]) > TOLERANCE]
+        given = rows[np.abs(s[rows]) > GIVEN_WAY]
         equal = np.flatnonzero(work.lower[n:] == work.upper[n:])
         pushing = np.abs(stage.multipliers) > _PUSHING * np.abs(s).max(initial=0.0)
         others = np.setdiff1d(rows, np.union1d(given, equal))
-        work.lower[n + others] -= TOLERANCE
-        work.upper[n + others] += TOLERANCE
+        work.lower[n + others] -= GIVEN_WAY
+        work.upper[n + others] += GIVEN_WAY
         if given.size:
             fixed = np.flatnonzero(pushing[:n])
             at = np.where(stage.multipliers[fixed] > 0.0, work.upper[fixed], work.lower[fixed])
@@ -295,7 +296,7 @@ class Relaxation:
         """Move the sides that x misses by rounding to x: of dependent equalities, one set of digits holds them all."""
         n, value = self.n, work.A @ x
         low, high = work.lower[n:], work.upper[n:]
-        close = (value >= low - 10.0 * TOLERANCE) & (value <= high + 10.0 * TOLERANCE)
+        close = (value >= low - 10.0 * GIVEN_WAY) & (value <= high + 10.0 * GIVEN_WAY)
         equal = close & (low == high)
         low[close] = np.where(equal, value, np.minimum(low, value))[close]
         high[close] = np.where(equal, value, np.maximum(high, value))[close]
@@ -305,7 +306,7 @@ class Relaxation:
     ) -> Relaxed:
         x = np.clip(last.x, qp.lower[: self.n], qp.upper[: self.n])
         slack = qp.violation(x)[self.n :]
-        return Relaxed(x, last.multipliers, flag, slack, slack > 10.0 * TOLERANCE * unit, *ends, iterations)
+        return Relaxed(x, last.multipliers, flag, slack, slack > 10.0 * GIVEN_WAY * unit, *ends, iterations)
 
 
 def relax(qp: QP, order: NDArray[np.int_], unit: Array | None = None) -> Relaxed:

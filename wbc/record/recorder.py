@@ -17,7 +17,8 @@ from typing import Any
 
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
-from wbc.record.recording import FORMAT, RecordingError, Writer
+from wbc.log.file import FileWriter, LogWriter
+from wbc.record.recording import FORMAT, RecordingError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 
@@ -36,8 +37,16 @@ def recorded_inputs(layout: Layout) -> tuple[str, ...]:
 TOLD = ("error", "margin")
 #: In place of a number of resets: what the solver remembers is not what was recorded
 UNKNOWN = -1
-#: The part ``reset`` of a tick
-COLD, WARM = struct.pack("d", 1.0), struct.pack("d", 0.0)
+#: The part ``reset`` of a tick that begins cold
+COLD = struct.pack("d", 1.0)
+#: The part ``reset`` of a tick that begins warm
+WARM = struct.pack("d", 0.0)
+#: Size of a chunk [bytes]
+CHUNK = 1 << 18
+#: Ticks of a chunk at least
+FEWEST = 16
+#: Ticks of a chunk at most
+MOST = 1024
 #: Packages whose version decides the bits of a command
 PACKAGES = ("casadi", "pin", "daqp", "osqp", "numpy")
 
@@ -79,8 +88,9 @@ class Recorder:
         self._command = self._tick.report.data.cast("B")[: 8 * (layout.variables + 1)]
         pickled, problem = _pickled(controller.stack)
         text = about(controller) | {"sizes": sizes, "not_pickled": problem}
-        self._writer: Writer | None = Writer(self.path, text, pickled, overwrite)
-        self._chunk, self._process = self._writer.chunk, os.getpid()
+        self._writer: LogWriter | None = FileWriter(self.path, overwrite, RecordingError)
+        self._writer.begin(text, {} if pickled is None else {"stack.pickle": pickled})
+        self._chunk, self._process = max(FEWEST, min(MOST, CHUNK // (8 * sum(sizes.values())))), os.getpid()
         self._rows: list[bytes] = []
         #: resets of the controller before the last tick that was recorded whole
         self._seen = UNKNOWN

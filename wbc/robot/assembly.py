@@ -102,6 +102,7 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
         locked_dofs=locked_dofs,
         source=description.source,
     )
+    robot = _actuated(robot, description, recipe)
     for role, frame in recipe.frames.items():
         robot.check_frame(f"frames.{role}", frame)
     if description.loops and not recipe.loops:
@@ -110,6 +111,23 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     elif description.loops:
         robot = robot.with_loops(*(_unlocked(loop, locked) for loop in description.loops))
     return _with_accelerations(robot, {**description.acceleration, **recipe.acceleration}, recipe.source)
+
+
+def _actuated(robot: Robot, description: Description, recipe: Recipe) -> Robot:
+    """The robot with motors where the recipe, or else the description, says; locked joints have none to name.
+
+    Raises:
+        RangeError: transmissions are asked for, and there are none. UnknownNameError: no such joint.
+    """
+    said = description.actuated
+    if recipe.actuated == "transmissions":
+        said = description.transmissions
+        if not said:
+            raise RangeError("actuated", recipe.actuated, "the description has no transmission of a joint")
+    elif recipe.actuated is not None:
+        return robot.with_actuated(recipe.actuated)
+    moved = [name for name in said if name in robot.joint_names]
+    return robot.with_actuated(moved) if moved else robot
 
 
 def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
@@ -378,8 +396,9 @@ def _both_ways(key: str, names: list[str], lower: Array, upper: Array) -> Array:
     """
     out, uneven = np.array(upper), []
     for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
-        if (key == "velocity" and low > 0.0) or (high == 0.0 and np.isinf(low)):
-            # Pinocchio 4.1 has the largest velocity as the lower one, with a positive sign; 0 is not given
+        if (low > 0.0 and (key == "velocity" or low == high)) or (high == 0.0 and np.isinf(low)):
+            # Pinocchio 4.1 has the largest velocity, and its sample models the effort, as the lower one too, with a
+            # positive sign; 0 is not given
             low = -high
         if high < 0.0 or ((high > 0.0) != (low < 0.0) and not np.isnan(low + high)):
             raise RangeError(f"limits.{key}", (low, high), f"{names[k]}: expected one below and one above 0")

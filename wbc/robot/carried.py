@@ -8,10 +8,10 @@ from typing import Any
 import pinocchio as pin
 
 from wbc import validation
-from wbc.errors import DuplicateNameError, RangeError, ShapeError
+from wbc.errors import DuplicateNameError, RangeError
 from wbc.robot.pairs.collision_pairs import find_self_pairs
 from wbc.robot.robot import Robot, checked_robot
-from wbc.shapes import Box, Capsule, Cylinder, PlacedShape, Solid, Sphere
+from wbc.shapes import PlacedShape, Solid
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 
@@ -75,12 +75,4 @@ def _inertia(shape: Solid, mass: float) -> pin.Inertia:
     m = validation.scalar("mass", mass, low=0.0, unit="kg")
     if m == 0.0:
         return pin.Inertia.Zero()
-    if isinstance(shape, Sphere):
-        return pin.Inertia.FromSphere(m, shape.radius)
-    if isinstance(shape, Box):
-        return pin.Inertia.FromBox(m, *shape.size)
-    if isinstance(shape, Cylinder):
-        return pin.Inertia.FromCylinder(m, shape.radius, shape.length)
-    if isinstance(shape, Capsule):
-        return pin.Inertia.FromCapsule(m, shape.radius, shape.length)
-    raise ShapeError("inertia", None, "the inertia of a Convex is not computed: give inertia=pin.Inertia(...)")
+    return shape.inertia(m)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pinocchio as pin
 
 from wbc import validation
@@ -23,8 +25,11 @@ from wbc.robot.sources.description import Description, with_base
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder, read_xml
 from wbc.robot.sources.mjmodel import compiled, is_mjmodel, read_mjmodel
-from wbc.robot.sources.srdf import read_states
+from wbc.robot.sources.sdf import read_sdf
+from wbc.robot.sources.srdf import Srdf, read_srdf
 from wbc.robot.sources.urdf import read_urdf
+
+log = logging.getLogger("wbc")
 
 SHAPES = ("auto", "description", "exact", "fit", "spheres", "convex", "none")
 
@@ -33,7 +38,7 @@ _FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 
 def read(source: Any, base: str | None, recipe: Recipe) -> Description:
-    """The description in a URDF or MJCF file, a ``pin.Model``, a ``mujoco.MjModel`` or a sequence of :class:`DHRow`.
+    """The description in a URDF, SDF or MJCF file, a ``pin.Model``, a ``mujoco.MjModel`` or rows of :class:`DHRow`.
 
     Raises:
         RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
@@ -50,7 +55,9 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
             return read_urdf(path, tree, base, recipe.mimic_leaders)
         if tree.tag == "mujoco":
             return read_mjmodel(compiled(path), base, str(path))
-        raise RobotFileError("robot", str(path), f"neither URDF nor MJCF: the root element is <{tree.tag}>")
+        if tree.tag == "sdf":
+            return read_sdf(path, tree, base)
+        raise RobotFileError("robot", str(path), f"neither URDF, SDF nor MJCF: the root element is <{tree.tag}>")
     if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
         return read_dh(source, base)
     expected = "expected a name, a path, a pin.Model, a mujoco.MjModel or a sequence of DHRow"
@@ -83,8 +90,10 @@ def finish(
 ) -> Robot:
     """The robot of a description: states, joints, limits, shapes."""
     states, geometry = dict(description.states), description.geometry
-    if recipe.state:
-        states |= read_states(example_data_folder() / recipe.srdf)
+    if recipe.srdf:
+        srdf = read_srdf(example_data_folder() / recipe.srdf)
+        description = _with_rotors(description, srdf)
+        states |= srdf.states() if recipe.state else {}
     if not recipe.state and "home" in states:
         recipe = replace(recipe, state="home")
     robot = override_limits(assemble(description, recipe, states), limits)
@@ -97,6 +106,38 @@ def finish(
         return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
     described = description_shapes(robot, package_dirs, exact=shapes == "exact", geometry=geometry)
     return _with_pairs(described, recipe)
+
+
+def _with_rotors(description: Description, srdf: Srdf) -> Description:
+    """The description with the rotors of an SRDF file, as ``pin.loadRotorParameters``, and notes of what is not read.
+
+        armature += inertia gear_ratio^2
+
+    Raises:
+        RobotFileError: a bad rotor, or one of a joint with several degrees of freedom.
+    """
+    model, notes, rotors = pin.Model(description.model), dict(description.notes), srdf.rotors()
+    here = [name for name in rotors if model.existJointName(name)]
+    several = [name for name in here if model.nvs[model.getJointId(name)] != 1]
+    if several:
+        raise RobotFileError("srdf", str(srdf.path), f"rotors of joints with several degrees of freedom: {several}")
+    dofs = [int(model.idx_vs[model.getJointId(name)]) for name in here]
+    armature, inertias, ratios = (np.array(x) for x in (model.armature, model.rotorInertia, model.rotorGearRatio))
+    for i, name in zip(dofs, here, strict=True):
+        inertias[i], ratios[i] = rotors[name]
+    armature[dofs] += inertias[dofs] * ratios[dofs] ** 2
+    model.armature, model.rotorInertia, model.rotorGearRatio = armature, inertias, ratios
+    if rotors:
+        without = [name for name in list(model.names)[1:] if name not in rotors]
+        notes["armature"] = f"rotors of the SRDF file; none given for {', '.join(without) or 'no joint'}"
+    if ignored := srdf.ignored():
+        notes["srdf"] = f"not read of the SRDF file: {ignored}"
+    followers = {mimic.follower for mimic in description.mimics}
+    passive = [name for name in srdf.passive() if model.existJointName(name) and name not in followers]
+    if passive:
+        notes["passive"] = f"passive joints of the SRDF file, which have motors here: {', '.join(passive)}"
+        log.warning("%s: %s", description.source or model.name, notes["passive"])
+    return replace(description, model=model, notes=notes)
 
 
 def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:

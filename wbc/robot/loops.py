@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,10 +19,20 @@ from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
 
-#: Rows of each kind of loop, with their units
-LABELS = {"connect": ("x", "y", "z"), "weld": ("x", "y", "z", "rx", "ry", "rz")}
+Kind = Literal["connect", "weld", "hinge", "slide"]
+#: Rows of each kind of loop: those that begin with r are rotations [rad], others lengths [m]
+LABELS: Mapping[Kind, tuple[str, ...]] = {
+    "connect": ("x", "y", "z"),
+    "weld": ("x", "y", "z", "rx", "ry", "rz"),
+    "hinge": ("x", "y", "z", "rx", "ry"),
+    "slide": ("x", "y", "rx", "ry", "rz"),
+}
+#: Twice the squared cosine of half the angle between axes is no less, so that none between opposite ones divides by 0
+OPPOSITE = 1e-12
 #: A loop is closed where its residual is below this [m, rad]: rounding of poses metres from the origin
 CLOSED = 1e-11
+#: What a loop may be open by where no joint moves it [m, rad]: lengths and axes of a file are rounded
+ROUNDED = 1e-6
 #: Steps towards a closed configuration at most: they converge quadratically, or not at all
 STEPS = 60
 #: The longest step of a joint [rad, m]: residuals of rotations are straight over a fraction of a turn
@@ -38,19 +49,20 @@ class LoopError(WbcError):
 class Loop:
     """Two frames that stay together:
 
-        e = (R_a' (p_b - p_a); log3(R_a' R_b)) = 0,      the first three rows alone for ``connect``
+        e = (R_a' (p_b - p_a); log3(R_a' R_b)) = 0,      those rows of it that ``kind`` has
 
     Attributes:
         name: of the loop.
         first, second: names of the frames a and b; ``"world"`` is one.
         kind: ``connect``: their origins meet, as in a ball joint, and as hinges in a plane do; ``weld``: their poses
-            are equal.
+            are equal; ``hinge``: up to a turn about their z axis, e's rotation being 2 sin(angle / 2) along the
+            shortest turn from axis to axis; ``slide``: up to a shift along the z axis of a.
     """
 
     name: str
     first: str
     second: str
-    kind: Literal["connect", "weld"] = "connect"
+    kind: Kind = "connect"
 
     def __post_init__(self) -> None:
         validation.name("Loop.name", self.name)
@@ -62,12 +74,17 @@ class Loop:
         return LABELS[self.kind]
 
     def error(self, kin: Tracer) -> ca.SX:
-        """e of the class, 3 or 6 rows [m, rad]."""
+        """e of the class, a row a label [m, rad]."""
         first, second = kin.pose(self.first), kin.pose(self.second)
         gap = first.rotation.T @ (second.position - first.position)
         if self.kind == "connect":
             return gap
-        return ca.vertcat(gap, kin.rotation_error(self.second, self.first, ca.SX.eye(3)))
+        if self.kind == "hinge":
+            axis = first.rotation.T @ second.rotation[:, 2]
+            half = ca.sqrt(0.5 * ca.fmax(1.0 + axis[2], OPPOSITE))
+            return ca.vertcat(gap, -axis[1] / half, axis[0] / half)
+        turn = kin.rotation_error(self.second, self.first, ca.SX.eye(3))
+        return ca.vertcat(gap[:2] if self.kind == "slide" else gap, turn)
 
 
 @dataclass(frozen=True)
@@ -156,7 +173,7 @@ class Closing:
 
     def __init__(self, model: pin.Model, loops: Sequence[AnyLoop], limits: Limits, index: Array) -> None:
         self._model, self._loops = model, loops
-        has = index >= 0
+        has = self._has = index >= 0
         self._at, self._lower, self._upper = index[has], limits.position_lower[has], limits.position_upper[has]
         kin = Tracer(Kinematics(model))
         error = ca.SX(ca.vertcat(*[loop.error(kin) for loop in loops]))
@@ -169,20 +186,37 @@ class Closing:
         return np.array(error).ravel(), np.array(jacobian)
 
     def close(self, q: Array) -> tuple[Array, float]:
-        """(the best configuration on the way, what its loops are open by there [m, rad])."""
-        error, jacobian = self.look(q)
-        best = q, float(np.abs(error).max(initial=0.0))
-        for _ in range(STEPS):
-            if best[1] <= CLOSED:
-                break
-            step = -np.linalg.lstsq(jacobian, error, rcond=DEPENDENT)[0]
-            step *= min(1.0, LONGEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
-            q = self._within(np.asarray(pin.integrate(self._model, q, step)))
+        """(the best configuration on the way, what its loops are open by there [m, rad]); what no joint moves, up to
+        :data:`ROUNDED`, is not counted.
+        """
+        best = q, np.inf
+        for n in range(STEPS + 1):
             error, jacobian = self.look(q)
-            opened = float(np.abs(error).max(initial=0.0))
+            left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
+            moved = left.T[sizes > DEPENDENT * sizes.max(initial=0.0)]
+            fixed = error - moved.T @ (moved @ error)
+            rest = error - fixed if np.abs(fixed).max(initial=0.0) <= ROUNDED else error
+            opened = float(np.abs(rest).max(initial=0.0))
             if opened < best[1]:
                 best = q, opened
+            if opened <= CLOSED or n == STEPS:
+                break
+            step = self._step(q, error, jacobian)
+            step *= min(1.0, LONGEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
+            q = self._within(np.asarray(pin.integrate(self._model, q, step)))
         return best
+
+    def _step(self, q: Array, error: Array, jacobian: Array) -> Array:
+        """The shortest that closes the straight model best, without joints that it pushes against their limits."""
+        free, at = np.ones(self._model.nv, dtype=np.bool_), q[self._at]
+        while True:
+            step = np.zeros(self._model.nv)
+            step[free] = -np.linalg.lstsq(jacobian[:, free], error, rcond=DEPENDENT)[0]
+            along = step[self._has]
+            pushed = ((at <= self._lower) & (along < 0.0)) | ((at >= self._upper) & (along > 0.0))
+            if not pushed.any():
+                return step
+            free[np.flatnonzero(self._has)[pushed]] = False
 
     def first(self, starts: Iterable[Array]) -> Array:
         """The first of the configurations that searches lead to that closes the loops.
@@ -200,7 +234,19 @@ class Closing:
         opened = {loop.name: float(error[rows].max()) for loop, rows in zip(self._loops, self.spans, strict=True)}
         worst = max(opened, key=lambda name: opened[name])
         reason = f"no configuration was found that closes it with the others; open by {opened[worst]:.3g} m or rad"
-        raise LoopError("loops", worst, f"{reason} at the nearest, q = {np.array2string(nearest[0], precision=4)}")
+        reason += f" at the nearest, q = {np.array2string(nearest[0], precision=4)}"
+        if beyond := self._beyond(nearest[0]):
+            reason += f"; one beyond the position limits of {', '.join(beyond)} does"
+        raise LoopError("loops", worst, reason)
+
+    def _beyond(self, q: Array) -> list[str]:
+        """Joints beyond their position limits where the loops are closed without any; none: they are not."""
+        free = copy.copy(self)
+        free._lower, free._upper = np.full_like(self._lower, -np.inf), np.full_like(self._upper, np.inf)
+        found, opened = free.close(q)
+        off = (found[self._at] < self._lower) | (found[self._at] > self._upper)
+        joints = {int(self._model.idx_qs[j]): str(self._model.names[j]) for j in range(1, self._model.njoints)}
+        return [joints[at] for at in self._at[off].tolist()] if opened <= CLOSED else []
 
     @property
     def spans(self) -> list[slice]:
@@ -217,8 +263,10 @@ class Closing:
         for loop, basis in zip(self._loops, bases, strict=False):
             for row in basis:
                 k = int(np.argmax(np.abs(row)))
-                unit = units[loop.follower] if isinstance(loop, JointCurve) else "m" if k < 3 else "rad"
-                rows.append((f"{loop.name}.{loop.labels[k]}", unit))
+                label = loop.labels[k]
+                turns = label.startswith("r")
+                unit = units[loop.follower] if isinstance(loop, JointCurve) else "rad" if turns else "m"
+                rows.append((f"{loop.name}.{label}", unit))
         return LoopRows(tuple(self._loops[:count]), bases, tuple(rows))
 
     def _within(self, q: Array) -> Array:

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("wbc")
 
-#: Bodies are where both say to within this [m, rad], and weigh what both say to within this part
-NEAR, ALIKE = 1e-6, 1e-6
+#: Bodies are where both models say to within this [m, rad]
+SAME_PLACE = 1e-6
+#: Bodies weigh what both models say to within this part
+ALIKE = 1e-6
 
 
 class MujocoJoints:
@@ -96,7 +98,7 @@ class MujocoJoints:
             ours, theirs = where.oMf[index].copy(), pose_of(data.xpos[b], data.xquat[b])
             first = first or (ours, theirs)
             gap = np.abs(pin.log6(first[0].actInv(ours).actInv(first[1].actInv(theirs))).vector).max()
-            if gap > NEAR * max(1.0, float(np.linalg.norm(ours.translation))):
+            if gap > SAME_PLACE * max(1.0, float(np.linalg.norm(ours.translation))):
                 what = f"body {name!r} is {gap:.3g} m or rad from where the model has it, seen from the first body"
                 raise ShapeError("robot", robot.name, f"it is another robot than the model's: {what}")
         masses = float(sum(i.mass for i in list(pinocchio.inertias)[1:])), self._mass(model)

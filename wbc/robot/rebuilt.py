@@ -16,8 +16,10 @@ from wbc.validation import Array
 
 #: Limits by pairs, which Pinocchio compares with each other
 _PAIRED = ("DryFrictionLimit", "EffortLimit", "PositionLimit", "VelocityLimit")
-#: What labels of joints and frames begin with; no file has such names
-_JOINT, _FRAME = "\x01joint ", "\x01frame "
+#: What labels of joints begin with; no file has such names
+_JOINT = "\x01joint "
+#: What labels of frames begin with; no file has such names
+_FRAME = "\x01frame "
 OF_DOFS = (
     "armature",
     "damping",

@@ -41,7 +41,7 @@ class Recipe:
         file: relative to the folder ``robots`` of the example-robot-data wheel.
         base: one of :data:`~wbc.robot.robot.BASES`.
         lock: joint name or pattern (``finger_*``) -> value of q to lock it at, or None for the neutral one.
-        srdf: file of collision rules and named configurations, "" for none.
+        srdf: file of collision rules, rotors and named configurations, "" for none.
         state: its configuration that is the neutral one, "" for none.
         neutral: joint name -> number, on top of that.
         frames: role -> frame name.
@@ -51,6 +51,8 @@ class Recipe:
         shapes: spheres and capsules fitted in advance.
         pairs: file of the pairs of links that must not touch, found with these shapes and locks; "" for none.
         problem: why the file cannot be loaded; "" for robots that can.
+        actuated: joints with motors, see :meth:`~wbc.robot.Robot.with_actuated`; ``"transmissions"``: those that the
+            file has a ``<transmission>`` of; None: as an MJCF file says, else all.
         loops: whether closed loops of the description are kept, see :meth:`~wbc.robot.Robot.with_loops`.
     """
 
@@ -69,6 +71,7 @@ class Recipe:
     shapes: tuple[LinkShape, ...] = ()
     pairs: str = ""
     problem: str = ""
+    actuated: Sequence[str] | None = None
     loops: bool = True
 
 

@@ -17,6 +17,7 @@ from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError, UnsupportedJointError
 from wbc.robot.limits import Limits
 from wbc.robot.loops import CLOSED, AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows
+from wbc.robot.motor_space import MotorSpace
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
@@ -27,10 +28,14 @@ log = logging.getLogger("wbc")
 MUJOCO_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 BASES = ("fixed", "floating", "planar", "differential")
+#: Configurations no joint of which is further apart are one [rad, m]
+SAME = 1e-6
 #: Random configurations from which loops are closed before they are said to be open for ever
 DRAWS = 100
-#: Configurations about neutral at which rows that others imply are found, and how far joints are from it [rad, m]
-LOOKS, NEAR = 8, 0.5
+#: Configurations about neutral at which rows that others imply are found
+LOOKS = 8
+#: How far joints are from neutral there [rad, m]
+NEAR = 0.5
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,8 @@ class Robot:
         notes: where limits come from, one sentence a key ("acceleration", "shapes", ...).
         locked_dofs: degrees of freedom that the robot cannot drive, whose velocity must stay 0 (the sideways
             velocity of a differential-drive base, a URDF's floating joint that is no base). Indices into v.
+        passive: degrees of freedom that move and that no motor drives, those of a base aside, see
+            :meth:`with_actuated`. Indices into v.
         source: the file that the model was read from; "" for a model made in memory.
         self_pairs: pairs of links with shapes that must not touch each other; None: not chosen yet.
         loops: closed loops of the mechanism, see :meth:`with_loops`; ``neutral`` is a configuration that closes them.
@@ -75,6 +82,7 @@ class Robot:
     frames: Mapping[str, str] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
     locked_dofs: tuple[int, ...] = ()
+    passive: tuple[int, ...] = ()
     source: str = ""
     self_pairs: tuple[tuple[str, str], ...] | None = None
     loops: LoopRows = field(default_factory=LoopRows)
@@ -84,9 +92,10 @@ class Robot:
         if self.limits.velocity.shape != (self.nv,):
             raise ShapeError("robot.limits", self.limits.velocity, f"expected {self.nv} entries each")
         self._check_position_limits()
-        for dof in self.locked_dofs:
-            if not 0 <= dof < self.nv:
-                raise RangeError("robot.locked_dofs", dof, f"expected an index into v, 0 to {self.nv - 1}")
+        for name in ("locked_dofs", "passive"):
+            for dof in getattr(self, name):
+                if not 0 <= dof < self.nv:
+                    raise RangeError(f"robot.{name}", dof, f"expected an index into v, 0 to {self.nv - 1}")
         neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
 
@@ -113,6 +122,24 @@ class Robot:
     def base_nv(self) -> int:
         """Degrees of freedom of the base, which come first in v: 0, 3 or 6."""
         return {"fixed": 0, "floating": 6}.get(self.base, 3)
+
+    @cached_property
+    def unactuated(self) -> tuple[int, ...]:
+        """Degrees of freedom without a motor, a floating base's and :attr:`passive`, whose torque is 0; places in v."""
+        return (*range(6 if self.base == "floating" else 0), *self.passive)
+
+    @cached_property
+    def motors(self) -> tuple[int, ...]:
+        """Degrees of freedom that motors drive, followers of couplings left out: ``step.torque[list(robot.motors)]``.
+        Indices into v.
+        """
+        others = {*self.unactuated, *self.locked_dofs, *(coupling.follower for coupling in self.couplings)}
+        return tuple(dof for dof in range(self.nv) if dof not in others)
+
+    @cached_property
+    def motor_names(self) -> tuple[str, ...]:
+        """Names of the :attr:`motors`' degrees of freedom."""
+        return tuple(self.dof_names[dof] for dof in self.motors)
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
@@ -236,6 +263,62 @@ class Robot:
         axes, data = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, self.model.createData()
         return np.asarray(pin.computeFrameJacobian(self.model, data, q, index, axes))
 
+    def motor_jacobian(self, q: Any) -> Array:
+        """G with v = G (v_base; v_motors): how all joints move with a floating base and the motors where loops and
+        couplings hold, J_l v = 0 [nv, (6 +) motors]. With B a basis of the motions that these allow, and B_m its rows
+        of the base and the motors,
+
+            G = B B_m^+,     v_frame = robot.jacobian(q, frame) @ G @ v_motors,     tau_motors = G' tau
+
+        where B_m^+ is the pseudoinverse: what motors never move, such as a rod that turns about itself, is at rest.
+
+        Raises:
+            LoopError: a dead point: the motors do not say how a joint moves that they move elsewhere.
+            ShapeError, NotFiniteError, RotationError: no configuration.
+        """
+        jacobian, lost = self._motor_space.jacobian(self.configuration("q", q))
+        if lost >= 0:
+            raise LoopError("q", q, f"a dead point: the motors do not say how {self.dof_names[lost]} moves")
+        return jacobian
+
+    def at_motors(self, q: Any, tau: Any) -> Array:
+        """Torques of the motors that do what generalised forces would, G' tau, and 0 elsewhere [nv]; of a robot without
+        loops and passive joints ``tau`` itself.
+
+        Raises:
+            As of :meth:`motor_jacobian`.
+        """
+        forces = validation.real_array("tau", tau, (self.nv,))
+        if not (self.loops or self.passive):
+            return forces
+        out = np.zeros(self.nv)
+        out[self._said] = self.motor_jacobian(q).T @ forces
+        out[list(self.unactuated)] = 0.0
+        return out
+
+    @cached_property
+    def _said(self) -> list[int]:
+        """Degrees of freedom of a floating base and of motors."""
+        return [*range(6 if self.base == "floating" else 0), *self.motors]
+
+    @cached_property
+    def _motor_space(self) -> MotorSpace:
+        return MotorSpace(self._tied, self._said, [self.neutral, *self._near(np.random.default_rng(0))])
+
+    def _tied(self, q: Array) -> Array:
+        """Rows of couplings, undriven directions and loops [rows, nv]."""
+        rows = np.zeros((len(self.couplings) + len(self.locked_dofs), self.nv))
+        for row, one in zip(rows, self.couplings, strict=False):
+            row[[one.follower, one.leader]] = 1.0, -one.ratio
+        rows[range(len(self.couplings), len(rows)), list(self.locked_dofs)] = 1.0
+        return np.concatenate([rows, self._closing.look(q)[1]]) if self.loops else rows
+
+    def _near(self, rng: np.random.Generator) -> list[Array]:
+        """Closed configurations about neutral."""
+        near = (pin.integrate(self.model, self.neutral, rng.uniform(-NEAR, NEAR, self.nv)) for _ in range(DRAWS))
+        found = (q for q, opened in map(self._closing.close, near) if opened <= CLOSED)
+        return list(itertools.islice(found, LOOKS))
+
     def integrate(self, q: Any, v: Any, dt: float = 1.0) -> Array:
         """q (+) v dt: the configuration after moving with a velocity for a time [s]; of a mechanism with loops the
         nearest that closes them, or leaves them open least.
@@ -341,13 +424,33 @@ class Robot:
             model.addFrame(pin.Frame(name, above.parentJoint, index, above.placement * local, kind))
         return replace(self, model=model)
 
-    def with_loops(self, *loops: AnyLoop) -> Robot:
+    def with_actuated(self, joints: Sequence[str]) -> Robot:
+        """A copy of which motors drive these joints, and no others: the others move with what carries them, by loops or
+        by themselves, and their torque is 0. A coupling is driven by any of its joints.
+
+        Raises:
+            UnknownNameError: no such joint. ShapeError: no names. RangeError: a floating base.
+        """
+        driven: set[int] = set()
+        for name in validation.strings("actuated", joints):
+            dofs = self.dofs(name, "actuated")
+            if self.base == "floating" and dofs.start == 0:
+                raise RangeError("actuated", name, "no motor drives a floating base")
+            driven |= set(range(dofs.start, dofs.stop))
+        driven |= {one.leader for one in self.couplings if one.follower in driven}
+        driven |= {*range(self.base_nv), *self.locked_dofs, *(one.follower for one in self.couplings)}
+        return replace(self, passive=tuple(dof for dof in range(self.nv) if dof not in driven))
+
+    def with_loops(self, *loops: AnyLoop, actuated: Sequence[str] | None = None) -> Robot:
         """A copy whose mechanism has these closed loops, in place of those it had; none: an open tree.
 
             robot.with_frame("pin", "coupler", offset).with_loops(Loop("four-bar", "pin", "rocker_end"))
 
         ``neutral`` becomes the nearest configuration that closes them. Rows that others imply are left out: those out
-        of the plane of a planar mechanism, and loops that add nothing. Every stack of velocities keeps them closed.
+        of the plane of a planar mechanism, and loops that add nothing. Every stack keeps them closed.
+
+        Args:
+            loops: see above. actuated: joints with motors, as of :meth:`with_actuated`; None: as before.
 
         Raises:
             UnknownNameError: no such frame or joint. DuplicateNameError: two loops of one name.
@@ -361,14 +464,12 @@ class Robot:
         names = [loop.name for loop in loops]
         if twice := next((name for name in names if names.count(name) > 1), None):
             raise DuplicateNameError("loops", twice, "two loops have this name")
-        bare = replace(self, loops=LoopRows())
+        bare = replace(self if actuated is None else self.with_actuated(actuated), loops=LoopRows())
         if not loops:
             return bare
         closing, rng = replace(bare, loops=LoopRows(loops))._closing, np.random.default_rng(0)
         neutral = closing.first(itertools.chain([self.neutral], (bare._drawn(rng) for _ in range(DRAWS))))
-        near = (pin.integrate(self.model, neutral, rng.uniform(-NEAR, NEAR, self.nv)) for _ in range(DRAWS))
-        found = (q for q, opened in map(closing.close, near) if opened <= CLOSED)
-        looks = [neutral, *itertools.islice(found, LOOKS)]
+        looks = [neutral, *replace(bare, neutral=neutral, loops=LoopRows(loops))._near(rng)]
         units = {name: self.dof_units[self.dofs(name).start] for name in self.joint_names}
         rows = closing.rows(len(loops), looks, units)
         for loop, basis in zip(loops, rows.bases, strict=True):
@@ -398,12 +499,32 @@ class Robot:
         start = self.configuration("q", q)
         if not self.loops:
             return start
-        found, opened = self._closing.close(start)
-        if opened > CLOSED:
-            raise LoopError(
-                "q", q, f"no configuration near it closes the loops; the nearest is open by {opened:.3g} m or rad"
-            )
-        return found
+        return self._closing.first([start])
+
+    def assemblies(self, joints: Any, count: int = 100, seed: int = 0) -> tuple[Array, ...]:
+        """Configurations that close the loops with some joints where they are given: the assembly modes that searches
+        from random starts lead to, the nearest to neutral first; of a mechanism that these joints leave free, some.
+        Whole turns make no other mode.
+
+        Args:
+            joints: name -> value [rad or m], of joints with one coordinate. count: of searches. seed: of their starts.
+
+        Raises:
+            UnknownNameError: no such joint. RangeError: a count below 1.
+        """
+        still = []
+        for name, value in validation.mapping("joints", joints, "joints to values").items():
+            validation.one_of("joints", name, self.joint_names)
+            still.append(JointCurve(f"given {name}", name, None, (validation.scalar(f"joints[{name!r}]", value),)))
+        searches = validation.integer("count", count, low=1)
+        given, rng = replace(self, loops=LoopRows((*self.loops.loops, *still)))._closing, np.random.default_rng(seed)
+        found, turn = list[Array](), np.where(np.array(self.dof_units) == "rad", 2.0 * np.pi, np.inf)
+        for start in itertools.chain([self.neutral], (self._drawn(rng) for _ in range(searches - 1))):
+            q, opened = given.close(start)
+            apart = [np.abs(self.difference(q, one)) for one in found]
+            if opened <= CLOSED and all(np.minimum(far % turn, -far % turn).max() > SAME for far in apart):
+                found.append(q)
+        return tuple(sorted(found, key=lambda q: float(np.abs(self.difference(self.neutral, q)).max())))
 
     @cached_property
     def _closing(self) -> Closing:
@@ -536,6 +657,7 @@ class Robot:
         h.update(repr((self.base, self.couplings, self.locked_dofs, self.self_pairs, self.loops.loops)).encode())
         for basis in self.loops.bases:
             h.update(basis.tobytes())
+        h.update(repr(self.passive).encode() if self.passive else b"")
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
                 h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())

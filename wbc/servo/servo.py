@@ -99,6 +99,8 @@ class Servo:
         position   u = r (+) (T v + f + d)          velocity   u = v + T (a + b) + f + d
         torque     u = (M(r) + armature) (a + d) + h(r, v) + damping v + f
 
+    (of a robot with loops the torques of motors that do that, :meth:`wbc.robot.Robot.at_motors`)
+
     at r(t + D), with f = C (M (a + b) + c) + S g + F sign(v) + B v, see :class:`Response`. z = int e dt makes up for
     what nobody told.
 
@@ -293,7 +295,7 @@ class Servo:
             a = self._change + d
             moved, gravity, *_ = loads = self._loads(q, v, a)
             own = self._armature * a + self._damping * v
-            return np.asarray(moved + gravity + own + (yields * loads).sum(axis=0))
+            return self._robot.at_motors(q, moved + gravity + own + (yields * loads).sum(axis=0))
         a = a + b
         if yields.any():
             d = d + (yields * self._loads(q, v, a)).sum(axis=0)

@@ -1,19 +1,23 @@
-"""Accelerations of robots of which some joints follow others through rigid gears."""
+"""Accelerations of robots of which some joints follow others through rigid gears, and of those with closed loops."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 
 from wbc.errors import RangeError
 from wbc.robot import Robot
-from wbc.simulation.dynamics import Dynamics, Grip
+from wbc.simulation.dynamics import ConstrainedDynamics, Grip
 from wbc.simulation.plant import GripKind
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.motion import MotionExpressions
+from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
 
-#: How far a follower may be from where its leader has it [rad; m], [rad/s; m/s]
+#: How far a follower may be from where its leader has it, and a loop open [rad; m], [rad/s; m/s]
 GAP = 1e-6
 #: Rows of a frame's twist that each kind of grip holds
 ROWS = {GripKind.POSE: (0, 1, 2, 3, 4, 5), GripKind.AXIS: (0, 1, 2, 3, 4), GripKind.POSITION: (0, 1, 2)}
@@ -21,10 +25,11 @@ ROWS = {GripKind.POSE: (0, 1, 2, 3, 4, 5), GripKind.AXIS: (0, 1, 2, 3, 4), GripK
 SAME = 1e-10
 
 
-class CoupledDynamics(Dynamics):
+class CoupledDynamics(ConstrainedDynamics):
     """v = G w of the joints that lead: G'M G dw/dt = G'(tau - h) + G'J'f, J G dw/dt = drift, by dense matrices.
 
-    A torque of a follower acts on its leader by the ratio. Grips as of :class:`Dynamics`.
+    A torque of a follower acts on its leader by the ratio. J are the rows of grips, as of
+    :class:`ConstrainedDynamics`, and of closed loops, whose drift is that of grips too.
     """
 
     def __init__(self, robot: Robot, model: pin.Model, rate: float) -> None:
@@ -35,16 +40,17 @@ class CoupledDynamics(Dynamics):
         self._G = np.eye(model.nv)[:, self.free]
         for coupling in robot.couplings:
             self._G[coupling.follower, self.free.index(coupling.leader)] = coupling.ratio
+        self._loops = _rows(robot, model) if robot.loops else None
 
     def reduced(self, matrix: Array) -> Array:
         """G' X G."""
         return np.asarray(self._G.T @ matrix @ self._G)
 
     def coupled(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """The state with followers exactly where they belong.
+        """The state with followers exactly where they belong, and loops closed.
 
         Raises:
-            RangeError: one is elsewhere.
+            RangeError: one is elsewhere, or open.
         """
         q, v, index = q.copy(), v.copy(), self._robot.position_index
         for coupling in self._robot.couplings:
@@ -57,7 +63,23 @@ class CoupledDynamics(Dynamics):
                     reason = f"{name} follows {leader}, which puts it at {wanted:.9g}"
                     raise RangeError(f"{field}[{name!r}]", float(found), reason)
             q[at], v[coupling.follower] = place, rate
-        return q, v
+        if self._loops is None:
+            return q, v
+        error, jacobian, _ = self._looked(q, v)
+        for field, found in (("q", error), ("v", jacobian @ v)):
+            if np.abs(found).max() > GAP:
+                name = self._robot.loops.rows[int(np.abs(found).argmax())][0]
+                reason = f"it leaves the loop {name} open by {np.abs(found).max():.3g}; see robot.closed"
+                raise RangeError(field, q if field == "q" else v, reason)
+        q = self._robot.closed(q)
+        jacobian = self._looked(q, v)[1] @ self._G
+        w = v[self.free]
+        return q, np.asarray(self._G @ (w - np.linalg.lstsq(jacobian, jacobian @ w, rcond=SAME)[0]))
+
+    def _looked(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        assert self._loops is not None
+        error, jacobian, bias = (np.array(part) for part in self._loops(q, v))
+        return error.ravel(), jacobian, bias.ravel()
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
         """Hold these frames, and no others."""
@@ -69,17 +91,17 @@ class CoupledDynamics(Dynamics):
         model, data, G = self.model, self.data, self._G
         mass = self.reduced(_mass(model, data, q))
         force = G.T @ (tau - pin.nonLinearEffects(model, data, q, v))
-        if not self._grips:
+        if not self._grips and self._loops is None:
             return np.asarray(G @ np.linalg.solve(mass, force))
         K, drift = self._constraint(q, v)
         solved = np.linalg.solve(mass, np.column_stack([force, K.T]))
         pushes = np.linalg.lstsq(K @ solved[:, 1:], drift - K @ solved[:, 0], rcond=SAME)[0]
-        self._forces = np.split(pushes, np.cumsum([len(rows) for *_, rows in self._grips])[:-1])
+        self._forces = np.split(pushes, np.cumsum([len(rows) for *_, rows in self._grips]))[:-1]
         return np.asarray(G @ (solved[:, 0] + solved[:, 1:] @ pushes))
 
     def latched(self, q: Array, v: Array) -> Array:
         """The velocity after the grips have closed on moving frames, without a bounce ``[nv]``."""
-        if not self._grips:
+        if not self._grips and self._loops is None:
             return v
         K = self._constraint(q, v)[0]
         solved = np.linalg.solve(self.reduced(_mass(self.model, self.data, q)), K.T)
@@ -95,13 +117,13 @@ class CoupledDynamics(Dynamics):
         return out
 
     def _constraint(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """J G of all grips, and what J a is to be."""
+        """J G of all grips and loops, and what J a is to be."""
         model, data, rate = self.model, self.data, self._rate
         # Jacobians first: the accelerations are to be those of these velocities alone
         jacobians = [pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL) for _, frame, _, _ in self._grips]
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         pin.updateFramePlacements(model, data)
-        K, drift = [], []
+        K, drift = list[Array](), list[Array]()
         for J, (_, frame, grip, rows) in zip(jacobians, self._grips, strict=True):
             gap = data.oMf[frame].actInv(grip.pose)
             if grip.kind is GripKind.POSE:
@@ -113,7 +135,20 @@ class CoupledDynamics(Dynamics):
                 bias = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL).vector
             K.append(J[rows] @ self._G)
             drift.append((rate * rate * error - bias)[rows] - 2.0 * rate * J[rows] @ v)
+        if self._loops is not None:
+            error, J, bias = self._looked(q, v)
+            K.append(J @ self._G)
+            drift.append(-rate * rate * error - bias - 2.0 * rate * J @ v)
         return np.vstack(K), np.concatenate(drift)
+
+
+def _rows(robot: Robot, model: pin.Model) -> ca.Function:
+    """(q, v) -> (e, J, (dJ/dt) v) of the loops' rows."""
+    tracer = Tracer(Kinematics(model))
+    error = robot.loops.error(tracer)
+    bias = tracer.second(error, MotionExpressions(tracer.kinematics))[1]
+    outputs = [ca.densify(part) for part in (*tracer.expanded(error, ca.densify(tracer.slope(error))), bias)]
+    return ca.Function("loops", [tracer.q, tracer.v], list(ca.cse(outputs)))
 
 
 def _mass(model: pin.Model, data: pin.Data, q: Array) -> Array:

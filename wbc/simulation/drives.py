@@ -22,9 +22,10 @@ class VelocityDrive:
     """A plant that takes velocities, and drives one on a fixed base that takes torques by computed torque
     (Luh, Walker, Paul, Resolved-acceleration control of mechanical manipulators, IEEE TAC 25, 1980):
 
-        tau = M (dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q)) + h
+        tau = G' (M (dv_ref/dt + 2 omega (v_ref - v) + omega^2 (q_ref - q)) + h)
 
-    Within a period v_ref goes from the last velocity to the new one in a straight line, and q_ref is its integral.
+    with G of :meth:`~wbc.robot.Robot.motor_jacobian` where there are loops or passive joints, else 1. Within a period
+    v_ref goes from the last velocity to the new one in a straight line, and q_ref is its integral.
 
         wbc.track.track(plan, plant=VelocityDrive(robot, PinocchioPlant(robot)))
 
@@ -44,7 +45,7 @@ class VelocityDrive:
         if CommandKind.TORQUE not in plant.commands:
             raise ShapeError("plant", type(plant).__name__, "expected a plant that takes torques")
         self.plant, self.nq, self.nv, self.time_step = plant, plant.nq, plant.nv, plant.time_step
-        self._model, self._data = robot.model, robot.model.createData()
+        self._robot, self._model, self._data = robot, robot.model, robot.model.createData()
         self._omega = validation.scalar("bandwidth", bandwidth, low=0.0, open_low=True, unit="1/s")
         self._command = Command(CommandKind.TORQUE, np.zeros(self.nv))
 
@@ -70,7 +71,7 @@ class VelocityDrive:
             state = plant.read()
             a = ramp / h + 2.0 * omega * (self._v - state.v)
             a += omega * omega * pin.difference(model, state.q, self._q)
-            self._command.values[:] = pin.rnea(model, self._data, state.q, state.v, a)
+            self._command.values[:] = self._robot.at_motors(state.q, pin.rnea(model, self._data, state.q, state.v, a))
             plant.apply(self._command)
             plant.advance(h)
             self._q = pin.integrate(model, self._q, (self._v + 0.5 * ramp) * h)

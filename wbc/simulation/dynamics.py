@@ -15,8 +15,10 @@ from wbc.validation import Array
 Integrator = Literal["rk4", "midpoint"]
 #: Distance of the two points that hold an axis [m]
 AXIS = 0.1
-#: Proximal parameter and iterations: rows that say the same twice, as those of an axis do, need a second one
-PROXIMAL, ITERATIONS = 1e-8, 2
+#: Proximal parameter
+PROXIMAL = 1e-8
+#: Iterations: rows that say the same twice, as those of an axis do, need a second one
+ITERATIONS = 2
 #: Joints whose displacements do not commute: a pose, a turn in space, a pose in the plane
 TURNING = {"JointModelFreeFlyer": 6, "JointModelSpherical": 3, "JointModelPlanar": 2}
 
@@ -53,7 +55,7 @@ class Slip:
         return time - float(np.sin(turn * time)) / turn
 
 
-class Dynamics:
+class ConstrainedDynamics:
     """M a + h = tau + sum J_k' f_k, with frames that are held: J_k a + dJ_k/dt v = -2 rate J_k v - rate^2 e_k
     (Baumgarte), solved by ``pin.constraintDynamics`` (Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of
     constrained dynamic equations, RSS 2021); without any by ``pin.aba``.
@@ -139,7 +141,7 @@ class Dynamics:
 Torque = Callable[[Array, Array], Array]
 
 
-def step_rk4(dynamics: Dynamics, q: Array, v: Array, torque: Torque, h: float) -> tuple[Array, Array]:
+def step_rk4(dynamics: ConstrainedDynamics, q: Array, v: Array, torque: Torque, h: float) -> tuple[Array, Array]:
     """Runge-Kutta of order 4 on the manifold (Munthe-Kaas, BIT 38, 1998; commutators as by Hairer, Lubich and Wanner,
     IV.8), with velocities in the axes of the joints' own frames:
 
@@ -162,7 +164,7 @@ def step_rk4(dynamics: Dynamics, q: Array, v: Array, torque: Torque, h: float) -
     return integrate(model, q, u), v + (h / 6.0) * (a1 + 2.0 * (a2 + a3) + a4)
 
 
-def step_midpoint(dynamics: Dynamics, q: Array, v: Array, torque: Torque, h: float) -> tuple[Array, Array]:
+def step_midpoint(dynamics: ConstrainedDynamics, q: Array, v: Array, torque: Torque, h: float) -> tuple[Array, Array]:
     """Order 2 with half of the accelerations: q <- q (+) (h v + h^2/2 a), v <- v + h a, a at the middle of the step."""
     model, half = dynamics.model, 0.5 * h
     a = dynamics.acceleration(q, v, torque(q, v))
@@ -171,7 +173,7 @@ def step_midpoint(dynamics: Dynamics, q: Array, v: Array, torque: Torque, h: flo
     return pin.integrate(model, q, h * v + (h * half) * a), v + h * a
 
 
-def _add_bracket(u: Array, a: Array, b: Array, factor: float, dynamics: Dynamics) -> None:
+def _add_bracket(u: Array, a: Array, b: Array, factor: float, dynamics: ConstrainedDynamics) -> None:
     """Add factor [a, b], of the joints whose displacements do not commute."""
     for start, size in dynamics.turning:
         if size == 6:

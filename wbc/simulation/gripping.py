@@ -15,12 +15,14 @@ from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.simulation.dynamics import Grip, Slip
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, MotorState
+from wbc.simulation.motors import MotorState, PlantMotors
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
 from wbc.validation import Array
 
-#: How far from its hold a frame may be when it is grasped [m], [rad]
-REACH, TURN = 0.01, 0.1
+#: How far from its hold a frame may be when it is grasped [m]
+REACH = 0.01
+#: How far from its hold's orientation a frame may be when it is grasped [rad]
+TURN = 0.1
 
 
 @dataclass(eq=False, kw_only=True)
@@ -45,7 +47,7 @@ class Gripping(ABC):
     robot: Robot
     nv: int
     _state: GrippingState
-    _drive: Drive
+    _drive: PlantMotors
     _balance: Balance
     _placed: pin.Data
 

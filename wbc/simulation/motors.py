@@ -55,7 +55,7 @@ class Motors:
         return cls(viscous=np.array(model.damping[base:]), coulomb=np.array(model.friction[base:]), **more)
 
 
-class Drive:
+class PlantMotors:
     """The motors of one plant, numbers spread over all velocity coordinates.
 
     Args:
@@ -63,7 +63,7 @@ class Drive:
 
     Attributes:
         armature: that the gears add ``[nv]``. damping: slope of the friction at rest, the steepest ``[nv]``.
-        driven: 1 where a motor is, 0 for a base ``[nv]``.
+        driven: 1 where a motor is, 0 for a base and passive joints ``[nv]``.
 
     Raises:
         ShapeError, NotFiniteError, RangeError: numbers that are none.
@@ -89,7 +89,7 @@ class Drive:
         self.armature = spread["gear"] ** 2 * spread["rotor"]
         self.damping = self._viscous + self._coulomb / self._slip
         self.driven = np.ones(robot.nv)
-        self.driven[: robot.base_nv] = 0.0
+        self.driven[[*range(robot.base_nv), *robot.passive]] = 0.0
         self._noisy, self._slows = bool(self._noise.any()), bool(np.isfinite(self._no_load).any())
         #: Whether there is friction at all
         self.rubs = bool(self.damping.any())

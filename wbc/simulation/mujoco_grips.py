@@ -15,7 +15,7 @@ from wbc.robot import Robot
 from wbc.simulation.dynamics import AXIS
 from wbc.simulation.gripping import Gripping, GrippingState
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, Motors
+from wbc.simulation.motors import Motors, PlantMotors
 from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
@@ -29,7 +29,7 @@ HELD = {GripKind.POSITION: 1, GripKind.AXIS: 2, GripKind.POSE: 3}
 
 
 @dataclass(eq=False, kw_only=True)
-class _State(GrippingState):
+class _GripState(GrippingState):
     """All that changes beside MuJoCo's own state."""
 
     off: dict[str, Array] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         UnknownNameError: no such frame. What :func:`mujoco_model` raises.
     """
 
-    _state: _State
+    _state: _GripState
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         import mujoco
 
         spec = mujoco_spec(robot, time_step=time_step, actuators="torque", drawn=False)
-        self._drive = Drive(motors or Motors(), robot, time_step)
+        self._drive = PlantMotors(motors or Motors(), robot, time_step)
         for start, armature in enumerate(self._drive.armature):
             if armature:
                 spec.joint(robot.dof_names[start]).armature += armature
@@ -97,7 +97,7 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         """At a configuration, at rest or with a velocity, and nothing grasped."""
         super().reset(q, time, v)
         drive = self._drive
-        self._state = _State(command=np.zeros(self.nv), motors=drive.fresh(), scale=drive.driven.copy(),
+        self._state = _GripState(command=np.zeros(self.nv), motors=drive.fresh(), scale=drive.driven.copy(),
                              random=np.random.default_rng(self._seed))  # fmt: skip
         self._state.first = self.momentum
 
@@ -161,7 +161,7 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         Raises:
             ShapeError: it was saved by a plant without grips.
         """
-        if not isinstance(saved._grips, _State):
+        if not isinstance(saved._grips, _GripState):
             raise ShapeError("saved", saved._grips, "of a plant without grips")
         for name in saved._grips.grips:
             validation.one_of("saved.grips", name, self._rows)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+from numpy.polynomial import Polynomial
 
 from wbc import extras, validation
 from wbc.errors import RangeError, UnsupportedJointError
-from wbc.robot import Robot
+from wbc.robot import JointCurve, Robot
 from wbc.robot.robot import checked_robot
 from wbc.rotations import TO_MUJOCO, quaternion
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+from wbc.shapes import PlacedShape
 from wbc.simulation.plant import CommandKind
 from wbc.symbolic.joints import motion_at
-from wbc.symbolic.kinematics import frame_index
+from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -24,10 +26,16 @@ if TYPE_CHECKING:
 
 #: Mass and moments of a body that has none, which MuJoCo does not take [kg, kg m^2]
 NOTHING = 1e-12
-#: Time constant of what stands for something rigid, in time steps: fewer do not hold; and its impedance, the largest
-SOFT, HARD = 2.0, (0.9999, 0.9999, 0.001, 0.5, 2.0)
-#: Bits of what touches what: shapes of the robot touch the ground and objects, not each other
-_TOUCHED, _TOUCHING = 1, 2
+#: Time constant of what stands for something rigid, in time steps: fewer do not hold
+SOFT = 2.0
+#: Impedance of what stands for something rigid (``solimp``), the largest that MuJoCo takes
+HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+#: Coefficients of a polynomial that a joint can follow
+POWERS = 5
+#: Bit of what is touched: the ground and objects
+_TOUCHED = 1
+#: Bit of what touches: shapes of the robot, which do not touch each other
+_TOUCHING = 2
 
 
 def mujoco_spec(
@@ -50,7 +58,6 @@ def mujoco_spec(
     import mujoco
 
     robot = checked_robot(robot)
-    robot.require_tree("a MuJoCo model that is made of a robot")
     spec = mujoco.MjSpec()
     spec.modelname = robot.name or "robot"
     spec.option.timestep = validation.scalar("time_step", time_step, low=0.0, open_low=True, unit="s")
@@ -68,6 +75,7 @@ def mujoco_spec(
         plane.contype, plane.conaffinity, plane.friction[0] = _TOUCHED, _TOUCHING, friction
         plane.rgba = [0.85, 0.87, 0.9, 1.0]
     _add_couplings(spec, robot)
+    _add_loops(spec, robot, bodies)
     _add_actuators(spec, robot, actuators, frequency)
     return spec
 
@@ -88,21 +96,24 @@ def mujoco_model(
         feet = {"left_sole": [PlacedShape(Box((0.2, 0.13, 0.02)), pin.SE3.Identity())]}
         plant = MujocoPlant(mujoco_model(robot, contacts=feet, ground=0.0), robot)
 
-    Joints and actuators have the names of the robot's joints, each body that of its first link. Without contacts its
-    motion is Pinocchio's: armatures and gravity are the model's, damping and friction of joints are 0. Joints that
-    follow others do so by constraints of MuJoCo, as hard as it has them: 1e-4 of an acceleration is lost.
+    Joints and actuators have the names of the robot's joints, each body that of its first link that is where the joint
+    is, else the joint's. Without contacts its motion is Pinocchio's: armatures and gravity are the model's, damping and
+    friction of joints are 0. Joints that follow others, and closed loops, are constraints of MuJoCo, as hard as it has
+    them: 1e-4 of an acceleration is lost.
 
     Args:
         robot: on a base that is fixed or floats. time_step: [s].
-        actuators: of every joint with one degree of freedom: ``"torque"`` within limits of effort, ``"position"`` or
-            ``"velocity"`` with gains from the inertia at the robot's neutral configuration and a frequency [1/s].
+        actuators: of every joint with one degree of freedom that a motor drives: ``"torque"`` within limits of effort,
+            ``"position"`` or ``"velocity"`` with gains from the inertia at the robot's neutral configuration and a
+            frequency [1/s].
         contacts: frame -> shapes fixed to it that touch the ground and objects; nothing else of the robot touches.
         ground: height of a floor [m]; None: none. friction: coefficient, of the floor and of the contacts.
         drawn: whether the robot's own shapes are in it, to be seen; they weigh and touch nothing.
 
     Raises:
         MissingPackageError: MuJoCo is not installed.
-        UnsupportedJointError: a joint that MuJoCo has none for: planar and helical ones, and composites.
+        UnsupportedJointError: a joint that MuJoCo has none for: planar and helical ones, and composites; a joint that
+            follows a polynomial of more than the fourth degree.
         RangeError: inertias that MuJoCo refuses, and why; a time step or a friction out of range.
         UnknownNameError: no such kind of actuator, or frame.
     """
@@ -122,14 +133,20 @@ def _add_bodies(spec: mujoco.MjSpec, robot: Robot) -> list[mujoco.MjsBody]:
 
     model, limits, bodies = robot.model, robot.limits, [spec.worldbody]
     links: dict[int, str] = {}
+    elsewhere: set[str] = set()
     for frame in model.frames:
         if frame.type == pin.FrameType.BODY:
-            links.setdefault(int(frame.parentJoint), str(frame.name))
+            if frame.placement.isIdentity():
+                links.setdefault(int(frame.parentJoint), str(frame.name))
+            else:
+                elsewhere.add(str(frame.name))
     taken: set[str] = set()
     for j in range(1, model.njoints):
         name, place, inertia = str(model.names[j]), model.jointPlacements[j], model.inertias[j]
         body = bodies[int(model.parents[j])].add_body(pos=place.translation, quat=quaternion(place.rotation)[TO_MUJOCO])
-        body.name = links[j] if j in links and links[j] not in taken else name
+        more = (f"{name} {k}" for k in itertools.count(1))
+        choices = itertools.chain((links.get(j, name), name), more)
+        body.name = next(one for one in choices if one not in taken and one not in elsewhere)
         taken.add(body.name)
         bodies.append(body)
         moments = np.array(inertia.inertia)
@@ -180,29 +197,15 @@ def _add_shapes(
     friction: float,
 ) -> None:
     """Geoms without mass on the bodies of their frames."""
-    import mujoco
-
-    kinds = mujoco.mjtGeom
     for name, placed in shapes.items():
         frame = robot.model.frames[frame_index(robot.model, robot.check_frame("contacts", name))]
         for k, one in enumerate(placed):
             validation.instance(f"contacts[{name!r}]", one, PlacedShape, "a PlacedShape")
-            place, shape = frame.placement * one.placement, one.shape
+            place = frame.placement * one.placement
             geom = bodies[int(frame.parentJoint)].add_geom(
                 pos=place.translation, quat=quaternion(place.rotation)[TO_MUJOCO], mass=0.0, group=1 if touching else 2
             )
-            if isinstance(shape, Sphere) or (isinstance(shape, Capsule) and shape.length == 0.0):
-                geom.type, geom.size = kinds.mjGEOM_SPHERE, [shape.radius, 0.0, 0.0]
-            elif isinstance(shape, Capsule):
-                geom.type, geom.size = kinds.mjGEOM_CAPSULE, [shape.radius, shape.length / 2.0, 0.0]
-            elif isinstance(shape, Cylinder):
-                geom.type, geom.size = kinds.mjGEOM_CYLINDER, [shape.radius, shape.length / 2.0, 0.0]
-            elif isinstance(shape, Box):
-                geom.type, geom.size = kinds.mjGEOM_BOX, np.array(shape.size) / 2.0
-            elif isinstance(shape, Convex):
-                mesh = spec.add_mesh(name=f"{name} {k} {'touching' if touching else 'drawn'}")
-                mesh.uservert = shape.points.ravel()
-                geom.type, geom.meshname = kinds.mjGEOM_MESH, mesh.name
+            one.shape.become(geom, spec, f"{name} {k} {'touching' if touching else 'drawn'}")
             geom.contype, geom.conaffinity = (_TOUCHING, _TOUCHED) if touching else (0, 0)
             if touching:
                 geom.name, geom.friction[0], geom.condim = f"{name} {k}", friction, 4
@@ -220,16 +223,40 @@ def _add_couplings(spec: mujoco.MjSpec, robot: Robot) -> None:
         equality.solref, equality.solimp = [SOFT * spec.option.timestep, 1.0], HARD
 
 
+def _add_loops(spec: mujoco.MjSpec, robot: Robot, bodies: Sequence[mujoco.MjsBody]) -> None:
+    import mujoco
+
+    kinds = {"connect": mujoco.mjtEq.mjEQ_CONNECT, "weld": mujoco.mjtEq.mjEQ_WELD}
+    for loop in robot.loops.loops:
+        if isinstance(loop, JointCurve):
+            # y = y0 + sum c_k (x - x0)^k in powers of x
+            curve = Polynomial(loop.coefficients)(Polynomial([-loop.origin[1], 1.0])) + loop.origin[0]
+            terms = np.trim_zeros(np.atleast_1d(curve.coef), "b")
+            if len(terms) > POWERS:
+                raise UnsupportedJointError("robot", loop.follower, f"MuJoCo has polynomials up to power {POWERS - 1}")
+            equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
+            equality.name1, equality.name2 = loop.follower, loop.leader or ""
+            equality.data[:POWERS] = np.pad(terms, (0, POWERS - len(terms)))
+        else:
+            equality = spec.add_equality(type=kinds[loop.kind], objtype=mujoco.mjtObj.mjOBJ_SITE)
+            equality.name1, equality.name2 = sites = [f"{loop.name} {side}" for side in "ab"]
+            for site, name in zip(sites, (loop.first, loop.second), strict=True):
+                frame = robot.model.frames[0 if name == WORLD else frame_index(robot.model, name)]
+                turn = quaternion(frame.placement.rotation)[TO_MUJOCO]
+                bodies[int(frame.parentJoint)].add_site(name=site, pos=frame.placement.translation, quat=turn)
+        equality.name = loop.name
+        equality.solref, equality.solimp = [SOFT * spec.option.timestep, 1.0], HARD
+
+
 def _add_actuators(spec: mujoco.MjSpec, robot: Robot, kind: str, frequency: float) -> None:
     import mujoco
 
     kind = validation.one_of("actuators", kind, [str(one) for one in CommandKind])
     frequency = validation.scalar("frequency", frequency, low=0.0, open_low=True, unit="1/s")
     inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.neutral))
-    followers = {coupling.follower for coupling in robot.couplings}
     for j in range(1, robot.model.njoints):
         start = int(robot.model.idx_vs[j])
-        if int(robot.model.nvs[j]) != 1 or start in followers:
+        if int(robot.model.nvs[j]) != 1 or start not in robot.motors:
             continue
         name, effort = str(robot.model.names[j]), float(robot.limits.effort[start])
         actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)

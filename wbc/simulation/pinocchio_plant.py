@@ -15,11 +15,11 @@ from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.coupled import CoupledDynamics
-from wbc.simulation.dynamics import Dynamics, Integrator, step_midpoint, step_rk4
+from wbc.simulation.dynamics import ConstrainedDynamics, Integrator, step_midpoint, step_rk4
 from wbc.simulation.gripping import Gripping, GrippingState
 from wbc.simulation.ground import Ground, Touch
 from wbc.simulation.momentum import Balance
-from wbc.simulation.motors import Drive, Encoders, Motors
+from wbc.simulation.motors import Encoders, Motors, PlantMotors
 from wbc.simulation.plant import GripKind, PlantError, PlantState
 from wbc.simulation.stability import largest_step
 from wbc.validation import Array
@@ -30,7 +30,7 @@ SINGULAR = 1e-9
 
 
 @dataclass(eq=False, kw_only=True)
-class _State(GrippingState):
+class _PinocchioState(GrippingState):
     """All that changes: what :meth:`PinocchioPlant.save` copies."""
 
     q: Array
@@ -45,11 +45,11 @@ class SavedState:
     """A plant's state at one time, see :meth:`PinocchioPlant.save`; it may be pickled."""
 
     robot: str
-    _state: _State
+    _state: _PinocchioState
 
 
 class PinocchioPlant(Gripping):
-    """Rigid bodies by Pinocchio: M a + h = tau + J'f, with closed grips as hard constraints (:class:`Dynamics`).
+    """Rigid bodies by Pinocchio: M a + h = tau + J'f, with closed grips as hard constraints.
 
         plant = PinocchioPlant(robot, motors=Motors(viscous=0.5, delay=0.002), encoders=Encoders(position=1e-5), seed=1)
         plant.reset(q, 0.0)
@@ -58,8 +58,8 @@ class PinocchioPlant(Gripping):
         plant.advance(0.001)
 
     It takes torques; those of a base's coordinates do nothing. The same seed and commands give the same bits. Joints
-    that follow others do so through rigid gears: their motors' torques act on what leads them
-    (:class:`CoupledDynamics`, which takes longer).
+    that follow others do so through rigid gears: their motors' torques act on what leads them; closed loops are hard
+    constraints (:class:`CoupledDynamics`, which takes longer). Torques of passive joints do nothing.
 
     Args:
         robot: what moves, with its true masses, its gravity and its limits of effort.
@@ -73,13 +73,12 @@ class PinocchioPlant(Gripping):
         seed: of all noise.
 
     Raises:
-        UnsupportedJointError: closed loops.
         RangeError: a link of negative mass or inertia, a mass matrix that is singular at the robot's neutral
             configuration, a time step that is too coarse (the largest that works is named). UnknownNameError: no such
             frame or integrator. ShapeError, NotFiniteError: numbers that are none.
     """
 
-    _state: _State
+    _state: _PinocchioState
 
     def __init__(
         self,
@@ -103,8 +102,7 @@ class PinocchioPlant(Gripping):
         self._rate = validation.scalar("rate", rate, low=0.0, unit="1/s")
         self._seed = validation.integer("seed", seed)
         self._encoders = encoders or Encoders()
-        robot.require_tree("a plant of rigid bodies")
-        self._drive = Drive(motors or Motors(), robot, self.time_step)
+        self._drive = PlantMotors(motors or Motors(), robot, self.time_step)
         model = robot.model.copy()
         for name, inertia in (payloads or {}).items():
             frame = model.frames[model.getFrameId(robot.check_frame("payloads", name))]
@@ -115,8 +113,10 @@ class PinocchioPlant(Gripping):
         self.model = model
         _check_inertias(model)
         self._balance, self._placed = Balance(model), model.createData()
-        follows = bool(robot.couplings) or any("Mimic" in joint.shortname() for joint in model.joints)
-        self._dynamics = CoupledDynamics(robot, model, self._rate) if follows else Dynamics(model, self._rate)
+        follows = bool(robot.couplings or robot.loops) or any("Mimic" in joint.shortname() for joint in model.joints)
+        self._dynamics = (
+            CoupledDynamics(robot, model, self._rate) if follows else ConstrainedDynamics(model, self._rate)
+        )
         self._touch = None if ground is None else Touch(ground, robot, model)
         self._check_mass(robot.neutral)
         self._check_step(robot.neutral)
@@ -129,8 +129,8 @@ class PinocchioPlant(Gripping):
         """At a configuration, at rest or with a velocity, with no command, and nothing grasped.
 
         Raises:
-            RangeError: it is inside of the ground, or a joint is not where the one that it follows puts it; or there
-                the mass matrix is singular or the time step too coarse.
+            RangeError: it is inside of the ground, or a joint is not where the one that it follows puts it, or a loop
+                is open; or there the mass matrix is singular or the time step too coarse.
         """
         q = self.robot.configuration("q", q)
         v = np.zeros(self.nv) if v is None else validation.real_array("v", v, (self.nv,))
@@ -143,7 +143,7 @@ class PinocchioPlant(Gripping):
 
     def _begin(self, q: Array, time: float, v: Array) -> None:
         anchors = np.zeros((0, 3)) if self._touch is None else self._touch.fresh()
-        self._state = _State(
+        self._state = _PinocchioState(
             q=q, v=v, time=time, anchors=anchors, reading=PlantState(q, v, time), command=np.zeros(self.nv),
             motors=self._drive.fresh(), scale=self._drive.driven.copy(), random=np.random.default_rng(self._seed),
         )  # fmt: skip

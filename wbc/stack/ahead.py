@@ -20,6 +20,7 @@ KERNELS = (
     "analysis/certificates/native/subdivide.c",
     "clearance/native/sweep.c",
     "coordinates/control/native/singular.c",
+    "geometry/native/geometry.c",
     "proximity/native/sensor.c",
     "resolvers/fsp/native/fsp.c",
     "walking/native/planner.c",
@@ -35,11 +36,12 @@ def build() -> list[Path]:
     toolchain.require()
     kernel.AHEAD.mkdir(exist_ok=True)
     tasks: dict[Path, Callable[[Path], None]] = {}
-    for compile_to, every in (
-        (toolchain.compile_generic, [generic.sources(variant) for variant in generic.variants()]),
-        (toolchain.compile_kernel, [kernel.texts_of(_WBC / name, _WBC / "proximity" / "native") for name in KERNELS]),
-    ):
-        tasks |= {kernel.ahead(texts): partial(compile_to, texts, portable=True) for texts in every}
+    for variant in generic.variants():
+        texts = generic.origins(variant)
+        tasks[kernel.ahead(texts)] = partial(generic.compiling(variant, portable=True), texts)
+    for name in KERNELS:
+        texts = kernel.texts_of(_WBC / name, _WBC / "geometry" / "native")
+        tasks[kernel.ahead(texts)] = partial(toolchain.compile_kernel, texts, portable=True)
     for old in set(kernel.AHEAD.glob("*.so")) - set(tasks):
         old.unlink()
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:

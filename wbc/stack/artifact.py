@@ -16,10 +16,12 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.key import key
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram, build
-from wbc.stack.rows import Rows
+from wbc.stack.rows import RowsLibrary
 
 BackendName = Literal["auto", "native", "vm"]
 BACKENDS = ("auto", "native", "vm")
+#: C of the functions, beside them
+_SOURCE = "rows.c"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class Artifact:
     library: pathlib.Path | None
     program: TickProgram | None
     cached: bool
-    rows: Rows | None = None
+    rows: RowsLibrary | None = None
 
     @property
     def backend(self) -> str:
@@ -73,7 +75,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
-    return _virtual(stack, layout, version)
+    return _virtual(stack, layout, version)[0]
 
 
 def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> Artifact:
@@ -90,30 +92,34 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
     return Artifact(layout, folder / "tick.so", None, cached)
 
 
-def _virtual(stack: Declaration, layout: Layout, version: str) -> Artifact:
-    """The functions for the virtual machine, built or from the cache."""
+def _virtual(stack: Declaration, layout: Layout, version: str, source: bool = False) -> tuple[Artifact, pathlib.Path]:
+    """The functions for the virtual machine, built or from the cache, and their folder; ``source``: with their C."""
     made: dict[str, ca.Function] = {}
 
     def fill(folder: pathlib.Path) -> None:
         made.update(build(stack, layout).functions)
         for name, function in made.items():
             function.save(str(folder / f"{name}.casadi"))
+        if source:
+            (folder / _SOURCE).write_text(codegen.casadi_source(list(made.values())))
 
-    folder, cached = cache.fetch(key(stack, version, "vm"), fill, what=_said(stack))
+    folder, cached = cache.fetch(key(stack, version, f"vm {source}"), fill, what=_said(stack))
     saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
     functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
     functions = replace(functions, lost=saved.get("lost"))
-    return Artifact(layout, None, functions, cached)
+    return Artifact(layout, None, functions, cached), folder
 
 
 def _at_once(stack: Declaration, layout: Layout, version: str) -> Artifact:
-    """The functions for the virtual machine, and behind them the same as native code, where a compiler is."""
-    out = _virtual(stack, layout, version)
-    if not toolchain.available() or out.program is None:
-        return out
-    name = key(stack, version, f"{toolchain.identity()}\nrows")
-    text = codegen.casadi_source(list(out.program.functions.values()))
-    return replace(out, rows=Rows(name, text, _said(stack)))
+    """The functions for the virtual machine, and behind them the same as native code, where a compiler is.
+
+    Their C is made here and not behind: CasADi keeps the interpreter's lock meanwhile, and a tick would wait.
+    """
+    if not toolchain.available():
+        return _virtual(stack, layout, version)[0]
+    out, folder = _virtual(stack, layout, version, source=True)
+    rows = RowsLibrary(lambda: key(stack, version, f"{toolchain.identity()}\nrows"), folder / _SOURCE, _said(stack))
+    return replace(out, rows=rows)
 
 
 def _said(stack: Declaration) -> str:

@@ -26,13 +26,16 @@ from wbc.robot import Robot
 from wbc.stack.commands import COMMANDS
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
-from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, Unactuated
+from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, LoopForces, Unactuated
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
 from wbc.tasks.base import Command, Constraint, Form, Item, SacrificeOrder, Task
 from wbc.tasks.damping import Damping
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.moving_frame import MovingFrame
 from wbc.tasks.wrench_sum import WrenchSum
+
+#: Weight of forces in loops against task rows of weight 1, in the sizes of forces: tasks decide what they can
+LOOP_WEIGHT = 1e-8
 
 #: Default cost of velocity against a task row of weight 1, per (rad/s)^2: keeps the optimum unique.
 #: It biases a posture task of weight w by the fraction damping / w.
@@ -171,12 +174,13 @@ class Declaration:
         """This stack with what it needs to command accelerations or torques; itself where it commands that already.
 
             rest                a task at the least weight that brings joints to rest that no other task moves
-            base                no motor drives a floating base (torques)
+            base                no motor drives a floating base, nor passive joints (torques)
+            loops               forces in loops that nothing else says are the least (torques)
             "<contact> wrench"  what the wrench of a contact may be (torques)
             "<contact> force"   what it should be (torques)
 
-        Simple bounds of a robot whose base floats stand as rows of a stack of torques: what the base, motors and
-        contacts can do decides its motion, and limits of motion that contradict it give way.
+        Simple bounds of a robot whose base floats, or that has passive joints, stand as rows of a stack of torques:
+        what motors, loops and contacts can do decides its motion, and limits of motion that contradict it give way.
 
         Raises:
             UnknownNameError: another command.
@@ -214,7 +218,9 @@ class Declaration:
         if self._command == "torque":
             contacts = [entry.name for entry in self.entries if isinstance(entry.item, Contact)]
             floating = self._robot.base == "floating"
-            if floating:
+            if self._robot.loops:
+                added.append(Entry(LoopForces(), self._free_name("loops"), last, LOOP_WEIGHT))
+            if self._robot.unactuated:
                 added.append(Entry(Unactuated(), self._free_name("base"), 0, 1.0))
                 bounds = [e for e in self.constraints if e.form == "bounds"]
                 self._entries |= {e.name: dataclasses.replace(e, yielding=True) for e in bounds}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import pathlib
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import resources
 
@@ -53,6 +54,9 @@ WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries")
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")
 _ALWAYS = ("MH", "KEPT", "BENDING", "NNZK")
+
+#: What makes the sources of the files in ``native``
+MAKERS = ("generic.py", "memory.py", "commands.py")
 
 _MEMBERS = re.compile(r"^    (double|int|long long|wide) (.*?);", re.MULTILINE)
 _ARRAY = re.compile(r"(\w+)\[(.*)\]")
@@ -118,7 +122,19 @@ def library(variant: Variant) -> pathlib.Path:
     Raises:
         CompileError: it was not compiled ahead, and there is no compiler, or it fails.
     """
-    return kernel.library(sources(variant), toolchain.compile_generic, "the tick, once for all stacks", at_once=True)
+    return kernel.library(origins(variant), compiling(variant), "the tick, once for all stacks", at_once=True)
+
+
+def compiling(variant: Variant, portable: bool = False) -> Callable[[kernel.Texts, pathlib.Path], None]:
+    """What compiles a variant: (its origins, output)."""
+    return lambda _, output: toolchain.compile_generic(sources(variant), output, portable)
+
+
+def origins(variant: Variant) -> dict[str, str]:
+    """Name -> text of what :func:`sources` is made of: quicker to read than to make, and it changes when that does."""
+    here = pathlib.Path(__file__).parent
+    files = [*sorted((here / "native").iterdir()), *(here / name for name in MAKERS)]
+    return {"variant": repr(variant)} | {file.name: file.read_text(encoding="utf-8") for file in files}
 
 
 def sources(variant: Variant) -> dict[str, str]:

@@ -9,9 +9,10 @@ import json
 import marshal
 import pathlib
 import sys
-from importlib import metadata
 
+import casadi as ca
 import numpy as np
+import pinocchio as pin
 
 from wbc.stack.declaration import Declaration, inner_items
 
@@ -20,6 +21,8 @@ from wbc.stack.declaration import Declaration, inner_items
 PARTS = (
     "wbc.errors",
     "wbc.extras",
+    "wbc.geometry",
+    "wbc.lazy",
     "wbc.native",
     "wbc.pickling",
     "wbc.proximity",
@@ -40,7 +43,7 @@ def key(stack: Declaration, version: str, toolchain: str) -> str:
     values and not in it. Of an item that is not this package's own, the file that its class stands in is in the hash,
     but not what that file imports.
     """
-    versions = [metadata.version("casadi"), metadata.version("pin"), np.__version__, version, toolchain]
+    versions = [ca.CasadiMeta.version(), pin.__version__, np.__version__, version, toolchain]
     classes = {base for entry in stack.entries for item in inner_items(entry.item) for base in type(item).__mro__}
     items = sorted({_source(base) for base in classes})
     text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)

@@ -72,6 +72,7 @@ class Layout:
             accelerations, are shares of scaled tasks, or the wrenches of contacts.
         elastic: limits of motion are rows, and they and what is held give way at prices and not in order.
         forces: where the wrench of each contact is among the variables, by the contact's name.
+        loop_forces: where the forces in loops are among the variables, one a row of :attr:`loop_rows`.
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
             that is asked for.
         nothing: an offset in the parameters that holds 0, where there are shares.
@@ -83,7 +84,7 @@ class Layout:
         robot = stack.robot
         self.nq, self.nv = robot.nq, robot.nv
         self.command = stack.command
-        self.elastic = stack.command == "torque" and robot.base == "floating"
+        self.elastic = stack.command == "torque" and bool(robot.unactuated)
         self.variables = self.nv
         self.forces: dict[str, slice] = {}
         if stack.command == "torque":
@@ -92,6 +93,9 @@ class Layout:
                     count = entry.item.components
                     self.forces[entry.name] = slice(self.variables, self.variables + count)
                     self.variables += count
+        self.loop_rows = robot.loops.rows if stack.command == "torque" else ()
+        self.loop_forces = slice(self.variables, self.variables + len(self.loop_rows))
+        self.variables += len(self.loop_rows)
         self.parameters = 0
         self.task_rows = self.general_rows = self.bound_blocks = self.margin_rows = 0
         self.blocks: dict[str, Block] = {}
@@ -206,6 +210,7 @@ class Layout:
             item = self.blocks[name].entry.item
             assert isinstance(item, Contact)
             out[span] = force_sizes(stack.robot)[list(item.axes)]
+        out[self.loop_forces] = force_sizes(stack.robot)[[0 if unit == "m" else 3 for _, unit in self.loop_rows]]
         return out
 
     def variable(self, number: int) -> tuple[str, str]:
@@ -216,6 +221,9 @@ class Layout:
                 assert isinstance(item, Contact)
                 axis = item.axes[number - span.start]
                 return f"{name}.{WRENCH[axis]}", "N" if axis < 3 else "N m"
+        if self.loop_forces.start <= number < self.loop_forces.stop:
+            label, unit = self.loop_rows[number - self.loop_forces.start]
+            return label, "N" if unit == "m" else "N m"
         return f"variable {number}", ""
 
 

@@ -18,8 +18,9 @@ The tick forms H = sum w (factor J)'J + damping and g from these, so that the co
 small and levels have their rows. ``ahead(q, v, p, dt)`` is h(q (+) v dt) with moving
 inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper triangle of sum_k pull_k d2(e_k)/dq2, the
 curvature of the errors of the first level's tasks, then of those that equality rows keep, for a weight ``force`` on
-each row, as far as it comes from the robot's links; see :mod:`wbc.symbolic.curvature`. ``lost(q, v, p, dt)`` is how far
-the errors that equality rows A v = b keep bend until q (+) v dt: e(q (+) v dt) - e - (A v) dt, one entry a general row.
+each row, as far as it comes from the robot's links; see :mod:`wbc.symbolic.curvature`. ``lost(q, v, p, dt)`` is by how
+much the errors that equality rows A v = b keep change until q (+) v dt, e(q (+) v dt) - e, one entry a general row:
+without (A v) dt it is how far they bend. Rates of what moves beside are taken from it.
 
 Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
 :mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x, enabled)`` are the torques of the joints, and ``ahead`` takes the
@@ -51,9 +52,8 @@ from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.motion import Motion
 from wbc.symbolic.operators import quick_operators
-from wbc.symbolic.tracer import Carrier, Tracer, along
+from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
@@ -108,7 +108,7 @@ def _kinematics_of(robot: Robot) -> Kinematics:
     return known
 
 
-class _Builder:
+class _ProgramBuilder:
     def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
         # Loops know first derivatives
         loops = loops and stack.command == "velocity"
@@ -126,11 +126,6 @@ class _Builder:
     def later(self) -> ca.SX:
         """q (+) v dt."""
         return self.kinematics.integrate(self.kinematics.q, self.kinematics.v * self.dt)
-
-    @cached_property
-    def motion(self) -> Motion:
-        """Twists of the links at the last velocity, and their rates where it does not change."""
-        return Motion(self.kinematics)
 
     def values(self, block: Block) -> dict[str, ca.SX | Pose]:
         """What the item's expressions receive for its inputs."""
@@ -181,41 +176,41 @@ class _Builder:
             total = total + ca.jacobian(expression, self.p[slot.span]) @ self.rate(owner, slot)
         return ca.sparsify(total)
 
-    def bending(self, block: Block, tracer: Tracer, error: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """(c, C): at a velocity v the error changes by c + C v more within the tick than at its rate at q, as a rate:
+    def midway(self, block: Block, matrix: ca.SX, rest: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(A, c) of the mean of a rate A(q) v + c(q) over the tick, of an item in a moving frame; else as they are:
 
-            dt/2 d2e/dt2 at the last v, and dt dJ/dt for what v has changed since,
+            (2 A_m - A) v + c_m - (A_m - A) v_last
 
-        with mean rates of what moves. What is left is of third order in dt.
+        A_m, c_m are those of half a tick later, at the last velocity and mean rates of what moves; the other terms are
+        what v has changed since. What is left is of second order in dt.
         """
-        moving = [
-            (self.p[slot.span], ca.densify(self.rate(owner, slot)))
-            for owner, slot in self.moving(block)
-            if all(other.input.rate != slot.input.name for other in owner.slots.values())
-        ]
-        second, v = tracer.second(error, self.motion, None, moving)[1], self.kinematics.v
-        rows, change = tracer.expand(tracer.slope(error)), ca.SX(0)
-        for symbols, rates in [(self.kinematics.q, self.kinematics.tangent_map @ v), *moving]:
-            change += ca.jtimes(ca.vec(rows), symbols, rates)
-        slope = self.dt * ca.reshape(change, rows.shape)
-        return 0.5 * self.dt * second - slope @ v, slope
+        if not block.entry.frame or self.second is not None:
+            return matrix, rest
+        q, v = self.kinematics.q, self.kinematics.v
+        half = self.kinematics.integrate(q, 0.5 * self.dt * v), self.advanced(block, 0.5 * self.dt)
+        rates = ca.Function("rates", [q, v, self.p, self.dt], [matrix, rest])
+        later, rest = rates(half[0], v, half[1], self.dt)
+        turned = later - matrix
+        return later + turned, rest - turned @ v
 
-    def advanced(self, block: Block) -> ca.SX:
-        """The parameter vector with this block's moving inputs dt later, at their mean rates over the tick."""
+    def advanced(self, block: Block, dt: ca.SX) -> ca.SX:
+        """The parameter vector with this block's moving inputs ``dt`` later; their rates keep the mean of the tick."""
         out = ca.SX(self.p)
         for owner, slot in self.moving(block):
+            if any(other.input.rate == slot.input.name for other in owner.slots.values()):
+                continue
             speed = self.speed(owner, slot, mean=True)
             part = self.p[slot.span]
             if slot.input.kind in ("pose", "rotation"):
                 angular = speed[3:] if slot.input.kind == "pose" else speed
-                turn = rot.from_quaternion(rot.exp3(angular * self.dt)) @ ca.reshape(part[:9], 3, 3)
+                turn = rot.from_quaternion(rot.exp3(angular * dt)) @ ca.reshape(part[:9], 3, 3)
                 moved = ca.vec(turn)
                 if slot.input.kind == "pose":
-                    moved = ca.vertcat(moved, part[9:] + speed[:3] * self.dt)
+                    moved = ca.vertcat(moved, part[9:] + speed[:3] * dt)
             elif slot.input.kind == "configuration":
-                moved = self.kinematics.integrate(part, speed * self.dt)
+                moved = self.kinematics.integrate(part, speed * dt)
             else:
-                moved = part + speed * self.dt
+                moved = part + speed * dt
             out[slot.span] = moved
         return out
 
@@ -246,15 +241,11 @@ class _Builder:
         if self.stack.calm and block.span.stop <= self.layout.leading:
             self.forces += tracer.forces(ca.dot(self.force[block.span], error))
         gain = self.p[block.slots["gain"].span]
-        desired = -gain * error - self.drift(block, error)
-        if block.entry.frame and own is None:
-            bend, slope = self.bending(block, tracer, error)
-            desired, jacobian = desired - bend, jacobian + slope
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(len(block.rows)) if fade is None else self.column(block, "row_factor", fade)
-        error, desired, factor, jacobian = tracer.expanded(error, desired, factor, jacobian)
-        jacobian, rest = jacobian[:, : robot.nv], jacobian[:, robot.nv :]
-        out = self.tasks[block.entry.name] = error, desired - ca.sum2(rest), factor, jacobian
+        error, drift, factor, jacobian = tracer.expanded(error, self.drift(block, error), factor, jacobian)
+        jacobian, drift = self.midway(block, jacobian[:, : robot.nv], drift + ca.sum2(jacobian[:, robot.nv :]))
+        out = self.tasks[block.entry.name] = error, -gain * error - drift, factor, jacobian
         return out
 
     def general(self, block: Block) -> tuple[Rows, ca.SX | None, ca.SX | None]:
@@ -283,7 +274,7 @@ class _Builder:
             assert rows is not None
             low, high = self.column(block, "lower", rows.lower), self.column(block, "upper", rows.upper)
             matrix, low, high = tracer.expanded(ca.SX(rows.matrix), low, high)
-            matrix, rest = matrix[:, : robot.nv], ca.sum2(matrix[:, robot.nv :])
+            matrix, rest = self.midway(block, matrix[:, : robot.nv], ca.sum2(matrix[:, robot.nv :]))
             return Rows(matrix, low - rest, high - rest), None, None
         if block.entry.name in self.balls:
             return (
@@ -295,16 +286,16 @@ class _Builder:
         assert margins is not None
         margin = self.column(block, "margins", margins)
         rate = self.p[block.slots["rate"].span]
-        low = -rate * margin - self.drift(block, margin)
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
         sensed = item.sensed_rows(robot)
         matrix = tracer.slope(margin[: count - sensed, :])
-        margin, low, factor, matrix = tracer.expanded(margin, low, factor, matrix)
+        margin, drift, factor, matrix = tracer.expanded(margin, self.drift(block, margin), factor, matrix)
+        matrix, drift[: count - sensed] = self.midway(block, matrix, drift[: count - sensed])
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
             matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))
-        rows = Rows(matrix, low, ca.SX.inf(count))
+        rows = Rows(matrix, -rate * margin - drift, ca.SX.inf(count))
         return rows, margin, factor
 
     def residual(self, block: Block, tracer: Tracer) -> ca.SX | None:
@@ -317,21 +308,23 @@ class _Builder:
         return None if kept is None else self.column(block, "residual", kept)
 
     def lost(self, block: Block) -> ca.SX:
-        """How far e of equality rows bends until q (+) v dt: e(q (+) v dt) - e - (A v) dt, with what moves beside."""
+        """How far e of equality rows is from e(q) at q (+) v dt, less what moves beside within dt; see the module."""
         tracer, item = self.tracer(block), block.entry.item
         kept = self.residual(block, tracer)
         if kept is None or not isinstance(item, Constraint):
             return ca.SX(len(block.rows), 1)
         rows = item.velocity_rows(self.stack.robot, tracer, self.values(block), self.dt)
         assert rows is not None
-        rate = along(ca.SX(rows.matrix), self.kinematics.v)
+        own = ca.SX(kept.numel(), 1)
         for owner, slot in self.moving(block):
             if owner is block:
-                rate += ca.jacobian(kept, self.p[slot.span]) @ self.rate(owner, slot)
+                own += ca.jacobian(kept, self.p[slot.span]) @ self.rate(owner, slot)
         keeps = ca.DM([float(not kept[k].is_zero()) for k in range(kept.numel())])
-        kept, rate = tracer.expanded(kept, rate)
-        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block))
-        return ca.sparsify(keeps * (later - kept - rate * self.dt))
+        kept, own, matrix = tracer.expanded(kept, own, ca.SX(rows.matrix))
+        nv = self.stack.robot.nv
+        _, rest = self.midway(block, matrix[:, :nv], ca.sum2(matrix[:, nv:]) + own)
+        later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block, self.dt))
+        return ca.sparsify(keeps * (later - kept - rest * self.dt))
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
         """Rows of sensed pairs, see :meth:`Constraint.sensed_rows`."""
@@ -349,7 +342,7 @@ class _Builder:
         margins = item.margins(self.stack.robot, tracer, self.values(block))
         assert margins is not None
         here = ca.Function("h", [self.kinematics.q, self.p], [ca.densify(tracer.expand(margins))])
-        margin = here(self.later, self.advanced(block))
+        margin = here(self.later, self.advanced(block, self.dt))
         sensed = item.sensed_rows(self.stack.robot)
         if sensed and not self.loops:
             closing = self.sensed_matrix(block, sensed) @ self.kinematics.v * self.dt
@@ -364,7 +357,7 @@ def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgra
     Raises:
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
-    b = _Builder(stack, layout, loops)
+    b = _ProgramBuilder(stack, layout, loops)
     balls, sensed = b.balls, Sensed.of(stack, layout) if b.loops else Sensed()
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]

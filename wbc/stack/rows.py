@@ -8,6 +8,7 @@ import logging
 import pathlib
 import threading
 import weakref
+from collections.abc import Callable
 from typing import Protocol
 
 from wbc.errors import CompileError
@@ -36,7 +37,7 @@ class Changing(Protocol):
         """From the next call on; may be called twice."""
 
 
-class Rows:
+class RowsLibrary:
     """A library in the making. Ticks change over when it is there; where it fails they stay as they are.
 
     A tick holds the interpreter's lock, and so does the change: it falls between two of them. A forked process has no
@@ -44,15 +45,16 @@ class Rows:
     take along.
 
     Args:
-        name: of the cache's entry. text: C code of the functions. what: it is, for the log.
+        named: gives the name of the cache's entry; a compiler is asked for its version. source: C of the functions.
+        what: it is, for the log.
 
     Attributes:
         ended: set when it is there, or has failed.
     """
 
-    def __init__(self, name: str, text: str, what: str) -> None:
+    def __init__(self, named: Callable[[], str], source: pathlib.Path, what: str) -> None:
         self.ended = threading.Event()
-        self._name, self._text, self._what = name, text, what
+        self._named, self._source, self._what = named, source, what
         self._library: ctypes.PyDLL | None = None
         self._ticks: list[weakref.ref[Changing]] = []
         self._thread = threading.Thread(target=self._work, name="wbc-rows", daemon=True)
@@ -68,7 +70,7 @@ class Rows:
 
     def _work(self) -> None:
         try:
-            folder, _ = cache.fetch(self._name, self._fill, library=True, what=f"rows of {self._what}")
+            folder, _ = cache.fetch(self._named(), self._fill, library=True, what=f"rows of {self._what}")
             self._library = load_library(folder / _LIBRARY)
         except (CompileError, OSError) as error:
             if not toolchain.ends():
@@ -83,4 +85,4 @@ class Rows:
             _working.discard(self._thread)
 
     def _fill(self, folder: pathlib.Path) -> None:
-        toolchain.compile_rows(self._text, folder / _LIBRARY, behind=True)
+        toolchain.compile_rows(self._source.read_text(), folder / _LIBRARY, behind=True)

@@ -4,7 +4,8 @@
     margins     d2h/dt2 >= -rate (2 dh/dt + rate h) / (1 + rate dt / 2)
     rows        with r = A v - lower:  dr/dt >= -rate r, and the same for upper; equalities with both
     contacts    their motion as rows above; cone w within its limits; w = target as a task
-    dynamics    M a + h - J'w = tau on the degrees of freedom whose tau is limited, or known to be 0
+    loops       J a + (dJ/dt) v = -2 w de/dt - w^2 e with w = 0.2 / dt, and their forces f as variables
+    dynamics    M a + h - J'w - J_l' f = tau on the degrees of freedom whose tau is limited, or known to be 0
 
 Why margins stay positive: with psi = dh/dt + rate h the row says psi(t + dt) >= (1 - rate dt) psi(t) where the second
 derivative of h does not change within the tick, and then h(t + dt) (1 + rate dt / 2) >= h(t) (1 - rate dt / 2) by the
@@ -13,6 +14,7 @@ trapezoidal rule, which is exact there; for every rate dt in (0, 1], however dt 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import casadi as ca
@@ -21,19 +23,26 @@ import numpy as np
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
 from wbc.symbolic.kinematics import Kinematics, Pose
-from wbc.symbolic.motion import Motion
+from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.tracer import Tracer, along
-from wbc.tasks._contact import Contact, ContactForce, ContactWrench, Unactuated
+from wbc.tasks._contact import Contact, ContactForce, ContactWrench, LoopForces, Unactuated
 from wbc.tasks.base import Constraint, Rows, Task
 from wbc.tasks.braking import clip
+from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.wrench_sum import WrenchSum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+#: Part of a motor's torque that braking counts on where forces of motion and weight take more of it
+LEAST_SHARE = 0.1
+#: How fast loops that are open close, critically damped [1 per tick]
+LOOP_RATE = 0.2
+#: and at most [characteristic lengths or rad per second]
+LOOP_SPEED = 0.1
 #: Torque of a motor without a limit [N m]; a number, as zero times infinity is none
-UNLIMITED = 1e300
+NO_LIMIT = 1e300
 
 
 class Builder(Protocol):
@@ -76,7 +85,7 @@ class SecondOrder:
     def __init__(self, builder: Builder) -> None:
         self._b, self._layout, self._robot = builder, builder.layout, builder.stack.robot
         self._kinematics = builder.kinematics
-        self._motion = Motion(builder.kinematics)
+        self._motion = MotionExpressions(builder.kinematics)
         self.x = ca.SX.sym("x", builder.layout.variables)
         self._forces: ca.SX | None = None
 
@@ -85,6 +94,10 @@ class SecondOrder:
         item = block.entry.item
         assert isinstance(item, Task)
         b, robot, count = self._b, self._robot, len(block.rows)
+        if isinstance(item, LoopForces):
+            rows = ca.SX(count, self._layout.variables)
+            rows[:, self._layout.loop_forces] = ca.SX.eye(count)
+            return ca.SX.zeros(count), ca.SX.zeros(count), ca.SX.ones(count), rows
         if isinstance(item, ContactForce):
             target, measured, feedback = (b.p[block.slots[name].span] for name in ("target", "measured", "feedback"))
             wanted = target + feedback * (target - measured)
@@ -144,11 +157,14 @@ class SecondOrder:
 
     def _limits(self, block: Block, item: Constraint) -> Rows:
         """Bounds on accelerations as rows. A joint that something has thrown beyond its limit of velocity is brought
-        back within the tick: limits of acceleration are of what is planned.
+        back within the tick: limits of acceleration are of what is planned. Before a limit of position a joint counts
+        on no more than its motor has.
         """
         b, v = self._b, self._kinematics.v
         longest = b.stack.dt_range[1]
-        bounds = item.acceleration_bounds(self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest)
+        bounds = item.acceleration_bounds(
+            self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest, self._motors
+        )
         assert bounds is not None
         ends = [b.column(block, "lower", bounds.lower), b.column(block, "upper", bounds.upper)]
         for i in np.flatnonzero(np.isfinite(most := item.velocity_limits(self._robot))).tolist():
@@ -157,6 +173,22 @@ class SecondOrder:
                 slower = ca.if_else(v[i] > most[i], ca.fmin(end[i], back), ca.fmax(end[i], back))
                 end[i] = ca.if_else(ca.fabs(v[i]) > most[i], slower, end[i])
         return Rows(self._wide(ca.SX.eye(self._layout.nv)), *ends)
+
+    @cached_property
+    def _motors(self) -> dict[int, ca.SX]:
+        """Decelerations that motors with limits T have for all that their joint carries, (T - |h|) / M, by degree of
+        freedom; h and M of a leader with its followers'.
+        """
+        out: dict[int, ca.SX] = {}
+        inertia = ca.diag(self._driven @ self._motion.dynamics.mass_matrix @ self._driven.T)
+        for block in self._layout.of_form("rows"):
+            item = block.entry.item
+            for i in item.dofs(self._robot) if isinstance(item, TorqueLimits) else ():
+                scale = self._b.values(block)["scale"]
+                assert isinstance(scale, ca.SX)
+                most = scale * float(self._robot.limits.effort[i])
+                out[i] = ca.fmax(most - ca.fabs(self._still[i]), LEAST_SHARE * most) / inertia[i]
+        return out
 
     def _rates(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
         """Rows on velocities: what they are off decays at ``rate``."""
@@ -181,9 +213,21 @@ class SecondOrder:
         ends = []
         for end in (low, high):
             ends.append(self._along(end, block) - drift - rate * (speed - end))
+        kept = item.residual(self._robot, tracer, b.values(block)) if item.exact else None
+        if kept is not None:
+            ends[0] = self._closing(block, tracer, kept, ends[0])
         if item.equality:
             ends[1] = ends[0]
         return Rows(self._wide(matrix[:, : self._layout.nv]), ends[0], ends[1])
+
+    def _closing(self, block: Block, tracer: Tracer, kept: ca.SX, others: ca.SX) -> ca.SX:
+        """Sides of rows that keep e at 0, and of those that keep nothing: ``others``."""
+        rate, bias = tracer.second(kept, self._motion)
+        value, fast = tracer.expand(ca.densify(kept)), LOOP_RATE / self._b.dt
+        most = ca.SX([LOOP_SPEED * row.scale(self._b.stack.length) for row in block.rows])
+        sides = -bias - 2.0 * fast * (rate + clip(0.5 * fast * value, -most, most))
+        keeps = [not kept[k].is_zero() for k in range(kept.numel())]
+        return ca.vertcat(*[sides[k] if keeps[k] else others[k] for k in range(kept.numel())])
 
     def _along(self, expression: ca.SX, block: Block) -> ca.SX:
         """Time derivative of an expression in q, v and inputs where v does not change."""
@@ -239,9 +283,17 @@ class SecondOrder:
     def _dynamics(self) -> ca.SX:
         """nv x variables: torques of the motors by accelerations and wrenches."""
         if self._forces is None:
-            parts = [self._motion.dynamics.mass_matrix, *(-jacobian.T for jacobian in self._contacts())]
+            parts = [self._motion.dynamics.mass_matrix, *(-jacobian.T for jacobian in self._contacts()), -self._loops.T]
             self._forces = ca.sparsify(self._driven @ ca.horzcat(*parts))
         return self._forces
+
+    @cached_property
+    def _loops(self) -> ca.SX:
+        """Rows of the loops whose forces are variables, rows x nv."""
+        if not self._layout.loop_rows:
+            return ca.SX(0, self._layout.nv)
+        tracer = Tracer(self._kinematics)
+        return tracer.jacobian(self._robot.loops.error(tracer))
 
     def _contacts(self) -> list[ca.SX]:
         """What the transposed of takes each contact's wrench to generalised forces, components x nv, as far as it is
@@ -280,7 +332,7 @@ class SecondOrder:
         return rotation, tracer.expand(along(tracer.frame_jacobian(frame), self._kinematics.v))
 
     def torque(self, enabled: ca.SX) -> ca.SX:
-        """Torques of the motors at the variables :attr:`x`, by one recursion: M a + h - J'w, 0 for a floating base;
+        """Torques of the motors at the variables :attr:`x`, by one recursion: M a + h - J'w - J_l' f, 0 where none is;
         within their limits also where a tick has no answer, and not beyond them by rounding.
 
         Args:
@@ -291,6 +343,7 @@ class SecondOrder:
         tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
         for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
             tau -= jacobian.T @ self.x[span]
+        tau -= self._loops.T @ self.x[self._layout.loop_forces]
         tau = self._driven @ (tau - self._loads)
         for block in self._layout.of_form("margins", "rows"):
             item = block.entry.item
@@ -302,12 +355,11 @@ class SecondOrder:
             if limits is None or isinstance(item, Unactuated):
                 continue
             dofs, on = list(limits.dofs), enabled[block.span]
-            low, high = (ca.if_else(on, end, s * UNLIMITED) for end, s in ((limits.lower, -1.0), (limits.upper, 1.0)))
+            low, high = (ca.if_else(on, end, s * NO_LIMIT) for end, s in ((limits.lower, -1.0), (limits.upper, 1.0)))
             if limits.drives is None:
                 tau[dofs] = ca.fmin(ca.fmax(tau[dofs], low), high)
             else:
                 own = ca.SX(ca.DM(limits.drives)) @ tau[dofs]
                 tau[dofs] = ca.SX(ca.DM(np.linalg.inv(limits.drives))) @ ca.fmin(ca.fmax(own, low), high)
-        if self._robot.base == "floating":
-            tau[:6] = 0.0
+        tau[list(self._robot.unactuated)] = 0.0
         return tau

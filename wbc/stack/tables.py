@@ -14,8 +14,10 @@ from wbc.tasks.base import Constraint, Row
 DISTURBANCE = 1e-6
 #: Full speed of joints without a limit [rad/s, or characteristic lengths per second]
 UNLIMITED = 10.0
-#: Violations of soft rows, and of rows that keep a direction, up to this are not reported [rad/s, lengths per second]
-SOFT_REPORTED, DIRECTION_REPORTED = 2e-9, 1e-5
+#: Violations of soft rows up to this are not reported [rad/s, lengths per second]
+SOFT_REPORTED = 2e-9
+#: Violations of rows that keep a direction up to this are not reported [rad/s, lengths per second]
+DIRECTION_REPORTED = 1e-5
 
 
 def left_free(stack: Declaration) -> float:

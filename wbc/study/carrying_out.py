@@ -10,14 +10,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from wbc import extras, validation
+from wbc.cores import cores
 from wbc.errors import SolverError, WbcError
 from wbc.study.declaration import Study
 from wbc.study.kept import Done, Kept
-from wbc.study.scenario import Scenario, Trial
+from wbc.study.scenario import Scenario, StudyTrial
 
-#: Trials that a cluster has at a time, for each of its threads; how long it may take until it answers [s]; and how many
-#: lost workers a trial survives
-AHEAD, PATIENCE, LOSSES = 4, 30, 3
+#: Trials that a cluster has at a time, for each of its threads
+AHEAD = 4
+#: How long a cluster may take until it answers [s]
+PATIENCE = 30
+#: Lost workers that a trial survives
+LOSSES = 3
 
 
 @dataclass
@@ -70,7 +74,7 @@ def carry_out(
     return progress
 
 
-def perform(scenario: Scenario, trial: Trial, metrics: tuple[str, ...], threads: int) -> Done:
+def perform(scenario: Scenario, trial: StudyTrial, metrics: tuple[str, ...], threads: int) -> Done:
     """One trial; an error in it is its result."""
     try:
         return Done(scenario.run(trial, metrics, threads))
@@ -81,22 +85,22 @@ def perform(scenario: Scenario, trial: Trial, metrics: tuple[str, ...], threads:
         return Done({}, f"{type(error).__name__}: {error} ({os.path.basename(last.filename)}:{last.lineno})")
 
 
-def _here(study: Study, trials: list[Trial]) -> Iterator[tuple[Trial, Done]]:
-    threads = len(os.sched_getaffinity(0))
+def _here(study: Study, trials: list[StudyTrial]) -> Iterator[tuple[StudyTrial, Done]]:
+    threads = cores()
     for trial in trials:
         yield trial, perform(study.scenario, trial, study.metrics, threads)
 
 
 def _on_cluster(
-    study: Study, trials: list[Trial], workers: int | None, address: str | None
-) -> Iterator[tuple[Trial, Done]]:
+    study: Study, trials: list[StudyTrial], workers: int | None, address: str | None
+) -> Iterator[tuple[StudyTrial, Done]]:
     """In the order in which they end. A trial whose worker is lost is done by another one."""
     waiting = iter(trials)
     with connected(workers, address) as client:
         from distributed import CancelledError, as_completed
         from distributed.client import ClosedClientError
 
-        running: dict[Any, Trial] = {}
+        running: dict[Any, StudyTrial] = {}
         ended = as_completed()
 
         def submit() -> None:

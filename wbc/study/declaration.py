@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 
 from wbc import validation
 from wbc.errors import RobotFileError, UnknownNameError, WbcError
-from wbc.study.scenario import Scenario, Trial, Value
+from wbc.study.scenario import Scenario, StudyTrial, Value
 
 #: Most trials of a study, and most values of a parameter
 MOST = 10**6
@@ -111,11 +111,11 @@ class Study:
         """Parameters of several values."""
         return tuple(name for name, values in self._values.items() if len(values) > 1)
 
-    def trials(self) -> Iterator[Trial]:
+    def trials(self) -> Iterator[StudyTrial]:
         """All trials; the last parameter changes fastest, seeds before it."""
         for values in itertools.product(*self._values.values()):
             for seed in self.seeds:
-                yield Trial(dict(zip(self._values, values, strict=True)), seed)
+                yield StudyTrial(dict(zip(self._values, values, strict=True)), seed)
 
     def data(self) -> dict[str, Any]:
         """What :meth:`read` takes."""

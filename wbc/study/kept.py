@@ -12,9 +12,13 @@ from typing import Any
 from wbc import extras
 from wbc.errors import BusyError, RangeError, RobotFileError
 from wbc.study.declaration import Study
-from wbc.study.scenario import Row, Trial
+from wbc.study.scenario import Row, StudyTrial
 
-STUDY, TRIALS, RESULTS, SUMMARY, PLOT = "study.json", "trials.jsonl", "results.parquet", "summary.json", "study.png"
+STUDY = "study.json"
+TRIALS = "trials.jsonl"
+RESULTS = "results.parquet"
+SUMMARY = "summary.json"
+PLOT = "study.png"
 FILES = (STUDY, TRIALS, RESULTS, SUMMARY, PLOT)
 
 
@@ -72,13 +76,13 @@ class Kept:
         except (json.JSONDecodeError, KeyError, TypeError) as error:
             raise RobotFileError("study", str(self.folder / TRIALS), f"is damaged: {error}") from error
 
-    def get(self, trial: Trial) -> Done | None:
+    def get(self, trial: StudyTrial) -> Done | None:
         """What a trial found; None if it is not done, or lacks a metric that is wanted now."""
         done = self._done.get(_key(trial))
         wanted = self.study.metrics or self.study.scenario.metrics
         return done if done is None or done.error or set(wanted) <= set(done.found) else None
 
-    def put(self, trial: Trial, done: Done) -> None:
+    def put(self, trial: StudyTrial, done: Done) -> None:
         """Keep it, on disk before this returns to its caller's next trial."""
         self._file.write(json.dumps({"trial": _key(trial), "found": done.found, "error": done.error}) + "\n")
         self._file.flush()
@@ -128,5 +132,5 @@ class Kept:
         self._file.close()
 
 
-def _key(trial: Trial) -> str:
+def _key(trial: StudyTrial) -> str:
     return json.dumps(asdict(trial), sort_keys=True)

@@ -9,10 +9,16 @@ import numpy as np
 
 from wbc.style import BLUE, CYCLE, pyplot
 
-#: Cells of a map along each axis at least and at most, rows of results for each, and bars of a histogram
-CELLS, EACH, BARS = (8, 40), 8, 30
-#: Metrics that are drawn, and groups of trials
-PANELS, GROUPS = 4, 4
+#: Cells of a map along each axis, at least and at most
+CELLS = (8, 40)
+#: Results for each cell of a map
+EACH = 8
+#: Bars of a histogram
+BARS = 30
+#: Metrics that are drawn, at most
+PANELS = 4
+#: Groups of trials that are drawn, at most
+GROUPS = 4
 
 
 def save_plot(

@@ -32,7 +32,7 @@ _KINDS: dict[Any, tuple[type, ...]] = {float: (float, int), int: (int,), str: (s
 
 
 @dataclass(frozen=True)
-class Trial:
+class StudyTrial:
     """Parameters and a seed."""
 
     parameters: dict[str, Value]
@@ -127,7 +127,7 @@ class Scenario:
             raise RangeError(field_name, value, f"expected {kind.__name__}")
         return float(value) if kind is float else value
 
-    def run(self, trial: Trial, metrics: tuple[str, ...], threads: int) -> Row:
+    def run(self, trial: StudyTrial, metrics: tuple[str, ...], threads: int) -> Row:
         """Carry out a trial; numbers that are not finite become None.
 
         Raises:

@@ -33,7 +33,7 @@ class Reach(TypedDict):
     reached: Array
 
 
-class Manipulability(TypedDict):
+class ManipulabilityResult(TypedDict):
     """Places [m], volume of the ellipsoid of velocities, and the least singular value over the greatest."""
 
     x: Array
@@ -51,7 +51,7 @@ class Solved(TypedDict):
     seconds: float
 
 
-class Layout(TypedDict):
+class LayoutResult(TypedDict):
     """Share of the holds that is left out, whether there is a plan, its re-grasps and its duration [s]."""
 
     removed: float
@@ -92,7 +92,7 @@ def reach(
     return {"x": x, "y": y, "z": z, "reached": found.solved}
 
 
-def manipulability(*, seed: int, robot: str = "panda", frame: str = "", samples: int = 1000) -> Manipulability:
+def manipulability(*, seed: int, robot: str = "panda", frame: str = "", samples: int = 1000) -> ManipulabilityResult:
     """Random configurations within limits, and there, with J scaled by the robot's characteristic length,
 
         measure = sqrt(det(J J')),    conditioning = s_min / s_max
@@ -132,7 +132,7 @@ def ik(
     return {"solved": solved, "descents": descents, "seconds": seconds}
 
 
-def layouts(*, seed: int, least: float = 0.1, most: float = 0.6, speed: float = 0.05) -> Layout:
+def layouts(*, seed: int, least: float = 0.1, most: float = 0.6, speed: float = 0.05) -> LayoutResult:
     """The published cylinder with a random share of its holds left out, between ``least`` and ``most``, and a plan for
     the three-armed walker from a random place to another one.
 

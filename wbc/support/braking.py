@@ -32,13 +32,15 @@ from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import CommandError, RangeError
 from wbc.robot import Robot
-from wbc.support.statics import Rows, Statics, least_lack
+from wbc.support.statics import Statics, TorqueRows, least_lack
 from wbc.validation import Array
 
 #: Rates that contacts leave below this share of their limits are none
 STILL = 1e-6
-#: Corrections by which contacts come back to where they are, and what is left of them [m, rad]
-CORRECTIONS, CLOSED_TO = 12, 1e-9
+#: Corrections by which contacts come back to where they are
+CORRECTIONS = 12
+#: Error of a contact that is left after them [m, rad]
+CLOSED_TO = 1e-9
 #: Random configurations that are given up for one that contacts and limits allow
 TRIES = 50
 
@@ -93,11 +95,12 @@ def braking(
             not command torques, or without q.
         RangeError: a limit that is not finite, a configuration whose contacts and limits leave no others about it, or
             motors and contacts that cannot hold the robot in one of the states, with what is missing.
-        ShapeError, NotFiniteError: q. SolverError: values of inputs that nobody has set.
+        ShapeError, NotFiniteError: q. SolverError: values of inputs that nobody has set. UnsupportedJointError: loops.
     """
     count, rate = validation.integer("samples", samples, low=1), validation.scalar("speed", speed, low=0.0, high=1.0)
     part = validation.scalar("share", share, low=0.0, high=1.0, open_low=True)
     random = np.random.default_rng(validation.integer("seed", seed))
+    (robot.stack.robot if isinstance(robot, CompiledStack) else robot).require_tree("what motors can brake")
     if isinstance(robot, CompiledStack):
         far = validation.scalar("spread", spread, low=0.0)
         return _WithContacts(robot, q, part, rate, far).search(random, count)
@@ -156,7 +159,7 @@ class _WithContacts:
     def __init__(self, controller: CompiledStack, q: Any, share: float, speed: float, spread: float) -> None:
         if q is None:
             raise CommandError("q", q, "give the configuration about which the contacts stay")
-        self._rows = Rows(controller)
+        self._rows = TorqueRows(controller)
         self._robot = robot = self._rows.stack.robot
         _check_finite(robot)
         self._share, self._speed, self._spread = share, speed, spread

@@ -137,13 +137,13 @@ def region(controller: CompiledStack, q: Any, *, torque: bool = True, tolerance:
     # the moment of the weight about the base, in its axes, by how far the centre of mass is elsewhere
     moments = np.zeros((6, 2))
     moments[3:] = np.column_stack([turn.T @ np.cross(axis, weight) for axis in axes])
-    program = _Program(found, moments, validation.flag("torque", torque))
+    program = _RegionProgram(found, moments, validation.flag("torque", torque))
     corners, outer = program.project(limit)
     here = axes @ center
     return Region(center, axes, corners + here, outer + here, bool(torque))
 
 
-class _Program:
+class _RegionProgram:
     """The linear program: variables (w, x)."""
 
     def __init__(self, found: Statics, moments: Array, torque: bool) -> None:

@@ -65,7 +65,7 @@ class Statics:
     scale: Array
 
 
-class Rows:
+class TorqueRows:
     """General rows of ticks that command torques.
 
     Attributes:
@@ -149,7 +149,7 @@ def statics(controller: CompiledStack, q: Any) -> Statics:
         CommandError: the controller does not command torques. ShapeError, NotFiniteError: q.
         SolverError: numbers that are not finite, such as values of inputs that nobody has set.
     """
-    rows = Rows(controller)
+    rows = TorqueRows(controller)
     robot = rows.stack.robot
     A, lower, upper = rows.at(robot.configuration("q", q), np.zeros(robot.nv))
     at, nv = rows.place, robot.nv

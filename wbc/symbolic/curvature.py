@@ -36,7 +36,7 @@ class AppliedForce:
 
 
 @dataclass(eq=False)
-class _Load:
+class _JointLoad:
     """What acts on a joint and on all that it carries: force, sum of f p', torque."""
 
     force: ca.SX
@@ -66,12 +66,12 @@ def curvature(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> ca.SX:
     return ca.sparsify(K)
 
 
-def _loads(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> dict[int, _Load]:
+def _loads(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> dict[int, _JointLoad]:
     """Per joint that carries a force, all that it carries."""
-    loads: dict[int, _Load] = {}
+    loads: dict[int, _JointLoad] = {}
 
-    def at(joint: int) -> _Load:
-        return loads.setdefault(joint, _Load(ca.SX(3, 1), ca.SX(3, 3), ca.SX(3, 1)))
+    def at(joint: int) -> _JointLoad:
+        return loads.setdefault(joint, _JointLoad(ca.SX(3, 1), ca.SX(3, 3), ca.SX(3, 1)))
 
     for force in forces:
         if force.kind == "mass":
@@ -99,7 +99,7 @@ def _loads(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> dict[int, 
     return loads
 
 
-def _turned(kinematics: Kinematics, joint: int, load: _Load) -> ca.SX:
+def _turned(kinematics: Kinematics, joint: int, load: _JointLoad) -> ca.SX:
     """J_k x f + w_k x m / 2 of a joint's columns, 3 x nv_j, summed over the load."""
     linear, angular = kinematics.joint_twist(joint)
     origin = kinematics.joint_pose(joint).position

@@ -15,7 +15,7 @@ from wbc.symbolic.kinematics import WORLD, Kinematics
 from wbc.symbolic.velocity import Velocities
 
 
-class Motion:
+class MotionExpressions:
     """Velocities and dynamics of one :class:`Kinematics`, each built on first use.
 
     Attributes:

@@ -25,7 +25,7 @@ from wbc.symbolic.curvature import AppliedForce
 from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
 from wbc.symbolic.manipulability import manipulability, manipulability_curvature
-from wbc.symbolic.motion import Motion
+from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.rotations import rotation_rate
 
 
@@ -349,7 +349,7 @@ class Tracer:
     def second(
         self,
         expression: ca.SX,
-        motion: Motion,
+        motion: MotionExpressions,
         own: ca.SX | None = None,
         moving: Sequence[tuple[ca.SX, ca.SX]] = (),
     ) -> tuple[ca.SX, ca.SX]:
@@ -479,7 +479,7 @@ class Placeholder:
     inner: bool = False
     turns: bool = False
     forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
-    twist: Callable[[Motion], tuple[ca.SX, ca.SX]] | None = None
+    twist: Callable[[MotionExpressions], tuple[ca.SX, ca.SX]] | None = None
 
 
 def along(matrix: ca.SX, v: ca.SX) -> ca.SX:

@@ -24,7 +24,12 @@ AXES = {
     "j": (5, 1.0),
     "l": (5, -1.0),
 }
-NEXT, BEFORE, STOP, FASTER, SLOWER, QUIT = "n", "p", " ", "+", "-", "q"
+NEXT = "n"
+BEFORE = "p"
+STOP = " "
+FASTER = "+"
+SLOWER = "-"
+QUIT = "q"
 HELP = "w/s a/d r/f: rows 1 to 3, u/o i/k j/l: rows 4 to 6; n, p: next pair, the one before; space: stop; +, -; q: quit"
 #: A key counts as held for this long after it was seen: terminals repeat keys after up to half a second [s]
 HELD = 0.6

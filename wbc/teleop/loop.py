@@ -14,10 +14,14 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, RobotFileError, ShapeError
+from wbc.log import Log
+from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.simulation import Connection, Plant
 from wbc.teleop.order import AT_ONCE, Source
 from wbc.teleop.rate_file import COLUMNS
-from wbc.teleop.session import RATE, Seen, Teleoperation
+from wbc.teleop.session import NOTHING, RATE, Seen, Teleoperation
+from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 
 
@@ -106,6 +110,35 @@ class SessionLog:
         except OSError as error:
             raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
         return file
+
+    def columns(self, robot: Robot) -> Log:
+        """As the log of every run: ``t``, ``q.*``, ``v.*``, ``asked.*``, ``met.*`` (rows of the pair), ``sigma``,
+        ``kept``, ``lost``, ``status``, ``tick``, and as flags ``binding.*``, ``pair.*`` and ``why.*``, what took of the
+        command.
+        """
+        robot = checked_robot(robot)
+        n, q = len(self.time), np.reshape(self.q, (-1, robot.nq))
+        rates = np.zeros((n, 2, AT_ONCE))
+        flags: dict[str, Array] = {}
+        for k, seen in enumerate(self.seen):
+            rates[k, 0, : len(seen.asked)], rates[k, 1, : len(seen.met)] = seen.asked, seen.met
+            said = [f"binding.{row}" for row in seen.step.binding if row.bound != "equal"]
+            said += [f"pair.{seen.active}", *(["pair.changing"] if seen.blending else [])]
+            for name in [*said, *(f"why.{reason}" for reason in (seen.why if seen.lost > NOTHING else ()))]:
+                flags.setdefault(name, np.zeros(n, dtype=bool))[k] = True
+        names = robot.dof_names if robot.nq == robot.nv else tuple(map(str, range(robot.nq)))
+        columns = {"t": np.array(self.time)} | {f"q.{name}": q[:, k] for k, name in enumerate(names)}
+        columns |= {f"v.{name}": np.reshape(self.v, (-1, robot.nv))[:, k] for k, name in enumerate(robot.dof_names)}
+        columns |= {f"{what}.{k}": rates[:, j, k] for j, what in enumerate(("asked", "met")) for k in range(AT_ONCE)}
+        columns |= {name: np.array([getattr(one, name) for one in self.seen]) for name in ("sigma", "kept", "lost")}
+        columns["status"] = np.array([STATUSES.index(one.step.ended) for one in self.seen], dtype=np.int8)
+        columns |= {"tick": np.array(self.cost), **flags}
+        units = dict.fromkeys(columns, "") | {"t": "s", "tick": "s"}
+        units |= {f"v.{name}": f"{unit}/s" for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)}
+        if robot.nq == robot.nv:
+            units |= {f"q.{name}": unit for name, unit in zip(names, robot.dof_units, strict=True)}
+        meta = {"robot": robot.name, "ticks": n, "late": self.late, "interrupted": self.interrupted}
+        return Log(columns, units, meta)
 
     def save_orders(self, path: str | os.PathLike[str]) -> pathlib.Path:
         """As a :class:`RateFile`: what was commanded from tick to tick, on the pairs that were used.

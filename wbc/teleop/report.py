@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from wbc.controller import Status
 from wbc.teleop.loop import SessionLog
-from wbc.teleop.session import NOTHING, Seen, Teleoperation
+from wbc.teleop.session import Teleoperation
 from wbc.track.page import RunPage, stretches
 from wbc.track.summary import Figure
 from wbc.validation import Array
 
-#: A part of the command above which it counts as lost [1]; losses that are told with their reasons
-LOST, TOLD = 0.01, 5
+#: Part of the command above which what is missing counts as lost
+LOST = 0.01
+#: Losses that are told with their reasons, at most
+TOLD = 5
 
 
 def session_figures(session: Teleoperation, log: SessionLog) -> list[Figure]:
@@ -59,14 +60,10 @@ def save_report(session: Teleoperation, log: SessionLog, folder: pathlib.Path) -
     page.section("Figures")
     page.figures(session_figures(session, log))
     if ticks:
-        times = np.array(log.time)
-        page.section("What bound when")
-        page.strips(times, _flags(log, lambda seen: [str(row) for row in seen.step.binding if row.bound != "equal"]))
-        page.section("Pairs")
-        page.strips(times, _flags(log, lambda seen: [seen.active, *(["pairs are changing"] if seen.blending else [])]))
-        page.section("What was lost, and why")
-        reasons = _flags(log, lambda seen: seen.why if seen.lost > NOTHING else ())
-        page.strips(times, reasons)
+        columns, times = log.columns(robot), np.array(log.time)
+        for title, group in (("What bound when", "binding"), ("Pairs", "pair"), ("What was lost, and why", "why")):
+            page.section(title)
+            page.strips(times, columns.group(group))
         found = stretches(np.asarray(lost > LOST, dtype=float))
         for first, last in sorted(found, key=lambda pair: pair[0] - pair[1])[:TOLD]:
             worst = first + int(lost[first:last].argmax())
@@ -80,18 +77,13 @@ def save_report(session: Teleoperation, log: SessionLog, folder: pathlib.Path) -
     page.section("Files")
     page.links(
         folder,
-        {"replay.html": "the session, played in the browser without a network", "log.csv": "every tick"},
+        {
+            "replay.html": "the session, played in the browser without a network",
+            "log.csv": "every tick",
+            "log.npz": "every tick, for wbc.log.load",
+        },
     )
     return page.save(folder)
-
-
-def _flags(log: SessionLog, names: Callable[[Seen], Iterable[str]]) -> dict[str, Array]:
-    """What was said in which ticks."""
-    out: dict[str, Array] = {}
-    for k, seen in enumerate(log.seen):
-        for name in names(seen):
-            out.setdefault(name, np.zeros(len(log.seen)))[k] = 1.0
-    return out
 
 
 def _numbers(q: Array) -> str:

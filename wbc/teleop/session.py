@@ -41,8 +41,10 @@ RATE = 50.0
 STALE = 0.5
 #: Modes whose pairs there are where nobody says which, as far as the robot has them
 USUAL = (Mode.M1, Mode.M2)
-#: Acceleration of joints where nobody says which: of the published arms, and of others that have no limit [rad/s^2]
-SLOW, PLAIN = 0.02, 10.0
+#: Acceleration of the joints of the published arms where nobody says which [rad/s^2]
+SLOW = 0.02
+#: Acceleration of the joints of other arms that have no limit [rad/s^2]
+PLAIN = 10.0
 #: A part of the command below this is not lost but rounding and the lag of one tick
 NOTHING = 1e-3
 #: A locus that is known exactly is the nearest one where it is within this factor of the first-order estimate

@@ -8,11 +8,22 @@ import numpy as np
 
 from wbc.validation import Array
 
-#: Flags of a tick
-SOLVED, RELAXED, BRAKED, CAPPED = 0, 1, 2, 3
-#: In the report in place of these: the first of the links of a chain that may have given the answer; braked at its end;
-#: braked because the policy wants it; moved out of a singular configuration because it wants that
-RECOVERED, CHAIN_BRAKED, POLICY_BRAKED, ESCAPED = 4, 8, 9, 10
+#: Flag of a tick: every hard row holds
+SOLVED = 0
+#: Flag of a tick: rows that may give way do so
+RELAXED = 1
+#: Flag of a tick: no answer, the robot brakes
+BRAKED = 2
+#: Flag of a tick: the cap on iterations ended the search; v keeps the bounds
+CAPPED = 3
+#: In the report in place of a flag: the first of the links of a chain that may have given the answer
+RECOVERED = 4
+#: The same: the chain ended and the robot brakes
+CHAIN_BRAKED = 8
+#: The same: the robot brakes because the policy wants it
+POLICY_BRAKED = 9
+#: The same: moved out of a singular configuration because the policy wants it
+ESCAPED = 10
 #: Added to what a tick returns, not to what it reports: the certificate fails, or a solver has found no answer
 UNSOUND = 4
 #: A refusal, of three: nothing was changed
@@ -24,15 +35,32 @@ INFINITE = 1e30
 #: Violations up to this, in row units, are rounding; as in ``native/settings.h``
 TOLERANCE = 1e-9
 
-#: A certificate fails where a violation is above the first, or where both the bound on the error of v is above the
-#: second (a length of the characteristic one counts as 1 rad) and the optimality conditions are off by more than the
-#: third, or a row that never gives way is violated by more than the last; as in ``native/settings.h``
-SOUND, KNOWN, OPTIMAL, FIRMLY = 1e-6, 1e-3, 1e-9, 1e-8
+#: A certificate fails where a violation is above this, as in ``native/settings.h``, as do those below
+SOUND = 1e-6
+#: A certificate fails where the bound on the error of v is above this (a characteristic length counts as 1 rad) and the
+#: optimality conditions are off by more than OPTIMAL
+KNOWN = 1e-3
+#: See KNOWN
+OPTIMAL = 1e-9
+#: A certificate fails where a row that never gives way is violated by more than this
+FIRMLY = 1e-8
 
-#: What equality rows may lose [rad, or characteristic lengths, per second], from where on joints that bounds stop are
-#: not counted on, how often rows are corrected, how often the step gets shorter and by how much, and from which rate on
-#: a joint turns round; as in ``native/bend.h``
-BENDS, STRETCHED, BENDINGS, SHORTER, STEEPER, TURNING = 1e-3, 2e-2, 8, 3, 100.0, 1.0
+#: What equality rows may lose [rad, or characteristic lengths, per second]; as in ``native/bend.h``, as are those below
+BENDS = 1e-3
+#: Loss from where on joints that bounds stop are not counted on [rad, or characteristic lengths, per second]
+STRETCHED = 2e-2
+#: How often rows are corrected
+BENDINGS = 8
+#: How often the step gets shorter
+SHORTER = 3
+#: Factor of the price of a step that gets shorter
+STEEPER = 100.0
+#: Rate from which on a joint turns round [rad/s]
+TURNING = 1.0
+#: What exact rows may miss 0 at q (+) v dt by [rad, or characteristic lengths]
+EXACT = 1e-10
+#: How often exact rows are corrected
+REFINED = 24
 #: How fast a robot whose base floats loses its velocity where a tick has no answer [1/s]; as in ``native/settings.h``
 REST_RATE = 20.0
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
 from wbc.tick.native import CompiledTick
+from wbc.validation import Array
 
 
 class Context:
@@ -27,6 +31,13 @@ class Context:
     def variable(self, number: int) -> str:
         """Name of a variable of the QP."""
         return self.stack.robot.dof_names[number] if number < self.nv else self.layout.variable(number)[0]
+
+    def loop_forces(self, variables: Array) -> dict[str, Array]:
+        """Of each loop by its name, of variables of a QP [..., variables]."""
+        loops = self.stack.robot.loops
+        ends = np.cumsum([self.layout.loop_forces.start, *(len(basis) for basis in loops.bases)]).tolist()
+        parts = (variables[..., first:end] for first, end in itertools.pairwise(ends))
+        return {loop.name: part @ basis for loop, basis, part in zip(loops.loops, loops.bases, parts, strict=True)}
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:

@@ -21,7 +21,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.stack.program import ROWS_OUTPUTS, TickProgram
-from wbc.stack.rows import Rows
+from wbc.stack.rows import RowsLibrary
 from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
@@ -65,13 +65,13 @@ class GenericTick(CompiledTick):
     """
 
     def __init__(
-        self, program: TickProgram, stack: Declaration, layout: Layout, native_rows: Rows | None = None
+        self, program: TickProgram, stack: Declaration, layout: Layout, native_rows: RowsLibrary | None = None
     ) -> None:
         self._given = (program, stack, layout, native_rows)
         soft = not layout.cascade and any(at >= 0 for at in layout.price_at)
         variant = generic.Variant(layout.command, layout.cascade, soft)
         library, self._native = _library(variant), False
-        self._context = _Context(stack, layout, program)
+        self._context = _ContextStruct(stack, layout, program)
         room = int(library.wbc_generic_room(self._context.pointer)) // 8
         memory, self._tick = np.zeros(room), np.zeros(int(library.wbc_tick_size()) // 8 + 1)
         self._context.set("memory", memory.ctypes.data)
@@ -153,7 +153,7 @@ class GenericTick(CompiledTick):
             self._bound += [buffer, function, arguments, results]
 
 
-class _Context:
+class _ContextStruct:
     """The sizes and tables of a stack as ``wbc_context`` has them: numbers and addresses of eight bytes each."""
 
     def __init__(self, stack: Declaration, layout: Layout, program: TickProgram) -> None:

@@ -23,10 +23,12 @@ from wbc.tick.buffers import (
     BENDINGS,
     BENDS,
     BRAKED,
+    EXACT,
     FIRMLY,
     INFINITE,
     KNOWN,
     OPTIMAL,
+    REFINED,
     RELAXED,
     REST_RATE,
     SHORTER,
@@ -47,9 +49,14 @@ from wbc.validation import Array
 _ROUNDING = 1e-12
 #: Corrections of the active set where a solver's answer has no certificate
 POLISH_ROUNDS = 200
-#: Prices of what is held and of limits of motion where these are rows, and what brings accelerations and wrenches to
-#: rest; as in ``native/settings.h``
-HOLD_PRICE, MOTION_PRICE, STEADY, WRENCH_STEADY = 1e2, 1e-2, 1e-4, 1e-2
+#: Price of what is held where it is a row, as in ``native/settings.h``, as are those below
+HOLD_PRICE = 1e2
+#: Price of limits of motion where these are rows
+MOTION_PRICE = 1e-2
+#: Cost that brings accelerations to rest
+STEADY = 1e-4
+#: Cost that brings wrenches to rest
+WRENCH_STEADY = 1e-2
 #: What a wrench off by its unit costs beside an acceleration off by its own where a tick has no answer; as there
 WRENCH_SHARE = 1e-2
 #: Of a tick that brakes
@@ -80,6 +87,9 @@ class SolvedTick(Buffers):
         wide = np.concatenate((scales, np.ones(layout.with_slacks - layout.variables)))
         self._dof_scales = None if (scales == 1.0).all() else wide
         self._soft, self._calm = SoftRows(stack, layout), stack.calm
+        general = layout.of_form("margins", "rows")
+        exact = [bool(getattr(block.entry.item, "exact", False)) for block in general for _ in block.rows]
+        self._exact = np.array(exact, dtype=np.bool_)
         self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
         #: strict levels, None where there is one
         self.levels = Levels(assembly, stack, layout) if layout.cascade else None
@@ -144,17 +154,24 @@ class SolvedTick(Buffers):
         """
         lost, dt = self.report[self._memory["lost"]], float(self.dt[0])
         worst = self.assembly.find_lost(everything)
-        for _ in range(BENDINGS):
-            if not worst > BENDS or flag not in (SOLVED, RELAXED):
+        off = self._bent_by(worst)
+        for _ in range(BENDINGS if worst > BENDS else REFINED):
+            if not off > 1.0 or flag not in (SOLVED, RELAXED):
                 break
-            before, last = worst, self.bend.copy()
+            before, last = off, self.bend.copy()
             qp = self._bent(qp, last - lost / dt)
             flag = self._answered(qp)
             worst = self.assembly.find_lost(everything)
-            if not worst < before or flag not in (SOLVED, RELAXED):
+            off = self._bent_by(worst)
+            if not off < before or flag not in (SOLVED, RELAXED):
                 flag = self._answered(self._bent(qp, last))
                 return flag, self.assembly.find_lost(everything)
         return flag, worst
+
+    def _bent_by(self, worst: float) -> float:
+        """How far rows are from what is allowed: ``worst`` of those that bend, and what exact ones miss."""
+        missed = np.abs(self.report[self._memory["lost"]]) / self._units
+        return max(worst / BENDS, float(missed[self._exact].max(initial=0.0)) / EXACT)
 
     def _turns_round(self) -> bool:
         """Whether a joint moves fast the other way than in the last tick."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
+    from wbc.log import Log, load, save
     from wbc.track.clearance import clearances, self_clearances
-    from wbc.track.log import Log, load, save
     from wbc.track.path import Sample, SplinePath, TimedPath
     from wbc.track.path_file import read_path
     from wbc.track.presets import PRESETS, preset

@@ -1,31 +1,34 @@
-"""Distances between links and obstacles, computed anew with Coal and Pinocchio: the referee of the margins."""
+"""Distances between links and obstacles, measured anew at the logged configurations."""
 
 from __future__ import annotations
 
-import itertools
 import logging
 import pathlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wbc import validation
+from wbc.clearance import TriangleMesh
 from wbc.errors import MissingShapeError, ShapeError
+from wbc.geometry import ShapeTable, distances
 from wbc.robot import Robot
-from wbc.robot.geometry.coal_shapes import geometry_of
+from wbc.robot.geometry.bodies import raw_of
+from wbc.robot.geometry.meshes import Mesh
+from wbc.robot.geometry.styles import exact_shape
 from wbc.robot.robot import checked_robot
 from wbc.robot.sources.files import captured_stderr
-from wbc.shapes import Shape
+from wbc.shapes import Geometry
+from wbc.symbolic.joint_steps import place
 from wbc.track.setup import MovingObstacle
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
 
-#: A body of a link: the frame it is fixed to, its place there, and its geometry
-Body = tuple[int, pin.SE3, Any]
+#: A body: its shape, and where that is at a configuration (of frames that were placed, and its number)
+Body = tuple[Geometry, Callable[[pin.Data, int], pin.SE3]]
 
 
 def clearances(robot: Robot, q: Array, obstacles: Mapping[str, MovingObstacle], t: Array) -> dict[str, Array]:
@@ -58,20 +61,13 @@ def self_clearances(robot: Robot, q: Array, pairs: Iterable[tuple[str, str]]) ->
     both = [validation.strings("pairs", pair) for pair in validation.items("pairs", pairs, "pairs of links")]
     if any(len(pair) != 2 for pair in both):
         raise ShapeError("pairs", pairs, "expected pairs of links")
-    out = {(pair[0], pair[1]): np.full(len(q), np.inf) for pair in both}
-    bodies = {link: _bodies(robot, robot.check_frame("pairs", link)) for pair in out for link in pair}
+    names = list(dict.fromkeys((pair[0], pair[1]) for pair in both))
+    bodies = {link: _bodies(robot, robot.check_frame("pairs", link)) for pair in names for link in pair}
     for link, group in bodies.items():
         if not group:
             raise MissingShapeError("pairs", link, "this link has no collision shapes")
-    data, request, result = robot.model.createData(), coal.DistanceRequest(), coal.DistanceResult()
-    for k, configuration in enumerate(q):
-        pin.framesForwardKinematics(robot.model, data, configuration)
-        where = {link: [_placed(data, body) for body in group] for link, group in bodies.items()}
-        for (first, second), gaps in out.items():
-            for a, b in itertools.product(where[first], where[second]):
-                result.clear()
-                gaps[k] = min(gaps[k], coal.distance(*a, *b, request, result))
-    return out
+    found = _least(robot, q, [(bodies[a], bodies[b]) for a, b in names])
+    return dict(zip(names, found, strict=True))
 
 
 def _states(robot: Robot, q: Any) -> Array:
@@ -97,7 +93,7 @@ def least_mesh_clearance(
     bodies: dict[str, list[Body]] = {}
     for name, placement, geometry in bodies_of(robot, pin.GeometryType.COLLISION) if obstacles and len(q) else ():
         if name in lower:
-            bodies.setdefault(name, []).append((int(robot.model.getFrameId(name)), placement, geometry))
+            bodies.setdefault(name, []).append(_on_link(robot, name, placement, _shape_of(geometry)))
     best: tuple[float, str, float] | None = None
     for link, group in bodies.items():
         for k in np.argsort(lower[link], kind="stable"):
@@ -132,42 +128,46 @@ def bodies_of(robot: Robot, kind: pin.GeometryType) -> list[tuple[str, pin.SE3, 
 def _distances(
     robot: Robot, bodies: Mapping[str, list[Body]], q: Array, obstacles: Mapping[str, MovingObstacle], t: Array
 ) -> dict[str, Array]:
-    out = {link: np.full(len(q), np.inf) for link, group in bodies.items() if group and obstacles}
-    data = robot.model.createData()
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    for k in range(len(q) if out else 0):
-        pin.framesForwardKinematics(robot.model, data, q[k])
-        for obstacle in obstacles.values():
-            geometry, where = _obstacle(obstacle, t[k])
-            for link in out:
-                for body in bodies[link]:
-                    result.clear()
-                    gap = coal.distance(*_placed(data, body), geometry, where, request, result)
-                    out[link][k] = min(out[link][k], gap)
-    return out
+    around = [_moving(one, t) for one in obstacles.values()]
+    links = [link for link, group in bodies.items() if group and obstacles]
+    return dict(zip(links, _least(robot, q, [(bodies[link], around) for link in links]), strict=True))
+
+
+def _least(robot: Robot, q: Array, pairs: Sequence[tuple[Sequence[Body], Sequence[Body]]]) -> list[Array]:
+    """The least signed distance between two groups of bodies at every configuration [m], for each of some pairs."""
+    if not pairs:
+        return []
+    every = list({id(body): body for pair in pairs for group in pair for body in group}.values())
+    number = {id(body): k for k, body in enumerate(every)}
+    table, center = ShapeTable([shape for shape, _ in every]), [shape.center for shape, _ in every]
+    both = [[(number[id(a)], number[id(b)]) for a in one for b in other] for one, other in pairs]
+    (first, second), begin = np.concatenate(both).T, np.cumsum([0, *map(len, both[:-1])])
+    data, poses, out = robot.model.createData(), np.empty((len(every), 12)), np.empty((len(q), len(pairs)))
+    for k, configuration in enumerate(q):
+        pin.framesForwardKinematics(robot.model, data, configuration)
+        for i, (_, where) in enumerate(every):
+            poses[i] = place(where(data, k) * pin.SE3(np.eye(3), center[i]))
+        out[k] = np.minimum.reduceat(distances(table, poses, first, second)[:, 0], begin)
+    return list(out.T)
 
 
 def _bodies(robot: Robot, link: str) -> list[Body]:
+    return [_on_link(robot, link, placed.placement, placed.shape) for placed in robot.shapes.get(link, ())]
+
+
+def _on_link(robot: Robot, link: str, placement: pin.SE3, shape: Geometry) -> Body:
     frame = int(robot.model.getFrameId(link))
-    return [(frame, *_geometry(p.shape, p.placement)) for p in robot.shapes.get(link, ())]
+    return shape, lambda data, _: data.oMf[frame] * placement
 
 
-def _placed(data: pin.Data, body: Body) -> tuple[Any, Any]:
-    """(geometry, its pose in the world) for Coal."""
-    frame, placement, geometry = body
-    pose = data.oMf[frame] * placement
-    return geometry, coal.Transform3s(pose.rotation, pose.translation)
+def _moving(obstacle: MovingObstacle, t: Array) -> Body:
+    return obstacle.shape, lambda _, k: obstacle.at(t[k])
 
 
-def _obstacle(obstacle: MovingObstacle, t: float) -> tuple[Any, Any]:
-    pose, geometry = _geometry(obstacle.shape, obstacle.at(t))
-    return geometry, coal.Transform3s(pose.rotation, pose.translation)
-
-
-def _geometry(shape: Shape, pose: pin.SE3) -> tuple[pin.SE3, Any]:
-    """(pose of Coal's geometry, geometry) of a shape at a pose."""
-    geometry = geometry_of(shape)
-    return pose * geometry.offset, geometry.geometry
+def _shape_of(geometry: Any) -> Geometry:
+    """A body of a description as a shape."""
+    raw = raw_of(geometry)
+    return TriangleMesh(raw.vertices[raw.triangles]) if isinstance(raw, Mesh) else exact_shape(raw)
 
 
 def _moves(robot: Robot, link: str) -> bool:

@@ -6,16 +6,26 @@ import base64
 import html
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.errors import WbcError
 from wbc.track.summary import Figure
 from wbc.validation import Array
 
 FILE = "report.html"
-#: Width and height of a strip, and of a bar chart [pixels]; bars of a histogram; strips that are shown at most
-WIDE, STRIP, TALL, BARS, STRIPS = 860, 15, 150, 60, 40
+#: Width of a strip [pixels]
+WIDE = 860
+#: Height of a strip [pixels]
+STRIP = 15
+#: Height of a bar chart [pixels]
+TALL = 150
+#: Bars of a histogram, at most
+BARS = 60
+#: Strips that are shown, at most
+STRIPS = 40
 #: Pictures that are larger are linked, so that the page stays small [bytes]
 LARGEST = 1 << 20
 STYLE = """
@@ -159,7 +169,7 @@ class RunPage:
         return file
 
 
-def stretches(flags: Array) -> list[tuple[int, int]]:
+def stretches(flags: NDArray[Any]) -> list[tuple[int, int]]:
     """(first, one after the last) of every stretch of set flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(flags, dtype=np.int8), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

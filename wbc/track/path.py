@@ -22,8 +22,10 @@ from wbc.validation import Array
 #: Consecutive orientations may be at most this far apart [rad]; beyond it, the direction of the turn is ambiguous.
 LARGEST_TURN = math.radians(170.0)
 
-#: Shortest time between poses, and longest path [s]: powers up to the fifth of times are added
-SHORTEST, LONGEST = 1e-6, 1e9
+#: Shortest time between poses [s]
+SHORTEST = 1e-6
+#: Longest path [s]: powers up to the fifth of times are added
+LONGEST = 1e9
 
 #: The spline of quaternions may not come nearer to zero than this, where its direction is badly defined.
 SHORTEST_QUATERNION = 0.2
@@ -130,7 +132,7 @@ class SplinePath:
             raise RangeError("path.poses", f"t = {at:.3g} s", "orientations change too unevenly here; add poses")
 
 
-class Approach:
+class ApproachedPath:
     """First a path from a pose to the start of another path, then that path. Both are at rest where they meet."""
 
     def __init__(self, start: pin.SE3, path: TimedPath, duration: float) -> None:

@@ -12,7 +12,7 @@ import json
 import os
 import pathlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,9 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
         missing = isinstance(error, FileNotFoundError)
         reason = validation.no_such(path) if missing else f"cannot be read: {error}"
         raise PathFileError("path", str(path), reason) from error
-    table = _from_csv(path, text) if path.suffix.lower() == ".csv" else _from_tables(path, text)
+    table = csv_rows(path, text, COLUMNS) if path.suffix.lower() == ".csv" else _from_tables(path, text)
+    if not text.strip():
+        raise PathFileError("path", str(path), "the file is empty")
     if len(table) < 2:
         raise PathFileError("path", str(path), f"expected at least two waypoints, found {len(table)}")
     for label, numbers in table:
@@ -64,22 +66,32 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
     return SplinePath(values[:, 0], list(values[:, 1:]))
 
 
-def _from_csv(path: pathlib.Path, text: str) -> list[tuple[str, np.ndarray]]:
-    """(label, eight numbers in the order of COLUMNS) of each line."""
+def csv_rows(
+    path: pathlib.Path, text: str, columns: Sequence[str], together: Sequence[str] = (), ignored: Sequence[str] = ()
+) -> list[tuple[str, np.ndarray]]:
+    """(label, numbers in the order of the columns) of each line; empty lines and comments with # do not count.
+
+    Args:
+        columns: these have to be there. together: all of these, or none; their numbers follow. ignored: may be there.
+
+    Raises:
+        UnknownNameError: another column. ShapeError: one that is missing or there twice, or cells that are no numbers.
+    """
     lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    rows = [(n, next(csv.reader([line]))) for n, line in lines]
+    rows = [(n, [cell.strip() for cell in next(csv.reader([line]))]) for n, line in lines]
     if not rows:
-        raise PathFileError("path", str(path), "the file is empty")
-    header = [name.strip() for name in rows[0][1]]
+        return []
+    header, known = rows[0][1], (*columns, *together, *ignored)
     for name in header:
-        if name not in COLUMNS:
-            raise UnknownNameError(f"{path.name} column", name, COLUMNS)
-    missing = [name for name in COLUMNS if name not in header]
+        if name not in known:
+            raise UnknownNameError(f"{path.name} column", name, known)
+    wanted = (*columns, *(together if set(together) & set(header) else ()))
+    missing = [name for name in wanted if name not in header]
     if missing:
-        raise ShapeError(f"{path.name} columns", header, f"missing {', '.join(missing)}", nearest(missing[0], COLUMNS))
+        raise ShapeError(f"{path.name} columns", header, f"missing {', '.join(missing)}", nearest(missing[0], known))
     if len(set(header)) != len(header):
         raise ShapeError(f"{path.name} columns", header, "a column is there twice")
-    order = [header.index(name) for name in COLUMNS]
+    order = [header.index(name) for name in wanted]
     out = []
     for number, cells in rows[1:]:
         if len(cells) != len(header):

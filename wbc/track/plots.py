@@ -11,9 +11,11 @@ import numpy as np
 import pinocchio as pin
 
 from wbc import style
+from wbc.log import Log
+from wbc.log.plots import LogPanel, over_time, save_each, tick_histogram
 from wbc.robot import Robot
 from wbc.shapes import Sphere
-from wbc.track.log import Log
+from wbc.track.page import stretches
 from wbc.track.scene import ELBOW, Scene
 from wbc.track.summary import position_errors, rotation_angles
 from wbc.validation import Array
@@ -23,55 +25,40 @@ def save_plots(log: Log, folder: pathlib.Path, progress: Callable[[str], None] |
     """Write the plots that the log has data for; returns the files. An empty log gives none.
 
     joints, velocities, accelerations (with their limits), errors, plane (commanded and reached), clearance (by link,
-    computed with Coal), tick_time.
+    measured anew), tick_time.
     """
     if len(log) == 0:
         return []
-    plots: dict[str, Callable[[Any, Log], Any]] = {
-        "joints": lambda plt, log: _dofs(plt, log, "q", "Joint positions", ("position_lower", "position_upper")),
-        "velocities": lambda plt, log: _dofs(plt, log, "v", "Joint velocities", ("velocity",)),
-        "accelerations": lambda plt, log: _dofs(plt, log, "a", "Joint accelerations", ("acceleration",)),
-        "errors": _errors,
-        "tick_time": _tick_time,
+    draws: dict[str, Callable[[Any], Any]] = {
+        "joints": lambda plt: _dofs(plt, log, "q", "Joint positions", ("position_lower", "position_upper")),
+        "velocities": lambda plt: _dofs(plt, log, "v", "Joint velocities", ("velocity",)),
+        "accelerations": lambda plt: _dofs(plt, log, "a", "Joint accelerations", ("acceleration",)),
+        "errors": lambda plt: _errors(plt, log),
+        "tick_time": lambda plt: tick_histogram(
+            plt, log["tick"], f"Tick time, {len(log)} ticks, {log.meta['solver']} ({log.meta['backend']})"
+        ),
     }
     if "plane.command" in log:
-        plots["plane"] = _plane
+        draws["plane"] = lambda plt: _plane(plt, log)
     if log.group("clearance"):
-        plots["clearance"] = _clearance
-    files = []
-    with style.pyplot() as plt:
-        for name, draw in plots.items():
-            figure = draw(plt, log)
-            files.append(folder / f"{name}.png")
-            figure.savefig(files[-1])
-            plt.close(figure)
-            if progress is not None:
-                progress(name)
-    return files
+        draws["clearance"] = lambda plt: _clearance(plt, log)
+    return save_each(draws, folder, progress)
 
 
 def _dofs(plt: Any, log: Log, group: str, title: str, limits: tuple[str, ...]) -> Any:
     """A panel for each degree of freedom that has a curve, forbidden ranges shaded."""
     curves = {name: values for name, values in log.group(group).items() if name in log.meta["dofs"]}
-    columns = 2 if len(curves) <= 8 else 4
-    rows = math.ceil(len(curves) / columns)
-    size = (4.6 * columns, 1.45 * rows + 0.9) if columns == 2 else (3.4 * columns, 1.35 * rows + 0.9)
-    figure, axes = plt.subplots(rows, columns, figsize=size, sharex=True, layout="constrained", squeeze=False)
-    for panel, (name, values) in zip(axes.flat, curves.items(), strict=False):
-        index = log.meta["dofs"].index(name)
-        low, high = _range(log, limits, index)
-        panel.plot(log["t"], values, color=style.BLUE)
-        _shade(panel, values, low, high)
-        panel.set_title(name, fontsize=10)
-        panel.set_ylabel(log.units[f"{group}.{name}"])
-    for panel in axes.flat[len(curves) :]:
-        panel.set_visible(False)
-    for panel in axes.flat[max(0, len(curves) - columns) : len(curves)]:
-        panel.xaxis.set_tick_params(labelbottom=True)
-    figure.supxlabel("time [s]", fontsize=11, color=style.INK)
+    panels = [
+        LogPanel(
+            log.units[f"{group}.{name}"],
+            [(values, style.BLUE, "")],
+            *_range(log, limits, log.meta["dofs"].index(name)),
+            name,
+        )
+        for name, values in curves.items()
+    ]
     shaded = "" if all(x is None for name in limits for x in log.meta["limits"][name]) else ", limits in red"
-    figure.suptitle(f"{title}{shaded}", x=0.01, ha="left", fontweight="bold", fontsize=13)
-    return figure
+    return over_time(plt, log["t"], panels, f"{title}{shaded}", 2 if len(panels) <= 8 else 4)
 
 
 def _range(log: Log, limits: tuple[str, ...], index: int) -> tuple[float, float]:
@@ -84,20 +71,6 @@ def _range(log: Log, limits: tuple[str, ...], index: int) -> tuple[float, float]
     return (-math.inf, math.inf) if values[0] is None else (-float(values[0]), float(values[0]))
 
 
-def _shade(panel: Any, values: Array, low: float, high: float) -> None:
-    """Show the limits where they are within twice the curve's span, and say where they are if they are not."""
-    bottom, top = float(values.min()), float(values.max())
-    pad = 0.12 * max(top - bottom, 1e-3)
-    if all(math.isfinite(x) for x in (low, high)):
-        bottom, top = min(bottom, low), max(top, high)
-        pad = 0.06 * (top - bottom)
-    panel.set_ylim(bottom - pad, top + pad)
-    for edge, end in ((low, bottom - pad), (high, top + pad)):
-        if math.isfinite(edge):
-            panel.axhspan(*sorted((edge, end)), color=style.RED, alpha=0.12, lw=0)
-            panel.axhline(edge, color=style.RED, lw=1.0)
-
-
 def _errors(plt: Any, log: Log) -> Any:
     """Position and rotation error of the frame, and of the elbow plane where there is one."""
     curves = [("position error [mm]", 1e3 * position_errors(log), style.BLUE)]
@@ -105,20 +78,11 @@ def _errors(plt: Any, log: Log) -> Any:
         curves.append(("rotation error [deg]", np.degrees(rotation_angles(log)), style.PURPLE))
     if "plane.command" in log:
         curves.append(("elbow plane error [deg]", np.degrees(log["error.plane.plane"]), style.ORANGE))
-    figure, axes = plt.subplots(
-        len(curves), 1, figsize=(9.2, 1.9 * len(curves) + 0.8), sharex=True, layout="constrained", squeeze=False
-    )
-    for panel, (label, values, colour) in zip(axes[:, 0], curves, strict=True):
-        panel.plot(log["t"], values, color=colour)
-        panel.set_ylabel(label)
-        panel.margins(x=0.01)
-        if values.min() >= 0.0:
-            panel.set_ylim(bottom=0.0)
-        _mark(panel, log)
-    axes[-1, 0].set_xlabel("time [s]")
-    title = f"Task errors of {log.meta['frame']}"
-    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=13)
-    _mark_legend(axes[0, 0], log)
+    panels = [LogPanel(label, [(values, colour, "")]) for label, values, colour in curves]
+    figure = over_time(plt, log["t"], panels, f"Task errors of {log.meta['frame']}")
+    for axis in figure.axes:
+        _mark(axis, log)
+    _mark_legend(figure.axes[0], log)
     return figure
 
 
@@ -154,27 +118,16 @@ def _clearance(plt: Any, log: Log) -> Any:
     panel.set_xlabel("time [s]")
     panel.set_ylabel("distance to the nearest obstacle [mm]")
     panel.margins(x=0.01)
-    panel.set_title("Clearance of the links' shapes, computed with Coal", fontsize=13)
+    panel.set_title("Clearance of the links' shapes", fontsize=13)
     panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
-def _tick_time(plt: Any, log: Log) -> Any:
-    """Histogram of the time that controller.step took."""
-    tick = log["tick"]
-    return style.tick_histogram(
-        plt, tick, f"Tick time, {len(tick)} ticks, {log.meta['solver']} ({log.meta['backend']})"
-    )
-
-
 def _mark(panel: Any, log: Log) -> None:
     """Shade the ticks at which an obstacle binds."""
-    flags = _obstacle_binds(log)
-    if flags.any():
-        t, dt = log["t"], log.meta["dt"]
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-        for start, end in zip(edges[::2], edges[1::2], strict=True):
-            panel.axvspan(t[start], t[end - 1] + dt, color=style.RED, alpha=0.10, lw=0)
+    t, dt = log["t"], log.meta["dt"]
+    for start, end in stretches(_obstacle_binds(log)):
+        panel.axvspan(t[start], t[end - 1] + dt, color=style.RED, alpha=0.10, lw=0)
 
 
 def _mark_legend(panel: Any, log: Log) -> None:

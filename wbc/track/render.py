@@ -1,21 +1,21 @@
-"""A small renderer for still pictures: triangles, depth buffer, one light with shadows, a floor.
+"""The renderer of all pictures and films: triangles, depth buffer, one light with shadows, a floor.
 
 It exists because a plotting library sorts whole surfaces by their distance, which draws an arm through itself. Plain
-numpy, a few seconds a picture; it is no viewer.
+numpy, without a screen: a few seconds a still picture, a tenth of a second a picture of a film; it is no viewer.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
+from wbc.shapes import PlacedShape
 from wbc.validation import Array
 
 #: Arrays of other kinds of numbers: single precision, indices, masks
@@ -27,6 +27,10 @@ AT_ONCE = 1_000_000
 SHADOW_MAP = 1200
 #: Looks at the shadow map for each pixel
 LOOKS = 8
+#: Vertical angle of view [rad]
+VIEW = math.radians(16.0)
+#: Part of a picture's width or height that what it shows takes
+FILLED = 0.90
 LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 
 
@@ -93,39 +97,60 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """What is visible at each pixel of one set of meshes: depth (inf: nothing), normal and colour."""
+    """What is visible at each pixel of one set of meshes.
+
+    Attributes:
+        depth: distance along the view [m], inf where nothing is; height x width.
+        owner: number of the triangle, -1 where nothing is; height x width.
+        normals, colours: of the triangles, m x 3.
+    """
 
     depth: Numbers
-    normal: Array
-    colour: Array
+    owner: Numbers
+    normals: Array
+    colours: Array
+
+
+def framed(
+    points: Array, size: tuple[int, int], azimuth: float, elevation: float, view: float = VIEW, filled: float = FILLED
+) -> Camera:
+    """A camera that looks so that points, n x 3 [m], fill the picture.
+
+    Args:
+        size: width and height [pixels]. azimuth, elevation: side and height that they are seen from [rad].
+        view: vertical angle of view [rad]. filled: part of the picture's width or height that they take.
+    """
+    flat, middle = math.cos(elevation), np.array(size) / 2
+    direction = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
+    target, distance = points.mean(axis=0), 8.0
+    for _ in range(6):
+        camera = Camera(target + distance * direction, target, view, *size)
+        screen = camera.project(points)[:, :2]
+        low, high = screen.min(axis=0), screen.max(axis=0)
+        off = (low + high) / 2 - middle
+        right, up, _ = camera.axes
+        target = target + (off[0] * right - off[1] * up) * distance / camera.focal
+        distance *= float(np.max((high - low) / (2.0 * filled * middle)))
+    return Camera(target + distance * direction, target, view, *size)
 
 
 def draw(meshes: Sequence[ColouredMesh], camera: Camera) -> Layer:
     """The nearest surfaces."""
-    size = camera.width * camera.height
-    nearness = np.full(size, np.inf, dtype=np.float32)
-    owner = np.full(size, -1, dtype=np.int64)
-    normals, colours, start = [], [], 0
-    for mesh in meshes:
-        screen = camera.project(mesh.triangles)
-        ahead = np.flatnonzero((screen[..., 2] > 0.05).all(axis=1))
-        screen = screen[ahead]
-        # In a picture with perspective the inverse of depth is linear, not depth
-        screen[..., 2] = -1.0 / screen[..., 2]
-        edges = mesh.triangles[:, 1:] - mesh.triangles[:, :1]
-        normal = np.cross(edges[:, 0], edges[:, 1])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-        _fill(screen, ahead + start, nearness, owner, camera.width, camera.height)
-        normals.append(normal)
-        colours.append(np.broadcast_to(mesh.colour, (len(normal), 3)))
-        start += len(mesh.triangles)
-    normals.append(np.zeros((1, 3)))
-    colours.append(np.zeros((1, 3)))
-    shape = (camera.height, camera.width)
-    depth = np.where(owner >= 0, -1.0 / nearness, np.inf)
-    return Layer(
-        depth.reshape(shape), np.vstack(normals)[owner].reshape(*shape, 3), np.vstack(colours)[owner].reshape(*shape, 3)
-    )
+    nearness = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
+    owner = np.full(camera.width * camera.height, -1, dtype=np.int64)
+    every = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
+    shades = np.array([mesh.colour for mesh in meshes]).reshape(-1, 3)
+    colours = np.repeat(shades, [len(mesh.triangles) for mesh in meshes], axis=0)
+    screen = camera.project(every)
+    ahead = np.flatnonzero((screen[..., 2] > 0.05).all(axis=1))
+    screen = screen[ahead]
+    # In a picture with perspective the inverse of depth is linear, not depth
+    screen[..., 2] = -1.0 / screen[..., 2]
+    _fill(screen, ahead, nearness, owner, camera.width, camera.height)
+    normals = np.cross(every[:, 1] - every[:, 0], every[:, 2] - every[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    depth, shape = np.where(owner >= 0, -1.0 / nearness, np.inf), (camera.height, camera.width)
+    return Layer(depth.reshape(shape), owner.reshape(shape), normals, colours)
 
 
 class Shadows:
@@ -169,7 +194,8 @@ def shade(layer: Layer, camera: Camera, shadows: Shadows | None) -> tuple[Number
     rays = camera.rays(seen)
     points = camera.eye + rays * layer.depth[seen][:, None]
     view = -rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    normal = layer.normal[seen]
+    owner = layer.owner[seen]
+    normal = layer.normals[owner]
     normal = np.where(np.sum(normal * view, axis=1, keepdims=True) < 0.0, -normal, normal)
     lambert = np.clip(normal @ LIGHT, 0.0, 1.0)
     lit = np.ones(len(points)) if shadows is None else shadows.lit(points + 0.006 * normal, 0.006)
@@ -177,7 +203,31 @@ def shade(layer: Layer, camera: Camera, shadows: Shadows | None) -> tuple[Number
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     shine = np.clip(np.sum(normal * half, axis=1), 0.0, 1.0) ** 40
     light = 0.43 + 0.13 * normal[:, 2] + 0.52 * lambert * lit
-    return seen, np.clip(layer.colour[seen] * light[:, None] + (0.16 * shine * lit)[:, None], 0.0, 1.0)
+    return seen, np.clip(layer.colours[owner] * light[:, None] + (0.16 * shine * lit)[:, None], 0.0, 1.0)
+
+
+class Backdrop:
+    """What stands still in a film, drawn once with its depth on white.
+
+    Args:
+        meshes: what stands still. camera: of all pictures.
+    """
+
+    def __init__(self, meshes: Sequence[ColouredMesh], camera: Camera) -> None:
+        self._camera, self._depth = camera, np.full((camera.height, camera.width), np.inf)
+        self._image = np.ones((camera.height, camera.width, 3), dtype=np.float32)
+        self._image, self._depth = self._drawn(meshes)
+
+    def over(self, meshes: Sequence[ColouredMesh]) -> Numbers:
+        """The picture with meshes before and behind what stands still, height x width x 3 in 0..1."""
+        return self._drawn(meshes)[0]
+
+    def _drawn(self, meshes: Sequence[ColouredMesh]) -> tuple[Numbers, Numbers]:
+        layer = draw(meshes, self._camera)
+        layer = replace(layer, depth=np.where(layer.depth < self._depth, layer.depth, np.inf))
+        image = self._image.copy()
+        seen, image[seen] = shade(layer, self._camera, None)
+        return image, np.minimum(layer.depth, self._depth)
 
 
 def floor(camera: Camera, shadows: Shadows, height: float, center: Array, radius: float) -> tuple[Array, Array]:
@@ -214,9 +264,10 @@ def occlusion(depth: Array, width: float) -> Array:
 
 def reduced(image: Array, factor: int) -> Array:
     """Means over blocks of factor x factor pixels."""
-    h, w = image.shape[0] // factor, image.shape[1] // factor
-    blocks = image[: h * factor, : w * factor].reshape(h, factor, w, factor, -1)
-    return np.asarray(blocks.mean(axis=(1, 3)))
+    h, w = factor * (image.shape[0] // factor), factor * (image.shape[1] // factor)
+    # numpy adds a few large arrays many times faster than it takes means along short axes
+    parts = [image[row:h:factor, column:w:factor] for row in range(factor) for column in range(factor)]
+    return np.asarray(sum(parts[1:], start=parts[0].copy()) / factor**2)
 
 
 def sphere(center: Array, radius: float, colour: tuple[float, float, float]) -> ColouredMesh:
@@ -270,7 +321,7 @@ def _fill(screen: Array, names: Numbers, least: Numbers, owner: Numbers, width: 
         names: m numbers.
         least, owner: what is kept, height * width.
     """
-    low, high = screen[..., 1].min(axis=1), screen[..., 1].max(axis=1)
+    low, high = _extremes(screen[..., 1])
     first = np.clip(np.ceil(low - 0.5), 0, height).astype(np.int64)
     rows = np.maximum(np.clip(np.floor(high - 0.5), -1, height - 1).astype(np.int64) - first + 1, 0)
     a, b, c = screen[:, 0], screen[:, 1] - screen[:, 0], screen[:, 2] - screen[:, 0]
@@ -284,7 +335,7 @@ def _fill(screen: Array, names: Numbers, least: Numbers, owner: Numbers, width: 
     left, right = _crossings(screen[triangle], row + 0.5)
     start = np.clip(np.ceil(left - 0.5 - 1e-4), 0, width).astype(np.int64)
     count = np.maximum(np.clip(np.floor(right - 0.5 + 1e-4), -1, width - 1).astype(np.int64) - start + 1, 0)
-    bottom, top = screen[..., 2].min(axis=1), screen[..., 2].max(axis=1)
+    bottom, top = _extremes(screen[..., 2])
     for part in np.array_split(np.arange(len(row)), max(1, int(count.sum()) // AT_ONCE)):
         span, step = _each(count[part])
         span = part[span]
@@ -298,13 +349,19 @@ def _fill(screen: Array, names: Numbers, least: Numbers, owner: Numbers, width: 
         owner[pixel[kept]] = names[who[kept]]
 
 
+def _extremes(corners: Array) -> tuple[Array, Array]:
+    """Least and largest of three numbers, m x 3; much faster than along an axis."""
+    a, b, c = corners.T
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def _each(counts: Numbers) -> tuple[Numbers, Numbers]:
     """For each of ``counts[k]`` things of k: k, and its number among them."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _crossings(triangles: Array, y: Array) -> tuple[Array, Array]:
+def _crossings(triangles: Array, y: Numbers) -> tuple[Array, Array]:
     """Leftmost and rightmost column of each triangle on a line at height y; (inf, -inf) where they do not meet."""
     left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
     for k in range(3):
@@ -317,44 +374,7 @@ def _crossings(triangles: Array, y: Array) -> tuple[Array, Array]:
     return left, right
 
 
-#: Points round a circle, and circles on a half sphere
-AROUND, RINGS = 48, 12
-
-
 def triangles(placed: PlacedShape) -> Array:
     """The shape's surface in the link's frame, m x 3 x 3 [m]."""
     place: pin.SE3 = placed.placement
-    return np.asarray(_surface(placed.shape) @ place.rotation.T + place.translation)
-
-
-def _surface(shape: Solid) -> Array:
-    if isinstance(shape, Box):
-        corners = np.array(np.meshgrid(*([-0.5, 0.5],) * 3)).reshape(3, -1).T
-        return _hull(corners * np.array(shape.size))
-    if isinstance(shape, Convex):
-        return _hull(shape.points)
-    if isinstance(shape, Cylinder):
-        half = shape.length / 2
-        return _turned(np.array([[0.0, -half], [shape.radius, -half], [shape.radius, half], [0.0, half]]))
-    assert isinstance(shape, (Sphere, Capsule))
-    half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
-    angle = np.linspace(0.0, math.pi / 2, RINGS + 1)
-    cap = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) + np.array([0.0, half])
-    return _turned(np.concatenate([cap[::-1] * np.array([1.0, -1.0]), cap]))
-
-
-def _hull(points: Array) -> Array:
-    from scipy.spatial import ConvexHull
-
-    return np.asarray(points[ConvexHull(points).simplices])
-
-
-def _turned(profile: Array) -> Array:
-    """The surface that points (distance from z, height), n x 2, sweep round the z axis."""
-    angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
-    wide, height = profile[:, :1], np.broadcast_to(profile[:, 1:], (len(profile), AROUND))
-    rings = np.stack([wide * np.cos(angle), wide * np.sin(angle), height], axis=2)
-    a, b = rings[:-1], rings[1:]
-    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
-    both = [np.stack(corners, axis=2).reshape(-1, 3, 3) for corners in ([a, b, d], [a, d, c])]
-    return np.concatenate(both)
+    return np.asarray(placed.shape.triangles() @ place.rotation.T + place.translation)

@@ -8,13 +8,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wbc.controller import Status
-from wbc.track.log import Log
+from wbc.log import Log
 from wbc.track.page import RunPage, stretches
 from wbc.track.run import STATUSES
 from wbc.track.summary import Figure, position_errors
 
-#: Off its target by less than this the frame followed [m]; what a margin or limit may be off by rounding
-FOLLOWED, ROUNDING = 1e-3, 1e-6
+#: A frame that is off its target by less than this followed it [m]
+FOLLOWED = 1e-3
+#: What a margin or limit may be off by rounding
+ROUNDING = 1e-6
 #: Conflicts that are explained
 EXPLAINED = 5
 

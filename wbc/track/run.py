@@ -22,10 +22,10 @@ import pinocchio as pin
 from wbc import validation
 from wbc.api import Controller
 from wbc.controller import Status, Step, core_of
+from wbc.log import Log, TickRecorder
 from wbc.shapes import Sphere
 from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance
-from wbc.track.log import Log
 from wbc.track.setup import PathRun
 from wbc.validation import Array
 
@@ -69,11 +69,11 @@ def track(
     recorder = RunRecorder(plan, controller)
     with connection:
         _loop(plan, controller, connection, recorder, progress, stop)
-    columns, units = recorder.columns()
-    robot, obstacles, t = plan.robot, plan.obstacles, recorder.times
-    gaps = clearances(robot, recorder.q, obstacles, t)
-    for name, values in gaps.items():
-        columns[f"clearance.{name}"], units[f"clearance.{name}"] = values, "m"
+    log, robot, obstacles = recorder.log(), plan.robot, plan.obstacles
+    q, t = log.array("q"), log["t"]
+    gaps = clearances(robot, q, obstacles, t)
+    columns = {**log.columns, **{f"clearance.{name}": values for name, values in gaps.items()}}
+    units = {**log.units, **{f"clearance.{name}": "m" for name in gaps}}
     meta = _meta(plan, controller, recorder, compile_time)
     if plant is not None:
         meta["integration"] = f"plant {type(plant).__name__}"
@@ -81,7 +81,7 @@ def track(
         when, step = recorder.worst
         said = [str(reason) for reason in step.explain().reasons if reason.task == "hand"]
         meta["hindrance"] = {"t": when, "text": " ".join(said)}
-    nearest = least_mesh_clearance(robot, recorder.q, obstacles, t, gaps)
+    nearest = least_mesh_clearance(robot, q, obstacles, t, gaps)
     if nearest is not None:
         meta["mesh_clearance"] = dict(zip(("least", "link", "t"), nearest, strict=True))
     return Log(columns, units, meta)
@@ -143,9 +143,9 @@ def _meta(plan: PathRun, controller: Controller, recorder: RunRecorder, compile_
         "kind": plan.kind,
         "path": plan.label,
         "duration": plan.path.duration,
-        "ticks": recorder.count,
+        "ticks": len(recorder),
         "planned": plan.ticks,
-        "interrupted": recorder.count < plan.ticks,
+        "interrupted": len(recorder) < plan.ticks,
         "dt": plan.dt,
         "integration": "q <- q (+) v dt, open loop",
         "solver": controller.solver,
@@ -175,108 +175,74 @@ def _meta(plan: PathRun, controller: Controller, recorder: RunRecorder, compile_
 
 
 class RunRecorder:
-    """Columns of a run that grow by one tick with each :meth:`add`."""
+    """Columns of a run that grow by one tick with each :meth:`add`.
+
+    Attributes:
+        worst: time and step of the tick that was farthest from its target, None where all were near.
+    """
 
     def __init__(self, plan: PathRun, controller: Controller) -> None:
-        n, robot = plan.ticks, plan.robot
-        self._plan = plan
-        self._data = robot.model.createData()
-        self._frame = int(robot.model.getFrameId(plan.frame))
-        blocks = core_of(controller).layout.blocks
-        self._tasks = {name: b.rows for name, b in blocks.items() if b.form == "task"}
-        self._margins = {name: b.rows for name, b in blocks.items() if b.form == "margins"}
-        self.count = 0
-        self._t = np.zeros(n)
-        self._q, self._v = np.zeros((n, robot.nq)), np.zeros((n, robot.nv))
-        self._pose, self._target = np.zeros((n, 7)), np.zeros((n, 7))
-        self._errors = {name: np.zeros((n, len(rows))) for name, rows in self._tasks.items()}
-        self._heights = {name: np.zeros((n, len(rows))) for name, rows in self._margins.items()}
-        self._plane = np.full(n, math.nan)
-        self._faded = np.zeros(n, dtype=bool)
-        self._status, self._iterations = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int32)
-        self._bound, self._tick = np.zeros(n), np.zeros(n)
-        self._binding: dict[str, Array] = {}
-        self._relaxed: dict[str, Array] = {}
-        self._relaxed_units: dict[str, str] = {}
-        #: time and step of the tick that was farthest from its target, None where all were near
+        self._plan, robot = plan, plan.robot
+        self._data, self._frame = robot.model.createData(), int(robot.model.getFrameId(plan.frame))
+        self._ticks = TickRecorder(_columns(plan, controller), {}, plan.ticks)
+        self._binding: dict[str, list[int]] = {}
+        self._relaxed: dict[tuple[str, str], list[tuple[int, float]]] = {}
         self.worst: tuple[float, Step] | None = None
         self._farthest = MISSED
 
-    @property
-    def q(self) -> Array:
-        """Configurations so far."""
-        return self._q[: self.count]
-
-    @property
-    def times(self) -> Array:
-        """Times so far [s]."""
-        return self._t[: self.count]
+    def __len__(self) -> int:
+        return len(self._ticks)
 
     def add(self, t: float, q: Array, target: pin.SE3, angle: float, step: Step, seconds: float) -> None:
         """Record a tick; it counts only when all of it is written."""
-        k, n = self.count, len(self._t)
-        self._t[k], self._q[k], self._v[k] = t, q, step.v
         pin.framesForwardKinematics(self._plan.robot.model, self._data, q)
-        self._pose[k] = pin.SE3ToXYZQUAT(self._data.oMf[self._frame])
-        self._target[k] = pin.SE3ToXYZQUAT(target)
-        off = float(np.linalg.norm(self._pose[k, :3] - self._target[k, :3]))
+        pose, aim = (pin.SE3ToXYZQUAT(place) for place in (self._data.oMf[self._frame], target))
+        off = float(np.linalg.norm(pose[:3] - aim[:3]))
         if off > self._farthest:
             self._farthest, self.worst = off, (t, step)
-        for name, residual in step.residuals.items():
-            self._errors[name][k] = residual.values
-        for name, margins in step.margins.items():
-            self._heights[name][k] = margins
-        self._plane[k] = angle
-        self._faded[k] = "plane" in step.faded
-        self._status[k] = STATUSES.index(step.status)
-        self._iterations[k] = step.iterations
-        self._bound[k], self._tick[k] = step.certificate.error_bound, seconds
-        for row in step.binding:
-            self._binding.setdefault(str(row), np.zeros(n, dtype=bool))[k] = True
+        errors = [residual.values for residual in step.residuals.values()]
+        plane = [] if self._plan.plane is None else [angle, angle + step.residuals["plane"].values[0]]
+        faded = [] if self._plan.plane is None else ["plane" in step.faded]
+        ending = [STATUSES.index(step.status), step.iterations, step.certificate.error_bound, seconds]
+        row = np.concatenate([[t], q, step.v, pose, aim, *errors, plane, faded, *step.margins.values(), ending])
+        self._ticks.extend(row[None])
+        tick = len(self) - 1
+        for binds in step.binding:
+            self._binding.setdefault(str(binds), []).append(tick)
         for slack in step.relaxed:
-            label = f"{slack.item}/{slack.row}"
-            self._relaxed_units[label] = slack.unit
-            self._relaxed.setdefault(label, np.zeros(n))[k] = slack.amount
-        self.count = k + 1
+            self._relaxed.setdefault((f"{slack.item}/{slack.row}", slack.unit), []).append((tick, slack.amount))
 
-    def columns(self) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-        """(columns, units) of the ticks so far; see :class:`wbc.track.Log`."""
-        robot, dt = self._plan.robot, self._plan.dt
-        out: dict[str, np.ndarray] = {}
-        units: dict[str, str] = {}
+    def log(self) -> Log:
+        """The ticks so far; see :class:`wbc.log.Log`."""
+        log, robot, n = self._ticks.log(), self._plan.robot, len(self)
+        columns, units = dict(log.columns), dict(log.units)
+        for name, unit in zip(robot.dof_names, robot.dof_units, strict=True):
+            columns[f"a.{name}"] = np.diff(columns[f"v.{name}"], prepend=0.0) / self._plan.dt
+            units[f"a.{name}"] = f"{unit}/s^2"
+        for label, ticks in sorted(self._binding.items()):
+            columns[f"binding.{label}"] = np.isin(np.arange(n), ticks)
+            units[f"binding.{label}"] = ""
+        for (label, unit), amounts in sorted(self._relaxed.items()):
+            name = f"relaxed.{label}"
+            columns[name], units[name] = np.zeros(n), unit
+            columns[name][[k for k, _ in amounts]] = [amount for _, amount in amounts]
+        return Log(columns, units, {})
 
-        def put(name: str, values: np.ndarray, unit: str = "") -> None:
-            out[name], units[name] = values[: self.count].copy(), unit
 
-        put("t", self._t, "s")
-        coordinates = {int(i): k for k, i in enumerate(robot.position_index) if i >= 0}
-        for i in range(robot.nq):
-            dof = coordinates.get(i)
-            name = str(i) if dof is None else robot.dof_names[dof]
-            put(f"q.{name}", self._q[:, i], "" if dof is None else robot.dof_units[dof])
-        before = np.vstack([np.zeros(robot.nv), self._v[:-1]])
-        for k, (name, unit) in enumerate(zip(robot.dof_names, robot.dof_units, strict=True)):
-            put(f"v.{name}", self._v[:, k], f"{unit}/s")
-            put(f"a.{name}", (self._v[:, k] - before[:, k]) / dt, f"{unit}/s^2")
-        for k, name in enumerate(POSE):
-            put(f"pose.{name}", self._pose[:, k], "m" if k < 3 else "")
-            put(f"target.{name}", self._target[:, k], "m" if k < 3 else "")
-        for task, rows in self._tasks.items():
-            for k, row in enumerate(rows):
-                put(f"error.{task}.{row.label}", self._errors[task][:, k], row.unit)
-        if self._plan.plane is not None:
-            put("plane.command", self._plane, "rad")
-            put("plane.angle", self._plane + self._errors["plane"][:, 0], "rad")
-            put("plane.faded", self._faded)
-        for item, rows in self._margins.items():
-            for k, row in enumerate(rows):
-                put(f"margin.{item}.{row.label}", self._heights[item][:, k], row.unit)
-        put("status", self._status)
-        put("iterations", self._iterations)
-        put("error_bound", self._bound, "rad/s")
-        put("tick", self._tick, "s")
-        for label, flags in sorted(self._binding.items()):
-            put(f"binding.{label}", flags)
-        for label, amounts in sorted(self._relaxed.items()):
-            put(f"relaxed.{label}", amounts, self._relaxed_units[label])
-        return out, units
+def _columns(plan: PathRun, controller: Controller) -> dict[str, tuple[str, str]]:
+    """What a row of a run has: name -> unit and kind of number."""
+    robot, blocks = plan.robot, core_of(controller).layout.blocks.items()
+    coordinates = {int(i): k for k, i in enumerate(robot.position_index) if i >= 0}
+    units = {"t": "s"}
+    for i in range(robot.nq):
+        dof = coordinates.get(i)
+        units[f"q.{i if dof is None else robot.dof_names[dof]}"] = "" if dof is None else robot.dof_units[dof]
+    units |= {f"v.{name}": f"{unit}/s" for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)}
+    units |= {f"{what}.{k}": "m" if len(k) == 1 else "" for what in ("pose", "target") for k in POSE}
+    units |= {f"error.{task}.{row.label}": row.unit for task, b in blocks if b.form == "task" for row in b.rows}
+    if plan.plane is not None:
+        units |= {"plane.command": "rad", "plane.angle": "rad", "plane.faded": ""}
+    units |= {f"margin.{item}.{row.label}": row.unit for item, b in blocks if b.form == "margins" for row in b.rows}
+    units |= {"status": "", "iterations": "", "error_bound": "rad/s", "tick": "s"}
+    kinds = {"plane.faded": "?", "status": "i1", "iterations": "i4"}
+    return {name: (unit, kinds.get(name, "f8")) for name, unit in units.items()}

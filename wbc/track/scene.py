@@ -5,19 +5,22 @@ from __future__ import annotations
 import fnmatch
 import math
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wbc import style, validation
 from wbc.errors import RangeError, RobotFileError, ShapeError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Solid, Sphere
+from wbc.shapes import Convex, PlacedShape, Solid, Sphere
+from wbc.shapes.solid import names_of_shapes
 from wbc.track import render
 from wbc.track.clearance import bodies_of
 from wbc.validation import Array
@@ -37,15 +40,14 @@ SUPERSAMPLING = 2
 BIAS = 0.003
 #: Largest angle above or below the scene: straight from above no direction is up [rad]
 HIGHEST = 1.5
-SOLIDS = (Sphere, Capsule, Box, Cylinder, Convex)
 #: Corners closer than this are never merged [m]
 FINEST = 1e-6
-#: Pixels of a picture at most, and lengths of a radius along a path
-PIXELS, STATIONS = 2**24, 1_000_000
+#: Pixels of a picture, at most
+PIXELS = 2**24
+#: Lengths of a radius along a path, at most
+STATIONS = 1_000_000
 #: Links whose poses differ by less stand at one place
 SAME = 1e-3
-#: Part of the picture's width or height that the scene takes
-FILLED = 0.90
 
 
 class Scene:
@@ -193,10 +195,8 @@ class Scene:
         path = validation.file_path("Scene.file", file)
         if not any(len(mesh.triangles) for mesh in self._solid):
             raise RangeError("Scene", len(self._solid), "nothing was added that is not pale")
-        everything = [*self._solid, *(mesh for meshes in self._pale for mesh in meshes)]
-        # Some hundred points of each are enough to see how large the scene is
-        sample = [mesh.triangles.reshape(-1, 3)[:: max(1, len(mesh.triangles) // 200)] for mesh in everything]
-        camera = _camera(np.concatenate(sample), (sides[0], sides[1]), azimuth, elevation)
+        fine = (SUPERSAMPLING * sides[0], SUPERSAMPLING * sides[1])
+        camera = render.framed(self.points(), fine, azimuth, elevation)
         image = _render(camera, self._solid, self._pale, self._floor)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -204,6 +204,41 @@ class Scene:
         except (OSError, ValueError) as error:
             raise RobotFileError("Scene.file", str(path), f"cannot be written: {error}") from error
         return path
+
+    def points(self) -> Array:
+        """Some hundred points of each thing in it, enough to see how large it is, n x 3 [m]."""
+        everything = [*self._solid, *(mesh for meshes in self._pale for mesh in meshes)]
+        return np.concatenate([m.triangles.reshape(-1, 3)[:: max(1, len(m.triangles) // 200)] for m in everything])
+
+    def film(self, camera: render.Camera) -> Callable[[], NDArray[np.uint8]]:
+        """What was added so far stands still from now on, and is drawn once; without floor, shadows and key.
+
+            frame = scene.film(camera)
+            for q in motion:
+                scene.add_robot(q)
+                pictures.append(frame())
+
+        Returns:
+            A function that draws what was added since in front of it and behind it, takes it away again, and returns
+            the picture, height x width x 3.
+
+        Raises:
+            ShapeError: no camera.
+        """
+        camera = validation.instance("Scene.camera", camera, render.Camera, "a Camera")
+        camera = replace(camera, width=SUPERSAMPLING * camera.width, height=SUPERSAMPLING * camera.height)
+        backdrop = render.Backdrop(self._taken(), camera)
+
+        def frame() -> NDArray[np.uint8]:
+            image = render.reduced(backdrop.over(self._taken()), SUPERSAMPLING)
+            return np.asarray(255.0 * image + 0.5, dtype=np.uint8)
+
+        return frame
+
+    def _taken(self) -> list[render.ColouredMesh]:
+        """What was added and is not pale, which then is no longer in the scene."""
+        taken, self._solid = self._solid, []
+        return taken
 
     def _label(self, colour: Colour, label: str) -> None:
         if label and (colour, label) not in self._key:
@@ -261,29 +296,11 @@ def simplified(triangles: Array, detail: float) -> Array:
 
 
 def _surface(shape: Solid, pose: pin.SE3, colour: Colour) -> render.ColouredMesh:
-    if not isinstance(shape, SOLIDS):
-        raise ShapeError("Scene.shape", shape, "expected a shape", [kind.__name__ for kind in SOLIDS])
+    if not isinstance(shape, Solid):
+        raise ShapeError("Scene.shape", shape, "expected a shape", names_of_shapes())
     if isinstance(shape, Sphere):
         return render.sphere(np.array(pose.translation), shape.radius, colour)
     return render.ColouredMesh(render.triangles(PlacedShape(shape, pose)), colour)
-
-
-def _camera(points: Array, size: tuple[int, int], azimuth: float, elevation: float) -> render.Camera:
-    """Looks so that the points fill the picture."""
-    view = math.radians(16.0)
-    width, height = (SUPERSAMPLING * s for s in size)
-    flat, rise = math.cos(elevation), math.sin(elevation)
-    direction = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), rise])
-    target, distance = points.mean(axis=0), 6.0
-    for _ in range(6):
-        camera = render.Camera(target + distance * direction, target, view, width, height)
-        screen = camera.project(points)[:, :2]
-        low, high = screen.min(axis=0), screen.max(axis=0)
-        off = (low + high) / 2 - np.array([width, height]) / 2
-        right, up, _ = camera.axes
-        target = target + (off[0] * right - off[1] * up) * distance / camera.focal
-        distance *= float(np.max((high - low) / (FILLED * np.array([width, height]))))
-    return render.Camera(target + distance * direction, target, view, width, height)
 
 
 def _render(

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from wbc.controller import Status
+from wbc.log import Log
 from wbc.tick.outcome import STATUSES
-from wbc.track.log import Log
 from wbc.validation import Array
 
 

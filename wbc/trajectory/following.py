@@ -13,7 +13,7 @@ from wbc import validation
 from wbc.api import Stack
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.continuation import Tracker
-from wbc.ik.engine import Engine
+from wbc.ik.engine import SearchEngine
 from wbc.stack.declaration import Declaration
 from wbc.tasks import EndEffector
 from wbc.trajectory.paths.path import Path, PolynomialPath
@@ -113,7 +113,7 @@ class _Seeker:
         validation.one_of("task", task, names)
         self.poses, self.robot, self.data = poses, stack.robot, stack.robot.model.createData()
         self.near, self.turned = tolerance, tolerance / stack.length
-        self.engine = Engine(stack, (task,), "auto")
+        self.engine = SearchEngine(stack, (task,), "auto")
         self.handle = self.engine.controller[task]
         item = stack[task].item
         assert isinstance(item, EndEffector)

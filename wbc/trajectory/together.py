@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any, overload
 
 import numpy as np
 
+from wbc.cores import cores
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.trajectory.laws.law import Law, State
 from wbc.validation import Array
@@ -101,7 +101,7 @@ def many(law: Callable[..., Law], *motions: Any, processes: int | None = None, *
             raise ShapeError(f"motions[{k}]", each, f"expected {max(count, 1)} motions, as many as of the first")
     if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
         raise RangeError("processes", processes, "expected an integer from 1 on")
-    at_work = min(processes or len(os.sched_getaffinity(0)), count)
+    at_work = min(processes or cores(), count)
     tasks = [(law, tuple(each[k] for each in motions), common) for k in range(count)]
     if at_work <= 1:
         return Laws([_made(task) for task in tasks])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pathlib
+import sys
 
 #: Below the loop where both want one core
 NICE = 5
@@ -15,8 +16,9 @@ CORE = 36
 def step_aside() -> None:
     """Before there are threads, which inherit it: a batch process, which on waking interrupts nobody."""
     os.nice(NICE)
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 class CoreLeft:
@@ -31,11 +33,14 @@ class CoreLeft:
 
     def __init__(self, process: int) -> None:
         self._tasks = pathlib.Path(f"/proc/{process}/task")
-        self._all = os.sched_getaffinity(0)
+        # Elsewhere nobody says on which core a thread runs
+        self._all = os.sched_getaffinity(0) if sys.platform == "linux" else set[int]()
         self._left = -1
 
     def look(self, thread: int) -> None:
         """Keep off the core that a thread of the loop ran on last; with one core there is nothing to leave."""
+        if sys.platform != "linux":
+            return
         with contextlib.suppress(OSError, ValueError, IndexError):
             stat = (self._tasks / str(thread) / "stat").read_text(encoding="ascii", errors="replace")
             core = int(stat.rpartition(")")[2].split()[CORE])

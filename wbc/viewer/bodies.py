@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +17,10 @@ from wbc.validation import Array
 
 Colour = tuple[int, int, int]
 
-#: Corners of a mesh closer than this part of the robot's characteristic length are one, where they are also closer than
-#: this part of the link's least side: of a thin link on a long robot nothing would be left
-DETAIL, OF_LINK = 0.007, 0.045
+#: Corners of a mesh closer than this part of the robot's characteristic length are one, where OF_LINK agrees
+DETAIL = 0.007
+#: They are also closer than this part of the link's least side: of a thin link on a long robot nothing would be left
+OF_LINK = 0.045
 #: Cosine of the angle between faces from which there is an edge
 EDGE = 0.6
 #: Meshes of fewer triangles are drawn as they are
@@ -30,7 +32,7 @@ LINK: Colour = (206, 211, 219)
 HAND: Colour = (70, 78, 92)
 
 
-class Mesh(NamedTuple):
+class DrawnMesh(NamedTuple):
     """A mesh in the frame of what it is part of: corners [n x 3] m, triangles [m x 3], colour."""
 
     corners: Array
@@ -38,9 +40,14 @@ class Mesh(NamedTuple):
     colour: Colour
 
 
-def robot_meshes(robot: Robot, detail: float = DETAIL) -> dict[str, Mesh]:
-    """Frame -> mesh of the link there. Links that carry a named tip are dark, as hands are."""
-    parts: dict[str, list[Array]] = {}
+#: Link -> what is drawn with it [m x 3 x 3] in its frame, and its colour
+Dress = Mapping[str, tuple[Array, Colour]]
+
+
+def robot_meshes(robot: Robot, detail: float = DETAIL, dress: Dress | None = None) -> dict[str, DrawnMesh]:
+    """Frame -> mesh of the link there. Links that carry a named tip are dark, as hands are, unless ``dress`` says."""
+    dress = {} if dress is None else dress
+    parts: dict[str, list[Array]] = {link: [triangles] for link, (triangles, _) in dress.items()}
     for link, triangles in link_meshes(robot):
         parts.setdefault(link, []).append(triangles)
     model = robot.model
@@ -54,7 +61,7 @@ def robot_meshes(robot: Robot, detail: float = DETAIL) -> dict[str, Mesh]:
             least = float(np.ptp(merged.reshape(-1, 3), axis=0).min())
             merged = simplified(merged, min(detail * robot.characteristic_length, OF_LINK * least))
         if len(merged):
-            out[link] = indexed(merged, HAND if dark else LINK)
+            out[link] = indexed(merged, dress[link][1] if link in dress else HAND if dark else LINK)
     return out
 
 
@@ -63,7 +70,7 @@ def bounded(parts: tuple[Shape, ...]) -> tuple[Shape, ...]:
     return tuple(part for part in parts if not isinstance(part, HalfSpace))
 
 
-def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> Mesh:
+def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> DrawnMesh:
     """The surface of shapes, in their common frame."""
     flat = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float) * GROUND
     origin, surfaces = pin.SE3.Identity(), []
@@ -75,7 +82,7 @@ def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> Mesh:
     return indexed(np.concatenate(surfaces), colour)
 
 
-def indexed(triangles: Array, colour: Colour) -> Mesh:
+def indexed(triangles: Array, colour: Colour) -> DrawnMesh:
     """Corners that are the same are one, but not across an edge.
 
     A page shades a corner by the mean normal of its faces, which is none where both sides of a thin wall meet.
@@ -95,4 +102,4 @@ def indexed(triangles: Array, colour: Colour) -> Mesh:
         places[left[near]] = sum(map(len, parts)) + np.searchsorted(used, owner[left[near]])
         parts.append(corners[used])
         left = left[~near]
-    return Mesh(np.concatenate(parts).astype(np.float32), places.reshape(-1, 3), colour)
+    return DrawnMesh(np.concatenate(parts).astype(np.float32), places.reshape(-1, 3), colour)

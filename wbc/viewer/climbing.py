@@ -7,34 +7,33 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots
 from wbc.errors import WbcError
 from wbc.validation import Array
 from wbc.viewer.beside import Viewer, show
-from wbc.viewer.bodies import OBSTACLE, Colour, Mesh, indexed
 from wbc.viewer.messages import RATE_LASTS, MessageError
 from wbc.viewer.one_hand import OneHand
 from wbc.viewer.operation import Operation
 from wbc.viewer.paced import ticks
-from wbc.viewer.scenery import Scenery, checked
+from wbc.viewer.scenery import checked
+from wbc.viewer.walks import scenery_of
 from wbc.walking.loop.state import Tick
 from wbc.walking.modes.drive import Drive
 from wbc.walking.planner.plan import Regrasp
-from wbc.walking.report import surroundings
 from wbc.walking.run.drive_mode import DriveMode
 from wbc.walking.run.request import DriveRequest, Site
 
 #: Rates at full stick: round, along [m/s], spin [rad/s]
-FASTEST = np.array([0.05, 0.05, 0.04])
-#: A body within this of its destination is there [m]; a course that is off by more than this is set anew [rad]
-THERE, OFF = 0.02, 0.15
-#: Points of a hand's way that are drawn; what a loop without an end gives at its end
-POINTS, END = 24, object()
-#: Colours of the structure and of its holds
-SURFACE: Colour = (204, 213, 223)
-STUD: Colour = (143, 153, 168)
+BODY_SPEED = np.array([0.05, 0.05, 0.04])
+#: A body within this of its destination is there [m]
+THERE = 0.02
+#: A course that is off by more than this is set anew [rad]
+OFF = 0.15
+#: Points of a hand's path that are drawn
+POINTS = 24
+#: What a loop without an end gives at its end
+END = object()
 
 
 class WalkOperation(Operation):
@@ -86,7 +85,7 @@ class WalkOperation(Operation):
         elif kind == "steer" and self.hand is not None:
             raise MessageError("message", kind, f"{self.hand.arm} is moved alone, and the body stands")
         elif kind == "steer":
-            self._steered = FASTEST * np.array([float(x) for x in message["rates"]])
+            self._steered = BODY_SPEED * np.array([float(x) for x in message["rates"]])
             self._until, self._goal = self._now() + RATE_LASTS, -1
         elif kind == "go":
             self._goal = self.drive.walk.structure.index(message["hold"])
@@ -188,7 +187,7 @@ class WalkOperation(Operation):
         if distance < THERE:
             self._goal = -1
             return np.zeros(3)
-        course = FASTEST[0] * left / distance
+        course = BODY_SPEED[0] * left / distance
         before = self.drive.command
         # Every other command is planned anew, so that one that is good enough stays
         if before[:2].any() and float(before @ course) > np.cos(OFF) * np.linalg.norm(before) * np.linalg.norm(course):
@@ -225,7 +224,8 @@ def climb(
     plan, stack = mode.plan(), mode.compiled(backend)
     walk = mode.walk(plan, stack, None)
     operation = WalkOperation(Drive(walk), on_tick=lambda _tick: shown())
-    with show(stack.controller, operation=operation, scenery=scenery_of(walk), **options) as viewer:
+    scenery = scenery_of(walker, walk.structure, walk.q)
+    with show(stack.controller, operation=operation, scenery=scenery, **options) as viewer:
         if announce is not None:
             announce(viewer)
         paced = ticks(viewer, walk.dt, seconds)
@@ -250,30 +250,6 @@ class _Nobody:
 
     def rates(self, time: float) -> Array | None:
         return np.zeros(3)
-
-
-def scenery_of(walk: Any) -> Scenery:
-    """Structure and holds of a walk."""
-    structure = walk.structure
-    rows = np.arange(len(structure))
-    surfaces: list[Mesh] = []
-    for triangles, colour in (
-        (surroundings.surface_triangles(structure, rows), SURFACE),
-        (surroundings.obstacle_triangles(structure, rows), OBSTACLE),
-    ):
-        if len(triangles):
-            surfaces.append(indexed(triangles, colour))
-    studs = indexed(surroundings.stud_triangles(structure, rows), STUD)
-    up = [float(x) for x in -pin.XYZQUATToSE3(walk.q[:7]).rotation[:, 2]]
-    return Scenery(
-        tuple(surfaces),
-        studs,
-        tuple(structure.ids),
-        np.array(structure.positions),
-        (up[0], up[1], up[2]),
-        "body",
-        tuple(arm.name for arm in walk.walker.arms),
-    )
 
 
 def _way(places: Array) -> list[list[float]]:

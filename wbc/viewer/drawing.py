@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wbc.api import Controller
 from wbc.controller import core_of
+from wbc.geometry import ShapeTable, distances
 from wbc.robot import Robot
-from wbc.robot.geometry.coal_shapes import geometry_of
 from wbc.rotations import TO_MUJOCO, quaternion
+from wbc.shapes import PlacedShape
+from wbc.symbolic.joint_steps import place
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
 from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
 from wbc.validation import Array
-from wbc.viewer.bodies import DETAIL, Colour, Mesh, bounded, robot_meshes, shape_mesh
+from wbc.viewer.bodies import DETAIL, Colour, DrawnMesh, bounded, robot_meshes, shape_mesh
 from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
@@ -28,22 +29,39 @@ if TYPE_CHECKING:
 
 #: A pose that moved less than this is not sent again [m, and as entries of a quaternion]
 STILL = 1e-5
-#: Clearances up to this are drawn [m]; below the other the line is red
-NEAR, TIGHT = 0.25, 0.03
-#: Points of the path of a hand, and how far apart they are [m]
-TRAIL, APART = 300, 0.004
-GREEN, AMBER, RED, BLUE = (64, 160, 90), (230, 150, 30), (215, 50, 40), (40, 110, 200)
-PURPLE, GREY = (130, 60, 170), (150, 158, 168)
+#: Clearances up to this are drawn [m]
+NEAR = 0.25
+#: The line of a clearance below this is red [m]
+TIGHT = 0.03
+#: Points of the path of a hand
+TRAIL = 300
+#: How far apart the points of a path are [m]
+APART = 0.004
+GREEN = (64, 160, 90)
+AMBER = (230, 150, 30)
+RED = (215, 50, 40)
+BLUE = (40, 110, 200)
+PURPLE = (130, 60, 170)
+GREY = (150, 158, 168)
 #: What is drawn only where it is asked for: the camera goes along, how far a hand can be
 DEMANDED = ("follow", "reach")
 #: Lengths of the arrows at a target, as part of the robot's; an obstacle's are shorter
 GIZMO = 0.24
 FLOOR = (226, 231, 236)
-#: The sky above and at the horizon
-SKY, HORIZON = (188, 205, 222), (238, 242, 246)
-#: Where a page's camera looks from, its field of view upwards [rad], and the part of it that the robot fills;
-#: the field is taken to be so many times as wide
-FROM, FIELD, FILLED, WIDE = np.array([1.2, -1.0, 0.75]), np.radians(45.0), 0.76, 1.35
+#: Where the sun is, up being z
+SUN = np.array([0.6, -1.2, 2.0])
+#: The sky above
+SKY = (188, 205, 222)
+#: The sky at the horizon
+HORIZON = (238, 242, 246)
+#: Where a page's camera looks from [m]
+FROM = np.array([1.2, -1.0, 0.75])
+#: Field of view of a page's camera upwards [rad]
+FIELD = np.radians(45.0)
+#: Part of the field of view that the robot fills
+FILLED = 0.76
+#: Width of the field of view over its height
+WIDE = 1.35
 #: In place of a quaternion for what has none
 EMPTY = np.zeros(0)
 #: What is told of a click at a hold: its id, number of viser's client
@@ -84,8 +102,8 @@ class Drawing:
         self._weight = float(pin.computeTotalMass(robot.model)) * NOMINAL
         self._scenery = scenery
         scene.set_up_direction("+z" if scenery is None else scenery.up)
-        _light(scene)
-        self._links = robot_meshes(robot, detail)
+        _light(scene, np.array([0.0, 0.0, 1.0] if scenery is None else scenery.up))
+        self._links = robot_meshes(robot, detail, None if scenery is None else scenery.dress)
         for link, mesh in self._links.items():
             self._add_mesh(f"/robot/{link}", mesh)
         self._obstacles: dict[str, Obstacle] = {}
@@ -98,7 +116,7 @@ class Drawing:
                 self._add_mesh(f"/obstacles/{name}", shape_mesh(item.parts))
             if isinstance(item, Task) and "target" in block.slots and is_place(block.slots["target"].input):
                 self._targets[name] = "target"
-        self._pairs = {name: list(self._shaped(item)) for name, item in self._obstacles.items()}
+        self._pairs = {name: self._shaped(item) for name, item in self._obstacles.items()}
         self._add_gizmos()
         if scenery is not None:
             self._add_scenery(scenery, picked)
@@ -254,9 +272,9 @@ class Drawing:
         self._only("/holds/of ", held)
 
     def note(self, said: Mapping[str, Any]) -> None:
-        """Holds that hands go to and that are gone, and the ways of the hands that are lifted, now and next."""
+        """Holds that hands have, go to and that are gone, and the ways of the hands that are lifted, now and next."""
         assert self._scenery is not None
-        for kind, colour in (("reserved", BLUE), ("gone", RED)):
+        for kind, colour in (("held", AMBER), ("reserved", BLUE), ("gone", RED)):
             shown = set()
             for hold in said.get(kind, ()):
                 shown.add(node := f"/holds/{kind} {hold}")
@@ -328,34 +346,34 @@ class Drawing:
 
     # Lines
 
-    def _shaped(self, item: Obstacle) -> Iterator[tuple[str, pin.SE3, Any]]:
-        """(link, place in it, geometry) of the shapes that keep clear."""
-        for link, shapes in self._robot.shapes.items():
-            if item.links is None or link in item.links:
-                joint = int(self._robot.model.frames[self._robot.model.getFrameId(link)].parentJoint)
-                for placed in shapes if joint else ():
-                    made = geometry_of(placed.shape)
-                    yield link, placed.placement * made.offset, made.geometry
+    def _shaped(self, item: Obstacle) -> tuple[list[tuple[str, PlacedShape]], ShapeTable]:
+        """(link, shape) of those that keep clear, and these before the parts of the obstacle for the kernel."""
+        joint = {
+            link: int(self._robot.model.frames[self._robot.model.getFrameId(link)].parentJoint)
+            for link in self._robot.shapes
+        }
+        links = [link for link in joint if joint[link] and (item.links is None or link in item.links)]
+        shaped = [(link, placed) for link in links for placed in self._robot.shapes[link]]
+        return shaped, ShapeTable([*(placed.shape for _, placed in shaped), *item.parts])
 
     def _clearances(self, tick: Tick) -> tuple[list[Array], list[Colour]]:
         """The shortest line from each link that is near to each obstacle."""
         lines, colours = [], []
-        request, result = coal.DistanceRequest(), coal.DistanceResult()
-        request.enable_signed_distance = True
         for name, item in self._obstacles.items():
             pose = tick.world_pose(name, "pose")
             margin = tick.numbers(name, "margin")
             if pose is None or not tick.is_on(core_of(self._controller).layout.blocks[name]):
                 continue
             nearest: dict[str, tuple[float, Array]] = {}
-            for part in item.parts:
-                made = geometry_of(part)
-                place = pose * made.offset
-                for link, local, geometry in self._pairs[name]:
-                    result.clear()
-                    gap = coal.distance(geometry, tick.pose(link) * local, made.geometry, place, request, result)
-                    if gap < min(NEAR, nearest.get(link, (np.inf, None))[0]):
-                        nearest[link] = gap, np.array([result.getNearestPoint1(), result.getNearestPoint2()])
+            (shaped, table), parts = self._pairs[name], len(item.parts)
+            poses = [tick.pose(link) * placed.placement for link, placed in shaped] + [pose] * parts
+            centers = [*(placed.shape.center for _, placed in shaped), *(part.center for part in item.parts)]
+            places = np.array([place(at * pin.SE3(np.eye(3), c)) for at, c in zip(poses, centers, strict=True)])
+            one, other = np.divmod(np.arange(len(shaped) * parts), parts)
+            for k, found in enumerate(distances(table, places, one, len(shaped) + other)):
+                link, gap = shaped[k // parts][0], float(found[0])
+                if gap < min(NEAR, nearest.get(link, (np.inf, None))[0]):
+                    nearest[link] = gap, np.array([found[4:], found[4:] + gap * found[1:4]])
             kept = 0.0 if margin is None else float(margin[0])
             for gap, line in sorted(nearest.values(), key=lambda pair: pair[0])[:4]:
                 lines.append(line)
@@ -444,7 +462,7 @@ class Drawing:
 
     # Nodes
 
-    def _add_mesh(self, node: str, mesh: Mesh) -> None:
+    def _add_mesh(self, node: str, mesh: DrawnMesh) -> None:
         self._nodes[node] = self._scene.add_mesh_simple(
             node, mesh.corners, mesh.triangles, color=mesh.colour, side="double"
         )
@@ -528,13 +546,14 @@ def viewpoint(controller: Controller, tick: Tick) -> tuple[Array, Array]:
     return target + max(float(needed.max()), 0.3) * back, target
 
 
-def _light(scene: viser.SceneApi) -> None:
+def _light(scene: viser.SceneApi, up: Array) -> None:
     """Lights and a sky, so that a light robot stands out from what is behind it."""
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), up)
     # viser's own picture of a city as light bleaches what is bright, and the page fades in until it is computed
     scene.configure_environment_map(None)
     scene.configure_default_lights(enabled=False)
     scene.add_light_hemisphere("/lights/sky", sky_color=(255, 255, 255), ground_color=(150, 156, 166), intensity=1.5)
-    scene.add_light_directional("/lights/sun", color=(255, 250, 242), intensity=2.2, position=(0.6, -1.2, 2.0))
+    scene.add_light_directional("/lights/sun", color=(255, 250, 242), intensity=2.2, position=tuple(turn * SUN))
     share = np.linspace(0.0, 1.0, 64)[:, None, None]
     sky = (1.0 - share) * np.array(SKY) + share * np.array(HORIZON)
     scene.set_background_image(np.repeat(sky, 2, axis=1).astype(np.uint8), format="png")

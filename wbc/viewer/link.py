@@ -19,17 +19,33 @@ from __future__ import annotations
 import mmap
 import os
 import struct
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-HEAD, RING, NOTE, SLOTS = 64, 1 << 16, 1 << 14, 4
+#: Bytes of the head
+HEAD = 64
+#: Bytes of the ring of states
+RING = 1 << 16
+#: Bytes of a note
+NOTE = 1 << 14
+#: Slots of the ring
+SLOTS = 4
 #: Words of the head, and of a slot's
-STATES, SENT, TAKEN, FLAGS, VIEWER_ALIVE, THREAD, NOTES = range(7)
+STATES = 0
+SENT = 1
+TAKEN = 2
+FLAGS = 3
+VIEWER_ALIVE = 4
+THREAD = 5
+NOTES = 6
 SLOT_HEAD = 24
-#: Flags of the loop: it brakes on a stop; it does so because the viewer was silent
-STOPPED, UNHEARD = 1, 2
+#: Flag of the loop: it brakes on a stop
+STOPPED = 1
+#: Flag of the loop: it brakes because the viewer was silent
+UNHEARD = 2
 #: A hand is lifted when the operator says yes
 WAITS = 4
 UNHEARD_TEXT = "the viewer gave no sign of life"
@@ -38,7 +54,7 @@ _LENGTH = struct.Struct("<I")
 _STAMP = struct.Struct("<qd")
 
 
-class State(NamedTuple):
+class SharedTick(NamedTuple):
     """A tick: its number from 1, its time on the loop's clock [s], its memory."""
 
     number: int
@@ -81,6 +97,16 @@ class _Shared:
             self.file = -1
 
 
+def _unnamed_file() -> int:
+    """A file that nothing but its descriptor leads to."""
+    made = getattr(os, "memfd_create", None)  # of Linux
+    if made is not None:
+        return int(made("wbc-viewer"))
+    file, name = tempfile.mkstemp(prefix="wbc-viewer-")
+    os.unlink(name)
+    return file
+
+
 class LoopEnd(_Shared):
     """The control loop's end; makes the memory.
 
@@ -89,7 +115,7 @@ class LoopEnd(_Shared):
     """
 
     def __init__(self, state: int) -> None:
-        file = os.memfd_create("wbc-viewer")
+        file = _unnamed_file()
         os.ftruncate(file, size_for(state))
         super().__init__(file, state)
         self._count = 0
@@ -159,7 +185,7 @@ class ViewerEnd(_Shared):
         self._words[SENT] = sent + needed
         return True
 
-    def read(self, after: int = 0) -> State | None:
+    def read(self, after: int = 0) -> SharedTick | None:
         """The newest state, None where it is not newer than number ``after``."""
         for _ in range(8):
             number = self._words[STATES]
@@ -169,7 +195,7 @@ class ViewerEnd(_Shared):
             begun, when = _STAMP.unpack_from(slot)
             # The loop may have come round while this was copied
             if begun == number and slot[16:SLOT_HEAD] == slot[:8] and self._words[STATES] < number + SLOTS - 1:
-                return State(number, when, slot[SLOT_HEAD:])
+                return SharedTick(number, when, slot[SLOT_HEAD:])
         return None
 
     def live(self) -> None:

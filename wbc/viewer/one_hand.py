@@ -15,9 +15,9 @@ from wbc.walking.modes.drive import Drive
 from wbc.walking.modes.hand_motion import ArmRefused
 
 #: Rates at full stick [m/s, rad/s]
-FASTEST = np.array([0.08, 0.08, 0.08, 0.4])
+HAND_SPEED = np.array([0.08, 0.08, 0.08, 0.4])
 #: How far ahead a motion by rates is proved clear, at best; where it is not, less is tried [s]
-AHEAD = (2.0, 1.0, 0.4)
+SHARES = (2.0, 1.0, 0.4)
 #: Rates that differ by more than this begin another motion
 OTHER = 0.1
 
@@ -81,7 +81,7 @@ class OneHand:
 
     def _by_rate(self) -> str:
         twist, reason = self._twist(), ""
-        for seconds in AHEAD:
+        for seconds in SHARES:
             try:
                 self._mode.by_rate(twist, seconds)
                 return ""
@@ -97,7 +97,7 @@ class OneHand:
             off = pose.translation - steering.origin
             off = off - steering.axis * float(steering.axis @ off)
             outward = off / np.linalg.norm(off)
-        rates = FASTEST * self._begun
+        rates = HAND_SPEED * self._begun
         axes = np.array([np.cross(steering.axis, outward), steering.axis, outward])
         return np.concatenate([rates[:3] @ axes, rates[3] * pose.rotation[:, 2]])
 

@@ -18,7 +18,7 @@ from wbc.viewer.paced import ticks
 from wbc.viewer.pairing import PairAbout, Pairing
 
 #: Rates at full stick [m/s, rad/s]
-FASTEST = (0.15, 0.05)
+OPERATED_SPEED = (0.15, 0.05)
 
 
 class PairOperation(Operation):
@@ -99,7 +99,7 @@ def pairing_of(session: Teleoperation) -> Pairing:
         swapped = next((other for other, two in control.pairs.items() if _swaps(pair, two)), "")
         items = control.items_of(name)
         out.append(PairAbout(pair, items, rows, control.units(pair.task), swapped, control.eased_below(name)))
-    return Pairing(tuple(out), FASTEST)
+    return Pairing(tuple(out), OPERATED_SPEED)
 
 
 def _label(one: Coordinate, row: str) -> str:
@@ -131,7 +131,7 @@ def operate(
         ShapeError, NotFiniteError: ``start`` is none.
         UnknownNameError, MissingPartError: no such robot, or it has no pairs. What :func:`wbc.viewer.show` raises.
     """
-    session = Teleoperation(robot, backend=backend, fastest=FASTEST)
+    session = Teleoperation(robot, backend=backend, fastest=OPERATED_SPEED)
     control, pairing = session.control, pairing_of(session)
     operation = PairOperation(session, pairing)
     q = session.start() if start is None else session.robot.configuration("start", start)

@@ -21,7 +21,7 @@ from wbc.viewer.messages import PAIRED, RATE_LASTS, WALKED, MessageError, value_
 #: What is dragged and has a velocity goes to where it was dragged at this speed at most [m/s, rad/s]
 FASTEST = (1.0, 4.0)
 #: Nearer than this it is there [m, rad]
-THERE = 1e-6
+ARRIVED = 1e-6
 
 
 class Operation:
@@ -218,7 +218,7 @@ class Operation:
         off = goal.translation - pose.translation
         turn = pin.log3(goal.rotation @ pose.rotation.T)
         need = max(float(np.linalg.norm(off)) / FASTEST[0], float(np.linalg.norm(turn)) / FASTEST[1])
-        if need <= THERE:
+        if need <= ARRIVED:
             self._arrive(name)
             return
         share = min(1.0, dt / need)

@@ -16,8 +16,10 @@ from wbc.validation import Array
 from wbc.viewer.messages import PAIRED, WALKED, MessageError
 from wbc.viewer.tick import Tick
 
-#: How far ahead a loss of rank is told, and at how many times it is looked for, now among them [s]
-AHEAD, LOOKS = 4.0, 9
+#: How far ahead a loss of rank is told [s]
+AHEAD = 4.0
+#: Instants at which it is looked for, now among them
+LOOKS = 9
 
 
 class PairAbout(NamedTuple):

@@ -1,4 +1,4 @@
-"""What ``wbc play`` opens: robots with a stack each, and where they begin."""
+"""What ``wbc view play`` opens: robots with a stack each, and where they begin."""
 
 from __future__ import annotations
 

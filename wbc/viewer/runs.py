@@ -8,35 +8,46 @@ import io
 import pathlib
 import re
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from wbc import extras, validation
+from wbc import __version__, extras, validation
 from wbc.api import Controller, Stack
 from wbc.controller.step import state_of
 from wbc.record.recording import Recording
 from wbc.replaying.ticks import compiled, replayed
 from wbc.robot import Robot
+from wbc.stack.artifact import compile_stack
 from wbc.tasks import EndEffector, Posture
 from wbc.validation import Array
 from wbc.viewer.drawing import Drawing, look
 from wbc.viewer.errors import ViewerError
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 from wbc.viewer.reading import sentences
+from wbc.viewer.scenery import Scenery
 from wbc.viewer.tick import Tick
 
-#: The recording in a run's folder, and the page that a run exports
-RECORDING, REPLAY = "ticks.npz", "replay.html"
-#: States of a recording that are kept a second, and of a page; a page has this many at most
-RATE, PAGE_RATE, MOST = 40.0, 20.0, 1200
+#: The recording in a run's folder
+RECORDING = "ticks.npz"
+#: The page that a run exports
+REPLAY = "replay.html"
+#: States of a recording that are kept a second [1/s]
+RATE = 40.0
+#: States of a page that are kept a second [1/s]
+PAGE_RATE = 20.0
+#: States that a page has at most
+PAGE_STATES = 1200
+#: What is said of the holds of a scenery
+Note = Mapping[str, Any]
 #: Corners of a page's meshes closer than this part of the robot's characteristic length are one
-DETAIL = 0.012
+PAGE_DETAIL = 0.012
 
 
 def states_of(
     recording: Recording, *, trust: bool = False, rate: float = RATE, progress: Callable[[int], None] | None = None
-) -> tuple[Controller, list[State]]:
+) -> tuple[Controller, list[SharedTick]]:
     """The ticks of a recording done again: a controller of their stack, and ``rate`` states a second.
 
     Raises:
@@ -47,7 +58,7 @@ def states_of(
     for tick in replayed(recording, controller):
         time = tick.number * dt
         if time >= due - 1e-9:
-            states.append(State(tick.number + 1, time, state_of(tick.step)))
+            states.append(SharedTick(tick.number + 1, time, state_of(tick.step)))
             due = time + 1.0 / rate
         if progress is not None:
             progress(tick.number)
@@ -82,12 +93,23 @@ def is_recording(file: pathlib.Path) -> bool:
 def recording_in(folder: pathlib.Path) -> pathlib.Path | None:
     """The recording of a run's folder, or the file itself; None where there is none."""
     found = folder / RECORDING if folder.is_dir() else folder
-    # A walk keeps other figures of its ticks under this name
+    # Something else may have this name
     return found if found.is_file() and is_recording(found) else None
 
 
-def save_motion(robot: Robot, times: Sequence[float], places: Sequence[Array], file: pathlib.Path) -> pathlib.Path:
+def save_motion(
+    robot: Robot,
+    times: Sequence[float] | Array,
+    places: Sequence[Array] | Array,
+    file: pathlib.Path,
+    *,
+    scenery: Scenery | None = None,
+    notes: Sequence[Note] = (),
+) -> pathlib.Path:
     """Write a motion of any robot as :func:`save_page` does: configurations ``places`` at ``times`` [s].
+
+    Args:
+        scenery, notes: as of :func:`save_page`, a note for each time.
 
     Raises:
         ViewerError: as of :func:`save_page`. ShapeError, NotFiniteError, RotationError: no configurations.
@@ -97,18 +119,32 @@ def save_motion(robot: Robot, times: Sequence[float], places: Sequence[Array], f
         if name == "tip" or name.endswith("_hand"):
             stack.add(EndEffector(frame), name=name)
     stack.add(Posture(), name="posture")
-    controller, states, due = stack.compile(backend="vm"), list[State](), -np.inf
-    for time, q in zip(times, places, strict=True):
+    # Not by Stack.compile, which warns of what might move too fast: nothing is commanded here
+    controller = Controller(stack, compile_stack(stack, "vm", __version__), "daqp")
+    states, said, due = list[SharedTick](), list[Note](), -np.inf
+    for k, (time, q) in enumerate(zip(times, places, strict=True)):
         if time >= due - 1e-9:
+            said += notes[k : k + 1]
             # Its targets are where it is, so that nothing but the robot and the way of its hands is drawn
             controller.reset(q)
-            states.append(State(len(states) + 1, time, state_of(controller.step(q))))
+            states.append(SharedTick(len(states) + 1, float(time), state_of(controller.step(q))))
             due = time + 1.0 / PAGE_RATE
-    return save_page(controller, states, file)
+    return save_page(controller, states, file, scenery=scenery, notes=said)
 
 
-def save_page(controller: Controller, states: Sequence[State], file: pathlib.Path, title: str = "") -> pathlib.Path:
+def save_page(
+    controller: Controller,
+    states: Sequence[SharedTick],
+    file: pathlib.Path,
+    title: str = "",
+    *,
+    scenery: Scenery | None = None,
+    notes: Sequence[Note] = (),
+) -> pathlib.Path:
     """Write states as one HTML file that plays in a browser, without a network or this package.
+
+    Args:
+        scenery: what stands around. notes: what is said of its holds in each state, see :meth:`Drawing.note`.
 
     Raises:
         MissingPackageError: viser is not installed.
@@ -121,23 +157,25 @@ def save_page(controller: Controller, states: Sequence[State], file: pathlib.Pat
         raise ViewerError("states", 0, "there is nothing to show")
     validation.instance("controller", controller, Controller, "a wbc Controller")
     length = states[-1].time - states[0].time
-    step = max(1.0 / PAGE_RATE, length / MOST)
+    step = max(1.0 / PAGE_RATE, length / PAGE_STATES)
     # What is recorded is what a server would send; nobody is asked to connect, so its address is not printed
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
-            drawing = Drawing(server.scene, controller, detail=DETAIL)
+            drawing = Drawing(server.scene, controller, detail=PAGE_DETAIL, scenery=scenery)
             first = Tick(controller, states[0])
-            look(server, controller, first)
-            drawing.show(first)
-            serializer = server.get_scene_serializer()
-            before = states[0].time
-            for state in states[1:]:
-                if state.time - before < step - 1e-9 and state is not states[-1]:
+            look(server, controller, first, scenery)
+            serializer, before = None, states[0].time
+            for k, state in enumerate(states):
+                if k and state.time - before < step - 1e-9 and state is not states[-1]:
                     continue
-                serializer.insert_sleep(state.time - before)
+                if serializer is not None:
+                    serializer.insert_sleep(state.time - before)
                 drawing.show(Tick(controller, state))
-                before = state.time
+                if notes:
+                    drawing.note(notes[k])
+                serializer, before = serializer or server.get_scene_serializer(), state.time
+            assert serializer is not None
             text = str(serializer.as_html())
             name = html.escape(title or f"{controller.stack.robot.name} – wbc replay")
             text = re.sub("<title>.*?</title>", lambda _: f"<title>{name}</title>", text, count=1)

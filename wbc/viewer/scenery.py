@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.validation import Array
-from wbc.viewer.bodies import Mesh
+from wbc.viewer.bodies import DrawnMesh, Dress
 from wbc.viewer.messages import PAIRED, MessageError
 
 #: A click counts for the hold that it passes nearer than this [m]
@@ -22,15 +22,17 @@ class Scenery(NamedTuple):
     Attributes:
         surfaces: what is only seen. studs: what holds look like, all in one. holds: their ids. places: [n x 3] m.
         up: direction that is up for whoever looks [3]. body: frame that cameras begin at. arms: names.
+        dress: what the robot's links look like.
     """
 
-    surfaces: tuple[Mesh, ...]
-    studs: Mesh
+    surfaces: tuple[DrawnMesh, ...]
+    studs: DrawnMesh
     holds: tuple[str, ...]
     places: Array
     up: tuple[float, float, float]
     body: str
     arms: tuple[str, ...]
+    dress: Dress
 
     def hit(self, origin: Array, direction: Array) -> str | None:
         """The first hold that a ray passes near to, None where it passes none."""

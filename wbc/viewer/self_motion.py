@@ -8,10 +8,14 @@ import pinocchio as pin
 from wbc.robot import Robot
 from wbc.validation import Array
 
-#: Largest joint step between two pictures [rad], and pictures each way
-STEP, MOST = 0.03, 60
-#: A singular value below this part of the largest is none; the hand strays less than this [m, rad]
-FLAT, STAYS = 1e-6, 1e-3
+#: Largest joint step between two pictures [rad]
+STEP = 0.03
+#: Pictures each way
+PICTURES = 60
+#: A singular value below this part of the largest is none
+FLAT = 1e-6
+#: The hand strays less than this [m, rad]
+STAYS = 1e-3
 
 
 def self_motion(robot: Robot, frame: str, q: Array, rows: int = 6) -> list[Array]:
@@ -39,7 +43,7 @@ def _one_way(robot: Robot, frame: str, q: Array, rows: int, sign: float) -> list
     number, base = model.getFrameId(frame), robot.base_nv
     pin.framesForwardKinematics(model, data, q)
     home, here, direction, out = data.oMf[number].copy(), q.copy(), np.zeros(0), list[Array]()
-    for _ in range(MOST):
+    for _ in range(PICTURES):
         J = pin.computeFrameJacobian(model, data, here, number, pin.LOCAL_WORLD_ALIGNED)[:rows, base:]
         moves = np.abs(J).max(axis=0) > FLAT
         _, sizes, turned = np.linalg.svd(J[:, moves])

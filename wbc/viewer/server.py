@@ -26,11 +26,15 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-#: An operator's page that was silent for so long is lost [s]; it gives a sign of life ten times a second
-SILENT, BEAT = 1.0, 0.1
+#: An operator's page that was silent for so long is lost [s]
+SILENT = 1.0
+#: Time between two signs of life of a page [s]
+BEAT = 0.1
 FOLDER = pathlib.Path(__file__).parent / "page"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
-PAGE, SCENE, SOCKET = "", "scene", "wbc"
+PAGE = ""
+SCENE = "scene"
+SOCKET = "wbc"
 
 
 class Client:

@@ -24,7 +24,7 @@ from wbc.viewer import messages
 from wbc.viewer.aside import CoreLeft
 from wbc.viewer.drawing import DEMANDED, Drawing, hand_of, look
 from wbc.viewer.errors import ViewerError
-from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, State, ViewerEnd
+from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, SharedTick, ViewerEnd
 from wbc.viewer.operation import Operation
 from wbc.viewer.pairing import Pairing, PairWatch
 from wbc.viewer.reading import declared, sentences, told
@@ -34,21 +34,24 @@ from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
 from wbc.viewer.timeline import Timeline
 
-#: States that are drawn and told a second, and explanations, at most
-RATE, EXPLAINED = 40.0, 25.0
-#: More pages than this share what they cost together, as viser writes the scene for each of them anew; none has
-#: fewer states a second than the other
-SHARED, SLOWEST = 3, 20.0
+#: States that are drawn and told a second, at most [1/s]
+RATE = 40.0
+#: Explanations that are told a second, at most [1/s]
+EXPLAINED = 25.0
+#: More pages than this share what they cost together, as viser writes the scene for each of them anew
+SHARED = 3
+#: States a second that every page has at least [1/s]
+SLOWEST = 20.0
 #: What a page can ask to be drawn
 SELF_MOTION = "self-motion"
 DRAWN = (*DEMANDED, SELF_MOTION)
 #: Between two signs of life for the loop [s]
-BEAT = 0.05
+LOOP_BEAT = 0.05
 #: Signs of life between two looks where the loop runs
-LOOKS = 10
+EXPLAINED_TRIES = 10
 
 
-class Explainer(threading.Thread):
+class LiveExplainer(threading.Thread):
     """Explains the newest tick that it is given, one after the other."""
 
     def __init__(self) -> None:
@@ -100,7 +103,7 @@ class Session:
         self,
         controller: Controller,
         link: ViewerEnd | None,
-        states: Sequence[State] = (),
+        states: Sequence[SharedTick] = (),
         *,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -135,7 +138,7 @@ class Session:
         # The scene after the address: a page that comes early waits for it
         dragged = None if link is None or scenery is not None or pairing is not None else self._dragged
         self._drawing = Drawing(self.server.scene, controller, dragged, scenery=scenery, picked=self._picked)
-        self._explainer = Explainer()
+        self._explainer = LiveExplainer()
         if link is not None:
             # A page may operate before the first of the regular signs; the loop would take it for lost
             link.live()
@@ -175,15 +178,15 @@ class Session:
         time.sleep(0.2)
         self.server.close()
 
-    _last: State | None = None
+    _last: SharedTick | None = None
 
     def _newest(self) -> int:
         return 0 if self._last is None else self._last.number
 
-    def _current(self) -> State | None:
+    def _current(self) -> SharedTick | None:
         return self._last if self.timeline.live else self.timeline.state()
 
-    def _show(self, state: State, sentence_rate: float) -> None:
+    def _show(self, state: SharedTick, sentence_rate: float) -> None:
         tick = Tick(self._controller, state)
         if self._tick is None:
             look(self.server.server, self._controller, tick, self._scenery)
@@ -231,9 +234,14 @@ class Session:
                 return
             if self._link is not None and self.server.answers():
                 self._link.live()
-            if self._link is not None and self._core is not None and number % LOOKS == 0 and self._link.thread:
+            if (
+                self._link is not None
+                and self._core is not None
+                and number % EXPLAINED_TRIES == 0
+                and self._link.thread
+            ):
                 self._core.look(self._link.thread)
-            time.sleep(BEAT)
+            time.sleep(LOOP_BEAT)
 
     # From pages
 

@@ -13,7 +13,7 @@ from wbc.stack.layout import Block
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks.base import Item
 from wbc.validation import Array
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 
 
 class Tick:
@@ -23,7 +23,7 @@ class Tick:
         number, time: of the tick. step: the step that the loop had. q: configuration.
     """
 
-    def __init__(self, controller: Controller, state: State) -> None:
+    def __init__(self, controller: Controller, state: SharedTick) -> None:
         core = core_of(controller)
         self.number, self.time, self.state = state.number, state.time, state
         self.step = Step(state.data, core.context)

@@ -6,10 +6,12 @@ import bisect
 import zlib
 from collections.abc import Sequence
 
-from wbc.viewer.link import State
+from wbc.viewer.link import SharedTick
 
-#: Memory for the past of a live loop [bytes], and the time between states that are kept [s]
-MOST, BETWEEN = 24 << 20, 1 / 30
+#: Memory for the past of a live loop [bytes]
+MEMORY = 24 << 20
+#: Time between states that are kept [s]
+BETWEEN = 1 / 30
 
 
 class Timeline:
@@ -23,8 +25,8 @@ class Timeline:
         speed: of playing, 0 where it pauses.
     """
 
-    def __init__(self, states: Sequence[State] = ()) -> None:
-        self._states: list[State] = list(states)
+    def __init__(self, states: Sequence[SharedTick] = ()) -> None:
+        self._states: list[SharedTick] = list(states)
         self._times = [state.time for state in self._states]
         #: bytes of a loop's states, which are compressed
         self._held = 0
@@ -33,7 +35,7 @@ class Timeline:
         self.at = self._times[0] if states else 0.0
         self.speed = 1.0
 
-    def add(self, state: State) -> None:
+    def add(self, state: SharedTick) -> None:
         """The newest state of a loop; what is oldest goes where memory is full."""
         if self._times and state.time < self._times[-1]:
             # The loop began anew
@@ -45,7 +47,7 @@ class Timeline:
         self._states.append(state._replace(data=zlib.compress(state.data, 1)))
         self._times.append(state.time)
         self._held += len(self._states[-1].data)
-        if self._held > MOST:
+        if self._held > MEMORY:
             # A tenth at a time: to cut the front off a list costs all of it
             gone = len(self._states) // 10
             del self._states[:gone], self._times[:gone]
@@ -77,7 +79,7 @@ class Timeline:
             if self.at >= self.end and self.recorded:
                 self.speed = 0.0
 
-    def state(self) -> State | None:
+    def state(self) -> SharedTick | None:
         """The state that is shown, None before there is any."""
         if not self._states:
             return None

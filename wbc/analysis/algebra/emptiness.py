@@ -10,8 +10,10 @@ from wbc.analysis.algebra.fourier import fourier
 from wbc.analysis.algebra.half_angles import HalfAngles, Relation
 from wbc.validation import Array
 
-#: Boxes at one time, and rounds of cutting each in two; what is left then is not proved
-BOXES, ROUNDS = 4000, 80
+#: Boxes that are looked at together
+BOXES = 4000
+#: Rounds of cutting each box in two; what is left then is not proved
+ROUNDS = 80
 #: What a bound must keep from zero, in parts of the sum of all coefficients: beyond any rounding
 _ROOM = 1e-9
 
@@ -29,7 +31,7 @@ def proved_empty(half: HalfAngles, relations: Sequence[Relation], boxes: int = B
     joints = sorted({k for r in relations for k in r.joints})
     if not relations or set(joints) & set(half.ring.slides):
         return False
-    waves = [_Waves(half, r, joints) for r in relations]
+    waves = [_WaveSum(half, r, joints) for r in relations]
     centre, width = np.zeros((1, len(joints))), np.full((1, len(joints)), np.nextafter(np.pi, 4.0))
     for _ in range(ROUNDS):
         left, weight = np.ones(len(centre), bool), np.zeros_like(centre)
@@ -51,7 +53,7 @@ def proved_empty(half: HalfAngles, relations: Sequence[Relation], boxes: int = B
     return False
 
 
-class _Waves:
+class _WaveSum:
     """A relation as a sum of waves in some joints; symbols take their values."""
 
     def __init__(self, half: HalfAngles, relation: Relation, joints: Sequence[int]) -> None:

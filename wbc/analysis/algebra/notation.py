@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -157,7 +157,11 @@ class Notation:
 
     def branches(self, branches: Iterable[LocusBranch]) -> list[str]:
         """Branches with the values that a joint takes gathered: one line for q2 = -pi/2 and q2 = pi/2."""
-        return [self._gathered(choice, relations) for choice, relations in gathered(branches)]
+        return list(self.lines(branches))
+
+    def lines(self, branches: Iterable[LocusBranch]) -> Iterator[str]:
+        """The lines of :meth:`branches`, each written when it is asked for: of many joints one takes seconds."""
+        return (self._gathered(choice, relations) for choice, relations in gathered(branches))
 
     def _gathered(self, choice: dict[int, tuple[Value, ...]], relations: tuple[Relation, ...]) -> str:
         parts = []

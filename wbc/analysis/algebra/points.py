@@ -14,8 +14,10 @@ from wbc.analysis.algebra.half_angles import HalfAngles, HalfPoly, Relation, Val
 from wbc.analysis.algebra.notation import coefficients
 from wbc.validation import Array
 
-#: A root of a polynomial in floats counts as real with this imaginary part, and a relation as zero at this value
-REAL, ZERO = 1e-9, 1e-10
+#: A root of a polynomial in floats counts as real when its imaginary part is below this
+REAL = 1e-9
+#: A relation counts as zero when its value is below this
+ZERO = 1e-10
 #: Configurations among which the signs of a relation are looked at
 SAMPLES = 256
 

@@ -20,8 +20,10 @@ from wbc.validation import Array
 _SOURCES = Path(__file__).parent / "native"
 #: Sizes of native/form.h: rows, columns, joints, waves
 _MOST = {"rows": 24, "columns": 16, "joints": 16, "waves": 1024}
-#: Boxes that wait inside one call, beyond those given to it; undecided ones that are kept
-_ROOM, _KEPT = 2000, 64
+#: Boxes that wait inside one call, beyond those given to it
+_ROOM = 2000
+#: Undecided boxes that are kept
+_KEPT = 64
 
 
 class _Form(ctypes.Structure):

@@ -6,7 +6,7 @@ import functools
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,20 +24,33 @@ from wbc.analysis.jacobians.jacobian import symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import check_task
 from wbc.analysis.jacobians.rank_matrix import rank_matrices
+from wbc.analysis.loci.child import Child
 from wbc.analysis.loci.made_within import made_within
 from wbc.analysis.rows import Rows, checked
 from wbc.errors import RangeError
 
-#: Verdicts
-COMPLETE, INCOMPLETE, UNDECIDED = "complete", "incomplete", "undecided"
+#: Verdict: the set loses rank nowhere
+COMPLETE = "complete"
+#: Verdict: the set loses rank somewhere
+INCOMPLETE = "incomplete"
+#: Verdict: the time or the boxes ran out before either was shown
+UNDECIDED = "undecided"
 #: Boxes narrower than this in the joint to be cut are left undecided [rad]
 SMALLEST = 1e-6
-#: Matrices that are tried on random boxes of this half width [rad], how many boxes, and parts of each at most
-_TRIED, _HALF, _SAMPLES, _BUDGET = 8, 0.3, 6, 400
-#: Boxes to begin with, at least; the part of the time that choosing a matrix may take
-_FIRST, _READY = 256, 0.2
-#: What a look for a witness near undecided boxes gets where all time is spent [s]
-_SPARE = 0.5
+#: Matrices that are tried on random boxes
+_TRIED = 8
+#: Half width of a random box [rad]
+_HALF = 0.3
+#: Random boxes for each matrix
+_SAMPLES = 6
+#: Parts that a random box may be cut into
+_PARTS = 400
+#: Boxes to begin with, at least
+_FIRST = 256
+#: Parts of the time until which a matrix is chosen, boxes are looked at, and witnesses are searched for
+_SHARES = 0.2, 0.9, 0.95
+#: Between two looks at what is known [s]
+_LOOK = 0.1
 
 Progress = Callable[[float], None]
 
@@ -109,41 +122,96 @@ def certify(
     wanted, added = _task(task), checked("constraints", constraints)
     workers, file = _means(workers, state, progress, ended)
     checked_model(model)
-    until = (began := time.monotonic()) + 60.0 * minutes
-    # What a file keeps must be the same problem for the next call, so there its preparation is not cut short
-    last, ready = (until, began + 60.0 * _READY * minutes) if file is None else (np.inf, np.inf)
-    if file is None and not made_within(model, (*wanted, *added), last - began):
+    problem = _Problem(model, wanted, added, part, workers, file)
+    began, seconds = time.monotonic(), 60.0 * minutes
+
+    def told(found: RankCertificate) -> None:
+        if progress is not None:
+            progress(found.counts.regular_part + found.counts.tube_part + found.counts.undecided_part)
+
+    if file is not None:
+        # What a file keeps must be the same problem for the next call, so there its preparation is not cut short
+        return problem.decided(_Times(np.inf, began + seconds, np.inf), told, ended)
+    if not made_within(model, (*wanted, *added), seconds):
         return _without_boxes(UNDECIDED, began)
-    J_T, J_R = _matrices(model, wanted, added)
-    matrices = []
-    for matrix in rank_matrices(model, (*wanted, *added)):
-        if not matrix:
-            return _without_boxes(COMPLETE, began)
-        matrices.append(matrix)
-        if time.monotonic() > ready:
-            break
-    if time.monotonic() > last:
-        return _without_boxes(UNDECIDED, began)
-    own, every = trig_form(model.ring, J_T) if wanted else None, trig_form(model.ring, J_R)
-    rng = np.random.default_rng(0)
-    eps = part * (highest := 0.0 if own is None else peak(own, rng, last))
-    witness_from = functools.partial(numeric_witness, model, wanted, added, every, eps=eps, until=last)
-    witness = witness_from(starts=weakest(own, [every], eps, rng, last)[0])
-    if witness is not None:
-        return _without_boxes(INCOMPLETE, began, eps, highest, witness)
-    chosen = _chosen(_shortest(model, matrices, ready), own, eps, ready)
-    both, proofs = _both(chosen, own), block_proofs(model, (*wanted, *added), chosen.joints)
-    found = symmetries(both, used_joints(both))
-    pieces = _pieces((*proofs, (chosen,)), own, eps, found, file)
-    finished, counts, verdict, left = pieces.work(until, workers, progress, ended), pieces.counts, COMPLETE, 0.0
-    if not finished or counts.undecided > 0:
-        verdict, left = UNDECIDED, max(0.0, 1.0 - counts.regular_part - counts.tube_part)
-        spare = max(last, time.monotonic() + _SPARE)
-        witness = witness_from(starts=pieces.kept[:, : model.robot.nv], until=spare) if len(pieces.kept) else None
-        verdict = verdict if witness is None else INCOMPLETE
-    tubed = counts.tube > 0
-    cut, everywhere = used_joints(both) if tubed else chosen.joints, verdict == COMPLETE and not tubed
-    return RankCertificate(verdict, eps, highest, everywhere, counts, left, cut, len(found), pieces.seconds, witness)
+    times = _Times(*(began + share * seconds for share in _SHARES))
+    left, seen = began + seconds - time.monotonic(), 0
+    with Child(lambda report: report(problem.decided(times, report, None)), left) as child:
+        try:
+            while True:
+                done = child.wait(min(_LOOK, began + seconds - time.monotonic()))
+                if len(child.reports) > seen:
+                    seen = len(child.reports)
+                    told(child.reports[-1])
+                if done or time.monotonic() > began + seconds or (ended is not None and ended()):
+                    break
+        except KeyboardInterrupt:
+            child.interrupt()
+    found = child.reports[-1] if child.reports else _without_boxes(UNDECIDED, began)
+    return replace(found, seconds=time.monotonic() - began)
+
+
+@dataclass(frozen=True)
+class _Times:
+    """On the monotonic clock: when a matrix is chosen, when the last box is looked at, when searches by numbers end."""
+
+    ready: float
+    boxes: float
+    last: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """What is to be proved, and by what means."""
+
+    model: ExactModel
+    task: tuple[Rows, ...]
+    constraints: tuple[Rows, ...]
+    part: float
+    workers: int
+    file: Path | None
+
+    def decided(
+        self,
+        times: _Times,
+        told: Callable[[RankCertificate], None],
+        ended: Callable[[], bool] | None,
+    ) -> RankCertificate:
+        """The certificate; ``told`` gets what is known while boxes are looked at."""
+        model, every_row, began = self.model, (*self.task, *self.constraints), time.monotonic()
+        J_T, J_R = _matrices(model, self.task, self.constraints)
+        matrices = []
+        for matrix in rank_matrices(model, every_row):
+            if not matrix:
+                return _without_boxes(COMPLETE, began)
+            matrices.append(matrix)
+            if time.monotonic() > times.ready:
+                break
+        own, every = trig_form(model.ring, J_T) if self.task else None, trig_form(model.ring, J_R)
+        rng = np.random.default_rng(0)
+        eps = self.part * (highest := 0.0 if own is None else peak(own, rng, times.last))
+        nearest = functools.partial(numeric_witness, model, self.task, self.constraints, every, eps=eps)
+        witness = nearest(weakest(own, [every], eps, rng, times.last)[0], until=times.last)
+        if witness is not None:
+            return _without_boxes(INCOMPLETE, began, eps, highest, witness)
+        chosen = _chosen(_shortest(model, matrices, times.ready), own, eps, times.ready)
+        both, proofs = _both(chosen, own), block_proofs(model, every_row, chosen.joints)
+        found = symmetries(both, used_joints(both))
+        pieces = _pieces((*proofs, (chosen,)), own, eps, found, self.file)
+
+        def known(verdict: str, witness: NumericWitness | None = None) -> RankCertificate:
+            counts, complete = pieces.counts, verdict == COMPLETE
+            left = 0.0 if complete else max(0.0, 1.0 - counts.regular_part - counts.tube_part)
+            tubed = counts.tube > 0
+            joints, everywhere = used_joints(both) if tubed else chosen.joints, complete and not tubed
+            numbers = joints, len(found), pieces.seconds
+            return RankCertificate(verdict, eps, highest, everywhere, counts, left, *numbers, witness)
+
+        finished = pieces.work(times.boxes, self.workers, lambda _: told(known(UNDECIDED)), ended)
+        if finished and not pieces.counts.undecided:
+            return known(COMPLETE)
+        witness = nearest(pieces.kept[:, : model.robot.nv], until=times.last) if len(pieces.kept) else None
+        return known(UNDECIDED if witness is None else INCOMPLETE, witness)
 
 
 def _task(task: Any) -> tuple[Rows, ...]:
@@ -215,7 +283,7 @@ def _chosen(forms: Sequence[TrigForm], task: TrigForm | None, eps: float, until:
         for centre in centres:
             if time.monotonic() > until:
                 return best
-            counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _BUDGET)
+            counts, left, _ = search.run(np.concatenate((centre, half, [0.0]))[None], _PARTS)
             total += counts.boxes + len(left)
         if total < least:
             best, least = form, total

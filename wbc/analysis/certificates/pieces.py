@@ -20,10 +20,16 @@ from wbc.errors import RobotFileError
 from wbc.interrupts import interrupts
 from wbc.validation import Array
 
-#: Boxes of one piece, boxes that it may become before it is handed back, at first and at most
-_PIECE, _FEW, _BUDGET = 16, 1000, 20_000
-#: Seconds that a piece should take at most, and between two saves
-_TURN, _SAVE = 0.3, 20.0
+#: Boxes of one piece
+_PIECE = 16
+#: Boxes that a piece may become at first before it is handed back
+_FEW = 1000
+#: The same, at most
+_LATER_BUDGET = 20_000
+#: Time that a piece should take at most [s]
+_TURN = 0.3
+#: Time between two saves [s]
+_SAVE = 20.0
 
 _Done: TypeAlias = tuple[Counts, Array, Array]
 
@@ -97,7 +103,7 @@ class BoxPieces:
         if took > _TURN:
             self._budget = max(1, self._budget // 2)
         elif took < _TURN / 4 and done[0].boxes >= self._budget:
-            self._budget = min(2 * self._budget, _BUDGET)
+            self._budget = min(2 * self._budget, _LATER_BUDGET)
         return done
 
     def _take(self) -> Array:

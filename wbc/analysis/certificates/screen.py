@@ -69,7 +69,7 @@ def screen(
     rng = np.random.default_rng(0)
     own = trig_form(model.ring, symbolic_jacobian(model, wanted).matrix)
     forms = {name: trig_form(model.ring, symbolic_jacobian(model, [r]).matrix) for name, r in candidates.items()}
-    eps = part * peak(own, rng)
+    eps = part * peak(own, rng, until)
     known: list[Array] = []
     total = sum(1 for size in range(1, most + 1) for _ in combinations(candidates, size))
     done = 0
@@ -85,7 +85,7 @@ def screen(
             rows = tuple(candidates[name] for name in names)
             if own.shape[0] + sum(f.shape[0] for f in parts) < model.robot.nv or _fails(own, parts, known):
                 continue
-            q, ratio = weakest(own, parts, eps, rng)
+            q, ratio = weakest(own, parts, eps, rng, until)
             witness = _witness(model, wanted, rows, q, eps)
             if witness is not None:
                 known.append(joint_values(model, witness.q))

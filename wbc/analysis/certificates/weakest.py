@@ -15,8 +15,12 @@ from wbc.analysis.jacobians.numeric import NumericRows, rank, singular_values
 from wbc.analysis.rows import Rows
 from wbc.validation import Array
 
-#: Random configurations, those of them that are followed, and steps of each
-STARTS, FOLLOWED, STEPS = 4000, 48, 80
+#: Random configurations
+STARTS = 4000
+#: The weakest of them, from which a minimum is followed
+FOLLOWED = 48
+#: Steps towards a minimum
+STEPS = 80
 #: Steps towards a null vector
 NEWTON = 40
 #: Configurations that are looked at before the clock is

@@ -31,6 +31,13 @@ class Budget:
         if self._until is None:
             self._until = time.monotonic() + 60.0 * self.minutes
 
+    def part(self, share: float) -> Budget:
+        """A budget of the first part of the time that is left, with as many branches."""
+        share = validation.scalar("share", share, low=0.0, high=1.0)
+        first = Budget(self._left, self.minutes)
+        first._until = time.monotonic() + share * self.seconds
+        return first
+
     @property
     def seconds(self) -> float:
         """What is left of the time, at least 0."""

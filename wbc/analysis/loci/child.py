@@ -8,7 +8,9 @@ import pickle
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
+from math import inf
 from types import TracebackType
 from typing import Any, TypeAlias
 
@@ -35,6 +37,7 @@ class Child:
     def __init__(self, work: Callable[[Report], None], seconds: float) -> None:
         self.reports: list[Any] = []
         self.done = False
+        self._until = time.monotonic() + seconds
         self._pid = 0
         self._error: Exception | None = None
         if not hasattr(os, "fork"):
@@ -51,14 +54,14 @@ class Child:
         self._reader = threading.Thread(target=self._read, args=(read,), daemon=True)
         self._reader.start()
 
-    def wait(self, seconds: float) -> bool:
-        """Whether the work has ended within this time, or was killed.
+    def wait(self, seconds: float = inf) -> bool:
+        """Whether the work has ended within this time and its own, which began before the fork, or was killed.
 
         Raises:
             Whatever the work raised.
         """
         if self._pid:
-            self._ended.wait(max(0.0, seconds))
+            self._ended.wait(max(0.0, min(seconds, self._until - time.monotonic())))
         if self._error is not None:
             raise self._error
         return not self._pid or self._ended.is_set()

@@ -30,8 +30,12 @@ ALGORITHMS: dict[str, Algorithm] = {
     "sub_determinants": sub_determinant_locus,
     "singular_vectors": singular_vector_locus,
 }
-#: Verdicts of the exact method
-STRICT, LOOSE, UNDECIDED = "strict", "loose", "undecided"
+#: Verdict of the exact method: the locus is empty
+STRICT = "strict"
+#: Verdict of the exact method: the task has lost rank on every branch of the locus
+LOOSE = "loose"
+#: Verdict of the exact method: on some branch the task may have full rank
+UNDECIDED = "undecided"
 #: Time between two messages of what is known so far [s]
 _NEWS = 0.2
 

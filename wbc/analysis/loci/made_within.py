@@ -29,7 +29,7 @@ def made_within(model: ExactModel, rows: Sequence[Rows], seconds: float) -> bool
 
     if missing:
         with Child(work, seconds) as child:
-            child.wait(seconds)
+            child.wait()
         for one, packed, frame in child.reports:
             model.blocks.setdefault((one, None), (_unpacked(model, packed), frame))
     return all((one, None) in model.blocks for one in rows)

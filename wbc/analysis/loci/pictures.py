@@ -19,10 +19,14 @@ from wbc.analysis.loci.level_surface import zero_surface
 from wbc.errors import RobotFileError
 from wbc.validation import Array
 
-#: Random points that are drawn of a curve, and tries for the one pose
-_POINTS, _TRIES = 1500, 20
-#: Points of the grid along each joint in which surfaces and curves are found
-_GRID, _FINE = 33, 241
+#: Random points that are drawn of a curve
+_POINTS = 1500
+#: Random starts of the search for the pose that is drawn
+_TRIES = 20
+#: Points of the grid along each joint in which surfaces are found
+_GRID = 33
+#: Points of the grid along each joint in which curves are found
+_FINE = 241
 #: Lines of a locus that are drawn, at most
 _MOST = 6
 

@@ -21,7 +21,7 @@ TERMS = 120
 
 
 @dataclass(frozen=True)
-class _Block:
+class _SquareBlock:
     """A square block whose determinant does not vanish on a branch."""
 
     rows: tuple[int, ...]
@@ -50,13 +50,13 @@ def singular_vector_locus(
     Source: E. Dupuis, PhD thesis, McGill University, 2001, section 3.4.
     """
     wide = matrix if len(matrix) <= len(matrix[0]) else transposed(matrix)
-    search = _Search(exact, budget or Budget(), progress)
+    search = _VectorSearch(exact, budget or Budget(), progress)
     found = search.started(wide)
     return Locus(tuple(exact.without_redundant(found)), tuple(unique(search.open)))
 
 
 @dataclass
-class _Search:
+class _VectorSearch:
     """One search: its arithmetic, what it may take, and the branches that it did not decide."""
 
     exact: Exact
@@ -149,10 +149,10 @@ class _Search:
         return self.locus(product, branch, known), deeper
 
 
-def _largest_block(exact: Exact, square: Matrix, branch: LocusBranch) -> _Block:
+def _largest_block(exact: Exact, square: Matrix, branch: LocusBranch) -> _SquareBlock:
     """A block as large as the rank on the branch; of several the one with the shortest determinant."""
     for size in range(len(square) - 1, 0, -1):
-        blocks: list[_Block] = []
+        blocks: list[_SquareBlock] = []
         for block in _blocks(exact, square, size):
             if not exact.branches.vanishes(block.det, branch):
                 blocks.append(block)
@@ -160,17 +160,17 @@ def _largest_block(exact: Exact, square: Matrix, branch: LocusBranch) -> _Block:
                 break
         if blocks:
             return min(blocks, key=lambda b: (not b.det.is_constant(), len(b.det)))
-    return _Block((), (), exact.ring.one)
+    return _SquareBlock((), (), exact.ring.one)
 
 
-def _blocks(exact: Exact, square: Matrix, size: int) -> Iterator[_Block]:
+def _blocks(exact: Exact, square: Matrix, size: int) -> Iterator[_SquareBlock]:
     indices = range(len(square))
     for rows in combinations(indices, size):
         for columns in combinations(indices, size):
-            yield _Block(rows, columns, determinant(exact.ring, [[square[i][j] for j in columns] for i in rows]))
+            yield _SquareBlock(rows, columns, determinant(exact.ring, [[square[i][j] for j in columns] for i in rows]))
 
 
-def _null_vectors(exact: Exact, square: Matrix, block: _Block) -> Matrix:
+def _null_vectors(exact: Exact, square: Matrix, block: _SquareBlock) -> Matrix:
     """Left null vectors by Cramer's rule: det B for one more row, minus det B with that row in B's rows."""
     inside = [[square[i][j] for j in block.columns] for i in block.rows]
     out: Matrix = []

@@ -2,7 +2,6 @@
 #ifndef WBC_MOTION_H
 #define WBC_MOTION_H
 
-#include "steps.h"
 #include "sweep.h"
 
 /* From knot i to knot j, or a part of what is between knot i and i + 1 */

@@ -59,18 +59,18 @@ static int look(sweep_t *s, int p, const piece_t *piece, int last) {
     const double middle = middle_of(piece);
     double quick = bound_of(s, i, j) - s->required[p];
     const int ends = rest <= s->tolerance || last;
-    if (quick - off < enough && bounded(s, i) && bounded(s, j)) {
+    if (quick - off < enough && convex(s->shape + i) && convex(s->shape + j)) {
         /* Their centres lie within them: what is too near by these is too near */
         double d[3];
         minus3(s->body_pose + 12 * i + 9, s->body_pose + 12 * j + 9, d);
         if (!ends && sqrt(dot3(d, d)) - s->required[p] - off < enough) return 1;
-        if (!round_(s, i) || !round_(s, j)) quick = fmax(quick, capsules_of(s, i, j) - s->required[p]);
+        if (!is_round(s->shape + i) || !is_round(s->shape + j)) quick = fmax(quick, capsules_of(s, i, j) - s->required[p]);
     }
     if (quick - off >= enough) {
         s->low[p] = fmin(s->low[p], quick - off);
         return 0;
     }
-    found_t found;
+    answer_t found;
     distance_of(s, i, j, &found);
     s->measured++;
     const double here = margin(s, p, middle, middle, found.gap);
@@ -117,7 +117,7 @@ void wbc_sweep(sweep_t *s, int count) {
 /* A pair at a time [knots]: distance and nearest points, and what counts of it */
 void wbc_sweep_at(sweep_t *s, int p, double time, double *out) {
     piece_t here = {(int)time, (int)time + 1, 0.0, 0.0};
-    found_t found;
+    answer_t found;
     if (here.i > s->knots - 2) here.i = s->knots - 2, here.j = s->knots - 1;
     here.low = here.high = time - here.i;
     s->node++;
@@ -126,7 +126,7 @@ void wbc_sweep_at(sweep_t *s, int p, double time, double *out) {
     ready(s, s->second[p]);
     distance_of(s, s->first[p], s->second[p], &found);
     out[0] = found.gap;
-    copy3(found.a, out + 1);
-    copy3(found.b, out + 4);
+    copy3(found.point, out + 1);
+    along3(found.point, found.gap, found.normal, out + 4);
     out[7] = margin(s, p, time, time, found.gap);
 }

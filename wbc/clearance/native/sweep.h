@@ -3,11 +3,8 @@
 #ifndef WBC_SWEEP_H
 #define WBC_SWEEP_H
 
-#include "pair.h"
+#include "measure.h"
 
-/* Shapes beside those of scene.h, all fixed in the world but the last: the inside and outside of an endless cylinder about z,
- * and triangles in a tree of boxes */
-enum { INSIDE = 3, OUTSIDE, TRIANGLES };
 /* What is looked for: the least of every pair, of all pairs, or any that is below what is required */
 enum { EVERY, LEAST, ANY };
 /* Joints of frames */
@@ -37,15 +34,10 @@ typedef struct {
     double *body_pose;
     const double *line; /* 8 each: ends of a capsule about the body in its frame, its radius, and that of what turns beside its core */
     double *world_line; /* 6 each */
-    const int *shape, *hull; /* of triangles: the root of their tree, and how many they are where they close round a solid */
-    const double *size, *points;
+    const shape_t *shape;
     const int *chain, *chain_length; /* depth each: frames with joints, from the body's on */
     double *moved;                   /* 2 (depth + 1) each: how far points may be off the middle, and the slack in it */
     int *stamp;
-    /* trees of boxes */
-    const int *tree;        /* 2 each: left and right child, or -1 - first and -last of the triangles */
-    const double *box;      /* 6 each: least and greatest corner */
-    const double *triangle; /* 24 each: three points, the last one again up to eight; all x, all y, all z */
     /* pairs */
     const int *first, *second;
     const int *stop_first, *stop_second; /* how far up the chains the two move apart */

@@ -27,11 +27,17 @@ from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
-#: Part of the median of the task's least singular value below which one is zero, and that the task must keep for a
-#: witness: parts of what is usual for this task of this arm do not depend on its size or on the scale of rows
-ZERO, KEPT = 1e-8, 1e-2
-#: Configurations of the screen, and how many of them Newton's method starts from
-STATES, STARTS, STEPS = 2000, 60, 30
+#: A singular value of the task below this part of the median of its least ones is zero. Parts of what is usual for this
+#: task of this arm do not depend on the arm's size or on the scale of rows.
+ZERO = 1e-8
+#: Part of the same median that the task's least singular value keeps where a configuration serves as a witness
+KEPT = 1e-2
+#: Random configurations of the screen
+STATES = 2000
+#: The nearest to a loss of rank, from which Newton's method starts
+STARTS = 60
+#: Steps of Newton's method
+STEPS = 30
 SCREENED = "screened"
 
 

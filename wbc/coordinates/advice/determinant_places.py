@@ -36,8 +36,10 @@ from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
-#: See :func:`closed_form`
-SMALL, LARGE = 4, 7
+#: Joints of an arm, at most, for the determinant of parts of a position to be short enough to be of use
+SMALL = 4
+#: Joints of an arm, at most, for any determinant to be short enough to be of use
+LARGE = 7
 #: Terms of a relation in half angles beyond which it is not written out: nobody reads it, and sorting it takes seconds
 LONG = 100
 #: What rank analysis knows

@@ -17,8 +17,12 @@ from wbc.coordinates.scales import scales
 from wbc.robot import Robot
 from wbc.validation import Array
 
-#: Configurations, sets at most that are returned, and subsets at most that are looked at
-STATES, SETS, SUBSETS = 48, 6, 600
+#: Random configurations at which the rank of a set is looked at
+SET_STATES = 48
+#: Sets that are returned at most
+SETS = 6
+#: Subsets that are looked at, at most
+SUBSETS = 600
 #: A further set has to better the best pair by this factor, as the geometric mean over the configurations
 GAIN = 1.05
 #: Part of a task's least singular value that counts as none, where logarithms are taken
@@ -40,7 +44,7 @@ class Sampled:
     @cached_property
     def _rows(self) -> dict[Coordinate, Array]:
         robot = self._robot
-        states = states_of(robot, STATES)
+        states = states_of(robot, SET_STATES)
         function = expressions.rate_function(robot, self._every)
         rates = function.map(len(states))(states.T).full()
         own, dofs = scales(robot, self._every)

@@ -20,7 +20,7 @@ from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
 #: Configurations at which ranks are looked at
-STATES = 16
+PART_STATES = 16
 
 
 def found_parts(robot: Robot) -> Parts:
@@ -40,7 +40,7 @@ def found_parts(robot: Robot) -> Parts:
     chains = chains_of(robot)
     for chain in chains.arms:
         single(robot, chain.joints)
-    finder = _Finder(robot)
+    finder = _PartFinder(robot)
     drafts = [finder.draft(chain) for chain in chains.arms]
     names = [str(n) for n in robot.model.names]
     trunk = chains.trunk
@@ -56,12 +56,12 @@ def found_parts(robot: Robot) -> Parts:
     return Parts(whole, arms, body, None if carrier is None else _with_sets(whole, carrier), others)
 
 
-class _Finder:
+class _PartFinder:
     """Frames that parts need are added to the robot as they are found."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._states = states_of(robot, STATES)
+        self._states = states_of(robot, PART_STATES)
         self._data = robot.model.createData()
 
     def draft(self, chain: Chain) -> Arm:

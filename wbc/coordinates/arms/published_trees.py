@@ -29,7 +29,8 @@ class TreeSets:
     """A tree of arms with its sets.
 
     Attributes:
-        robot: with all frames that the rows need. sets: by name, the default of ``wbc analyse`` in this order.
+        robot: with all frames that the rows need.
+        sets: by name, the default of ``wbc coordinates analyse`` in this order.
     """
 
     robot: Robot

@@ -11,7 +11,6 @@ import numpy as np
 
 from wbc import validation
 from wbc.coordinates import expressions
-from wbc.coordinates.control.pair_stack import metric_of
 from wbc.coordinates.items import FollowRows
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.samples import ROUNDING
@@ -69,7 +68,7 @@ def motion_cue(robot: Robot, pair: CoordinatePair, q: Any, rates: Any) -> Motion
         met = J_T N (S J_T N)^+ S asked,    J_C N = 0,    minimising |S (asked - met)|              [m/s, rad/s]
 
     N is an orthonormal basis of the null space of J_C, its rank decided at 1e-9 of the largest singular value. S
-    divides rows in metres by the robot's characteristic length, as the controller does, or takes the velocities of
+    divides rows in metres by the robot's characteristic length, as the controller does; a pose is the velocities of
     three points where the pair has a ``metric``.
     For a pair that is not over-determined all is met where it is regular.
 
@@ -97,17 +96,11 @@ def _function(robot: Robot, pair: CoordinatePair) -> ca.Function:
     kin = Tracer(Kinematics(robot.model))
     task, held = ([expressions.matrix(robot, kin, one) for one in side] for side in (pair.task, pair.constraint))
     length = robot.characteristic_length
-    rows, columns = scales(robot, pair.task, length)
-    scale, _ = scales(robot, pair.constraint, length)
-    parts, start = [], 0
-    for one, matrix in zip(pair.task, task, strict=True):
-        count = matrix.shape[0]
-        metric = metric_of(pair, one)
-        own = ca.SX(np.diag(rows[start : start + count]))
-        parts.append(own if metric is None else FollowRows(one, metric).spread(kin))
-        start += count
+    served = FollowRows(pair.task, pair.metric)
+    size = [1.0 / row.scale(length) for row in served.rows(robot)]
+    scale, columns = scales(robot, pair.constraint, length)
     J_T, J_C = ca.vertcat(*task) @ np.diag(columns), ca.vertcat(ca.SX(0, robot.nv), *held) @ np.diag(columns)
-    whole = J_T, ca.diagcat(*parts), np.diag(scale) @ J_C if pair.constraint else J_C
+    whole = J_T, np.diag(size) @ served.spread(robot, kin), np.diag(scale) @ J_C if pair.constraint else J_C
     return ca.Function("cue", [kin.q], [kin.expand(ca.densify(one)) for one in whole])
 
 

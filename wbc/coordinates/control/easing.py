@@ -23,7 +23,7 @@ CLEAR = 1.001
 #: A pair is eased below this part of the least singular value that it typically has, and below LEAST at most
 PART = 0.1
 #: Configurations at which "typically" is looked at
-STATES = 64
+EASED_STATES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Easing:
         rows, columns = scales(robot, rates.row_slices)
         self._scales = rows[:, None] * columns
         self._least = LeastSingular(native=native)
-        usual = np.array([self._scales * rates.whole(q) for q in states_of(robot, STATES)])
+        usual = np.array([self._scales * rates.whole(q) for q in states_of(robot, EASED_STATES)])
         self._parts = {pair.name: self._part(robot, pair, rows, length, usual) for pair in pairs}
         #: The pair, the matrix of all coordinates and how far its singular value was above the threshold
         self._name, self._margin = "", 0.0

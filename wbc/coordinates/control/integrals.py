@@ -75,7 +75,6 @@ class RateIntegrals:
         self._q, self._before, self.rows = q, every, rows
         np.multiply(rates, dt, out=self._planned)
 
-    def cap(self, rows: slice, most: float) -> None:
+    def cap(self, rows: Rows, most: float) -> None:
         """Forget what rows are ahead by beyond ``most``."""
-        part = self.off[rows]
-        np.clip(part, -most, most, out=part)
+        self.off[rows] = np.clip(self.off[rows], -most, most)

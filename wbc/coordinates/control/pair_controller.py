@@ -27,7 +27,7 @@ from wbc.tasks import Item
 from wbc.validation import Array
 
 #: A blend's acceleration is at most this part of a joint's limit
-SHARE = 0.8
+PAIR_SHARE = 0.8
 
 
 class PairController:
@@ -336,4 +336,4 @@ class PairController:
         change = np.abs(np.linalg.lstsq(every[rows], self._command[rows], rcond=1e-6)[0] - v)
         limit = self.robot.limits.acceleration
         slow = np.isfinite(limit) & (limit > 0.0)
-        return float((1.5 * change[slow] / (SHARE * limit[slow])).max(initial=0.0))
+        return float((1.5 * change[slow] / (PAIR_SHARE * limit[slow])).max(initial=0.0))

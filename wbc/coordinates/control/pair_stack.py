@@ -9,7 +9,7 @@ from wbc import validation
 from wbc.api import Stack
 from wbc.coordinates import expressions
 from wbc.coordinates.items import FollowRows, KeepRows
-from wbc.coordinates.pair import CoordinatePair, is_pose, pairs_of
+from wbc.coordinates.pair import CoordinatePair, pairs_of
 from wbc.coordinates.rows import Coordinate
 from wbc.errors import DuplicateNameError
 from wbc.robot import Robot
@@ -20,7 +20,7 @@ DAMPING = 1e-11
 #: Name of the item that lets the task give way near a locus, see :class:`wbc.coordinates.control.easing.Easing`
 EASE = "ease near a locus"
 #: Part of the drift of what is held that one step takes back
-SHARE = 0.5
+STACK_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,13 @@ class PairStack:
 
     Attributes:
         stack: the declaration. pairs: by name.
-        coordinates: all of them, each once. follow, keep: name of the item by coordinate.
+        coordinates: all of them, each once. follow: name of the item that is the task, by pair. keep: by coordinate.
     """
 
     stack: Stack
     pairs: dict[str, CoordinatePair]
     coordinates: tuple[Coordinate, ...]
-    follow: dict[tuple[Coordinate, float | None], str]
+    follow: dict[str, str]
     keep: dict[Coordinate, str]
 
 
@@ -76,29 +76,25 @@ def pair_stack(
     every = tuple(dict.fromkeys(one for pair in given for one in pair.rows))
     labels = _labels(every)
     stack = Stack(robot, dt, damping=DAMPING, length=length, calm=False)
-    follow: dict[tuple[Coordinate, float | None], str] = {}
+    follow: dict[str, str] = {}
+    tasks: dict[FollowRows, str] = {}
     keep: dict[Coordinate, str] = {}
     for pair in given:
-        for one in pair.task:
-            metric = metric_of(pair, one)
-            if (one, metric) not in follow:
-                name = f"follow {labels[one]}" + ("" if metric is None else f" by points at {metric:g} m")
-                stack.add(FollowRows(one, metric), name=name, scaled=scaled)
-                follow[one, metric] = name
+        task = FollowRows(pair.task, pair.metric)
+        if task not in tasks:
+            points = "" if pair.metric is None else f" by points at {pair.metric:g} m"
+            tasks[task] = f"follow {', '.join(labels[one] for one in pair.task)}{points}"
+            stack.add(task, name=tasks[task], scaled=scaled)
+        follow[pair.name] = tasks[task]
         for one in pair.constraint:
             if one not in keep:
                 keep[one] = f"keep {labels[one]}"
-                stack.add(KeepRows(one, SHARE / dt if gain is None else gain), name=keep[one])
+                stack.add(KeepRows(one, STACK_SHARE / dt if gain is None else gain), name=keep[one])
     stack.add(Damping(), name=EASE)
     for item in validation.items("items", items, "items of a stack"):
         stack.add(item)
     stack.add(JointLimits() if validation.flag("limits", limits) else JointLimits(position=False, acceleration=False))
     return PairStack(stack, named, every, follow, keep)
-
-
-def metric_of(pair: CoordinatePair, one: Coordinate) -> float | None:
-    """The metric that a pair serves a coordinate with."""
-    return pair.metric if is_pose(one) else None
 
 
 def row_count(robot: Robot, rows: Iterable[Coordinate]) -> int:

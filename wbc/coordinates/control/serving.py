@@ -9,7 +9,7 @@ import numpy as np
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.coordinates.control.integrals import RateIntegrals, Rows
-from wbc.coordinates.control.pair_stack import PairStack, metric_of
+from wbc.coordinates.control.pair_stack import PairStack
 from wbc.coordinates.expressions import DRIFT
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rate_matrices import RateMatrices
@@ -27,17 +27,17 @@ class Served:
 
     Attributes:
         items: names of its items. task_rows, held_rows: its rows among those of all coordinates.
-        speeds: (input, rows) of every coordinate's rate.
-        integral_rows: rows of coordinates with integrals that count. offsets, drifts: (input, rows) of those that are
-            commanded and of those that are held.
+        speeds: (input, rows) of every item's rates.
+        integral_rows: rows of coordinates with integrals that count. offset: (input, rows) of the task, where some of
+            it counts. drifts: of what is held.
     """
 
     items: frozenset[str]
     task_rows: Rows
     held_rows: Rows
-    speeds: tuple[tuple[Slot, slice], ...]
+    speeds: tuple[tuple[Slot, slice | Rows], ...]
     integral_rows: Rows
-    offsets: tuple[tuple[Slot, slice], ...]
+    offset: tuple[Slot, Rows] | None
     drifts: tuple[tuple[Slot, slice], ...]
 
     def write(self, controller: Controller, rates: Array) -> None:
@@ -49,11 +49,12 @@ class Served:
     def write_integrals(self, controller: Controller, integrals: RateIntegrals) -> None:
         """What coordinates are ahead of their integrals by; what is commanded makes up for little of it."""
         core = core_of(controller)
-        for slot, rows in self.offsets:
+        if self.offset is not None:
+            slot, rows = self.offset
             integrals.cap(rows, LAG)
             core.write(slot, -integrals.off[rows])
-        for slot, rows in self.drifts:
-            core.write(slot, integrals.off[rows])
+        for slot, held in self.drifts:
+            core.write(slot, integrals.off[held])
 
 
 def served(
@@ -62,20 +63,22 @@ def served(
     """What the tick of a pair writes; ``masked``: coordinates that have integrals."""
     blocks = core_of(controller).layout.blocks
     slices = rates.row_slices
-    follow = {one: declared.follow[one, metric_of(pair, one)] for one in pair.task}
+    follow, task_rows = declared.follow[pair.name], _rows(rates, pair.task)
     keep = {one: declared.keep[one] for one in pair.constraint}
     tall = sum(slices[one].stop - slices[one].start for one in pair.rows) > rates.robot.nv
-    items = follow | keep
-    offsets = [] if tall else [one for one in pair.task if one in masked]
+    offset = None if tall or masked.isdisjoint(pair.task) else (blocks[follow].slots["offset"], task_rows)
     drifts = [one for one in pair.constraint if one in masked]
     counted = [one for one in pair.rows if one in masked]
     return Served(
-        frozenset(items.values()),
-        _rows(rates, pair.task),
+        frozenset({follow, *keep.values()}),
+        task_rows,
         _rows(rates, pair.constraint),
-        tuple((blocks[name].slots["speed"], slices[one]) for one, name in items.items()),
+        (
+            (blocks[follow].slots["speed"], task_rows),
+            *((blocks[name].slots["speed"], slices[one]) for one, name in keep.items()),
+        ),
         _rows(rates, counted),
-        tuple((blocks[follow[one]].slots["offset"], slices[one]) for one in offsets),
+        offset,
         tuple((blocks[keep[one]].slots[DRIFT], slices[one]) for one in drifts),
     )
 

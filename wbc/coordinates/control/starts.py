@@ -14,7 +14,7 @@ from wbc.robot.robot import checked_robot
 from wbc.validation import Array
 
 #: Configurations that are looked at
-STATES = 200
+START_STATES = 200
 #: The neutral configuration will do where each pair has this part of what is usual for it
 ENOUGH = 0.5
 #: Part of a joint's range that a start stays away from its ends
@@ -31,7 +31,7 @@ def regular_start(robot: Robot, pairs: Sequence[CoordinatePair]) -> Array:
         ShapeError: no pairs.
     """
     pairs, neutral = pairs_of(pairs), checked_robot(robot).neutral
-    states = [neutral, *(q for q in states_of(robot, STATES) if _inside(robot, q))]
+    states = [neutral, *(q for q in states_of(robot, START_STATES) if _inside(robot, q))]
     found = Conditioning(robot, [pair.rows for pair in pairs], backend="vm").many(np.array(states))
     shares = []
     for J in found:

@@ -25,8 +25,10 @@ from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.validation import Array
 
-#: Intervals of the first look, and rounds of setting samples closer at most
-FIRST, ROUNDS = 64, 40
+#: Intervals of the first look
+FIRST = 64
+#: Rounds of setting samples closer, at most
+ROUNDS = 40
 #: Samples closer than this part of the path are not set closer for a given pair that is lost between them [1]
 FINEST = 1.0 / 1024.0
 #: A joint goes this far at most [rad, m]: the path is sampled closely all along
@@ -154,12 +156,12 @@ def carry(
     step = np.asarray(pin.difference(robot.model, start, end))
     if not np.abs(step).max(initial=0.0) <= FARTHEST:
         raise RangeError("q1", q1, f"expected joints that go {FARTHEST:g} rad or m at most")
-    search = _Search(robot, start, step, given, part)
+    search = _SampleSearch(robot, start, step, given, part)
     legs = tuple(Leg(p, a * total, b * total, s, k >= len(given)) for p, k, a, b, s in search.legs())
     return CarriedMotion(robot, start, end, total, search.step / total, legs)
 
 
-class _Search:
+class _SampleSearch:
     """Candidates along the path; rows of all of them come from one function."""
 
     def __init__(self, robot: Robot, q0: Array, step: Array, pairs: Sequence[CoordinatePair], share: float) -> None:

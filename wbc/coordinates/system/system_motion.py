@@ -23,8 +23,10 @@ from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
-#: Sets of rows whose rank is looked at together, and at most
-TOGETHER, MOST = 20_000, 2_000_000
+#: Sets of rows whose rank is looked at together
+TOGETHER = 20_000
+#: Sets of rows that are looked at, at most
+MOST = 2_000_000
 
 
 def system_coordinates(robot: Robot) -> tuple[BodyRows, ...]:

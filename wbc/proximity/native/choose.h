@@ -6,7 +6,7 @@
 #ifndef WBC_CHOOSE_H
 #define WBC_CHOOSE_H
 
-#include "pair.h"
+#include "pairs.h"
 
 /* Whether pair i is chosen after pair k */
 static inline int after(const scene_t *s, int i, int k) {

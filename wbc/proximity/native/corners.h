@@ -2,7 +2,7 @@
 #ifndef WBC_CORNERS_H
 #define WBC_CORNERS_H
 
-#include "pair.h"
+#include "pairs.h"
 
 /* A corner no farther than this from the core of the other body is inside, and has no row [m] */
 #define INSIDE 1e-6
@@ -21,7 +21,7 @@ static void line_through(const double *point, const double *normal, double *line
 /* Corner number c of body `own` against body `other`; the normal times sign */
 static void corner_row(const scene_t *s, int own, int other, int c, double sign, corner_t *out) {
     const double *O = s->body_pose + 12 * own, *T = s->body_pose + 12 * other;
-    const shape_t shape = shape_of(s, other);
+    const shape_t *shape = s->shape + other;
     double point[3], offset[3], local[3], core[3], normal[3];
     out->gap = s->far;
     memset(out->line, 0, sizeof out->line);
@@ -29,13 +29,13 @@ static void corner_row(const scene_t *s, int own, int other, int c, double sign,
     for (int k = 0; k < 3; k++) point[k] += O[9 + k];
     minus3(point, T + 9, offset);
     turn_back(T, offset, local);
-    nearest(&shape, local, core);
+    nearest(shape, local, core);
     minus3(core, local, offset);
     const double length = sqrt(dot3(offset, offset));
     if (length <= INSIDE) return;
     turn(T, offset, normal);
     for (int k = 0; k < 3; k++) normal[k] *= sign / length;
-    out->gap = length - s->size[6 * own + 4] - s->size[6 * other + 4];
+    out->gap = length - s->shape[own].size[4] - shape->size[4];
     line_through(point, normal, out->line);
 }
 
@@ -46,7 +46,7 @@ static int corners_of(const scene_t *s, int pair, corner_t *found) {
     int count = 0;
     for (int side = 0; side < 2; side++) {
         const int own = bodies[side], other = bodies[1 - side];
-        if (s->kind[other] != SUM) continue;
+        if (s->shape[other].kind != SUM) continue;
         for (int c = 0; c < s->corner_count[own]; c++) {
             corner_row(s, own, other, c, side ? -1.0 : 1.0, found + count);
             if (found[count].gap < s->far / 2) found[count++].gap += more;

@@ -30,10 +30,10 @@ static int outside_twist(const scene_t *s, double *twist) {
 static double fastest(const scene_t *s, int body, const double *twist) {
     const double *center = s->body_pose + 12 * body + 9;
     double velocity[3];
-    if (s->kind[body] == PLANE) return INFINITY;
+    if (s->shape[body].kind == PLANE) return INFINITY;
     cross3(twist + 3, center, velocity);
     for (int k = 0; k < 3; k++) velocity[k] += twist[k];
-    return sqrt(dot3(velocity, velocity)) + sqrt(dot3(twist + 3, twist + 3)) * s->size[6 * body + 5];
+    return sqrt(dot3(velocity, velocity)) + sqrt(dot3(twist + 3, twist + 3)) * s->shape[body].size[5];
 }
 
 /* Twists of the joints that carry bodies, at the world's origin; the longest time that a joint takes to stop */
@@ -82,8 +82,8 @@ static int used(const scene_t *s, int pair, double gap, const double *line, doub
         const double lag = dt + fmax(-drift, 0.0) / a, speed = 2.0 * h / (lag + sqrt(lag * lag + 2.0 * h / a));
         allowed = fmin(allowed, speed + fmax(drift, 0.0));
     }
-    if (closing > allowed + s->tie) return closing > fmax(allowed, 0.0) + s->tie ? INWARD : TOO_MUCH;
-    if (closing > allowed - (1.0 - WHOLE) * fabs(allowed) - s->tie) return ALL;
+    if (closing > allowed + s->how.tie) return closing > fmax(allowed, 0.0) + s->how.tie ? INWARD : TOO_MUCH;
+    if (closing > allowed - (1.0 - WHOLE) * fabs(allowed) - s->how.tie) return ALL;
     return closing > 0.5 * allowed || !(h > 0.0) ? HALF : LITTLE;
 }
 

@@ -2,14 +2,15 @@
 #ifndef WBC_SCENE_H
 #define WBC_SCENE_H
 
-/* Shapes: a box, a disc across z and a ball added up (spheres, capsules, boxes, cylinders); a hull; a half-space z <= 0 */
-enum { SUM, HULL, PLANE };
+#include "measure.h"
 
 /* See wbc/proximity/native.py, which fills it: the order of the fields is the same there */
 typedef struct {
     int joints, steps, bodies, pairs, rows, corners, width, nv, has_pose, has_velocity;
-    /* rows further than `far` are without a pair; [m] also: what counts as touching, as equal, and as near contact */
-    double far, touch, tie, trust, keep_share, keep_length, off, near;
+    /* rows further than `far` are without a pair [m] */
+    double far;
+    tolerance_t how;
+    double keep_share, keep_length, off, near;
     /* kinematics */
     const double *q;
     const int *joint_parent, *joint_steps; /* steps of joint k: joint_steps[k] to joint_steps[k + 1] */
@@ -21,9 +22,7 @@ typedef struct {
     const int *body_joint;
     const double *body_place; /* 12 each, on the joint */
     double *body_pose;        /* 12 each, in the world */
-    const int *kind, *hull;   /* hull: where the points start, and how many, 2 each */
-    const double *size;       /* half sides, disc, ball, radius of the bounding sphere: 6 each */
-    const double *points;     /* of a hull: all x, then all y, then all z */
+    const shape_t *shape;
     const double *corner;     /* width x 3 each */
     const int *corner_count;
     /* pairs */

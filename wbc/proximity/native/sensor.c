@@ -1,7 +1,7 @@
 /* The sensor of the closest pairs: one call a tick, from the configuration to the rows. No memory is allocated. */
 #include "scene.h"
 #include "steps.h"
-#include "pair.h"
+#include "pairs.h"
 #include "choose.h"
 #include "corners.h"
 #include "missing.h"

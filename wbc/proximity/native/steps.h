@@ -3,18 +3,10 @@
 #define WBC_STEPS_H
 
 #include "scene.h"
-#include "vectors.h"
 
 /* Numbers of a step: axis, scale, offset; of PLACE a pose. CIRCLE reads (cos, sin), FOLLOW the angle of such a
  * pair. wbc/symbolic/joint_steps.py has the same numbers */
 enum { TURN, SHIFT, CIRCLE, FOLLOW, QUATERNION, PLACE };
-
-static void axis_angle(const double *u, double c, double s, double *R) {
-    const double t = 1.0 - c;
-    R[0] = c + t * u[0] * u[0], R[1] = t * u[0] * u[1] - s * u[2], R[2] = t * u[0] * u[2] + s * u[1];
-    R[3] = t * u[0] * u[1] + s * u[2], R[4] = c + t * u[1] * u[1], R[5] = t * u[1] * u[2] - s * u[0];
-    R[6] = t * u[0] * u[2] - s * u[1], R[7] = t * u[1] * u[2] + s * u[0], R[8] = c + t * u[2] * u[2];
-}
 
 static void quaternion(const double *q, double *R) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];

@@ -7,7 +7,7 @@ Source: IKOR, inverse kinematics on redundant systems; ORNL/TM-13096. What its l
 from __future__ import annotations
 
 from wbc.published.ikor.cases import case, differences, printed
-from wbc.published.ikor.driver import Code, Driver, Run, Stop
+from wbc.published.ikor.driver import Code, CourseRun, Driver, Stop
 from wbc.published.ikor.files import IkorFileError
 from wbc.published.ikor.legacy import legacy_hermies
 from wbc.published.ikor.lines import Trajectory, arc_from, line_to, posed, straight
@@ -17,10 +17,10 @@ from wbc.published.ikor.settings import Method, Settings, Switch
 __all__ = [
     "ArmMachine",
     "Code",
+    "CourseRun",
     "Driver",
     "IkorFileError",
     "Method",
-    "Run",
     "Settings",
     "Stop",
     "Switch",

@@ -19,7 +19,7 @@ PLATFORM = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
+class ObstacleGap:
     """Between an obstacle and a link: least distance, less than 0 within the obstacle, nearest point of the link, and
     the unit normal along which that gets away. The platform, link -1, is a disc on the ground.
     """
@@ -42,12 +42,12 @@ class Gap:
 def gaps(
     machine: ArmMachine, q: Array, spheres: Array, margin: float = 0.0, whole: bool = True,
     polygons: Sequence[Sequence[Array]] = (),
-) -> list[Gap]:  # fmt: skip
+) -> list[ObstacleGap]:  # fmt: skip
     """Of every obstacle and link; ``whole``: of tool and platform, too, which the published driver left out.
 
     ``polygons``: of planar arms, each as its convex parts, corners [k, 2] to the left around.
     """
-    points, out = machine.points(q), list[Gap]()
+    points, out = machine.points(q), list[ObstacleGap]()
     links = len(points) - (1 if whole else 2)
     ways = np.diff(points, axis=0)[:links]
     lengths = np.maximum((ways * ways).sum(axis=1), 1e-300)
@@ -59,18 +59,20 @@ def gaps(
                 ends = ("",) if len(sizes) == 1 else (", first end", ", last end")
                 for size, place, end in zip(sizes.tolist(), places, ends, strict=True):
                     point, away = np.append(place, points[link, 2]), np.append(normal, 0.0)
-                    out.append(Gap(size - margin, link, point, away, name + end))
+                    out.append(ObstacleGap(size - margin, link, point, away, name + end))
     for number, (*centre, radius) in enumerate(spheres, 1):
         shares = np.clip(((centre - points[:links]) * ways).sum(axis=1) / lengths, 0.0, 1.0)
         near = points[:links] + shares[:, None] * ways
         for link in range(links):
             size, normal = _away(near[link] - centre, ways[link])
-            out.append(Gap(size - radius - margin, link, near[link], normal, f"sphere {number}"))
+            out.append(ObstacleGap(size - radius - margin, link, near[link], normal, f"sphere {number}"))
         across = (radius + margin) ** 2 - centre[2] ** 2
         if whole and machine.base != "none" and across >= 0.0:
             middle = np.array([q[-3], q[-2], centre[2]])
             size, normal = _away(middle - centre, np.array([0.0, 0.0, 1.0]))
-            out.append(Gap(size - machine.plate - math.sqrt(across), PLATFORM, middle, normal, f"sphere {number}"))
+            out.append(
+                ObstacleGap(size - machine.plate - math.sqrt(across), PLATFORM, middle, normal, f"sphere {number}")
+            )
     return out
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.published.ikor.driver import Driver, Run
+from wbc.published.ikor.driver import CourseRun, Driver
 from wbc.published.ikor.legacy import QUARTER, legacy_hermies
 from wbc.published.ikor.lines import Trajectory, euler_angles, rotation_of, straight
 from wbc.published.ikor.machines import ArmMachine, hermies
@@ -71,7 +71,7 @@ def route(machine: ArmMachine, trajectory: str) -> Trajectory:
     return straight(machine, way / steps, steps, start, turn / steps)
 
 
-def case(trajectory: str, config: str, *, legacy: bool = True, spheres: Any = (), **settings: Any) -> Run:
+def case(trajectory: str, config: str, *, legacy: bool = True, spheres: Any = (), **settings: Any) -> CourseRun:
     """A published run again: legacy with the two defects of the printed norms, else with consistent kinematics;
     ``spheres`` and fields of :class:`Settings` beside those of the configuration, as it was not published.
 
@@ -89,14 +89,14 @@ def case(trajectory: str, config: str, *, legacy: bool = True, spheres: Any = ()
     return Driver(machine, Settings(rows=AXES[: int(config[0])], euler=legacy, **settings), spheres).run(path)
 
 
-def differences(run: Run, trajectory: str, config: str) -> Array:
+def differences(run: CourseRun, trajectory: str, config: str) -> Array:
     """ln(measured / printed) at the legible steps."""
     found = printed()[trajectory, config]
     good = np.isfinite(found.fsp)
     return np.asarray(np.log(run.norms[found.steps[good].astype(int) - 1] / found.fsp[good]))
 
 
-def unmatched(run: Run, trajectory: str, config: str) -> list[tuple[int, float, float, float, str]]:
+def unmatched(run: CourseRun, trajectory: str, config: str) -> list[tuple[int, float, float, float, str]]:
     """Printed norms that are off by more than :data:`NEAR`: step, printed, measured, ln(measured / printed), and why.
 
     ``misread``: both rows beside it match, which no motion would do, as feedback shows a step on. ``given back``: with

@@ -56,7 +56,7 @@ class Stop(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class CourseRun:
     """What came of it.
 
     Attributes:
@@ -81,20 +81,20 @@ class Run:
 
 
 @dataclass
-class _Log:
+class _StepLog:
     """Steps so far: columns before each, and what is known of each."""
 
     path: list[Array]
     steps: list[tuple[Any, ...]] = field(default_factory=list)
 
-    def run(self, stop: Stop, message: str = "", loops: int = 0) -> Run:
+    def run(self, stop: Stop, message: str = "", loops: int = 0) -> CourseRun:
         """All of it."""
         columns: list[tuple[Any, ...]] = list(zip(*self.steps, strict=True)) or [()] * 6
         norms, errors, clearance, seconds = (np.array(column, dtype=float) for column in columns[:4])
         acted, given_up = columns[4:]
         code = Code.OK if stop in (Stop.DONE, Stop.NOTHING) else Code.PARTIAL
         q = np.array(self.path)
-        return Run(q, norms, errors, clearance, seconds, acted, given_up, code, stop, message, loops)
+        return CourseRun(q, norms, errors, clearance, seconds, acted, given_up, code, stop, message, loops)
 
 
 class Driver:
@@ -147,13 +147,13 @@ class Driver:
             out.append((switch.point, driver))
         return out
 
-    def run(self, trajectory: Trajectory) -> Run:
+    def run(self, trajectory: Trajectory) -> CourseRun:
         """The whole trajectory; what stops it earlier, Ctrl-C too, is said in the answer."""
         settings, points, euler = self.settings, trajectory.points, trajectory.euler
         q = self.machine.checked("start", trajectory.start).copy()
         if euler is None:
             euler = np.tile(euler_angles(self.machine.place(q)[1]), (len(points), 1))
-        log, aims, fresh, loops = _Log([q]), list(zip(points, euler, strict=True)), 0, 0
+        log, aims, fresh, loops = _StepLog([q]), list(zip(points, euler, strict=True)), 0, 0
         while (k := len(log.steps)) < len(aims):
             try:
                 self._follow(log, aims, k + 1)
@@ -169,7 +169,7 @@ class Driver:
         message = f"{trajectory.dropped} points left out" if trajectory.dropped else ""
         return log.run(full if aims else Stop.NOTHING, message, loops)
 
-    def _follow(self, log: _Log, aims: list[tuple[Array, Array]], last: int, held: Sequence[int] = ()) -> None:
+    def _follow(self, log: _StepLog, aims: list[tuple[Array, Array]], last: int, held: Sequence[int] = ()) -> None:
         """Steps to the aims that the log has not, up to a number."""
         for k in range(len(log.steps), last):
             began, q = time.perf_counter(), log.path[-1]
@@ -179,10 +179,10 @@ class Driver:
             v, found = driver.step(q, *aims[k], held, before)
             driver._done(log, q, v, found, aims[k], began)
 
-    def _loop_back(self, log: _Log, aims: list[tuple[Array, Array]], k: int, last: int, joint: int) -> bool:
+    def _loop_back(self, log: _StepLog, aims: list[tuple[Array, Array]], k: int, last: int, joint: int) -> bool:
         """From step k on to another, or back by :data:`BACK` steps and on with a joint at rest: what misses less."""
         first = max(0, k - BACK)
-        other = _Log(log.path[: first + 1], log.steps[:first])
+        other = _StepLog(log.path[: first + 1], log.steps[:first])
         self._follow(log, aims, last)
         try:
             self._follow(other, aims, last, (joint,))
@@ -195,7 +195,7 @@ class Driver:
 
     def operate(
         self, source: Any, start: Any = None, *, seconds: float = math.inf, dt: float = 0.02, realtime: bool = False
-    ) -> Run:
+    ) -> CourseRun:
         """By an operator's rates, as the published joysticks: of :data:`PAIRS` that of the latest order.
 
         Args:
@@ -213,7 +213,7 @@ class Driver:
         oriented, placed = copy.copy(self), copy.copy(self)
         oriented.settings, placed.settings = (replace(self.settings, rows=rows) for rows in (AXES, AXES[:3]))
         q = self.machine.checked("start", self.machine.home if start is None else start).copy()
-        log, active, rates, began = _Log([q]), "tool", np.zeros(6), time.perf_counter()
+        log, active, rates, began = _StepLog([q]), "tool", np.zeros(6), time.perf_counter()
         place, rotation = self.machine.place(q)
         point, euler = place.copy(), euler_angles(rotation)
         while len(log.steps) * dt < seconds:
@@ -308,7 +308,7 @@ class Driver:
         return J[chosen], x[chosen]
 
     def _done(
-        self, log: _Log, q: Array, v: Array, found: Optimum, aim: tuple[Array, Array], began: float
+        self, log: _StepLog, q: Array, v: Array, found: Optimum, aim: tuple[Array, Array], began: float
     ) -> Array:  # fmt: skip
         """The columns after a step, which goes to the log."""
         after = q + v

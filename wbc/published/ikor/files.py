@@ -32,7 +32,7 @@ class IkorFileError(WbcError):
     """A file that is not what it should be; ``field`` names the file and the line, ``value`` what stands there."""
 
 
-class _Lines:
+class _FileLines:
     """Lines with something on them, with their numbers."""
 
     def __init__(self, file: Any) -> None:
@@ -90,14 +90,14 @@ def read_trajectory(file: Any, machine: ArmMachine, angles: Any = None, most: in
     Raises:
         IkorFileError: a bad line, by number and value.
     """
-    lines = _Lines(file)
+    lines = _FileLines(file)
     start = lines.numbers(machine.joints, "initial joints") / _units(machine)
     (count,) = lines.counts(1, "the number of points", -999_999)
     points = np.array([lines.numbers(3, f"point {k + 1}") for k in range(max(0, count))]).reshape(-1, 3)
     lines.end()
     euler = None
     if angles is not None:
-        lines = _Lines(angles)
+        lines = _FileLines(angles)
         euler = np.radians([lines.numbers(3, f"yaw, pitch, roll {k + 1}") for k in range(len(points))]).reshape(-1, 3)
         lines.end()
         euler = euler[:most]
@@ -119,7 +119,7 @@ def read_spheres(file: Any) -> Array:
     Raises:
         IkorFileError: a bad line.
     """
-    lines, out = _Lines(file), list[Array]()
+    lines, out = _FileLines(file), list[Array]()
     while lines.left:
         line = lines.left[0][0]
         sphere = lines.numbers(4, "a sphere: x, y, z, radius")
@@ -141,7 +141,7 @@ def read_polygons(file: Any) -> list[Array]:
     Raises:
         IkorFileError: a bad line.
     """
-    lines, out = _Lines(file), list[Array]()
+    lines, out = _FileLines(file), list[Array]()
     while lines.left:
         line, words = lines.left[0]
         what = "a polygon: x, y of three corners or more"
@@ -166,7 +166,7 @@ def read_angles(file: Any, machine: ArmMachine) -> Array:
     Raises:
         IkorFileError: a bad line.
     """
-    lines, out = _Lines(file), list[Array]()
+    lines, out = _FileLines(file), list[Array]()
     while lines.left:
         out.append(lines.numbers(machine.joints, f"joints of step {len(out) + 1}"))
     return np.array(out).reshape(-1, machine.joints) / _units(machine)
@@ -183,12 +183,26 @@ def read_jacobian(file: Any) -> tuple[Array, Array]:
     Raises:
         IkorFileError: a bad line.
     """
-    lines = _Lines(file)
+    lines = _FileLines(file)
     n, m = lines.counts(2, "rows and joints", 1)
     J = np.array([lines.numbers(m, f"row {k + 1} of J") for k in range(n)])
     x = np.array([lines.numbers(1, f"rate {k + 1}")[0] for k in range(n)])
     lines.end()
     return J, x
+
+
+def named(robot: str, base: str = "none") -> ArmMachine:
+    """hermies, airarm or planar, or the machine of a file, on a platform.
+
+    Raises:
+        IkorFileError: no such file, or a bad line. UnknownNameError: no such platform.
+    """
+    makers: dict[str, Callable[[str], ArmMachine]] = {
+        "hermies": hermies,
+        "airarm": airarm,
+        "planar": lambda _: planar(),
+    }
+    return makers[robot](base) if robot in makers else read_robot(robot, base)
 
 
 def read_robot(file: Any, base: str = "none") -> ArmMachine:
@@ -199,7 +213,7 @@ def read_robot(file: Any, base: str = "none") -> ArmMachine:
     Raises:
         IkorFileError: a bad line.
     """
-    lines = _Lines(file)
+    lines = _FileLines(file)
     (count,) = lines.counts(1, "the number of links", 1)
     links = lines.numbers(count, "lengths of links")
     (joints,) = lines.counts(1, "the number of joints", 1)
@@ -240,7 +254,7 @@ def read_robot(file: Any, base: str = "none") -> ArmMachine:
     return _with_rows(machine, np.array(rows), flags, lines, line)
 
 
-def _with_rows(machine: ArmMachine, rows: Array, flags: list[bool], lines: _Lines, line: int) -> ArmMachine:
+def _with_rows(machine: ArmMachine, rows: Array, flags: list[bool], lines: _FileLines, line: int) -> ArmMachine:
     """The machine with a file's limits, weights and home; rows of a platform may be there and not be used."""
     count, units = machine.joints, _units(machine)
     if len(rows) < count and machine.base != "none":
@@ -256,7 +270,7 @@ def _with_rows(machine: ArmMachine, rows: Array, flags: list[bool], lines: _Line
     return replace(machine, upper=most / units, lower=least / units, weights=weights, home=home / units)
 
 
-def _flag(lines: _Lines, line: int, word: str) -> bool:
+def _flag(lines: _FileLines, line: int, word: str) -> bool:
     if word.upper() not in ("Y", "N"):
         raise lines.error(line, word, "expected Y or N")
     return word.upper() == "Y"

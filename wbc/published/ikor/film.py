@@ -9,16 +9,20 @@ from typing import Any
 import numpy as np
 
 from wbc import style, validation
-from wbc.published.ikor.driver import Run
+from wbc.published.ikor.driver import CourseRun
 from wbc.published.ikor.machines import ArmMachine
 from wbc.validation import Array
 
-#: Pictures of a film at most, and how many a second
-MOST, RATE = 40, 10
+#: Pictures of a film, at most
+MOST = 40
+#: Pictures of a film a second [1/s]
+RATE = 10
 SUFFIXES = (".gif", ".html")
 
 
-def save_film(machine: ArmMachine, run: Run, spheres: Array, file: Any, polygons: Sequence[Array] = ()) -> pathlib.Path:
+def save_film(
+    machine: ArmMachine, run: CourseRun, spheres: Array, file: Any, polygons: Sequence[Array] = ()
+) -> pathlib.Path:
     """``.gif``, or ``.html``: a page that plays, steps and scrubs.
 
     Raises:

@@ -16,9 +16,14 @@ from wbc.validation import Array
 
 #: Of a line that is created: [m], [rad], as the published program shows them
 INCREMENTS = 0.01, math.radians(1.0)
-#: Configurations that a pose is searched from beside home, steps from each, longest of them [rad or m], miss at the end
-#: [m, rad]
-SEARCHES, STEPS, LONGEST, REACHED = 40, 100, 0.3, 1e-10
+#: Configurations that a pose is searched from, beside home
+SEARCHES = 40
+#: Steps of the search from each
+STEPS = 100
+#: Longest step [rad or m]
+LONGEST = 0.3
+#: Miss at the end [m, rad]
+REACHED = 1e-10
 #: Smallest cosine of the pitch at which yaw and roll are told apart
 GIMBAL = 1e-6
 

@@ -19,15 +19,20 @@ from wbc.validation import Array
 
 #: Platforms: none, x and y and turn as they please, rolling without slip, or steered in front as well
 BASES = ("none", "holonomic", "differential", "car")
-#: Of a car: distance of its axles [m] and its largest steering angle [rad]; assumed
-WHEEL_BASE, STEERING = 0.8, math.radians(40.0)
+#: Distance of a car's axles [m]; assumed
+WHEEL_BASE = 0.8
+#: Largest steering angle of a car [rad]; assumed
+STEERING = math.radians(40.0)
 #: HERMIES-III [m]: shoulder, upper arm, forearm, hand, tool. The first is 0.396 in what is legible, and 0.356 by the
 #: published norms
 HERMIES_LINKS = (0.356, 0.635, 0.508, 0.343, 0.029)
-#: Of both platforms: from its centre to the arm [m]; HERMIES's is 0.6 in what is legible, and 0.6100 by the
-#: norms of all three trajectories.
-#: Radius of a disc that holds it; assumed, the plate's size is not legible
-HERMIES_BASE, AIRARM_BASE, PLATE = (-0.61, 0.0, 0.3), (0.0, 1.0, 0.0), 0.5
+#: From the centre of HERMIES's platform to the arm [m]: 0.6 in what is legible, and 0.6100 by the norms of all three
+#: trajectories
+HERMIES_BASE = (-0.61, 0.0, 0.3)
+#: From the centre of AIRARM's platform to the arm [m]
+AIRARM_BASE = (0.0, 1.0, 0.0)
+#: Radius of a disc that holds a platform [m]; assumed, the plate's size is not legible
+PLATE = 0.5
 #: AIRARM [m]: the last two by the position on a published screen; assumed
 AIRARM_LINKS = (0.6096, 1.3716, 0.0, 0.4572, 0.2048)
 #: The planar arm of the first tests [m]: not printed; assumed

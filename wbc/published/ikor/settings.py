@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wbc import validation
-from wbc.errors import RangeError
+from wbc.errors import RangeError, ShapeError
 from wbc.resolvers.fsp import Criterion
 
 #: Rows of a task, in their order
@@ -47,6 +47,21 @@ class Switch:
 
     def __post_init__(self) -> None:
         validation.integer("switch", self.point, 1)
+
+    @classmethod
+    def read(cls, text: str) -> Switch:
+        """From POINT:what=on|off,what=on|off.
+
+        Raises:
+            ShapeError, UnknownNameError: another text. RangeError: no such point.
+        """
+        point, _, changes = text.partition(":")
+        pairs = [change.split("=") for change in changes.split(",")]
+        if not point.isdecimal() or not point.isascii() or any(len(pair) != 2 for pair in pairs):
+            raise ShapeError("switch", text, "expected POINT:orientation=on|off,platform=on|off")
+        one_of = validation.one_of
+        states = {one_of("switch", a, ("orientation", "platform")): one_of(a, b, ("on", "off")) for a, b in pairs}
+        return cls(int(point), **{name: state == "on" for name, state in states.items()})
 
 
 @dataclass(frozen=True)

@@ -6,22 +6,21 @@ its print has wrong is put right here and shown in tests/published/test_newton_e
 
 from __future__ import annotations
 
-from wbc.published.newton_euler.actuators import Drive, Motor, discretised
+from wbc.published.newton_euler.actuators import DriveTrain, Motor, discretised
 from wbc.published.newton_euler.control import Adaptive, Estimator, Linearised, Nominal, OneStep, gain
 from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo, Decoupling
-from wbc.published.newton_euler.dynamics import Dynamics, Rigid
-from wbc.published.newton_euler.links import Arm, Link
+from wbc.published.newton_euler.dynamics import ArmDynamics, Rigid
+from wbc.published.newton_euler.links import Link, SerialChain
 from wbc.published.newton_euler.recursion import Equations, External, LinearModel, equations, linear_model
-from wbc.published.newton_euler.simulation import Run, simulate
+from wbc.published.newton_euler.simulation import SimulatedRun, simulate
 
 __all__ = [
     "Adaptive",
-    "Arm",
+    "ArmDynamics",
     "DecoupledArm",
     "DecoupledTwo",
     "Decoupling",
-    "Drive",
-    "Dynamics",
+    "DriveTrain",
     "Equations",
     "Estimator",
     "External",
@@ -32,7 +31,8 @@ __all__ = [
     "Nominal",
     "OneStep",
     "Rigid",
-    "Run",
+    "SerialChain",
+    "SimulatedRun",
     "discretised",
     "equations",
     "gain",

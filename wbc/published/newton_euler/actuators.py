@@ -109,7 +109,7 @@ def discretised(A: Array, dt: float, terms: int = 16) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class DriveTrain:
     """The motors of an arm, one a joint, stacked: x = (x_1, x_2, ...) [m], of orders that may differ."""
 
     motors: Sequence[Motor]

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbc.errors import UnsupportedJointError
-from wbc.motion_control.comparison import CONTROLLERS, Maker, Scenario, scenario_of
+from wbc.motion_control.comparison import CONTROLLERS, ControlScenario, Maker, scenario_of
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion
 from wbc.published.newton_euler.control import ERROR_WEIGHT, Adaptive, Linearised, Nominal, OneStep
 from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo
@@ -52,15 +52,15 @@ PUBLISHED: Mapping[str, Maker] = {
 OWN: Mapping[str, Maker] = {"2 decoupled": lambda robot, motion, dt: DecoupledTwo(motion, PREVIEW)}
 
 
-def published_scenario() -> Scenario:
+def published_scenario() -> ControlScenario:
     """The arm, its line of 0.58 m in 1 s, the three controllers and today's."""
     model = arm().model.copy()
     model.name = "three_link"
     model.addFrame(pin.Frame(TIP, model.njoints - 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    return Scenario(load(model), task(), 1.0, {**PUBLISHED, **OWN, **CONTROLLERS}, HALF, TIP)
+    return ControlScenario(load(model), task(), 1.0, {**PUBLISHED, **OWN, **CONTROLLERS}, HALF, TIP)
 
 
-def scenario_with_published(robot: Robot) -> Scenario:
+def scenario_with_published(robot: Robot) -> ControlScenario:
     """A swing of any robot; on a fixed base with the published controllers too."""
     scenario = scenario_of(robot)
     return replace(scenario, controllers={**PUBLISHED, **scenario.controllers})

@@ -17,19 +17,21 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError, SolverError
 from wbc.published.newton_euler.actuators import discretised
-from wbc.published.newton_euler.dynamics import Dynamics, dynamics_of, measured
-from wbc.published.newton_euler.links import Arm
+from wbc.published.newton_euler.dynamics import ArmDynamics, dynamics_of, measured
+from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.three_link import Motion
 from wbc.qp import QP, make_solver
 from wbc.validation import Array
 
-#: Weights of the thesis, times unit matrices: on torques, and on errors of positions and of rates
-TORQUE_WEIGHT, ERROR_WEIGHT = 0.01, 1e5
+#: Weight of the thesis on torques, times the unit matrix
+TORQUE_WEIGHT = 0.01
+#: Weight of the thesis on errors of positions and of rates, times the unit matrix
+ERROR_WEIGHT = 1e5
 #: Without excitation P would grow by 1/rho a step until it is no number
 LARGEST_P = 1e30
 
 
-class Controller(Protocol):
+class ControlLaw(Protocol):
     """A law that is asked once a step, in order."""
 
     def command(self, time: float, q: Array, v: Array) -> Array:
@@ -74,7 +76,7 @@ class OneStep:
 class Nominal:
     """No feedback: the torques of the desired motion (5.10)."""
 
-    def __init__(self, arm: Arm | Dynamics, motion: Motion) -> None:
+    def __init__(self, arm: SerialChain | ArmDynamics, motion: Motion) -> None:
         self.arm, self.motion = dynamics_of(arm), motion
 
     def command(self, time: float, q: Array, v: Array) -> Array:
@@ -93,7 +95,7 @@ class Linearised:
 
     def __init__(
         self,
-        arm: Arm | Dynamics,
+        arm: SerialChain | ArmDynamics,
         motion: Motion,
         dt: float,
         optimum: OneStep | None = None,
@@ -156,7 +158,7 @@ class Adaptive:
 
     def __init__(
         self,
-        arm: Arm | Dynamics,
+        arm: SerialChain | ArmDynamics,
         motion: Motion,
         dt: float,
         optimum: OneStep | None = None,

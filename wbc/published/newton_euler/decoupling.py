@@ -17,8 +17,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.published.newton_euler.dynamics import Dynamics, dynamics_of, measured
-from wbc.published.newton_euler.links import Arm
+from wbc.published.newton_euler.dynamics import ArmDynamics, dynamics_of, measured
+from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.three_link import Motion, closed_form
 from wbc.validation import Array
 
@@ -85,7 +85,7 @@ class DecoupledArm:
 
     def __init__(
         self,
-        arm: Arm | Dynamics,
+        arm: SerialChain | ArmDynamics,
         motion: Motion,
         preview: float,
         poles: Sequence[complex] = POLES,

@@ -9,12 +9,12 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.motion_control.motion import mass_matrix
-from wbc.published.newton_euler.links import Arm
+from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.recursion import Equations, LinearModel, equations, linear_model
 from wbc.validation import Array
 
 
-class Dynamics(Protocol):
+class ArmDynamics(Protocol):
     """An arm on a fixed base with n joints, of which nq numbers say where they are."""
 
     n: int
@@ -33,7 +33,7 @@ class Dynamics(Protocol):
 class ByRecursion:
     """The thesis' own equations of its arms."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: SerialChain) -> None:
         self.arm, self.n, self.nq = arm, arm.n, arm.n
 
     def equations(self, q: Array, v: Array) -> Equations:
@@ -71,12 +71,12 @@ class Rigid:
         return np.asarray(pin.difference(self.model, wanted, q))
 
 
-def dynamics_of(arm: Arm | Dynamics) -> Dynamics:
+def dynamics_of(arm: SerialChain | ArmDynamics) -> ArmDynamics:
     """Of an arm put together from vectors the thesis' equations."""
-    return ByRecursion(arm) if isinstance(arm, Arm) else arm
+    return ByRecursion(arm) if isinstance(arm, SerialChain) else arm
 
 
-def measured(dynamics: Dynamics, q: Array, v: Array) -> tuple[Array, Array]:
+def measured(dynamics: ArmDynamics, q: Array, v: Array) -> tuple[Array, Array]:
     """Positions [nq] and velocities [n] as they were measured.
 
     Raises:

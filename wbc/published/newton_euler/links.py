@@ -60,7 +60,7 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class SerialChain:
     """Links in series on a base.
 
     Attributes:

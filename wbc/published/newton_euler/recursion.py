@@ -17,7 +17,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.published.newton_euler.links import Arm
+from wbc.published.newton_euler.links import SerialChain
 from wbc.validation import Array
 
 #: A mass matrix of a larger condition has no inverse worth having
@@ -107,20 +107,20 @@ def regular(H: Array) -> Array:
     return H
 
 
-def equations(arm: Arm, q: Array, v: Array, external: External | None = None) -> Equations:
+def equations(arm: SerialChain, q: Array, v: Array, external: External | None = None) -> Equations:
     """H and h at joint positions q and velocities v, [n] each."""
     H, h = _sums(inertial(arm, q, v, external, derivatives=False), arm)
     return Equations(H[0], h[0])
 
 
-def linear_model(arm: Arm, q: Array, v: Array, a: Array, external: External | None = None) -> LinearModel:
+def linear_model(arm: SerialChain, q: Array, v: Array, a: Array, external: External | None = None) -> LinearModel:
     """The model linearised about positions q, velocities v and accelerations a, [n] each."""
     H, h = _sums(inertial(arm, q, v, external, derivatives=True), arm)
     n = arm.n
     return LinearModel(H[0], h[0], h[1 + n :].T, (H[1 : 1 + n] @ a + h[1 : 1 + n]).T)
 
 
-def inertial(arm: Arm, q: Array, v: Array, external: External | None, *, derivatives: bool) -> Inertial:
+def inertial(arm: SerialChain, q: Array, v: Array, external: External | None, *, derivatives: bool) -> Inertial:
     """The recursion from the base to the tip (B.75 to B.103)."""
     n, external = arm.n, external or External()
     q, v = validation.ordinary_array("q", q, (n,)), validation.ordinary_array("v", v, (n,))
@@ -169,7 +169,7 @@ def inertial(arm: Arm, q: Array, v: Array, external: External | None, *, derivat
     return out
 
 
-def _place(arm: Arm, q: Array, derivatives: bool) -> tuple[list[Array], ...]:
+def _place(arm: SerialChain, q: Array, derivatives: bool) -> tuple[list[Array], ...]:
     """Columns of A_i [rows, 3, 3], and e_i, r_ii, r_i-1,i [rows, 3], n of each."""
     rotations, axes, levers, before = arm.place(q)
     rows = 1 + 2 * arm.n if derivatives else 1
@@ -195,7 +195,7 @@ def _place(arm: Arm, q: Array, derivatives: bool) -> tuple[list[Array], ...]:
     )
 
 
-def _sums(found: Inertial, arm: Arm) -> tuple[Array, Array]:
+def _sums(found: Inertial, arm: SerialChain) -> tuple[Array, Array]:
     """H [rows, n, n] and h [rows, n]: what the joints carry of all links beyond them (B.104 to B.115)."""
     n = arm.n
     out = np.zeros((len(found.axes[0]), n, n + 1))
@@ -218,7 +218,8 @@ def _product(rule: Callable[[Array, Array], Array], a: Array, b: Array) -> Array
     return out
 
 
-_LEFT, _RIGHT = [1, 2, 0], [2, 0, 1]
+_LEFT = [1, 2, 0]
+_RIGHT = [2, 0, 1]
 
 
 def _crossed(x: Array, y: Array) -> Array:

@@ -15,8 +15,8 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.published.newton_euler.actuators import Drive, discretised
-from wbc.published.newton_euler.control import Controller
+from wbc.published.newton_euler.actuators import DriveTrain, discretised
+from wbc.published.newton_euler.control import ControlLaw
 from wbc.published.newton_euler.dynamics import Rigid
 from wbc.published.newton_euler.three_link import Motion
 from wbc.validation import Array
@@ -31,7 +31,7 @@ Rate = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class SimulatedRun:
     """A simulated run, a row a step.
 
     Attributes:
@@ -61,18 +61,18 @@ class Run:
 
 def simulate(
     model: pin.Model,
-    controller: Controller,
+    controller: ControlLaw,
     motion: Motion,
     *,
     dt: float = 0.01,
     steps: int = 100,
     plant: str = "torque",
-    drive: Drive | None = None,
+    drive: DriveTrain | None = None,
     substeps: int = SUBSTEPS,
     offset: Array | None = None,
     noise: float = 0.0,
     seed: int = 0,
-) -> Run:
+) -> SimulatedRun:
     """Let a controller follow a motion from its start, where the arm already moves as desired.
 
     Args:
@@ -127,7 +127,7 @@ def simulate(
     columns = [np.array(column, dtype=np.float64) for column in zip(*logged, strict=True)]
     positions, velocities = np.vstack([columns[0], q]), np.vstack([columns[1], v])
     errors = np.vstack([columns[2], motion(steps * dt)[0] - q])
-    return Run(np.linspace(0.0, steps * dt, steps + 1), positions, velocities, errors, *columns[3:])
+    return SimulatedRun(np.linspace(0.0, steps * dt, steps + 1), positions, velocities, errors, *columns[3:])
 
 
 def _advanced(rate: Rate, y: Array, dt: float, substeps: int) -> Array:
@@ -151,7 +151,7 @@ def _moved(model: pin.Model, data: pin.Data, torque: Array) -> Rate:
     return rate
 
 
-def _driven(drive: Drive, exact: Rigid, voltage: Array) -> Rate:
+def _driven(drive: DriveTrain, exact: Rigid, voltage: Array) -> Rate:
     """(I - T F H) q'' = T (A x + B u + F h), z' by the motors' rows: arm and motors under a voltage."""
     A, B, F, T = drive.system
     TF, Bu, one, n = T @ F, B @ voltage, np.eye(len(voltage)), len(voltage)
@@ -166,7 +166,7 @@ def _driven(drive: Drive, exact: Rigid, voltage: Array) -> Rate:
     return rate
 
 
-def _as_listed(drive: Drive, x: Array, voltage: Array, torque: Array, dt: float) -> tuple[Array, Array, Array]:
+def _as_listed(drive: DriveTrain, x: Array, voltage: Array, torque: Array, dt: float) -> tuple[Array, Array, Array]:
     """The motors alone, with the torque that was asked for as their load (4.9)."""
     A, B, F, _ = drive.system
     Phi, E = discretised(A, dt, 36)

@@ -13,11 +13,13 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.published.newton_euler.actuators import Motor
-from wbc.published.newton_euler.links import Arm, Link
+from wbc.published.newton_euler.links import Link, SerialChain
 from wbc.validation import Array
 
-#: Gravity of the listing [m/s^2]; from joint 1 to joint 2 along the axis of joint 2 [m]
-GRAVITY, SHOULDER = 9.80621, 0.1524
+#: Gravity of the listing [m/s^2]
+GRAVITY = 9.80621
+#: From joint 1 to joint 2 along the axis of joint 2 [m]
+SHOULDER = 0.1524
 #: r_01, from joint 1 to the base's origin [m]
 BASE = np.array([0.0, 0.1, -0.1])
 #: From joint 3's origin, which is the tip, to the centre of mass of link 3 [m]
@@ -36,12 +38,12 @@ State = tuple[Array, Array, Array]
 Motion = Callable[[float], State]
 
 
-def arm(payload: float = 0.0) -> Arm:
+def arm(payload: float = 0.0) -> SerialChain:
     """The modified Stanford arm; ``payload``: a point mass at the centre of mass of link 3 [kg]."""
     validation.scalar("payload", payload, low=0.0, unit="kg")
     x, y, z = np.eye(3)
     side = np.array([0.0, -0.1054, 0.0])
-    return Arm(
+    return SerialChain(
         (
             Link(9.29, np.array([0.276, 0.255, 0.071]), -y, z, np.array([0, 0.0175, -0.1105]),
                  np.array([0, 0.0175, -0.2629])),

@@ -12,18 +12,26 @@ from wbc import robots, validation
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robot.transmission import Transmission
-from wbc.robots.link_tree import Link, build_model
+from wbc.robots.link_tree import TreeLink, build_model
 from wbc.robots.operator_chains import X, Y, Z
 from wbc.symbolic.kinematics import Kinematics
 from wbc.validation import Array
 
 INCH = 0.0254
-#: Manipulator [m]: shoulder along y, arm down, wrist along y
-SHOULDER, ARM, WRIST = 18.0 * INCH, 40.0 * INCH, 1.39 * INCH
+#: Manipulator: shoulder along y [m]
+SHOULDER = 18.0 * INCH
+#: Manipulator: arm down [m]
+ARM = 40.0 * INCH
+#: Manipulator: wrist along y [m]
+WRIST = 1.39 * INCH
 #: Measuring arm [m]
 LINKS = (15.125 * INCH, 14.750 * INCH, 4.00 * INCH)
-#: Potentiometers: degrees a volt, volts a count; which channel has which joint
-DEGREES, VOLTS, CHANNELS = -20.0, 10.0 / 32752.0, (1, 0, 3, 2, 5, 4)
+#: Potentiometers: degrees a volt
+DEGREES = -20.0
+#: Potentiometers: volts a count
+VOLTS = 10.0 / 32752.0
+#: Potentiometers: which channel has which joint
+CHANNELS = (1, 0, 3, 2, 5, 4)
 #: Shorter than this no direction is read from a vector
 NONE = 1e-12
 MINUS_Y = (0.0, -1.0, 0.0)
@@ -35,9 +43,9 @@ def _chain(name: str, joints: list[tuple[Axis, Axis]], end: Axis) -> Robot:
     links, parent = [], "base"
     for k, (axis, at) in enumerate(joints, start=1):
         bounds = (-np.inf, np.inf, np.inf, np.inf)
-        links.append(Link(f"F{k}", parent, pin.SE3(np.eye(3), np.array(at)), f"joint{k}", *bounds, axis))
+        links.append(TreeLink(f"F{k}", parent, pin.SE3(np.eye(3), np.array(at)), f"joint{k}", *bounds, axis))
         parent = f"F{k}"
-    links.append(Link("tip", parent, pin.SE3(np.eye(3), np.array(end))))
+    links.append(TreeLink("tip", parent, pin.SE3(np.eye(3), np.array(end))))
     return robots.load(build_model(name, "base", links, floating=False), name=name)
 
 

@@ -19,8 +19,10 @@ from wbc.validation import Array
 
 #: Least |det J| that is inverted, as a part of that at home, 40 * 40 * 18 in^3
 LEAST = 1e-6
-#: Steps of Newton that a place takes at most, and where they end [m, rad]
-STEPS, NEAR = 20, 1e-10
+#: Steps of Newton's method that a place takes at most
+STEPS = 20
+#: Error at which they end [m, rad]
+NEAR = 1e-10
 
 
 class LevelHand:

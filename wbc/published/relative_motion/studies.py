@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wbc import validation
+from wbc.published.relative_motion import printed as known
 from wbc.published.relative_motion.arms import INCH, measured, published_measured
 from wbc.published.relative_motion.motion import hold_on_table
 from wbc.published.relative_motion.printed import registration, slopes, tables
@@ -23,8 +24,10 @@ Row = dict[str, float | str]
 READINGS = ((10.0, 5.0, -20.0, 0.0), (30.0, 0.0, -60.0, 20.0), (40.0, -25.0, -20.0, 0.0), (-20.0, 15.0, -45.0, 10.0))
 #: What is added of the table, and whether hold_on_table compensates and feeds forward
 ADDED = {"nothing": (False, False), "pose": (True, False), "pose and twist": (True, True)}
-#: Where the operator keeps the hand on the table [m, rad], and how far apart master and slave begin [m]
-KEPT, APART = np.array([0.5, -0.4, 0.3, 0.0]) * INCH, 2.0 * INCH
+#: Where the operator keeps the hand on the table [m, rad]
+KEPT = np.array([0.5, -0.4, 0.3, 0.0]) * INCH
+#: How far apart master and slave begin [m]
+APART = 2.0 * INCH
 #: Cycles in which master and slave meet
 CYCLES = 400
 
@@ -53,6 +56,21 @@ def measuring(readings: Sequence[Sequence[float]] = READINGS) -> list[Row]:
         turned = math.remainder(published[3] - place[3], 2.0 * math.pi)
         own = {"yaw": math.degrees(place[3]), "published off": off, "yaw off": math.degrees(turned)}
         rows.append({"q1, q2, q4, q6": ", ".join(f"{x:g}" for x in degrees), **shown, **own})
+    return rows
+
+
+def lines_of(names: Sequence[str], solves: int = 32) -> list[Row]:
+    """Largest errors of each line of some tables."""
+    rows: list[Row] = []
+    for name in names:
+        command = known.commanded(name) / INCH
+        errors = {"measured": known.tables()[name].modified[:, :3] - command}
+        errors |= {method: known.predicted(name, method) - command for method in known.METHODS}
+        lines = known.line_errors(name, solves)
+        for k, size in enumerate(known.tables()[name].commands[1:]):
+            worst = {key: float(np.abs(off[k]).max()) for key, off in errors.items()}
+            ends: Row = {"line end": float(lines[k, 0]), "line": float(lines[k, 1])}
+            rows.append({"table": name, "command": float(size), **worst, **ends})
     return rows
 
 

@@ -18,17 +18,17 @@ from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.machine.body import moved
 from wbc.published.three_arm_walker.machine.grid import Place
 from wbc.published.three_arm_walker.machine.motion import BodyMotion
-from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault, Plant
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault, WalkerPose
 from wbc.validation import Array
 
 
 class ArmMotion(Protocol):
     """A sub-mode of arm control."""
 
-    def start(self, gait: Gait, plant: Plant) -> None:
+    def start(self, gait: Gait, plant: WalkerPose) -> None:
         """The arm lets go."""
 
-    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
+    def step(self, gait: Gait, plant: WalkerPose) -> CycleCommand | Fault | None:
         """What the arms do in this cycle; None once it is done."""
 
 
@@ -38,10 +38,10 @@ class Handhold:
     def __init__(self, arm: int, place: Place) -> None:
         self.arm, self.place = arm, place
 
-    def start(self, gait: Gait, plant: Plant) -> None:
+    def start(self, gait: Gait, plant: WalkerPose) -> None:
         gait.start(self.arm, gait.swing(self.arm, plant, self.place), self.place)
 
-    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
+    def step(self, gait: Gait, plant: WalkerPose) -> CycleCommand | Fault | None:
         command = gait.track(self.arm, plant)
         if gait.supporting[self.arm]:
             return None
@@ -54,11 +54,11 @@ class Destination:
     def __init__(self, arm: int, poses: Sequence[Array]) -> None:
         self.arm, self.poses = arm, list(poses)
 
-    def start(self, gait: Gait, plant: Plant) -> None:
+    def start(self, gait: Gait, plant: WalkerPose) -> None:
         motion = BodyMotion([plant.hands[self.arm], *self.poses], gait.calibration)
         gait.start(self.arm, motion, None)
 
-    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
+    def step(self, gait: Gait, plant: WalkerPose) -> CycleCommand | Fault | None:
         command = gait.track(self.arm, plant)
         if gait.arrived:
             return None
@@ -71,10 +71,10 @@ class Velocity:
     def __init__(self, arm: int, given: Callable[[float], Array]) -> None:
         self.arm, self.given = arm, given
 
-    def start(self, gait: Gait, plant: Plant) -> None:
+    def start(self, gait: Gait, plant: WalkerPose) -> None:
         gait.start(self.arm, None, None)
 
-    def step(self, gait: Gait, plant: Plant) -> CycleCommand | Fault | None:
+    def step(self, gait: Gait, plant: WalkerPose) -> CycleCommand | Fault | None:
         twist = np.asarray(self.given(gait.time), dtype=float)
         joint = plant.place(self.arm, moved(plant.hands[self.arm], twist))
         return gait.order(self.arm, twist) if joint is None else Fault(joint, self.arm + 1)

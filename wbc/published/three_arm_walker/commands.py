@@ -23,7 +23,7 @@ DEAD_BAND = np.array([640.0, 640.0, 1280.0])
 SCALE = np.array([100000.0, 100000.0, 640000.0])
 
 
-class Command(Protocol):
+class WalkCommand(Protocol):
     """A mode of walking."""
 
     def rates(self, time: float, place: Array) -> Array | None:
@@ -58,11 +58,11 @@ class DestinationCommand:
 
     def __init__(self, points: Sequence[Sequence[float]], end: float = 1.0) -> None:
         self.points, self.end = points, end
-        self.line: Line | None = None
+        self.line: Waypoints | None = None
 
     def rates(self, time: float, place: Array) -> Array | None:
         if self.line is None:
-            self.line = Line(np.vstack([place, self.points]))
+            self.line = Waypoints(np.vstack([place, self.points]))
         desired, rate = self.line.at(time)
         off = desired - place
         off[2] = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
@@ -72,7 +72,7 @@ class DestinationCommand:
         return None if (np.abs(rates) <= self.end).all() else np.asarray(rates)
 
 
-class Line:
+class Waypoints:
     """Points (T, A, heading), m + 1 x 3, passed at constant rates.
 
     Attributes:

@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc.published.three_arm_walker.gait.tracking import pose_error
 from wbc.published.three_arm_walker.machine.arm import START, forward, joint_beyond
-from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.motion import CYCLE
 from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault
 from wbc.published.three_arm_walker.machine.rates import joint_rates, saturated
@@ -35,7 +35,7 @@ class LiteralPlant:
     """
 
     def __init__(
-        self, shoulders: Shoulders, body: Array, calibration: Calibration, singular: Variant = "listing"
+        self, shoulders: Shoulders, body: Array, calibration: WalkerCalibration, singular: Variant = "listing"
     ) -> None:
         self.shoulders, self.body, self.singular = shoulders, body, singular
         self.limits = np.array(calibration.joint_rates)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.machine.grid import INCH, PITCH, STEP
 from wbc.published.three_arm_walker.machine.motion import RATE
-from wbc.published.three_arm_walker.machine.plant import Plant
+from wbc.published.three_arm_walker.machine.plant import WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS
 from wbc.validation import Array
 
@@ -43,7 +43,7 @@ class WalkerRecorder:
     def __init__(self) -> None:
         self.rows: list[tuple[Array, Array, list[bool], list[tuple[int, int]], Array]] = []
 
-    def add(self, plant: Plant, gait: Gait, rates: Array) -> None:
+    def add(self, plant: WalkerPose, gait: Gait, rates: Array) -> None:
         """One cycle, with the rates of T and A [grid units/s] and the spin [rad/s] that are commanded."""
         places = [place or (0, 0) for place in gait.places]
         self.rows.append((plant.body.copy(), plant.hands.copy(), list(gait.supporting), places, rates))

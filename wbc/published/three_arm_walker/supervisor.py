@@ -18,13 +18,13 @@ from typing import Literal
 import numpy as np
 
 from wbc.published.three_arm_walker.arm_control import ArmMotion
-from wbc.published.three_arm_walker.commands import Command
+from wbc.published.three_arm_walker.commands import WalkCommand
 from wbc.published.three_arm_walker.gait.gait import LATE, Gait, Lift
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.machine.body import body_place, body_twist
 from wbc.published.three_arm_walker.machine.grid import Place
 from wbc.published.three_arm_walker.machine.motion import CYCLE
-from wbc.published.three_arm_walker.machine.plant import Fault, Plant
+from wbc.published.three_arm_walker.machine.plant import Fault, WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
 from wbc.published.three_arm_walker.record import WalkerRecorder
 from wbc.validation import Array
@@ -61,7 +61,7 @@ class PublishedOutcome:
 class Supervisor:
     """MAIN: a gait on a plant."""
 
-    def __init__(self, gait: Gait, plant: Plant) -> None:
+    def __init__(self, gait: Gait, plant: WalkerPose) -> None:
         self.gait, self.plant = gait, plant
         self.recorder = WalkerRecorder()
 
@@ -70,7 +70,7 @@ class Supervisor:
         """(T, A, heading [rad]) of the body."""
         return np.array(body_place(self.plant.body))
 
-    def walk(self, command: Command, key: Key, duration: float = np.inf) -> PublishedOutcome:
+    def walk(self, command: WalkCommand, key: Key, duration: float = np.inf) -> PublishedOutcome:
         """A mode of walking, until it ends by itself, by key, or by time [s]."""
 
         def cycle(place: Array) -> Fault | Reason | None:

@@ -14,7 +14,7 @@ from wbc.published.three_arm_walker.commands import DestinationCommand, Velocity
 from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.literal import LiteralPlant
 from wbc.published.three_arm_walker.machine.body import moved
-from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import (
     COLUMNS,
     INCH,
@@ -27,7 +27,7 @@ from wbc.published.three_arm_walker.machine.grid import (
     frame,
 )
 from wbc.published.three_arm_walker.machine.motion import CYCLE
-from wbc.published.three_arm_walker.machine.plant import IdealPlant, Plant
+from wbc.published.three_arm_walker.machine.plant import IdealPlant, WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
 from wbc.published.three_arm_walker.record import PublishedLog
 from wbc.published.three_arm_walker.supervisor import PublishedOutcome, Supervisor
@@ -67,7 +67,7 @@ class PublishedWalker:
         height: float = 52.0 * INCH,
         threshold: float = 1.0,
         removed: Iterable[Any] = (),
-        calibration: Calibration | None = None,
+        calibration: WalkerCalibration | None = None,
         tracking: Literal["ideal", "rates"] = "ideal",
         margin: Variant = "listing",
         singular: Variant = "listing",
@@ -83,12 +83,12 @@ class PublishedWalker:
         for field, value in (("margin", margin), ("singular", singular)):
             validation.one_of(field, value, ("listing", "text"))
         validation.one_of("tracking", tracking, ("ideal", "rates"))
-        known = calibration or Calibration()
+        known = calibration or WalkerCalibration()
         shoulders = _shoulders(known.shoulder_radius / INCH, height / INCH)
         body = frame(column, row, RADIUS + (height + offset) / INCH, heading)
         turn = body[:3, :3] @ np.array([*tilts, 0.0])
         body = moved(body, np.concatenate([np.zeros(3), turn / CYCLE]))
-        plant: Plant = IdealPlant(shoulders, body)
+        plant: WalkerPose = IdealPlant(shoulders, body)
         if tracking == "rates":
             plant = LiteralPlant(shoulders, body, known, singular)
         self.supervisor = Supervisor(Gait(shoulders, Terrain(removed), known, threshold, margin), plant)

@@ -23,16 +23,22 @@ from wbc.validation import Array
 
 #: Singular values below this are damped
 ONSET = 1e-2
-#: Cost of the directions that a level leaves free, in the QP of that level; its steps take the effect away again
-PROXIMAL, STEPS, SETTLED = 1e-6, 12, 1e-11
+#: Cost of the directions that a level leaves free, in the QP of that level; the steps take its effect away again
+PROXIMAL = 1e-6
+#: Steps at most
+STEPS = 12
+#: Relative change at which the steps end
+SETTLED = 1e-11
 #: Corrections of the active set where the solver finds none
 POLISH_ROUNDS = 200
 #: Violations up to this are rounding
 TOLERANCE = 1e-9
 #: Rows shorter than this in the space that is left cannot be moved
 DEAD = 1e-9
-#: Multipliers above this share of what drives a level are not rounding; nor are those below NOISE
-PUSHING, NOISE = 1e-6, 1e-12
+#: Multipliers above this share of what drives a level are not rounding
+PUSHING = 1e-6
+#: Multipliers below this are rounding, whatever drives the level
+NOISE = 1e-12
 #: Directions that binding rows share with others by less than this angle count as one
 DEPENDENT = 1e-7
 #: Curvature above this share of the largest one takes its direction

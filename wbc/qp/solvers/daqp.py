@@ -16,8 +16,12 @@ from wbc.qp.solvers.backend import Backend, answer, refusal
 #: Settings of the wheel; ``eps_prox`` 0 switches the regularisation off (H is positive definite).
 SETTINGS: dict[str, float] = {"primal_tol": 1e-11, "dual_tol": 1e-12, "eps_prox": 0.0, "iter_limit": 2000}
 
-# Row states of the library: active at the upper bound, active at the lower bound, equality
-_UPPER, _LOWER, _EQUALITY = 1, 3, 5
+#: State of a row in the library: active at the upper bound
+_UPPER = 1
+#: State of a row in the library: active at the lower bound
+_LOWER = 3
+#: State of a row in the library: equality
+_EQUALITY = 5
 _INFINITE = 1e30
 
 

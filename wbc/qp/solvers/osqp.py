@@ -30,7 +30,7 @@ _SETTINGS: dict[str, Any] = {
     "eps_dual_inf": 1e-9,
 }
 _SOLVED = {"solved", "solved inaccurate", "maximum iterations reached"}
-_INFEASIBLE = {"primal infeasible", "primal infeasible inaccurate"}
+_INFEASIBLE_STATUSES = {"primal infeasible", "primal infeasible inaccurate"}
 
 
 class Osqp(Backend):
@@ -74,7 +74,7 @@ class Osqp(Backend):
             self._solver.update_settings(eps_abs=tolerance, eps_rel=tolerance)
             result = self._solver.solve(raise_error=False)
             iterations += int(result.info.iter)
-            if result.info.status in _INFEASIBLE:
+            if result.info.status in _INFEASIBLE_STATUSES:
                 self.reset()
                 return refusal(qp, "infeasible", iterations)
             if result.info.status not in _SOLVED or not np.isfinite(result.x.sum() + result.y.sum()):

@@ -102,7 +102,7 @@ def _searched(J: Array, x: Array, held: tuple[int, ...], search: str) -> tuple[G
     A = J[:, active]
     rows = _independent(A)
     columns = _first_block(A[rows], x[rows])[1]
-    finder = _Search(A[rows], x[rows])
+    finder = _BlockingSearch(A[rows], x[rows])
     if len(columns) < A.shape[1]:
         finder.exhaust() if search == "exhaustive" else finder.exchange(columns)
     else:
@@ -114,7 +114,7 @@ def _searched(J: Array, x: Array, held: tuple[int, ...], search: str) -> tuple[G
     return Generated(vectors, len(rows), rows, active, []), blocks, completed
 
 
-class _Search:
+class _BlockingSearch:
     """Independent solutions of A v = b, A of full row rank, with at most as many joints moving as rows."""
 
     def __init__(self, A: Array, b: Array) -> None:

@@ -1,1 +1,1 @@
-"""Shapes of links: read, fitted to meshes, covered, and as segments and geometries of Coal."""
+"""Shapes of links: read, fitted to meshes, covered."""

@@ -9,8 +9,10 @@ from wbc.robot.recipe import segment_shape
 from wbc.shapes import PlacedShape
 from wbc.validation import Array
 
-#: Points and facets that enter the problem at once, and how often those that were missed are added.
-BATCH, ROUNDS = 20, 12
+#: Points and facets that enter the problem at once
+BATCH = 20
+#: How often those that were missed are added
+ROUNDS = 12
 
 
 def quick_ball(points: Array) -> tuple[Array, Array, float]:

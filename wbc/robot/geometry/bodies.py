@@ -20,7 +20,7 @@ from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
 from wbc.robot.sources.mjmodel import compiled, is_mjmodel
 from wbc.robot.sources.mjnames import names_of, pose_of
-from wbc.shapes import Capsule, Sphere
+from wbc.shapes import Capsule, HeightMap, Sphere
 from wbc.validation import Array
 
 
@@ -46,7 +46,7 @@ class RawEllipsoid:
     radii: Array
 
 
-Raw = Sphere | Capsule | RawBox | RawCylinder | RawEllipsoid | Mesh
+Raw = Sphere | Capsule | HeightMap | RawBox | RawCylinder | RawEllipsoid | Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
         frame = model.frames[item.parentFrame]
         local = frame.placement.inverse() * item.placement
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
-        bodies.append(CollisionBody(str(frame.name), mesh, local, partial(_from_coal, item.geometry)))
+        bodies.append(CollisionBody(str(frame.name), mesh, local, partial(raw_of, item.geometry)))
     return bodies
 
 
@@ -179,7 +179,7 @@ def _from_geom(model: Any, g: int) -> Raw:
     """The body of a geom, in its own frame.
 
     Raises:
-        RobotFileError: a plane, a height field or a signed distance field.
+        RobotFileError: a plane or a signed distance field.
     """
     kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
     if kind == _MESH:
@@ -187,12 +187,20 @@ def _from_geom(model: Any, g: int) -> Raw:
         vertices = slice(int(model.mesh_vertadr[mesh]), int(model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh]))
         faces = slice(int(model.mesh_faceadr[mesh]), int(model.mesh_faceadr[mesh] + model.mesh_facenum[mesh]))
         return Mesh(np.array(model.mesh_vert[vertices], dtype=float), np.array(model.mesh_face[faces], dtype=np.intp))
+    if kind == _HEIGHTS:
+        k = int(model.geom_dataid[g])
+        x, y, rise, base = (float(s) for s in model.hfield_size[k])
+        shape, start = (int(model.hfield_nrow[k]), int(model.hfield_ncol[k])), int(model.hfield_adr[k])
+        data = np.array(model.hfield_data[start : start + shape[0] * shape[1]], dtype=float)
+        return HeightMap(rise * data.reshape(shape), (2.0 * x, 2.0 * y), base)
     if kind not in _GEOMS:
-        raise RobotFileError("geom", model.geom(g).name, "no shape is fitted to planes and fields")
+        raise RobotFileError("geom", model.geom(g).name, "no shape is fitted to planes and signed distance fields")
     return _GEOMS[kind](size)
 
 
-#: MuJoCo's numbers of kinds of geoms, and what they are from their sizes
+#: MuJoCo's number of height fields among kinds of geoms
+_HEIGHTS = 1
+#: MuJoCo's number of meshes among kinds of geoms
 _MESH = 7
 _GEOMS: dict[int, Callable[[Array], Raw]] = {
     2: lambda size: Sphere(float(size[0])),
@@ -203,7 +211,7 @@ _GEOMS: dict[int, Callable[[Array], Raw]] = {
 }
 
 
-def _from_coal(geometry: Any) -> Raw:
+def raw_of(geometry: Any) -> Raw:
     """The body of a Coal geometry.
 
     Raises:

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wbc.robot.geometry.ball import least_excess_ball, quick_ball
-from wbc.robot.geometry.fitting import fit_capsule, quick_capsule
+from wbc.robot.geometry.fitting import fit_capsule
 from wbc.robot.geometry.hull import Hull
 from wbc.robot.geometry.meshes import Mesh
 from wbc.shapes import Capsule, PlacedShape, Sphere
+from wbc.shapes.around import quick_capsule
 from wbc.validation import Array
 
 #: Fractions of a slab's width by which its borders are moved in search of better ones.

@@ -30,7 +30,7 @@ def description_shapes(
 
     A sphere stays a sphere and a capsule a capsule. A cylinder, box or ellipsoid becomes the least capsule on its
     longest axis that contains it, with ``excess`` [m] the exact Hausdorff distance of the two; with ``exact`` a
-    cylinder stays a cylinder and a box a box, and an ellipsoid becomes a polyhedron around it.
+    cylinder, box or ellipsoid stays itself. A height field stays a height map.
 
     Raises:
         RobotFileError: the robot was not read from a file, or the file cannot be read any more.
@@ -63,12 +63,12 @@ def fit_shapes(
     capsule  its least capsule; with ``count`` > 1 cut into slabs   as in :func:`description_shapes`, or slabs
              with a capsule each
     spheres  cut into slabs with a sphere each                      the same
-    convex   the hull of each connected component                   a Box or Cylinder (an ellipsoid: a polyhedron)
+    convex   the hull of each connected component                   a Box, Cylinder or Ellipsoid
     ======== ====================================================== ==================================================
 
-    Spheres and capsules stay themselves. ``excess`` [m] is how far a shape stands out of the hull of the body (for
-    convex parts 0): exact for meshes and boxes, see ``Hull``; an upper bound for spheres and for
-    several capsules around cylinders and ellipsoids, which are fitted to a polyhedron around them.
+    Spheres, capsules and height maps stay themselves. ``excess`` [m] is how far a shape stands out of the hull of the
+    body (for convex parts 0): exact for meshes and boxes, see ``Hull``; an upper bound for spheres and for several
+    capsules around cylinders and ellipsoids, which are fitted to a polyhedron around them.
 
     Args:
         robot: a robot that was read from a URDF or MJCF file, or any with ``geometry``.
@@ -105,7 +105,7 @@ def fit_shapes(
 
 
 def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> ConvexParts:
-    """The hulls of a mesh's connected components, for obstacles and links of which Coal measures distances.
+    """The hulls of a mesh's connected components, for obstacles and links.
 
     Args:
         mesh: path of a file that Coal's loader reads (STL, OBJ, DAE, ...), or vertices n x 3 [m].

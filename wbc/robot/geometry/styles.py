@@ -9,12 +9,12 @@ import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.robot.geometry import fitting
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
 from wbc.robot.geometry.convex_parts import parts_of
 from wbc.robot.geometry.covering import cover
 from wbc.robot.geometry.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh
-from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
+from wbc.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightMap, PlacedShape, Solid, Sphere
+from wbc.shapes.around import around_cylinder, around_ellipsoid
 from wbc.validation import Array
 
 #: Kind of shapes -> how many a body gets at most, where nobody says.
@@ -56,7 +56,7 @@ class Style:
     def shapes(self, raw: Raw, placement: pin.SE3) -> tuple[tuple[PlacedShape, ...], tuple[str, ...]]:
         """(shapes of a body in its link's frame, remarks about components without volume).
 
-        Together the shapes contain the body. Spheres and capsules stay themselves.
+        Together the shapes contain the body. Spheres, capsules and height maps stay themselves.
 
         Raises:
             RobotFileError: a mesh without a volume, for convex parts. RangeError: a box or cylinder of size 0, for
@@ -68,13 +68,13 @@ class Style:
         return self._fitted(raw, placement), ()
 
     def _fitted(self, raw: Raw, placement: pin.SE3) -> tuple[PlacedShape, ...]:
-        if isinstance(raw, (Sphere, Capsule)):
+        if isinstance(raw, (Sphere, Capsule, HeightMap)):
             return (PlacedShape(raw, placement),)
         count = COUNTS[self.kind] if self.count is None else self.count
         if isinstance(raw, Mesh):
             return cover(raw.moved(placement), self.kind, count, self.tolerance)
         if self.kind == "convex":
-            return (_exact(raw, placement),)
+            return (PlacedShape(exact_shape(raw), placement),)
         if self.kind == "spheres":
             return _covered(raw, placement, self, count)
         one = (_capsule(raw, placement),)
@@ -104,28 +104,32 @@ def _polyhedron(raw: RawBox | RawCylinder | RawEllipsoid) -> tuple[Mesh, float]:
     return ellipsoid_mesh(raw.radii)
 
 
-def _exact(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> PlacedShape:
+def exact_shape(raw: Sphere | Capsule | HeightMap | RawBox | RawCylinder | RawEllipsoid) -> Solid:
+    """A body as a shape of the same size.
+
+    Raises:
+        RangeError: a box, cylinder or ellipsoid of size 0.
+    """
     if isinstance(raw, RawBox):
-        return PlacedShape(Box((2 * raw.half[0], 2 * raw.half[1], 2 * raw.half[2])), placement)
+        return Box((2 * raw.half[0], 2 * raw.half[1], 2 * raw.half[2]))
     if isinstance(raw, RawCylinder):
-        return PlacedShape(Cylinder(raw.radius, 2 * raw.half), placement)
-    mesh, slack = ellipsoid_mesh(raw.radii)
-    return PlacedShape(Convex(mesh.vertices), placement, slack)
+        return Cylinder(raw.radius, 2 * raw.half)
+    return Ellipsoid(tuple(raw.radii)) if isinstance(raw, RawEllipsoid) else raw
 
 
 def _capsule(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> PlacedShape:
     """The least capsule on the body's longest axis, with the exact excess."""
     if isinstance(raw, RawCylinder):
-        radius, half, gap = fitting.around_cylinder(raw.radius, raw.half)
+        radius, half, gap = around_cylinder(raw.radius, raw.half)
         turn = pin.SE3.Identity()
     elif isinstance(raw, RawBox):
         longest = int(np.argmax(raw.half))
         across: Array = np.delete(raw.half, longest)
         size = float(np.hypot(*across))
-        radius, half, gap = fitting.around_cylinder(size, float(raw.half[longest]), float(across.min()))
+        radius, half, gap = around_cylinder(size, float(raw.half[longest]), float(across.min()))
         turn = _axis_to_z(longest)
     else:
-        radius, half, gap = fitting.around_ellipsoid(raw.radii)
+        radius, half, gap = around_ellipsoid(raw.radii)
         turn = _axis_to_z(int(np.argmax(raw.radii)))
     shape = Sphere(radius) if half <= 0.0 else Capsule(radius, 2 * half)
     return PlacedShape(shape, placement * turn, gap)

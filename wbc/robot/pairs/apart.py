@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.robot.geometry.segments import segment_distances
+from wbc.geometry import segment_distances
 from wbc.robot.pairs.descent import Descent
 from wbc.robot.pairs.distances import Links
 from wbc.robot.sampling import draw
@@ -42,7 +42,7 @@ def most_apart(
     sides = [[links.parts[pair[k]][0] for pair in pairs] for k in (0, 1)]
     if not pairs:
         return {}
-    ends = [np.stack([scene.ends(part)[end] for part in parts], axis=1) for parts in sides for end in (0, 1)]
+    ends = [np.stack([scene.ends(part)[end] for part in parts]) for parts in sides for end in (0, 1)]
     radii = np.array([a.radius + b.radius for a, b in zip(*sides, strict=True)])
     left = np.flatnonzero(segment_distances(*ends).max(axis=1) - radii <= enough)
     if not len(left):

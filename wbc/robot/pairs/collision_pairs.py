@@ -13,7 +13,7 @@ from wbc.robot.pairs.distances import Links
 from wbc.robot.pairs.link_pairs import link_pairs, neighbours
 from wbc.robot.pairs.search import PairFinding, Progress, search
 from wbc.robot.robot import Robot
-from wbc.robot.sources.srdf import CollisionRules, read_collisions
+from wbc.robot.sources.srdf import CollisionRules, read_srdf
 
 #: Reason -> what it means; the first three are of pairs that are kept.
 REASONS: Mapping[str, str] = {
@@ -124,7 +124,7 @@ def find_self_pairs(
     samples, seed = _whole("samples", samples), _whole("seed", seed)
     clearance = validation.scalar("clearance", clearance, unit="m")
     rules = (
-        read_collisions(validation.file_path("srdf", srdf))
+        read_srdf(validation.file_path("srdf", srdf)).collisions()
         if srdf is not None
         else CollisionRules({}, frozenset(), frozenset())
     )

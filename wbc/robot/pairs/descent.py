@@ -14,8 +14,10 @@ from wbc.validation import Array
 if TYPE_CHECKING:
     from wbc.robot.robot import Robot
 
-#: A descent takes at most this many steps, the first of them as large as this [rad], halved where it leads apart ...
-STEPS, FIRST_STEP = 40, 0.3
+#: Steps of a descent at most
+STEPS = 40
+#: First step of a descent [rad], halved where it leads apart
+FIRST_STEP = 0.3
 
 #: ... until they are shorter than this [rad].
 LAST_STEP = 1e-3
@@ -78,5 +80,4 @@ class Descent:
             gradient[coupling.leader] += coupling.ratio * gradient[coupling.follower]
             gradient[coupling.follower] = 0.0
         gradient[: self._robot.base_nv] = 0.0
-        # Coal has no normal for some bodies one inside the other: there is nothing to follow then
-        return self._sign * distance, self._sign * gradient if np.isfinite(gradient).all() else np.zeros(model.nv)
+        return self._sign * distance, self._sign * gradient

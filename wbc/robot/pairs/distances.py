@@ -2,26 +2,25 @@
 
 The broad phase bounds every shape by a capsule and computes the distances of their axes for all configurations at
 once: less the radii, they are lower bounds of the signed distance, and the distance itself for spheres and capsules.
-The narrow phase asks Coal in the order of the bounds, until they exceed the least distance found.
+The narrow phase measures in the order of the bounds, until they exceed the least distance found.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-# isort: split
-import coal
-
-from wbc.robot.geometry.coal_shapes import geometry_of
-from wbc.robot.geometry.segments import bounding_capsule, segment_distances
+from wbc.errors import NotFiniteError
+from wbc.geometry import ShapeTable, distances, segment_distances
 from wbc.robot.pairs.link_pairs import joint_of
 from wbc.robot.sampling import joint_poses
-from wbc.shapes import Capsule, PlacedShape, Sphere
+from wbc.shapes import PlacedShape, Solid
+from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
@@ -31,17 +30,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LinkPart:
-    """A shape of a link: as Coal has it, where it sits on its joint, and the capsule that bounds it.
+    """A shape of a link: where it sits on its joint, and the capsule that bounds it.
 
     Attributes:
         joint: number of the joint that carries it.
-        placement: of the Coal geometry on that joint.
+        placement: of the shape's centre on that joint.
         ends, radius: of the bounding capsule on that joint [m].
         exact: whether that capsule is the shape.
     """
 
     joint: int
-    geometry: Any
+    shape: Solid
     placement: pin.SE3
     ends: tuple[Array, Array]
     radius: float
@@ -68,31 +67,30 @@ class Links:
         )
         self._joints = sorted({part.joint for group in self.parts.values() for part in group})
         self.index = {joint: k for k, joint in enumerate(self._joints)}
-        self._request = coal.DistanceRequest()
-        self._request.enable_signed_distance = True
+        every = [part for group in self.parts.values() for part in group]
+        self._table = ShapeTable([part.shape for part in every])
+        self._number = {id(part): k for k, part in enumerate(every)}
+        self._poses = np.zeros((len(every), 12))
 
     def place(self, steps: Array) -> Scenes:
         """All shapes at each of the configurations ``steps`` away from the neutral one."""
         return Scenes(self, *joint_poses(self.robot, steps, self._joints))
 
     def witness(self, first: str, second: str, poses: dict[int, pin.SE3]) -> tuple[float, Array, Array, Array]:
-        """(signed distance [m], normal from first to second, nearest points) of two links, by Coal."""
-        least: tuple[float, Any] = (np.inf, None)
-        for a in self.parts[first]:
-            for b in self.parts[second]:
-                result = coal.DistanceResult()
-                value = coal.distance(
-                    a.geometry,
-                    _transform(poses[a.joint] * a.placement),
-                    b.geometry,
-                    _transform(poses[b.joint] * b.placement),
-                    self._request,
-                    result,
-                )
-                if value < least[0]:
-                    least = (float(value), result)
-        result = least[1]
-        return least[0], np.array(result.normal), result.getNearestPoint1(), result.getNearestPoint2()
+        """(signed distance [m], normal from first to second, nearest points) of two links.
+
+        Raises:
+            NotFiniteError: a distance that is no number.
+        """
+        sides = [[self._number[id(part)] for part in self.parts[link]] for link in (first, second)]
+        for part in (*self.parts[first], *self.parts[second]):
+            self._poses[self._number[id(part)]] = place(poses[part.joint] * part.placement)
+        one, other = np.repeat(sides[0], len(sides[1])), np.tile(sides[1], len(sides[0]))
+        found = distances(self._table, self._poses, one, other, self.robot.characteristic_length)
+        gap, normal, point = np.split(found[int(np.argmin(found[:, 0]))], [1, 4])
+        if not math.isfinite(gap[0]):
+            raise NotFiniteError(f"distance of {first!r} and {second!r}", float(gap[0]), "of their shapes")
+        return float(gap[0]), normal, point, point + gap * normal
 
     def is_exact(self, *links: str) -> bool:
         """Whether the links carry spheres and capsules only."""
@@ -108,7 +106,7 @@ class Links:
         if not rows:
             return {}
         sides = [[a for _, a, _ in rows], [b for _, _, b in rows]]
-        ends = [np.hstack([scene.ends(part)[end] for part in parts]) for parts in sides for end in (0, 1)]
+        ends = [np.concatenate([scene.ends(part)[end] for part in parts]) for parts in sides for end in (0, 1)]
         bounds = segment_distances(*ends) - np.array([a.radius + b.radius for _, a, b in rows])
         least = np.full(len(pairs), np.inf)
         np.minimum.at(least, [k for k, _, _ in rows], bounds)
@@ -128,18 +126,15 @@ class Scenes:
     def __init__(self, links: Links, rotations: Array, positions: Array) -> None:
         self.links = links
         self._rotations, self._positions = rotations, positions
-        # One row a coordinate: sums of rows are quick, sums of short columns are not
-        turns, shifts = np.moveaxis(rotations, 0, -1).copy(), np.moveaxis(positions, 0, -1).copy()
         self._ends = {
-            id(part): [
-                _moved(turns[links.index[part.joint]], shifts[links.index[part.joint]], end) for end in part.ends
-            ]
+            id(part): [rotations[:, at] @ end + positions[:, at] for end in part.ends]
             for group in links.parts.values()
             for part in group
+            for at in (links.index[part.joint],)
         }
 
     def ends(self, part: LinkPart) -> tuple[Array, Array]:
-        """The ends of a shape's bounding capsule at each configuration [3 x n each]."""
+        """The ends of a shape's bounding capsule at each configuration [n x 3 each]."""
         a, b = self._ends[id(part)]
         return a, b
 
@@ -153,26 +148,16 @@ class Scenes:
         return np.asarray(np.min(found, axis=0))
 
     def distance(self, first: str, second: str, n: int) -> float:
-        """Signed distance [m] at the n-th configuration, by Coal."""
+        """Signed distance [m] at the n-th configuration."""
         index = self.links.index
         joints = {part.joint for link in (first, second) for part in self.links.parts[link]}
         poses = {j: pin.SE3(self._rotations[n, index[j]], self._positions[n, index[j]]) for j in joints}
         return self.links.witness(first, second, poses)[0]
 
 
-def _moved(turn: Array, shift: Array, point: Array) -> Array:
-    """A point at each configuration [3 x n], for rotations [3 x 3 x n] and positions [3 x n]."""
-    return np.asarray(turn[:, 0] * point[0] + turn[:, 1] * point[1] + turn[:, 2] * point[2] + shift)
-
-
 def _part(robot: Robot, link: str, placed: PlacedShape) -> LinkPart:
     above = pin.SE3.Identity() if link == WORLD else robot.model.frames[frame_index(robot.model, link)].placement
-    geometry = geometry_of(placed.shape)
-    a, b, radius = bounding_capsule(placed)
-    place = above * placed.placement * geometry.offset
-    exact = isinstance(placed.shape, (Sphere, Capsule))
-    return LinkPart(joint_of(robot, link), geometry.geometry, place, (above * a, above * b), radius, exact)
-
-
-def _transform(pose: pin.SE3) -> Any:
-    return coal.Transform3s(pose.rotation, pose.translation)
+    shape, here = placed.shape, above * placed.placement
+    a, b, radius = shape.capsule()
+    at = here * pin.SE3(np.eye(3), shape.center)
+    return LinkPart(joint_of(robot, link), shape, at, (here * a, here * b), radius, shape.is_round)

@@ -17,6 +17,8 @@ from wbc.robot.robot import BASES
 from wbc.validation import Array
 
 ROOT = "root_joint"
+#: Components of an axis this much apart are the same
+_ALIGNED = 1e-15
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Description:
         undriven: joints with several degrees of freedom that no motor moves, the base left out.
         geometry: the ``mujoco.MjModel`` that has the shapes; None: the file has them.
         loops: closed loops, between frames of ``model``.
+        actuated: joints with motors; none: all. transmissions: joints that the file has a transmission of, which may
+            be some of those with motors.
     """
 
     model: pin.Model
@@ -56,6 +60,8 @@ class Description:
     undriven: tuple[str, ...] = ()
     geometry: Any = None
     loops: tuple[AnyLoop, ...] = ()
+    actuated: tuple[str, ...] = ()
+    transmissions: tuple[str, ...] = ()
 
 
 def root_joint(base: str) -> pin.JointModel | None:
@@ -64,6 +70,14 @@ def root_joint(base: str) -> pin.JointModel | None:
     if base == "fixed":
         return None
     return pin.JointModelFreeFlyer() if base == "floating" else pin.JointModelPlanar()
+
+
+def single_joint(axis: Array, *, slides: bool) -> pin.JointModel:
+    """The Pinocchio joint that turns about, or slides along, a unit vector; one that knows its axis where it can."""
+    turning = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ, pin.JointModelRevoluteUnaligned)
+    sliding = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ, pin.JointModelPrismaticUnaligned)
+    kinds, along = sliding if slides else turning, np.flatnonzero(np.abs(axis - np.eye(3)).max(axis=1) < _ALIGNED)
+    return kinds[along[0]]() if along.size else kinds[3](axis)
 
 
 def own_base(model: pin.Model) -> str:

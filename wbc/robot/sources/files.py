@@ -66,7 +66,7 @@ def read_xml(path: pathlib.Path) -> tuple[str, ElementTree.Element]:
     if not path.exists():
         raise RobotFileError("robot", str(path), "there is no such file")
     if path.is_dir():
-        raise RobotFileError("robot", str(path), "this is a directory, expected a URDF or MJCF file")
+        raise RobotFileError("robot", str(path), "this is a directory, expected a URDF, SDF or MJCF file")
     try:
         data = path.read_bytes()
     except OSError as error:

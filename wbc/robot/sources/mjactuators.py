@@ -21,6 +21,18 @@ def on_joint(model: mujoco.MjModel, joint: int) -> list[int]:
     return np.flatnonzero(np.isin(model.actuator_trntype, kinds) & (model.actuator_trnid[:, 0] == joint)).tolist()
 
 
+def driven_joints(model: mujoco.MjModel) -> tuple[int, ...]:
+    """Joints that some actuator moves, by itself or through a tendon or site, at a configuration like any other."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_integratePos(model, data.qpos, np.random.default_rng(0).uniform(0.1, 0.5, model.nv), 1.0)
+    mujoco.mj_forward(model, data)
+    moment = np.zeros((len(data.moment_rownnz), model.nv))
+    mujoco.mju_sparse2dense(moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind)
+    return tuple(sorted({int(j) for j in model.dof_jntid[moment.any(axis=0)]}))
+
+
 def joint_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
     """Those of them that push on a hinge, slide or ball joint about axes that turn with it."""
     import mujoco

@@ -56,7 +56,7 @@ def sentence(words: str, names: Iterable[str]) -> str:
     return f"{words}: {found}" if found else ""
 
 
-class Compared:
+class MjCompared:
     """What MuJoCo and Pinocchio say of one robot.
 
     Args:

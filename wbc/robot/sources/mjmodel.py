@@ -19,10 +19,10 @@ import pinocchio as pin
 
 from wbc import extras
 from wbc.errors import RobotFileError
-from wbc.robot.sources.description import Description, Mimic, own_base, with_base
+from wbc.robot.sources.description import Description, Mimic, own_base, single_joint, with_base
 from wbc.robot.sources.files import captured_stderr
-from wbc.robot.sources.mjactuators import elsewhere, force_range, of_actuators
-from wbc.robot.sources.mjcompared import Compared, sentence
+from wbc.robot.sources.mjactuators import driven_joints, elsewhere, force_range, of_actuators
+from wbc.robot.sources.mjcompared import MjCompared, sentence
 from wbc.robot.sources.mjloops import loops_of
 from wbc.robot.sources.mjnames import BALL, FREE, HINGE, SIZES, SLIDE, MjNames, coordinates, names_of, pose_of
 from wbc.validation import Array
@@ -36,8 +36,6 @@ log = logging.getLogger("wbc")
 MOST = 300
 #: Equality of two joints
 _JOINT_EQUALITY = 2
-#: Components of an axis this much apart are the same
-_ALIGNED = 1e-15
 #: Numbers this much apart, for a coordinate of 1, say the same of two couplings
 _SAME = 1e-12
 
@@ -176,13 +174,20 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
         "objects": f"no part of the robot are bodies {beside}" if beside else "",
         "mocap": sentence("fixed here, and moved by a program in the file", carried),
         "armature": sentence("armature is along the body's axes here, along the world's in MuJoCo, of", heavy),
-        **_set_limits(model, whole, order, names, {mimic.follower for mimic in mimics}),
+        **_set_limits(model, whole, order, names),
     }
     try:
-        compared = Compared(model, whole, order, names, mimics)
+        compared = MjCompared(model, whole, order, names, mimics)
         difference = compared.difference()
         loops, lost = loops_of(model, lost, trees.robot, set(order), names, whole)
+        driven = [j for j in order if j in driven_joints(model) and model.jnt_type[j] != FREE]
         said |= compared.forces() | compared.loops(lost, set(trees.robot))
+        followers = {mimic.follower for mimic in mimics}
+        still = [names.joints[j] for j in order if j not in driven and model.jnt_type[j] != FREE]
+        said["motors"] = sentence(
+            "no torque is commanded of joints that no actuator drives",
+            [name for name in still if driven and name not in followers],
+        )
     except (RuntimeError, mujoco.FatalError) as error:  # no memory for a state, a plugin that does not begin
         raise RobotFileError("robot", label, f"MuJoCo cannot compute it: {error}") from error
     if difference:
@@ -199,8 +204,9 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
     based, kind = with_base(whole, base, drawn)
     notes = {"reader": "compiled by MuJoCo", **said}
     return Description(
-        based, kind, mimics, states, notes=notes, source=source, undriven=tuple(free), geometry=model, loops=loops
-    )
+        based, kind, mimics, states, notes=notes, source=source, undriven=tuple(free), geometry=model, loops=loops,
+        actuated=tuple(names.joints[j] for j in driven),
+    )  # fmt: skip
 
 
 def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[pin.Model, list[int]]:
@@ -264,14 +270,9 @@ def _joint(model: mujoco.MjModel, j: int) -> tuple[pin.SE3, pin.JointModel]:
     if int(model.jnt_type[j]) == BALL:
         return pin.SE3(np.eye(3), anchor), pin.JointModelSpherical()
     axis, ref = axis / np.linalg.norm(axis), float(model.qpos0[int(model.jnt_qposadr[j])])
-    along = np.flatnonzero(np.abs(axis - np.eye(3)).max(axis=1) < _ALIGNED)
     if int(model.jnt_type[j]) == SLIDE:
-        kinds = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)
-        made = kinds[along[0]]() if along.size else pin.JointModelPrismaticUnaligned(axis)
-        return pin.SE3(np.eye(3), -ref * axis), made
-    kinds = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-    made = kinds[along[0]]() if along.size else pin.JointModelRevoluteUnaligned(axis)
-    return pin.SE3(pin.exp3(-ref * axis), anchor), made
+        return pin.SE3(np.eye(3), -ref * axis), single_joint(axis, slides=True)
+    return pin.SE3(pin.exp3(-ref * axis), anchor), single_joint(axis, slides=False)
 
 
 def _inertia(model: mujoco.MjModel, body: int) -> pin.Inertia:
@@ -280,16 +281,14 @@ def _inertia(model: mujoco.MjModel, body: int) -> pin.Inertia:
     return pin.Inertia(float(model.body_mass[body]), axes.translation, turned)
 
 
-def _set_limits(
-    model: mujoco.MjModel, out: pin.Model, order: list[int], names: MjNames, followers: set[str]
-) -> dict[str, str]:
+def _set_limits(model: mujoco.MjModel, out: pin.Model, order: list[int], names: MjNames) -> dict[str, str]:
     """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates.
 
     Returns:
         What of them a robot cannot hold, one sentence a key.
     """
     lower, upper, effort = np.full(out.nq, -np.inf), np.full(out.nq, np.inf), np.zeros(out.nv)
-    off, uneven, still = _off(model, "LIMIT", "CONSTRAINT"), list[str](), list[str]()
+    off, uneven = _off(model, "LIMIT", "CONSTRAINT"), list[str]()
     for k, j in enumerate(order, start=1):
         kind, start = int(model.jnt_type[j]), int(out.idx_vs[k])
         if kind == FREE:
@@ -298,19 +297,15 @@ def _set_limits(
             lower[out.idx_qs[k]], upper[out.idx_qs[k]] = model.jnt_range[j]
         size = SIZES[kind][1]
         low, high = force_range(model, j, size)
-        effort[start : start + size] = most = np.maximum(-low, high)
+        effort[start : start + size] = np.maximum(-low, high)
         if not np.allclose(-low, high, rtol=1e-9, atol=0.0):
             ranges = (f"{least:.6g} to {largest:.6g}" for least, largest in zip(low, high, strict=True))
             uneven.append(f"{names.joints[j]} ({', '.join(ranges)})")
-        if not most.all() and names.joints[j] not in followers:
-            still.append(names.joints[j])
     out.lowerPositionLimit, out.upperPositionLimit = lower, upper
     out.upperEffortLimit, out.lowerEffortLimit = effort, -effort
     out.upperVelocityLimit, out.lowerVelocityLimit = np.full(out.nv, np.inf), np.full(out.nv, -np.inf)
     ranged = [j for j in order if model.jnt_limited[j] and (off or int(model.jnt_type[j]) == BALL)]
     tendons = [str(model.tendon(t).name) or f"tendon {t}" for t in range(model.ntendon) if model.tendon_limited[t]]
-    if len(still) == len(order) or not len(model.actuator_trntype):  # a file that says nothing of actuators
-        still = []
     return {
         "position": sentence(
             "limits that the file switches off" if off else "the cone of a ball joint is no limit here",
@@ -320,7 +315,6 @@ def _set_limits(
         "actuators": sentence(
             "not held is what drives tendons, sites or free joints, or as a muscle", elsewhere(model)
         ),
-        "motors": sentence("unlimited here is the torque of joints that no actuator drives", still),
         "uneven": sentence("torques are limited alike both ways, by the larger of", uneven),
     }
 

@@ -16,10 +16,13 @@ if TYPE_CHECKING:
     import mujoco
 
 #: What Pinocchio calls the fixed root, as a joint and as a frame, and what it is called here
-ROOT = "universe"
-_RESERVED = (ROOT, "world")
-#: MuJoCo's kinds of joints, and how many numbers each has in qpos and in qvel
-FREE, BALL, SLIDE, HINGE = range(4)
+UNIVERSE = "universe"
+_RESERVED = (UNIVERSE, "world")
+#: MuJoCo's kinds of joints (``mjtJoint``)
+FREE = 0
+BALL = 1
+SLIDE = 2
+HINGE = 3
 SIZES = {FREE: (7, 6), BALL: (4, 3), SLIDE: (1, 1), HINGE: (1, 1)}
 
 
@@ -28,7 +31,7 @@ class MjNames:
     """A name for each body, joint and site, by MuJoCo's number of it.
 
     Attributes:
-        bodies: the world is :data:`ROOT`; a body without a name has its number.
+        bodies: the world is :data:`UNIVERSE`; a body without a name has its number.
         joints: one without a name has that of its body, with ``_joint``, its number where there are several, or
             ``_free``.
         sites: ``""`` where the file gives none; one that shares its name with a body or joint has ``_site`` appended.
@@ -47,7 +50,7 @@ def names_of(model: mujoco.MjModel) -> MjNames:
         _RESERVED,
         "_body",
     )
-    bodies = [ROOT, *bodies]
+    bodies = [UNIVERSE, *bodies]
     made = []
     for j in range(model.njnt):
         body = int(model.jnt_bodyid[j])

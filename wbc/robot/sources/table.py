@@ -7,7 +7,7 @@ A file holds one TOML table for each robot:
     file = "folder/file.urdf"          below the wheel's folder ``robots``
     base = "fixed"                     fixed | floating | planar | differential
     lock = ["finger_*"]                joints to lock, or a table joint = value
-    srdf = "folder/file.srdf"          collision rules; with state = "name" also the neutral configuration
+    srdf = "folder/file.srdf"          collision rules, rotors; with state = "name" also the neutral configuration
     neutral = { joint = 1.0 }          rad or m, on top of it
     frames = { tip = "frame" }         role = frame
     acceleration = { joint = 15.0 }    rad/s^2 or m/s^2, needs ``source``

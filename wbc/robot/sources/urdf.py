@@ -67,7 +67,10 @@ def read_urdf(
     whole, kind = with_base(model, base)
     beyond = range(1 if kind == "fixed" else 2, whole.njoints)
     undriven = tuple(str(whole.names[j]) for j in beyond if moving_freely(whole, j) != "fixed")
-    return Description(whole, kind, mimics, notes=remarks.said(), source=str(path), undriven=undriven)
+    moved = tuple(str(joint.get("name")) for one in tree.findall("transmission") for joint in one.findall("joint"))
+    return Description(
+        whole, kind, mimics, notes=remarks.said(), source=str(path), undriven=undriven, transmissions=moved
+    )
 
 
 def _motion(tree: ElementTree.Element) -> str:

@@ -9,6 +9,7 @@ nothing in it makes this program read another file.
 from __future__ import annotations
 
 import contextlib
+import functools
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -16,23 +17,26 @@ import xml.etree.ElementTree as ElementTree
 DEEPEST = 500
 
 #: What a robot description begins with
-ROOTS = ("robot", "mujoco")
+ROOTS = ("robot", "mujoco", "sdf")
 _COMMENT = re.compile("<!--.*?-->", re.DOTALL)
 _NAME = r"[A-Za-z_:\u0080-\U0010ffff][\w:.\-\u0080-\U0010ffff]*"
-_TOKEN = re.compile(
-    rf"""<!--.*?-->|<\?.*?\?>|<!\[CDATA\[(?P<data>.*?)\]\]>|<!(?!--|\[CDATA\[)[^>]*>
-    |<\s*/(?P<end>{_NAME})\s*>
-    |<\s*(?P<start>{_NAME})(?P<attributes>(?:\s*{_NAME}\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(?P<empty>/?)>
-    |(?P<text>[^<]+)""",
-    re.DOTALL | re.VERBOSE | re.ASCII,
-)
-_ATTRIBUTE = re.compile(rf"""({_NAME})\s*=\s*(?:"([^"]*)"|'([^']*)')""", re.ASCII)
 _ENTITY = re.compile(r"&(?:#(\d{1,7})|#x([0-9a-fA-F]{1,6})|(lt|gt|amp|quot|apos));")
 _NAMED = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
 
 
+@functools.cache
+def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """Of a token and of an attribute; made when a file needs them, as that takes as long as reading some files."""
+    token = rf"""<!--.*?-->|<\?.*?\?>|<!\[CDATA\[(?P<data>.*?)\]\]>|<!(?!--|\[CDATA\[)[^>]*>
+    |<\s*/(?P<end>{_NAME})\s*>
+    |<\s*(?P<start>{_NAME})(?P<attributes>(?:\s*{_NAME}\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*(?P<empty>/?)>
+    |(?P<text>[^<]+)"""
+    attribute = rf"""({_NAME})\s*=\s*(?:"([^"]*)"|'([^']*)')"""
+    return re.compile(token, re.DOTALL | re.VERBOSE | re.ASCII), re.compile(attribute, re.ASCII)
+
+
 def parse(text: str) -> ElementTree.Element:
-    """The root element: the first <robot> or <mujoco> where there are several.
+    """The root element: the first of :data:`ROOTS` where there are several.
 
     Raises:
         ElementTree.ParseError: what tinyxml2 refuses, with the line.
@@ -51,7 +55,7 @@ def _parse(text: str) -> ElementTree.Element:
     opened: list[ElementTree.Element] = []
     at, text = 0, text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     while at < len(text):
-        token = _TOKEN.match(text, at)
+        token = _patterns()[0].match(text, at)
         if token is None:
             raise _error("no tag, comment or text begins here", text, at)
         if token["start"]:
@@ -81,7 +85,7 @@ def _parse(text: str) -> ElementTree.Element:
 
 def _attributes(text: str, whole: str, at: int) -> dict[str, str]:
     out: dict[str, str] = {}
-    for name, double, single in _ATTRIBUTE.findall(text):
+    for name, double, single in _patterns()[1].findall(text):
         if name in out:
             raise _error(f"attribute {name} twice", whole, at)
         out[name] = _replaced(double or single)

@@ -25,6 +25,12 @@ static void shift(wbc_tick *t) {
     }
 }
 
+/* By how much a row gives way per multiplier, of a price that it has or that a relaxation gives it; 0 for a hard row */
+INLINE double softness(const wbc_tick *t, int k) {
+    if (ELASTIC && t->elastic[k] > 0.0) return t->elastic[k];
+    return SOFTENED(t, k) ? t->give[k] : 0.0;
+}
+
 /* By how much a soft row gives way per multiplier of the search */
 INLINE double looseness(const wbc_tick *t, int k) {
 #if SOFT_ROWS > 0

@@ -21,16 +21,28 @@
  * second]: where rows bend it is not their tasks that want it */
 #define TURNING 1.0
 
+#if BENDING > 0
+/* What each row loses of what it keeps until q (+) v dt: its residual changes by another amount than its rate says */
+static void lose(wbc_tick *t, const double *v) {
+    const double *arg[4] = {t->q, v, t->p, &t->dt};
+    double *res[1] = {t->report.lost};
+    lost(arg, res, t->work_iw, t->work_w, 0);
+    for (int k = 0; k < MC; k++) {
+        const double loss = bent[k] ? t->report.lost[k] - row_at(t, k, v) * t->dt : 0.0;
+        t->report.lost[k] = isfinite(loss) && t->free_low[k] == t->free_high[k] ? loss : 0.0;
+    }
+}
+#endif
+
 /* What the equality rows lose at the command and do not make up for; the largest as a rate, in row units. `all`: what they miss
  * of moved sides, too, which is not what the order of sacrifice has taken. */
 EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
 #if BENDING > 0
-    const double *arg[4] = {t->q, t->report.v, t->p, &t->dt};
-    double *res[1] = {t->report.lost}, worst = 0.0;
-    lost(arg, res, t->work_iw, t->work_w, 0);
+    double worst = 0.0;
+    lose(t, t->report.v);
     for (int k = 0; k < MC; k++) {
+        if (!bent[k] || t->free_low[k] != t->free_high[k]) continue;
         t->report.lost[k] += (t->bend[k] + (all ? row_at(t, k, t->report.v) - t->free_low[k] : 0.0)) * t->dt;
-        if (!(bent[k] && t->free_low[k] == t->free_high[k] && isfinite(t->report.lost[k]))) t->report.lost[k] = 0.0;
         worst = larger(worst, fabs(t->report.lost[k]) / row_scale[k]);
     }
     return worst / t->dt;
@@ -59,20 +71,87 @@ static void unbend(wbc_tick *t) {
 
 #if BENDING > 0
 
-/* Both sides of the equality rows to where `bend` wants them, and the problem as it was assembled */
+/* Both sides of an equality row to where `bend` wants them */
+INLINE void bend_row(wbc_tick *t, int k, double bend) {
+    t->free_low[k] = t->free_high[k] = t->free_low[k] + (bend - t->bend[k]);
+    t->bend[k] = bend;
+}
+
+/* The same of all, and the problem as it was assembled */
 static void bend_rows(wbc_tick *t, const double *bend) {
 #if SOFT_ROWS > 0
     unmelt(t);
 #endif
-    for (int k = 0; k < MC; k++) {
-        if (t->free_low[k] != t->free_high[k]) continue;
-        t->free_low[k] = t->free_high[k] = t->free_low[k] + (bend[k] - t->bend[k]);
-        t->bend[k] = bend[k];
-    }
+    for (int k = 0; k < MC; k++)
+        if (t->free_low[k] == t->free_high[k]) bend_row(t, k, bend[k]);
     t->prepared = 0;
     memset(t->report.slack, 0, sizeof t->report.slack);
     own_sides(t);
 }
+
+/* Exact rows make up for what they would lose at the last command, which this one is near to; before the first search */
+static void foresee(wbc_tick *t) {
+    if (!has_exact_rows()) return;
+    lose(t, t->v_last);
+    for (int k = 0; k < MC; k++) {
+        if (bent[k] != 2 || t->free_low[k] != t->free_high[k]) continue;
+        bend_row(t, k, -t->report.lost[k] / t->dt);
+        t->low[NV + k] = t->high[NV + k] = t->free_low[k];
+    }
+    if (t->prepared) right_side(t);
+}
+
+#if LEVELS == 0
+/* Whether the rows that hold the command are still those of the optimum: forces have their signs, and no other row binds */
+static int same_rows(const wbc_tick *t) {
+    for (int a = 0; a < t->daqp.n_active; a++) {
+        const int i = t->daqp.WS[a];
+        if (!stays(t, i) && (t->sense[i] & LOWER ? t->daqp.lam_star[a] > 0.0 : t->daqp.lam_star[a] < 0.0)) return 0;
+    }
+    for (int i = 0; i < M_ALL; i++) {
+        if (t->sense[i] & ACTIVE || (i >= NV && (t->idle[i - NV] || HELD(t, i - NV)))) continue;
+        const double value = i < NV ? t->x[i] : row_at(t, i - NV, t->x);
+        const double rounding = TOLERANCE * (i < NV ? dof_scale[i] : row_scale[i - NV]);
+        if (value < t->low[i] - rounding || value > t->high[i] + rounding) return 0;
+    }
+    return 1;
+}
+
+/* Exact rows make up for what they lose at the command, with the factors of the rows that hold it: M dy = change of the sides, and
+ * multipliers as they follow. 0 where other rows would hold it, and the search is to go on with the sides as they are then */
+static int make_up(wbc_tick *t) {
+    DAQPWorkspace *work = &t->daqp;
+    if (!t->factored || work->n_active == 0) return 1;
+    for (int n = 0; n < REFINED; n++) {
+        double mu[ACTIVE_MAX], change[ACTIVE_MAX], dy[WIDE] = {0}, opened = 0.0;
+        wbc_tick_find_lost(t, 1);
+        for (int a = 0; a < work->n_active; a++) {
+            const int i = work->WS[a], k = i - NV, exact = i >= NV && bent[k] == 2 && t->free_low[k] == t->free_high[k];
+            change[a] = exact ? -t->report.lost[k] / t->dt : 0.0;
+            mu[a] = -change[a] * t->scaling[i];
+            if (exact) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
+        }
+        if (opened <= EXACT) return 1;
+        solve_gram(t, work->n_active, mu);
+        for (int a = 0; a < work->n_active; a++) {
+            const int i = work->WS[a], k = i - NV;
+            push_back(t, i, -mu[a], dy);
+            work->lam_star[a] += mu[a] * t->scaling[i];
+            if (change[a] == 0.0) continue;
+            bend_row(t, k, t->bend[k] + change[a]);
+            t->low[i] = t->high[i] = t->free_low[k];
+            work->lam_star[a] += t->strength[k] * change[a];
+        }
+        for (int i = 0; i < NV; i++) t->x[i] = t->report.v[i] + dot(t->inverse + i * WIDE, dy, i);
+        if (!same_rows(t)) {
+            bend_rows(t, t->bend);
+            return 0;
+        }
+        command(t);
+    }
+    return 1;
+}
+#endif
 
 /* The problem again, with the curvature of equality rows, and without counting on joints that bounds stop at the command; 0 where
  * that is what it was */

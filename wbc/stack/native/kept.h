@@ -18,4 +18,11 @@ static void held_back(const wbc_tick *t, const double *step, double *force) {
     for (int k = 0; k < MC; k++) force[MT + k] = bent[k] ? -t->strength[k] * row_at(t, k, step) : 0.0;
 }
 
+/* Whether rows are exact: closed loops */
+INLINE int has_exact_rows(void) {
+    int any = 0;
+    for (int k = 0; k < MC; k++) any |= bent[k] == 2;
+    return any;
+}
+
 #endif

@@ -16,12 +16,17 @@
 #define PRIMAL_STEPS (6 * NV + 60)
 /* Rows whose part beside the others is shorter than this depend on them */
 #define BESIDE 1e-9L
+/* Rows that the search begins beyond by at most this, in row units, are held: its first steps meet them */
+#define NEAR 1e-2
+/* Shares of whole numbers of it are apart from each other */
+#define GOLDEN 0.6180339887498949
 /* A step below this leaves the point where it is; sets of which the optimum is refined at most so often */
 #define STILL 1e-15L
 #define REPEATS 3
 
 typedef struct {
     const double *H, *g;
+    int apart;                  /* whether rows end apart by a rounding */
     wide x[NV], p[NV], G[NV], L[NV * NV], y[NV], Q[NV * NV], R[NV * NV], mu[NV], size[NV];
     int active[M_ALL];          /* 0, or which bound the row is held at: ACTIVE the upper, ACTIVE | LOWER the lower */
     int free[NV], count;        /* variables that no bound fixes */
@@ -34,14 +39,20 @@ static wide wide_row(const wbc_tick *t, int k, const wide *x) {
     return sum;
 }
 
-static double active_bound(const wbc_tick *t, const wbc_primal *s, int i) { return s->active[i] & LOWER ? t->low[i] : t->high[i]; }
+INLINE int is_soft(const wbc_tick *t, int i) { return i >= NV && softness(t, i - NV) > 0.0; }
 
-INLINE int is_soft(const wbc_tick *t, int i) {
-    (void)t;
-    return i >= NV && SOFTENED(t, i - NV);
+/* Where a row ends. Of a relaxation at prices hard rows end apart by a rounding each: many meet at the point of a cone,
+ * where steps would have no length. */
+static double side(const wbc_tick *t, const wbc_primal *s, int i, int lower) {
+    const double end = lower ? t->low[i] : t->high[i];
+    if (MC == 0 || !s->apart || i < NV || t->low[i] == t->high[i] || is_soft(t, i)) return end;
+    const double share = (i - NV) * GOLDEN, gap = (1.0 + share - floor(share)) * 4.0 * TOLERANCE * row_scale[i - NV];
+    return lower ? end - gap : end + gap;
 }
 
-/* Where the search begins: the command, if it keeps all hard rows; 0 if it does not */
+static double active_bound(const wbc_tick *t, const wbc_primal *s, int i) { return side(t, s, i, s->active[i] & LOWER); }
+
+/* Where the search begins: the command, if it keeps all hard rows or nearly does; 0 if it does not */
 static int begin_primal(wbc_tick *t, wbc_primal *s) {
     memset(s->active, 0, sizeof s->active);
     for (int i = 0; i < NV; i++) {
@@ -57,13 +68,15 @@ static int begin_primal(wbc_tick *t, wbc_primal *s) {
             else s->active[i] = at > t->high[i] ? ACTIVE : at < t->low[i] ? ACTIVE | LOWER : 0;
             continue;
         }
-        if (at < t->low[i] - 4.0 * TOLERANCE * row_scale[k] || at > t->high[i] + 4.0 * TOLERANCE * row_scale[k]) return 0;
-        if (t->low[i] == t->high[i]) s->active[i] = ACTIVE;
+        const wide below = (side(t, s, i, 1) - at) / row_scale[k], above = (at - side(t, s, i, 0)) / row_scale[k];
+        if (below > NEAR || above > NEAR) return 0;
+        if (t->low[i] == t->high[i] || above > 4.0 * TOLERANCE) s->active[i] = ACTIVE;
+        else if (below > 4.0 * TOLERANCE) s->active[i] = ACTIVE | LOWER;
     }
     for (int a = 0; a < t->daqp.n_active; a++) {
         const int i = t->daqp.WS[a], lower = t->sense[i] & LOWER;
         if ((i >= NV && MC == 0) || s->active[i] || is_soft(t, i)) continue;
-        const wide at = i < NV ? s->x[i] : wide_row(t, i - NV, s->x), end = lower ? t->low[i] : t->high[i];
+        const wide at = i < NV ? s->x[i] : wide_row(t, i - NV, s->x), end = side(t, s, i, lower);
         if (i < NV ? at == end : fabsl(at - end) <= TOLERANCE * row_scale[i - NV]) s->active[i] = ACTIVE | lower;
     }
     return 1;
@@ -86,7 +99,7 @@ static void wide_gradient(const wbc_tick *t, wbc_primal *s) {
         }
     for (int k = 0; k < MC; k++) {
         if (!is_soft(t, NV + k) || !s->active[NV + k]) continue;
-        const wide force = (wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / t->give[k];
+        const wide force = (wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / softness(t, k);
         for (int e = a_start[k]; e < a_end[k]; e++) {
             s->G[a_col[e]] += force * t->at[e];
             s->size[a_col[e]] += fabsl(force * t->at[e]);
@@ -112,7 +125,7 @@ static int factor_free(const wbc_tick *t, wbc_primal *s) {
             for (int c = a_start[k]; c <= e; c++) {
                 const int a = place[a_col[e]], b = place[a_col[c]];
                 if (a < 0 || b < 0) continue;
-                s->L[(a > b ? a : b) * NV + (a > b ? b : a)] += (wide)t->at[e] * t->at[c] / t->give[k];
+                s->L[(a > b ? a : b) * NV + (a > b ? b : a)] += (wide)t->at[e] * t->at[c] / softness(t, k);
             }
     }
     for (int a = 0; a < s->count; a++)
@@ -213,7 +226,7 @@ static int walk(const wbc_tick *t, wbc_primal *s) {
             if (down == ((s->active[i] & LOWER) != 0)) continue;
             remaining = active_bound(t, s, i) - at;
         } else {
-            const double end = down ? t->low[i] : t->high[i];
+            const double end = side(t, s, i, down);
             if (fabs(end) >= WBC_INF) continue;
             remaining = end - at;
         }
@@ -263,7 +276,7 @@ static int release(wbc_tick *t, wbc_primal *s) {
     }
     for (int k = 0; k < MC; k++)
         if (is_soft(t, NV + k) && s->active[NV + k])
-            lambda[NV + k] = (double)((wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / t->give[k]);
+            lambda[NV + k] = (double)((wide_row(t, k, s->x) - active_bound(t, s, NV + k)) / softness(t, k));
     if (which < 0 || worst <= 64.0 * NV * (double)WIDE_EPS * largest) return 0;
     s->active[which] = 0;
     return 1;
@@ -302,6 +315,7 @@ static int primal(wbc_tick *t) {
     s.H = t->H;
     s.g = t->g;
 #endif
+    for (int k = 0; ELASTIC && k < MC; k++) s.apart |= t->elastic[k] > 0.0;
     if (!begin_primal(t, &s)) return 0;
     for (int step = 0; step < PRIMAL_STEPS && !found; step++) {
         if (!primal_step(t, &s)) return 0;
@@ -335,7 +349,7 @@ static int primal(wbc_tick *t) {
     out->error_bound = bound + rounding;
     for (int i = 0; i < M_ALL; i++) t->keep[i] = is_soft(t, i) ? 0 : s.active[i];
 #if SOFT_ROWS > 0
-    for (int k = 0; k < MC; k++) t->held[k] = is_soft(t, NV + k) ? s.active[NV + k] : 0;
+    for (int k = 0; k < MC; k++) t->held[k] = SOFTENED(t, k) ? s.active[NV + k] : 0;
     memset(t->melted, 0, sizeof t->melted);
 #endif
     t->warm = 1;

@@ -216,23 +216,18 @@ static int trusted_step(wbc_tick *t, const double *free, const double *slope, do
     return 1;
 }
 
-/* Weighted errors that this step leaves, and what equality rows hold against them. R is the metric without curvature, before and
- * after; `firm`: with firm rows in between. */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, int firm, double *force) {
+/* Weighted errors that the step in the metric R leaves, and what equality rows hold against them; `changed`: R is another one then */
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force, int *changed) {
     double step[WIDE], slope[WIDE] = {0};
-    int changed = firm;
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
-    t->firm = firm;
-    const int found = (!firm || cut_off(t, free, 0.0)) && trusted_step(t, free, slope, step, &changed);
-    t->firm = 0;
-    if (!found) return 0;
+    if (!trusted_step(t, free, slope, step, changed)) return 0;
     along_all(t, step, force);
     for (int k = 0; k < LEADING; k++) force[k] = t->weight[k] * t->report.factor[k] * (error[k] - force[k]);
     for (int k = LEADING; k < MT; k++) force[k] = 0.0;
     if (KEPT) without_kept(t, step, force);
     held_back(t, step, force);
-    return !changed || cut_off(t, free, 0.0);
+    return 1;
 }
 
 /* Share in [0, 1] of the curvature that counts, by the errors that are left and the least pivot of H */
@@ -272,10 +267,10 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
     return larger(larger(most[0], most[1]), larger(most[2], most[3]));
 }
 
-/* Curvature into H and what makes it positive definite again; leaves the factor. 1 where there is any to count. */
-static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *whole, const double *force) {
-    double least, most, slope[WIDE] = {0}, step[WIDE];
-    find_pivots(t, &least, &most);
+/* Curvature into H and what makes it positive definite again; leaves the factor. `least`: its least pivot before. 1 where there is any
+ * to count. */
+static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *whole, const double *force, double least) {
+    double slope[WIDE] = {0}, step[WIDE];
     const double largest = curve_errors(t, free, error, force, least);
     if (largest == 0.0) return 0;
     const int amended = decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);
@@ -357,29 +352,35 @@ static void reach(wbc_tick *t) {
     }
     gather(t, error, slope);
     t->prepared = 1;
-    const int blocked = find_free(t, slope, free);
-    if (!(blocked ? cut_off(t, free, 0.0) : factor(t))) {
-        t->prepared = 0;
+    const int blocked = find_free(t, slope, free), exact = has_exact_rows();
+    /* Exact rows are firm at once: with less, a step is one off the mechanism */
+    t->firm = exact;
+    if (!(blocked || exact ? cut_off(t, free, 0.0) : factor(t))) {
+        t->prepared = t->firm = 0;
         return;
     }
 #if NNZK > 0
     /* There may be none also where code for stacks of any size is compiled */
     if (NNZK > 0) {
-        double force[MT + MC + 1];
-        if (!left_over(t, free, error, slope, KEPT, force)) return;
-#if BENDING > 0
+        double force[MT + MC + 1], least, most;
+        int changed = exact;
+        find_pivots(t, &least, &most);
+        t->firm = exact || KEPT;
+        int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, force, &changed);
         /* Errors that are left push against rows that bend: with how much is seen where these are firm */
-        double least, most;
-        if (BENDING > 0 && !KEPT) {
-            find_pivots(t, &least, &most);
-            if (counted(t, error, force, least) > 0.0 && !left_over(t, free, error, slope, 1, force)) return;
+        if (BENDING > 0 && found && !t->firm && counted(t, error, force, least) > 0.0) {
+            t->firm = 1;
+            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, force, &changed);
         }
-#endif
+        changed |= t->firm;
+        t->firm = 0;
+        if (!found) return;
         const int prepared = t->prepared;
         t->prepared = 1;
-        t->curved = add_curvature(t, free, error, slope, force);
+        t->curved = add_curvature(t, free, error, slope, force, least);
         if (!t->prepared) return;
         if (!t->curved) t->prepared = prepared;
+        if (!t->curved && changed && !(blocked ? cut_off(t, free, 0.0) : (t->prepared = factor(t)))) return;
     }
 #endif
     const double allowed = CALM ? stoppable(t, free, error, largest) : largest;

@@ -237,10 +237,20 @@ static void as_task(wbc_tick *t, int k, double price) {
     t->idle[k] = 1;
 }
 
+/* Rows that give way at a price reach to where they are at x */
+static void widen(wbc_tick *t, const double *x) {
+    for (int k = 0; k < MC; k++) {
+        if (!(t->elastic[k] > 0.0)) continue;
+        const double value = row_at(t, k, x);
+        t->low[NV + k] = smaller(t->free_low[k], value);
+        t->high[NV + k] = larger(t->free_high[k], value);
+    }
+}
+
 /* The optimum where what is held and limits of motion give way at prices, in one search: of a robot whose base floats what
  * motors and contacts can do, the classes before, has an answer unless a wrench must be larger than motors bear. */
 static int elastic_search(wbc_tick *t) {
-    double largest = 0.0, soft_scaling[M_ALL], loose[MC + 1];
+    double largest = 0.0, soft_scaling[M_ALL];
     int flag = -1, warm = t->warm;
     for (int i = 0; i < NV; i++) largest = larger(largest, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
     for (int i = 0; i < NV; i++) {
@@ -251,9 +261,8 @@ static int elastic_search(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double price = class_price(row_order[k]) * largest / (row_scale[k] * row_scale[k]);
         const int given = price > 0.0 && !MINIMISED(k) && !t->idle[k] && !(t->give[k] > 0.0);
-        loose[k] = t->give[k];
         if (given && t->low[NV + k] == t->high[NV + k]) as_task(t, k, price);
-        else if (given) loose[k] = 1.0 / price;
+        else if (given) t->elastic[k] = 1.0 / price;
     }
 #if SOFT_ROWS > 0
     memset(t->held, 0, sizeof t->held);
@@ -272,9 +281,10 @@ static int elastic_search(wbc_tick *t) {
         memcpy(soft_scaling, t->scaling, sizeof soft_scaling);
         for (int i = 0; i < M_ALL; i++) t->sense[i] = 0;
         for (int k = 0; k < MC; k++) {
-            if (!(loose[k] > 0.0) || t->idle[k]) continue;
+            const double loose = softness(t, k);
+            if (!(loose > 0.0) || t->idle[k]) continue;
             t->sense[NV + k] = SOFT;
-            soft_scaling[NV + k] *= sqrt(loose[k] * (t->give[k] > 0.0 ? 1.0 : cheaper));
+            soft_scaling[NV + k] *= sqrt(loose * (t->give[k] > 0.0 ? 1.0 : cheaper));
         }
         t->daqp.scaling = soft_scaling;
         t->settings.rho_soft = 1.0;
@@ -286,10 +296,8 @@ static int elastic_search(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double value = row_at(t, k, t->x);
         if (LEVELS > 0 && t->spring[k] > 0.0) t->low[NV + k] = t->high[NV + k] = value;
-        if (!(loose[k] > 0.0) || t->give[k] > 0.0) continue;
-        t->low[NV + k] = smaller(t->low[NV + k], value);
-        t->high[NV + k] = larger(t->high[NV + k], value);
     }
+    widen(t, t->x);
     memcpy(t->met, t->x, sizeof t->met);
     /* The same point as that of hard rows, whose factors a refinement takes */
     for (int i = 0; i < M_ALL; i++) {
@@ -322,6 +330,7 @@ static int elastic(wbc_tick *t) {
     memcpy(t->low, low, sizeof low);
     memcpy(t->high, high, sizeof high);
     memset(t->spring, 0, sizeof t->spring);
+    memset(t->elastic, 0, sizeof t->elastic);
     t->prepared = 0;
     return flag;
 }

@@ -175,6 +175,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = t->spent = t->alone = t->proven = 0;
+    memset(t->elastic, 0, sizeof t->elastic);
     find_idle_rows(t);
     if (t->unusable != 0.0) {
         brake(t);

@@ -39,6 +39,21 @@ static int unsound(const wbc_tick *t, int flag) {
 }
 
 #if LEVELS == 0
+/* After a relaxation at prices: the same problem, whose rows have not been frozen where its search met them */
+static int again_at_prices(wbc_tick *t, int flag) {
+    int any = 0;
+    for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++) {
+        if (!(t->elastic[k] > 0.0)) continue;
+        any = 1;
+        t->low[NV + k] = t->free_low[k];
+        t->high[NV + k] = t->free_high[k];
+    }
+    const int found = any && primal(t);
+    if (any) widen(t, t->report.v);
+    memset(t->elastic, 0, sizeof t->elastic);
+    return found;
+}
+
 /* After a relaxation: from the point that its classes met at */
 static int primal_of_the_rest(wbc_tick *t, int flag) {
     if (flag != WBC_RELAXED || LAST_ORDER == 0) return 0;
@@ -110,8 +125,11 @@ static int answer(wbc_tick *t, int *nameless) {
     if (t->cap == 0.0 && unsound(t, flag) && flag == WBC_BRAKED && primal(t)) flag = (int)(t->report.flag = WBC_SOLVED);
     flag = all_levels(t, flag);
 #else
+#if BENDING > 0
+    for (int n = 0; n < REFINED && flag == WBC_SOLVED && !make_up(t); n++) flag = wbc_tick_solve(t);
+#endif
     wbc_tick_certify(t);
-    if (t->cap == 0.0 && unsound(t, flag) && (primal(t) || primal_of_the_rest(t, flag))) {
+    if (t->cap == 0.0 && unsound(t, flag) && (again_at_prices(t, flag) || primal(t) || primal_of_the_rest(t, flag))) {
         flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
         /* Rows that contradicted each other by rounding only: their frozen bounds are not what is to be certified */
         *nameless = flag == WBC_RELAXED && !report_slack(t, flag);
@@ -148,23 +166,6 @@ static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
 }
 #endif
 
-/* Exact rows make up for what they would lose at the last command, which this one is near to */
-static void foresee(wbc_tick *t) {
-#if BENDING > 0
-    double next[MC + 1] = {0};
-    int exact = 0;
-    for (int k = 0; k < MC; k++) exact |= bent[k] == 2;
-    if (!exact) return;
-    memcpy(t->report.v, t->v_last, sizeof t->report.v);
-    wbc_tick_find_lost(t, 0);
-    for (int k = 0; k < MC; k++)
-        if (bent[k] == 2) next[k] = -t->report.lost[k] / t->dt;
-    bend_rows(t, next);
-#else
-    (void)t;
-#endif
-}
-
 /* Equality rows make up for what they lose within the tick; where that does not help, the step gets shorter */
 static int bent_answer(wbc_tick *t, int flag, int *nameless) {
 #if BENDING > 0
@@ -191,7 +192,9 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     /* What accelerations count from, for who looks at the tick afterwards */
     memcpy(t->v_in, t->v_last, sizeof t->v_in);
     assemble(t, 1);
+#if BENDING > 0
     foresee(t);
+#endif
     int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
     if (PRICES) report_soft_rows(t);
     for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++)

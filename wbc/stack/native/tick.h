@@ -130,6 +130,7 @@ typedef struct {
     int spent;                   /* the cap has ended a search of this tick */
     double met[NV];              /* where the classes of a relaxation met */
     double spring[MC + 1];       /* price of an equality row that a relaxation has made a part of H; 0 for the others */
+    double elastic[MC + 1];      /* by how much a relaxation lets a row give way per multiplier; 0 for the others */
     double firm_missed;          /* the largest violation of a row that never gives way */
     int proven;                  /* nothing within the bounds keeps the rows that never give way */
     int brief;                   /* iterations of a search that may fail; 0: as many as it takes */

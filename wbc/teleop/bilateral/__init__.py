@@ -5,9 +5,9 @@ from __future__ import annotations
 from wbc.teleop.bilateral.run import BilateralRecord, Operator, Packet, Port, Wall, run_bilateral
 from wbc.teleop.bilateral.scheme import (
     Bilateral,
+    Channel,
     Channels,
     Device,
-    Link,
     Scheme,
     four_channel,
     position_force,
@@ -17,9 +17,9 @@ from wbc.teleop.bilateral.scheme import (
 __all__ = [
     "Bilateral",
     "BilateralRecord",
+    "Channel",
     "Channels",
     "Device",
-    "Link",
     "Operator",
     "Packet",
     "Port",

@@ -15,8 +15,10 @@ from wbc.robot.robot import checked_robot
 from wbc.simulation import Connection, Plant
 from wbc.validation import Array
 
-#: Weight of the posture beside the hand, which settles what the hand leaves free; gain of the orientation [1/s]
-POSTURE, GAIN = 1e-4, 5.0
+#: Weight of the posture beside the hand, which settles what the hand leaves free
+POSTURE = 1e-4
+#: Gain of the orientation [1/s]
+GAIN = 5.0
 
 
 class FollowingArm:

@@ -122,7 +122,7 @@ class Wall:
     damping: float = 10.0
 
 
-class Arm(Protocol):
+class Follower(Protocol):
     """What follows a device, see :class:`wbc.teleop.bilateral.arms.FollowingArm`."""
 
     n: int
@@ -164,7 +164,7 @@ class BilateralRecord:
 
 def run_bilateral(
     systems: Bilateral | Sequence[Bilateral], operators: Operator | Sequence[Operator], walls: Wall | Sequence[Wall],
-    *, arms: tuple[Arm | None, Arm | None] = (None, None), seed: int = 0,
+    *, arms: tuple[Follower | None, Follower | None] = (None, None), seed: int = 0,
     progress: Callable[[int], None] | None = None,
 ) -> BilateralRecord:  # fmt: skip
     """Teleoperation from rest at 0 until the operators' paths end; many independent runs of the same period at once.

@@ -100,7 +100,7 @@ def four_channel(stiffness: float = 400.0, damping: float = 30.0, share: float =
 
 
 @dataclass(frozen=True)
-class Link:
+class Channel:
     """One direction: packets arrive after ``delay`` and up to ``jitter`` more [s]; a part ``loss`` never does.
 
     Packets that others have overtaken are of no use; between packets the last one holds.
@@ -112,9 +112,9 @@ class Link:
 
     def __post_init__(self) -> None:
         for name in ("delay", "jitter"):
-            validation.scalar(f"Link.{name}", getattr(self, name), low=0.0, high=LONGEST, unit="s")
-        if validation.scalar("Link.loss", self.loss, low=0.0, high=1.0) == 1.0:
-            raise RangeError("Link.loss", self.loss, "expected less than 1: nothing would arrive")
+            validation.scalar(f"Channel.{name}", getattr(self, name), low=0.0, high=LONGEST, unit="s")
+        if validation.scalar("Channel.loss", self.loss, low=0.0, high=1.0) == 1.0:
+            raise RangeError("Channel.loss", self.loss, "expected less than 1: nothing would arrive")
 
     def newest(self, ticks: int, dt: float, generator: np.random.Generator) -> Array:
         """For each tick 1 + the number of the newest packet that is there, 0 for none yet [ticks]."""
@@ -146,15 +146,15 @@ class Bilateral:
     scheme: Scheme
     master: Device = Device()
     slave: Device = Device()
-    forward: Link = Link()
-    backward: Link = Link()
+    forward: Channel = Channel()
+    backward: Channel = Channel()
     dt: float = 0.002
     passivity: bool = True
     unchecked: bool = False
 
     def __post_init__(self) -> None:
         dt = validation.scalar("dt", self.dt, low=0.0, open_low=True, unit="s")
-        kinds = (("scheme", Scheme), ("master", Device), ("slave", Device), ("forward", Link), ("backward", Link))
+        kinds = (("scheme", Scheme), ("master", Device), ("slave", Device), ("forward", Channel), ("backward", Channel))
         for name, kind in kinds:
             validation.instance(name, getattr(self, name), kind, f"a {kind.__name__}")
         self.master.check("master", dt)

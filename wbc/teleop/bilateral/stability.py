@@ -8,8 +8,10 @@ import numpy as np
 
 from wbc.validation import Array
 
-#: Frequencies at which it is judged at first, and at most
-POINTS, MOST = 4096, 2**20
+#: Frequencies at which stability is judged at first
+POINTS = 4096
+#: Frequencies at which it is judged, at most
+MOST = 2**20
 #: What rounding may take from the criterion
 ROUNDING = 1e-9
 

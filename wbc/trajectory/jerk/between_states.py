@@ -21,7 +21,7 @@ Synchronisation = Literal["time", "phase", "none"]
 ACROSS = 1e-9
 
 #: Positions outside their limits by less than this share of the range are rounding
-TOLERANCE = 1e-10
+STATE_TOLERANCE = 1e-10
 
 
 def jerk_limited(
@@ -204,9 +204,9 @@ def _escape(course: Course, limits: MotionLimits, i: int) -> tuple[float, float]
     low, high = float(limits.lower[i]), float(limits.upper[i])
     below, above = course.extrema()
     size = high - low if np.isfinite(high - low) else max(abs(x) for x in (low, high, 1.0) if np.isfinite(x))
-    if above[0] > high + TOLERANCE * size:
+    if above[0] > high + STATE_TOLERANCE * size:
         return above
-    return below if below[0] < low - TOLERANCE * size else None
+    return below if below[0] < low - STATE_TOLERANCE * size else None
 
 
 def _on_line(task: StateTask, limits: MotionLimits) -> Law:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.errors import BoundsError, RangeError
 from wbc.trajectory.jerk.between_states import limits_of, sizes_of
 from wbc.trajectory.jerk.braking import after
@@ -74,6 +74,7 @@ class Online:
     """
 
     def __init__(self, limits: MotionLimits, dt: float, synchronisation: str) -> None:
+        extras.require("laws", "a jerk-limited law", "ruckig")
         import ruckig
 
         self.dof = len(sizes_of(limits)[0])

@@ -24,11 +24,15 @@ from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import Path
 from wbc.validation import Array
 
-#: Programs are solved until so many in a row gain less than this share of the duration, and no more than so many
-PATIENCE, GAIN, ROUNDS = 3, 5e-4, 20
+#: Programs are solved until this many in a row gain less than GAIN
+PATIENCE = 3
+#: Share of the duration that a program has to gain
+GAIN = 5e-4
+#: Programs that are solved, at most
+ROUNDS = 20
 
 #: but while what limits are passed by falls to this share of what it was, programs go on
-SETTLED = 0.98
+SLOWER = 0.98
 
 #: x of a program is no lower than this share of the last one's, below which a tangent says too little of the time; or
 #: than the second one, where that is too much
@@ -154,7 +158,7 @@ def fastest(stretch: Stretch) -> Timing:
         loss = max(1.0, *(float(r.max()) ** (1.0 / order) for order, r in enumerate(ratios, 1)))
         # Cells in which more is used between the points that the program looks at are given less
         shares = np.minimum(shares * np.clip(0.9999 / ratios, 0.5, 1.01), 1.0)
-        gained, settled = 1.0 - timing.duration * loss / least, loss > SETTLED * before
+        gained, settled = 1.0 - timing.duration * loss / least, loss > SLOWER * before
         before = loss
         if gained > 0.0:
             best, least = timing, timing.duration * loss

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from wbc import extras
 from wbc.trajectory.jerk.course import (
     Course,
     Point,
@@ -92,6 +93,7 @@ class StateTask:
 
 def by_ruckig(task: StateTask, synchronisation: str, duration: float = 0.0) -> list[Course] | None:
     """A course a joint, None where ruckig refuses; ``synchronisation``: time, phase, none; ``duration``: at least."""
+    extras.require("laws", "a jerk-limited law", "ruckig")
     import ruckig
 
     length, tau = task.units

@@ -14,7 +14,7 @@ from wbc.trajectory.jerk.course import Point
 from wbc.validation import Array
 
 #: Positions beyond their limits by less than this [rad or m] are rounding
-TOLERANCE = 1e-9
+WALL_TOLERANCE = 1e-9
 #: Accelerations beyond their limits by less than this share are rounding
 SHARE = 1e-12
 #: The most ticks for which a state is known to be clear
@@ -109,7 +109,7 @@ class Walls:
         for i, (near_low, near_high, low, high, most, slow, ramp, soft) in enumerate(self._rows):
             size = ca.fabs(push[i])
             speed = ca.fabs(rate[i]) + 0.5 * soft * size * size
-            stop = speed * (speed * slow + ramp + size * soft) - TOLERANCE
+            stop = speed * (speed * slow + ramp + size * soft) - WALL_TOLERANCE
             far = ca.fmin(position[i] - near_low, near_high - position[i]) / self._changes[0][i]
             left = ca.fmin(position[i] - low - stop, high - stop - position[i]) / self._changes[1][i]
             clearances.append(ca.if_else(size > most * (1.0 + SHARE), -1.0, ca.fmax(far, left)))
@@ -137,5 +137,5 @@ class Walls:
     def held_back(self, i: int, now: Point, wanted: Point) -> Point | None:
         """See :func:`guarded`, for one joint."""
         return guarded(
-            now, wanted, self._low[i], self._high[i], self._acceleration[i], self._jerk[i], self._dt, TOLERANCE
+            now, wanted, self._low[i], self._high[i], self._acceleration[i], self._jerk[i], self._dt, WALL_TOLERANCE
         )

@@ -10,8 +10,10 @@ import numpy as np
 from wbc.trajectory.paths.path import Index
 from wbc.validation import Array
 
-#: Rounds of more samples, each so many times as many
-ROUNDS, TIMES = 2, 8
+#: Rounds of more samples
+ROUNDS = 2
+#: Factor of the samples of a round
+TIMES = 8
 
 #: What may lie between samples, above the highest of them, without a look at more samples
 CLOSE = 2e-4

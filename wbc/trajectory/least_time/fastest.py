@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wbc import extras
 from wbc.errors import InfeasibleError, RangeError, SolverError
 from wbc.trajectory.laws.certificate import Check
 from wbc.trajectory.laws.limits import MotionLimits
@@ -20,8 +21,12 @@ from wbc.validation import Array
 if TYPE_CHECKING:
     from wbc.trajectory.least_time.reachability import SpeedProgram
 
-#: Intervals: at least so many in all, so many for each piece of a path, and on each piece
-LEAST, PER_PIECE, LEAST_ON_PIECE = 500, 125, 8
+#: Intervals of a path, at least
+LEAST = 500
+#: Intervals for each piece of a path
+PER_PIECE = 125
+#: Intervals on each piece, at least
+LEAST_ON_PIECE = 8
 
 #: Tangents at a knot that differ by less than this share are one tangent
 SMOOTH = 1e-9
@@ -89,6 +94,7 @@ class FastestTask:
         rows = self._rows(grid, shrunk)
         _limited(grid, rows)
         # toppra brings matplotlib with it, which takes longer than all else that a command loads
+        extras.require("laws", "a least-time law", "toppra")
         from wbc.trajectory.least_time.reachability import SpeedProgram
 
         program = SpeedProgram(grid.s, rows, self._squared(grid, shrunk))

@@ -26,7 +26,7 @@ LOWERED = (0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2)
 LARGEST = 1e8
 
 
-class _Path:
+class _ToppraPath:
     """What toppra asks of a path when the coefficients are ready made."""
 
     path_interval = (0.0, 1.0)
@@ -80,7 +80,7 @@ class SpeedProgram:
         bounds[:, 1] = np.minimum(squared * (self.unit / self.length) ** 2, LARGEST)
         self.bounds = bounds
         constraints.append(_Coefficients((None, None, None, None, None, None, bounds)))
-        self._solver = seidelWrapper(constraints, _Path(), sigma, 1)
+        self._solver = seidelWrapper(constraints, _ToppraPath(), sigma, 1)
         self._up, self._down = np.array([1e-9, -1.0]), np.array([-1e-9, 1.0])
 
     def fastest(self, start: float = 0.0, end: float = 0.0) -> PathSpeeds:

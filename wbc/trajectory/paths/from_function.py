@@ -81,10 +81,10 @@ def function_path(
         raise RangeError("path.end", end, f"must be larger than start, {low:g}")
     tolerance = validation.scalar("path.tolerance", tolerance, low=0.0, open_low=True, unit="rad or m")
     most = int(validation.scalar("path.intervals", intervals, low=FIRST))
-    return _halved(_Samples(function, low, high), tolerance, most)
+    return _halved(_FunctionSamples(function, low, high), tolerance, most)
 
 
-class _Samples:
+class _FunctionSamples:
     """Values of a function at shares u in [0, 1] of its range, checked, and asked for once."""
 
     def __init__(self, function: Callable[[float], Any], low: float, high: float) -> None:
@@ -113,7 +113,7 @@ class _Samples:
         return self._known[u]
 
 
-def _halved(samples: _Samples, tolerance: float, most: int) -> FunctionPath:
+def _halved(samples: _FunctionSamples, tolerance: float, most: int) -> FunctionPath:
     count, before, off, where = FIRST, None, np.inf, samples.low
     while count <= most:
         nodes = np.arange(count + 1) / count

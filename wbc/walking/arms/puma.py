@@ -43,7 +43,7 @@ LIMIT_NAMES = (*(f"joint {i} limit" for i in range(1, 7)), "elbow limit", "shoul
 #: Relative slack of reach, for rounding: a straight arm may miss by this
 ROUNDING = 1e-12
 #: Where hands wait in the air: angles about the axis of joint 1 [rad], and in parts of upper arm and forearm together
-#: their distance from that axis and how far they are beyond the neck. ``python -m bench.walk.fits`` tries others
+#: their distance from that axis and how far they are beyond the neck
 WAITING_ANGLES, WAITING_RADIUS, WAITING_BEYOND = (0.0, radians(40.0), radians(-40.0)), 20.0 / 34.0, 10.0 / 34.0
 
 

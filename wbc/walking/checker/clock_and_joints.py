@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wbc.validation import Array
 from wbc.walking.checker.holds import rotations, turns_between
@@ -17,6 +18,8 @@ from wbc.walking.log.log import WalkLog
 #: A step of time below this [s] is none
 LEAST_STEP = 1e-12
 HARD = "joint acceleration / limit"
+#: A body that is driven may take so long to slow down, or to take up a turn's end [s]
+SLOWING = 1.0
 FAST, SPIN_FAST = "body's speed beyond what was asked", "body's turn rate beyond what was asked"
 JUMP, SPIN_JUMP = "jump of the body's velocity", "jump of the body's turn rate"
 
@@ -93,11 +96,15 @@ def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
 
     span = np.maximum(log.t[window:] - log.t[:-window], 1e-12)
     moved = position[window:] - position[:-window]
-    asked = log.meta.get("request")
-    if isinstance(asked, Mapping) and asked.get("kind") == "path" and not asked.get("plan"):
-        turned = turns_between(rotation[:-window], rotation[window:]) / span
-        tally.add(FAST, np.linalg.norm(moved, axis=1) / span - asked["speed"], log.t, lambda _: "body")
-        tally.add(SPIN_FAST, turned - asked["turn_rate"], log.t, lambda _: "body")
+    if (asked := _asked(log, window)) is not None:
+        speed, turn_rate, about_z = asked
+        before, after = rotation[:-window], rotation[window:]
+        turned = turns_between(before, after)
+        if about_z:
+            step = np.swapaxes(before, 1, 2) @ after
+            turned = np.abs(np.arctan2(step[:, 1, 0] - step[:, 0, 1], step[:, 0, 0] + step[:, 1, 1]))
+        tally.add(FAST, np.linalg.norm(moved, axis=1) / span - speed, log.t, lambda _: "body")
+        tally.add(SPIN_FAST, turned / span - turn_rate, log.t, lambda _: "body")
     tally.add("twist speed", np.linalg.norm(sums(slice(0, 3)) - moved, axis=1) / span, log.t, lambda _: "body")
     # exp(sum of w dt) R[k] against R[k + w]: to second order in the turn, which is small within a window
     turn, angle = sums(slice(3, 6)), np.linalg.norm(sums(slice(3, 6)), axis=1)
@@ -105,6 +112,23 @@ def check_twist(log: WalkLog, rules: Rules, tally: Tally) -> None:
     half = np.concatenate([axis * np.sin(angle / 2)[:, None], np.cos(angle / 2)[:, None]], axis=1)
     off = turns_between(rotations(half) @ rotation[:-window], rotation[window:])
     tally.add("twist turn rate", off / span, log.t, lambda _: "body")
+
+
+def _asked(log: WalkLog, window: int) -> tuple[Array | float, Array | float, bool] | None:
+    """Largest speed [m/s] and turn rate [rad/s] that were asked for, and whether the turn is that about z alone: by a
+    path's request, or by the commands in each window and :data:`SLOWING` before it. None: by nothing.
+    """
+    request = log.meta.get("request")
+    if not isinstance(request, Mapping) or request.get("plan"):
+        return None
+    if request.get("kind") == "path":
+        return request["speed"], request["turn_rate"], False
+    if request.get("kind") != "drive":
+        return None
+    rates = np.stack([np.linalg.norm(log.command[:, part], axis=1) for part in (slice(0, 3), slice(3, 6))])
+    lag = round(SLOWING / log.dt)
+    most = sliding_window_view(np.pad(rates, ((0, 0), (lag, 0))), lag + window + 1, axis=1).max(axis=2)
+    return most[0], most[1], True
 
 
 def check_jumps(log: WalkLog, tally: Tally) -> None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import ShapeError
-from wbc.robot.geometry.segments import segment_distances
+from wbc.geometry import segment_distances
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.hold import checked_id
@@ -88,8 +88,7 @@ class Obstacle:
         length = self.shape.length if isinstance(self.shape, Capsule) else 0.0
         half = length / 2 * self.placement.rotation[:, 2]
         ends = (self.placement.translation - half, self.placement.translation + half)
-        columns = [np.broadcast_to(point, np.shape(a)).reshape(-1, 3).T for point in (a, b, *ends)]
-        return np.asarray(segment_distances(*columns).reshape(np.shape(a)[:-1]) - self.shape.radius)
+        return segment_distances(a, b, *ends) - self.shape.radius
 
     def moved(self, pose: pin.SE3) -> Obstacle:
         """The same obstacle on a structure that was moved by ``pose``."""

@@ -9,11 +9,11 @@ from dataclasses import asdict
 from typing import Any
 
 from wbc.errors import WbcError
+from wbc.log import LogFileError
 from wbc.robots import TwoEndedData, Walker, WalkerData, walker
 from wbc.walking.holds.files import save_structure
 from wbc.walking.holds.structure import Structure
-from wbc.walking.log.log import FILE, WalkLog
-from wbc.walking.log.part import WalkLogError
+from wbc.walking.log.log import FILE, WalkLog, WalkLogError
 
 #: What was asked for
 BEGUN = "begun.json"
@@ -102,5 +102,5 @@ def walked(folder: pathlib.Path) -> bool:
         return True
     try:
         return len(WalkLog.load(folder)) > 1
-    except WalkLogError:
+    except LogFileError:
         return False

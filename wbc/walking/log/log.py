@@ -5,26 +5,26 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc import log as logs
 from wbc import validation
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
+from wbc.log import Log, LogFileError
 from wbc.validation import Array
-from wbc.walking.log.part import FILE as FILE
-from wbc.walking.log.part import PART, read_part
-from wbc.walking.log.part import WalkLogError as WalkLogError
-from wbc.walking.log.ticks import TICK
+from wbc.walking.log.ticks import TICK, TickColumns
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-FORMAT = 1
+FORMAT = 2
+#: Names of the files in a run's folder: while it is walked, and whole
+PART, FILE = "run.part", "run.npz"
 #: What a hand does; the log has the index. A hand holds only while it is closed
 HAND_STATES = ("open", "closing", "closed", "opening")
 OPEN, CLOSING, CLOSED, OPENING = range(4)
@@ -40,23 +40,33 @@ META: Mapping[str, type | tuple[type, ...]] = {
     "seed": int,
     "versions": dict,
 }
-_FORMAT = "format"
+#: Members of poses and twists in names of columns
+POSE, TWIST = ("x", "y", "z", "qx", "qy", "qz", "qw"), ("vx", "vy", "vz", "wx", "wy", "wz")
+#: Fields of names, which a log has in its meta
+NAMES = ("joints", "arms", "hands", "hold_id")
 
 
-#: Fields with a row a tick, in the order in which ``run.part`` has them
-ROW = (
-    *("t", "pose_body_in_structure", "q", "v", "twist_body", "hand_state", "hand_hold", "body_fixed"),
-    *("command", "command_kind"),
-)
-#: When a hold was there, in ``run.part``
-PRESENCE = np.dtype([("presence_hold", "i8"), ("presence_span", "f8", 2)])
+class WalkLogError(LogFileError):
+    """A log of a walk that is missing, cannot be read or written, or is of another format."""
 
 
-def row_dtype(joints: int, arms: int) -> np.dtype[Any]:
-    """A row of a log with so many joints and arms: its fields :data:`ROW`."""
-    sizes: list[Any] = [("f8",), ("f8", (7,)), ("f8", (joints,)), ("f8", (joints,)), ("f8", (6,))]
-    sizes += [("i8", (arms,)), ("i8", (arms,)), ("?",), ("f8", (7,)), ("i8",)]
-    return np.dtype([(name, *size) for name, size in zip(ROW, sizes, strict=True)])
+def columns_of(joints: Sequence[str], arms: Sequence[str]) -> dict[str, dict[str, tuple[str, str]]]:
+    """Field of :class:`WalkLog`, then of :class:`TickColumns` -> its columns in a :class:`wbc.log.Log`, by name with
+    unit and kind of number, in the order of a row.
+    """
+    return {
+        "t": {"t": ("s", "f8")},
+        "pose_body_in_structure": {f"pose.{k}": ("m" if len(k) == 1 else "", "f8") for k in POSE},
+        "q": {f"q.{joint}": ("rad", "f8") for joint in joints},
+        "v": {f"v.{joint}": ("rad/s", "f8") for joint in joints},
+        "twist_body": {f"twist.{k}": ("m/s" if k[0] == "v" else "rad/s", "f8") for k in TWIST},
+        "hand_state": {f"hand_state.{arm}": ("", "i8") for arm in arms},
+        "hand_hold": {f"hand_hold.{arm}": ("", "i8") for arm in arms},
+        "body_fixed": {"body_fixed": ("", "?")},
+        "command": {f"command.{k}": ("", "f8") for k in range(7)},
+        "command_kind": {"command_kind": ("", "i8")},
+        **{name: {name: of} for name, of in TICK.items()},
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,105 +160,114 @@ class WalkLog:
             out |= (rows == row) & (times >= start) & (times < end)
         return out
 
-    def save(self, path: str | os.PathLike[str]) -> pathlib.Path:
+    def columns(self, ticks: TickColumns | None = None) -> Log:
+        """As columns, with what the controller said of the ticks; its tables are ``holds`` (pose, roll and largest
+        tilt, h x 9) and ``presence`` (row of the hold, from, to, p x 3).
+        """
+        columns, units = dict[str, np.ndarray](), dict[str, str]()
+        for name, parts in columns_of(self.joints, self.arms).items():
+            if name in TICK and ticks is None:
+                continue
+            values = getattr(self, name) if ticks is None or name not in TICK else ticks.padded(name)
+            for column, (part, (unit, _)) in zip(values.reshape(len(self), -1).T, parts.items(), strict=True):
+                columns[part], units[part] = column, unit
+        meta = {"format": FORMAT, **self.meta} | {name: list(getattr(self, name)) for name in NAMES}
+        tables = {
+            "holds": np.column_stack([self.hold_pose, self.hold_roll, self.hold_max_tilt]),
+            "presence": np.column_stack([self.presence_hold, self.presence_span]),
+        }
+        return Log(columns, units, meta, tables)
+
+    def save(self, path: str | os.PathLike[str], ticks: TickColumns | None = None) -> pathlib.Path:
         """Writes the log, whole or not at all; returns the file.
 
         Args:
-            path: the file, or a folder, which gets ``run.npz``.
+            path: the file, or a folder, which gets ``run.npz``. ticks: what the controller said of them.
 
         Raises:
-            WalkLogError: the file cannot be written.
+            LogFileError: the file cannot be written.
         """
         file = pathlib.Path(path)
         file = file / FILE if file.is_dir() else file
-        arrays: dict[str, Any] = {f.name: np.array(getattr(self, f.name)) for f in fields(self) if f.name != "meta"}
-        arrays |= {"meta": np.array(json.dumps(dict(self.meta))), _FORMAT: np.array(FORMAT)}
-        # Written beside its place and renamed into it, so that no reader ever meets half a file
-        fresh = file.with_name(f".{file.name}")
-        try:
-            with fresh.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **arrays)
-            fresh.replace(file)
-        except OSError as error:
-            raise WalkLogError("path", str(path), f"cannot be written: {error.strerror}") from error
-        return file
+        return logs.save(self.columns(ticks), file.parent, "npz", file.stem)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> WalkLog:
         """The log in a file, or in a run's folder: of a run that was killed as far as it was written, ``run.part``.
 
         Raises:
-            WalkLogError: no such file, no log of a walk, another format, or a field that is missing.
+            LogFileError: no such file, no log of a walk, another format, or a field that is missing.
             ShapeError, NotFiniteError, RangeError, RotationError: a field that cannot be; the message names it.
         """
-        file = pathlib.Path(path)
-        if file.is_dir():
-            if not (file / FILE).is_file() and (file / PART).is_file():
-                return cls(**_from_part(file / PART))
-            file = file / FILE
-        if not file.is_file():
-            raise WalkLogError(
-                "run", str(path), f"there is no {FILE}" if file.name == FILE else "there is no such file"
-            )
-        try:
-            with np.load(file, allow_pickle=False) as data:
-                read = {name: data[name] for name in data.files}
-        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-            raise WalkLogError("run", str(path), f"no log of a walk: {error}") from error
-        if _FORMAT not in read or read[_FORMAT].shape != () or read[_FORMAT] != FORMAT:
-            raise WalkLogError(
-                "run.format",
-                read.get(_FORMAT, "none"),
-                f"no log of a walk of format {FORMAT}, which this version reads",
-            )
-        missing = [f.name for f in fields(cls) if f.name not in read]
-        if missing:
-            raise WalkLogError(f"run.{missing[0]}", str(path), "the file lacks this field")
-        try:
-            read["meta"] = json.loads(str(read["meta"]))
-        except ValueError as error:
-            raise WalkLogError("run.meta", str(read["meta"]), f"no JSON: {error}") from error
-        return cls(**{f.name: read[f.name] for f in fields(cls)})
+        log = load_columns(path)
+        if len(_taken(log.columns, "t")) < 2:
+            raise WalkLogError("run", str(path), "the run was ended before its first ticks were written")
+        return cls.of(log)
 
-    def _set(self, name: str, array: NDArray[Any]) -> None:
-        array.flags.writeable = False
-        object.__setattr__(self, name, array)
+    @classmethod
+    def of(cls, log: Log) -> WalkLog:
+        """From :meth:`columns`; raises as :meth:`load`."""
+        meta = dict(log.meta)
+        if meta.pop("format", None) != FORMAT:
+            raise WalkLogError("run.format", log.meta.get("format"), f"this version reads walks of format {FORMAT}")
+        found: dict[str, Any] = {}
+        for name in NAMES:
+            found[name] = tuple(_taken(meta, name))
+            meta.pop(name)
+        for name, parts in columns_of(found["joints"], found["arms"]).items():
+            if name not in TICK:
+                columns = [_taken(log.columns, part) for part in parts]
+                if any(np.shape(column) != (len(log),) for column in columns):
+                    raise ShapeError(f"WalkLog.{name}", columns, f"expected {len(log)} entries a column")
+                found[name] = np.stack(columns, axis=1)
+        for name in ("t", "body_fixed", "command_kind"):
+            found[name] = found[name][:, 0]
+        holds, presence = (_table(log, name, wide) for name, wide in (("holds", 9), ("presence", 3)))
+        found |= {"hold_pose": holds[:, :7], "hold_roll": holds[:, 7].astype(int), "hold_max_tilt": holds[:, 8]}
+        found |= {"presence_hold": presence[:, 0].astype(int), "presence_span": presence[:, 1:]}
+        return cls(**found, meta=meta)
+
+    def _set(self, name: str, value: NDArray[Any]) -> None:
+        value.flags.writeable = False
+        object.__setattr__(self, name, value)
 
 
-def _from_part(file: pathlib.Path) -> dict[str, Any]:
-    """The fields of a log out of what was written while walking.
+def load_columns(path: str | os.PathLike[str]) -> Log:
+    """The columns of a walk, of its file or folder.
 
     Raises:
-        WalkLogError: nothing was, or something else.
+        LogFileError: no such file, or no log.
     """
-    arrays = read_part(file)
-    if not arrays:
-        raise WalkLogError("run", str(file.parent), "the run was ended before it walked")
-    try:
-        text = json.loads(str(arrays[0]))
-        if text["format"] != FORMAT:
-            raise WalkLogError("run.format", text["format"], f"this version reads format {FORMAT}")
-        dtype, presence = row_dtype(len(text["joints"]), len(text["arms"])), np.zeros(0, PRESENCE)
-        rows, ticks = [np.zeros(0, dtype)], 0
-        for array in arrays[2:]:
-            if array.dtype == dtype:
-                rows.append(array)
-            elif array.dtype == TICK:
-                ticks += len(array)
-            else:
-                presence = array
-        whole = np.concatenate(rows)[:ticks]
-        if len(whole) < 2:
-            raise WalkLogError("run", str(file.parent), "the run was ended before its first ticks were written")
-        out: dict[str, Any] = {name: np.ascontiguousarray(whole[name]) for name in ROW}
-        out |= {name: np.array(arrays[1][name]) for name in ("hold_id", "hold_pose", "hold_roll", "hold_max_tilt")}
-        out |= {name: np.array(presence[name]) for name in ("presence_hold", "presence_span")}
-        names = {name: tuple(text[name]) for name in ("joints", "arms", "hands")}
-        return {**names, **out, "meta": text["meta"]}
-    except WalkLogError:
-        raise
-    except (IndexError, KeyError, TypeError, ValueError) as error:
-        raise WalkLogError("run", str(file), f"no log of a walk: {error}") from error
+    file = pathlib.Path(path)
+    if file.is_dir():
+        found = [file / name for name in (FILE, PART) if (file / name).is_file()]
+        if not found:
+            raise WalkLogError("run", str(path), f"there is no {FILE}")
+        file = found[0]
+    return logs.load(file)
+
+
+def _taken(found: Mapping[str, Any], name: str) -> Any:
+    """An entry of a file.
+
+    Raises:
+        WalkLogError: there is none.
+    """
+    if name not in found:
+        raise WalkLogError(f"run.{name}", sorted(found), "the log of a walk lacks this")
+    return found[name]
+
+
+def _table(log: Log, name: str, wide: int) -> Array:
+    """A table of so many columns.
+
+    Raises:
+        WalkLogError: there is none. ShapeError, NotFiniteError: another one.
+    """
+    rows = validation.real_array(
+        f"WalkLog.{name}", _taken(log.tables, name), (len(log.tables[name]), wide), finite=False
+    )
+    return rows
 
 
 def _names(name: str, value: Any) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from math import inf
@@ -15,11 +14,12 @@ from numpy.typing import NDArray
 
 from wbc import __version__, validation
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.log import TickRecorder
 from wbc.validation import Array
 from wbc.walking.holds.hold import FIXED, FREE
 from wbc.walking.holds.structure import Structure
-from wbc.walking.log.log import FORMAT, PRESENCE, ROW, WalkLog, row_dtype
-from wbc.walking.log.part import Records
+from wbc.walking.log.log import FORMAT, NAMES, WalkLog, columns_of
+from wbc.walking.log.ticks import TICK, TickColumns
 
 #: Packages whose versions a log states, beside this one's
 PACKAGES = ("numpy", "pin", "casadi", "daqp")
@@ -27,12 +27,10 @@ PACKAGES = ("numpy", "pin", "casadi", "daqp")
 ROLLS: Mapping[Any, int] = {FREE: 0, FIXED: 1}
 #: Numbers of a command -> its index in ``COMMANDS``
 _KINDS = {0: 0, 6: 1, 7: 2}
-#: Fields of a hold besides its id
-_HOLD: list[Any] = [("hold_pose", "f8", 7), ("hold_roll", "i8"), ("hold_max_tilt", "f8")]
 
 
 class LogRecorder:
-    """Ticks of a walk, in arrays that double when they are full.
+    """Ticks of a walk.
 
         recorder = LogRecorder(structure, joints, arms, hands, dt=0.01, seed=0, robot="walker", robot_digest="...")
         recorder.append(t, q[:7], q[7:], v[6:], v[:6], states, holds)
@@ -44,6 +42,9 @@ class LogRecorder:
         joints: in the order of q. arms: names. hands: links of the URDF, one an arm.
         dt: time between ticks [s]. seed: of the run. robot: its name. robot_digest: of its data.
         meta: more plain data for ``WalkLog.meta``.
+
+    Attributes:
+        ticks: the rows as they are kept, and written while the walk goes on.
 
     Raises:
         ShapeError, RangeError: bad numbers.
@@ -67,7 +68,8 @@ class LogRecorder:
             raise RangeError("capacity", capacity, "expected a whole number of at least 1")
         self._structure, self._names = structure, (tuple(joints), tuple(arms), tuple(hands))
         m, a = len(self._names[0]), len(self._names[1])
-        self._meta: dict[str, Any] = {
+        said: dict[str, Any] = {
+            "format": FORMAT,
             **(meta or {}),
             "robot": robot,
             "robot_digest": robot_digest,
@@ -76,13 +78,14 @@ class LogRecorder:
             "dt": validation.scalar("dt", dt, low=0.0, open_low=True, unit="s"),
             "seed": seed,
             "versions": dict(versions()),
+            **dict(zip(NAMES, map(list, (*self._names, structure.ids)), strict=True)),
         }
-        self._dtype = row_dtype(m, a)
-        self._rows, self._count, self._lengths = np.zeros(capacity, self._dtype), 0, (7, m, m, 6, a, a)
+        columns = {name: of for parts in columns_of(*self._names[:2]).values() for name, of in parts.items()}
+        self.ticks, self._lengths = TickRecorder(columns, said, capacity), (7, m, m, 6, a, a)
         self._spans: list[list[float]] = [[k, -inf, inf] for k in range(len(structure))]
 
     def __len__(self) -> int:
-        return self._count
+        return len(self.ticks)
 
     def append(
         self,
@@ -106,22 +109,10 @@ class LogRecorder:
         Raises:
             ShapeError: arrays of another length; the tick is then not recorded.
         """
-        k = self._count
-        self._grow(1)
         numbers = pin.SE3ToXYZQUAT(pose) if isinstance(pose, pin.SE3) else pose
-        given = () if command is None else command
-        lengths = (len(numbers), len(q), len(v), len(twist), len(states), len(holds))
-        if lengths != self._lengths or len(given) not in _KINDS:
-            raise ShapeError(
-                "tick",
-                (*lengths, len(given)),
-                f"expected {self._lengths} numbers of pose, q, v, twist, states, holds, and 0, 6 or 7 of the command",
-            )
-        whole = np.zeros(7)
-        whole[: len(given)] = given
-        hands = np.asarray(states), np.asarray(holds)
-        self._rows[k] = (t, numbers, q, v, twist, *hands, bool(body_fixed), whole, _KINDS[len(given)])
-        self._count = k + 1
+        given = numbers, q, v, twist, states, holds, () if command is None else command
+        p, q, v, twist, hands, places, asked = (np.array(values, dtype=float)[None] for values in given)
+        self.extend(np.array([float(t)]), p, q, v, twist, hands, places, asked, np.array([body_fixed]))
 
     def extend(
         self,
@@ -134,72 +125,51 @@ class LogRecorder:
         holds: NDArray[Any],
         command: Array,
         body_fixed: NDArray[Any],
+        ticks: Array | None = None,
     ) -> None:
-        """n ticks at once: what :meth:`append` takes, by rows; every tick has a command, a twist or a pose.
+        """n ticks at once: what :meth:`append` takes, by rows.
+
+        Args:
+            ticks: what the controller said of each step that follows, the fields of :class:`TickColumns`, n x 5.
 
         Raises:
             ShapeError: arrays of another shape; no tick is then recorded.
         """
         n, width = len(t), command.shape[-1]
-        found = tuple(np.shape(rows) for rows in (t, pose, q, v, twist, states, holds, command, body_fixed))
+        given = pose, q, v, twist, states, holds
+        found = tuple(np.shape(rows) for rows in (t, *given, command, body_fixed))
         wanted = ((n,), *((n, length) for length in self._lengths), (n, width), (n,))
-        if found != wanted or width not in (6, 7):
-            raise ShapeError("ticks", found, f"expected {wanted}, a command of 6 or 7 numbers")
-        self._grow(n)
-        rows = self._rows[self._count : self._count + n]
-        for name, values in zip(ROW, (t, pose, q, v, twist, states, holds, body_fixed), strict=False):
-            rows[name] = values
-        rows["command"][:, :width], rows["command"][:, width:] = command, 0.0
-        rows["command_kind"] = _KINDS[width]
-        self._count += n
+        if found != wanted or width not in _KINDS:
+            raise ShapeError("ticks", found, f"expected {wanted}, a command of 0, 6 or 7 numbers")
+        whole, kind = np.zeros((n, 7)), np.full((n, 1), float(_KINDS[width]))
+        whole[:, :width] = command
+        said = np.zeros((n, len(TICK))) if ticks is None else ticks
+        self.ticks.extend(np.concatenate((t[:, None], *given, body_fixed[:, None], whole, kind, said), axis=1))
 
-    def begin_with(self, log: WalkLog, count: int) -> None:
+    def begin_with(self, log: WalkLog, ticks: TickColumns, count: int) -> None:
         """Take over the first ``count`` rows of a log of the same machine and holds. What vanished by then stays gone.
 
         Raises:
             ShapeError: another machine or other holds. RangeError: something is recorded already.
         """
-        if self._count:
-            raise RangeError("rows", self._count, "a log is gone on with from its beginning")
+        if len(self):
+            raise RangeError("rows", len(self), "a log is gone on with from its beginning")
         if (log.joints, log.arms, log.hold_id) != (*self._names[:2], self._structure.ids):
             raise ShapeError("log", log.arms, "expected a log of the same machine on the same holds")
-        self._grow(count)
-        for name in ROW:
-            self._rows[name][:count] = getattr(log, name)[:count]
-        self._count, now = count, float(log.t[count])
+        columns = log.columns(ticks).columns.values()
+        self.ticks.extend(np.stack([column[:count] for column in columns], axis=1))
+        now = float(log.t[count])
         spans = zip(log.presence_hold.tolist(), log.presence_span.tolist(), strict=True)
         self._spans = [[row, start, end if end <= now else inf] for row, (start, end) in spans if start <= now]
 
-    def records(self, start: int = 0) -> Records:
-        """The rows from one on, as they are kept; not a copy."""
-        return self._rows[start : self._count]
-
-    def head(self) -> list[Records]:
-        """What ``run.part`` begins with: names and meta as JSON, and the table of holds."""
-        joints, arms, hands = self._names
-        text = {"format": FORMAT, "joints": joints, "arms": arms, "hands": hands, "meta": self._meta}
-        holds = np.zeros(len(self._structure), [("hold_id", f"U{max(map(len, self._structure.ids))}"), *_HOLD])
-        for name, values in self._holds().items():
-            holds[name] = values
-        return [np.array(json.dumps(text)), holds, self.presence()]
-
-    def presence(self) -> Records:
-        """When each hold was there, as ``run.part`` has it."""
-        return np.array([(int(row), (start, end)) for row, start, end in self._spans], PRESENCE)
-
-    def _grow(self, count: int) -> None:
-        """Arrays that are full double."""
-        while self._count + count > len(self._rows):
-            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-
-    def _holds(self) -> dict[str, Any]:
-        """The table of holds, as the log has it."""
+    def tables(self) -> dict[str, Array]:
+        """The holds, and when each was there."""
         holds = self._structure.holds
+        poses = np.array([pin.SE3ToXYZQUAT(hold.pose) for hold in holds])
+        rolls = np.array([ROLLS.get(hold.roll, hold.roll) for hold in holds], dtype=float)
         return {
-            "hold_id": self._structure.ids,
-            "hold_pose": np.array([pin.SE3ToXYZQUAT(hold.pose) for hold in holds]),
-            "hold_roll": np.array([ROLLS.get(hold.roll, hold.roll) for hold in holds]),
-            "hold_max_tilt": self._structure.tilts,
+            "holds": np.column_stack([poses, rolls, self._structure.tilts]),
+            "presence": np.array(self._spans, dtype=float).reshape(-1, 3),
         }
 
     def vanish(self, t: float, hold: str) -> None:
@@ -227,11 +197,7 @@ class LogRecorder:
             ShapeError: fewer than two ticks, or names that do not fit. NotFiniteError, RangeError, RotationError: a
                 tick that cannot be.
         """
-        rows, presence = self._rows[: self._count], self.presence()
-        names = dict(zip(("joints", "arms", "hands"), self._names, strict=True))
-        fields: dict[str, Any] = {**names, **{name: rows[name].copy() for name in ROW}, **self._holds()}
-        fields |= {name: presence[name] for name in ("presence_hold", "presence_span")}
-        return WalkLog(**fields, meta=self._meta)
+        return WalkLog.of(self.ticks.log(self.tables()))
 
     def _open_span(self, hold: str, wanted: bool) -> int:
         """The span without end of a hold, if it is ``wanted``; -1 where there is none and none is."""

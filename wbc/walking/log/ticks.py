@@ -1,22 +1,25 @@
-"""What the controller said of every tick, kept beside the log as ``ticks.npz``."""
+"""What the controller said of every tick, columns of the log beside those of the walk."""
 
 from __future__ import annotations
 
-import os
-import pathlib
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.errors import ShapeError
+from wbc.log import Log
 from wbc.validation import Array
-from wbc.walking.log.part import FILE, PART, Records, WalkLogError, read_part
 
-#: Name of the file in a run's folder
-TICKS = "ticks.npz"
-#: A tick in ``run.part``
-TICK = np.dtype([("path_time", "f8"), ("body_error", "f8"), ("slip", "f8"), ("cost", "f8"), ("solved", "?")])
+#: Fields of :class:`TickColumns`, which are columns of the log: unit and kind of number
+TICK: Mapping[str, tuple[str, str]] = {
+    "path_time": ("s", "f8"),
+    "body_error": ("m", "f8"),
+    "slip": ("m", "f8"),
+    "cost": ("s", "f8"),
+    "solved": ("", "?"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,49 +38,18 @@ class TickColumns:
     solved: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, records: Records) -> TickColumns:
-        """From rows of the type :data:`TICK`."""
-        return cls(*(np.array(records[f.name]) for f in fields(cls)))
-
-    def records(self) -> Records:
-        """As rows of the type :data:`TICK`."""
-        out = np.zeros(len(self.cost), TICK)
-        for f in fields(self):
-            out[f.name] = getattr(self, f.name)
-        return out
-
-    def save(self, path: str | os.PathLike[str]) -> pathlib.Path:
-        """Writes the columns into a folder, whole or not at all; returns the file.
+    def of(cls, log: Log) -> TickColumns:
+        """From the columns of a log; the step of its last row leads to one that is not there.
 
         Raises:
-            WalkLogError: the file cannot be written.
+            ShapeError: a log without them.
         """
-        file = pathlib.Path(path) / TICKS
-        fresh = file.with_name(f".{TICKS}")
-        try:
-            with fresh.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **{f.name: getattr(self, f.name) for f in fields(self)})
-            fresh.replace(file)
-        except OSError as error:
-            raise WalkLogError("path", str(path), f"cannot be written: {error.strerror}") from error
-        return file
+        missing = [f.name for f in fields(cls) if f.name not in log]
+        if missing:
+            raise ShapeError(f"run.{missing[0]}", sorted(log.columns), "the log says nothing of the controller's ticks")
+        return cls(*(np.array(log[f.name][:-1]) for f in fields(cls)))
 
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> TickColumns:
-        """What :meth:`save` wrote, from the file or its folder, or what was written while walking.
-
-        Raises:
-            WalkLogError: no such file, or not such a one.
-        """
-        file = pathlib.Path(path)
-        if file.is_dir():
-            if not (file / FILE).is_file() and (file / PART).is_file():
-                chunks = [array for array in read_part(file / PART) if array.dtype == TICK]
-                # The step of the last row leads to one that was not written
-                return cls.of(np.concatenate([np.zeros(0, TICK), *chunks])[:-1])
-            file = file / TICKS
-        try:
-            with np.load(file, allow_pickle=False) as data:
-                return cls(*(data[f.name] for f in fields(cls)))
-        except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-            raise WalkLogError("ticks", str(path), f"no ticks of a walk: {error}") from error
+    def padded(self, name: str) -> np.ndarray:
+        """A field with an entry for each row of the log: 0, where no step follows."""
+        values: np.ndarray = getattr(self, name)
+        return np.append(values, np.zeros(1, values.dtype))

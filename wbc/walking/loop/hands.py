@@ -29,6 +29,8 @@ SETTLING = 8.0
 PART = 0.33
 #: A hand whose wrist hardly turns its axis swings about a little as it comes to rest: it closes after so many ticks
 STEADY = 3
+#: Time on its hold after which a hand may close that is slow on the whole, and not in each tick [s]
+LINGERING = 0.2
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
 
@@ -234,7 +236,7 @@ class Hands:
             before = swinging.place, swinging.axis, swinging.x_axis
             rests = self.rests(swinging.arm, swinging.hold, before, swinging.x, swinging.earlier)
             swinging.rests = swinging.rests + 1 if rests else 0
-            if swinging.rests >= swinging.steady:
+            if swinging.rests >= swinging.steady or self._lingers(swinging):
                 swinging.state, swinging.latch = "closing", self.data.latch_time
         elif swinging.state == "closing":
             swinging.latch -= self.machine.dt
@@ -242,13 +244,35 @@ class Hands:
         return False
 
     def rests(
-        self, arm: int, hold: int, before: tuple[Array, Array, Array], x: Array | None, earlier: Array | None
+        self,
+        arm: int,
+        hold: int,
+        before: tuple[Array, Array, Array],
+        x: Array | None,
+        earlier: Array | None,
+        seconds: float | None = None,
     ) -> bool:
-        """Whether a hand is on a hold and still; ``before`` and ``earlier`` as of :func:`at_rest`."""
+        """Whether a hand is on a hold and still; ``before``, some seconds ago (default: a tick), and ``earlier`` as of
+        :func:`at_rest`.
+        """
         structure, machine = self.machine.structure, self.machine
-        there = structure.positions[hold], structure.axes[hold]
+        there, dt = (structure.positions[hold], structure.axes[hold]), machine.dt if seconds is None else seconds
         earlier = earlier if machine.lag == 0.0 else None
-        return at_rest(before, machine.hand(arm), there, x, structure.tilts[hold], self.data, machine.dt, earlier)
+        return at_rest(before, machine.hand(arm), there, x, structure.tilts[hold], self.data, dt, earlier)
+
+    def _lingers(self, swinging: Swinging) -> bool:
+        """Whether a hand has been on its hold for :data:`LINGERING`, and slow on the whole: noise of encoders moves it
+        from tick to tick faster than a hand may close.
+        """
+        arm, hold, x = swinging.arm, swinging.hold, swinging.x
+        here, time = self.machine.hand(arm), self.machine.time
+        if not self.rests(arm, hold, here, x, None):
+            swinging.came = None
+            return False
+        if swinging.came is None:
+            swinging.came = time, here
+        since, place = swinging.came
+        return time - since >= LINGERING and self.rests(arm, hold, place, x, None, time - since)
 
     def missed(self, swinging: Swinging) -> bool:
         """The latch did not close: the hand tries again; whether it has tried often enough."""

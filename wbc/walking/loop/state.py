@@ -54,6 +54,7 @@ class Swinging:
             leaves. wrist: joints 4 to 6 as they are to be now [rad].
         shift: added to what the hand follows on its hold [m].
         counted: it is a move of the plan, not one of an earlier plan, or one that brings a free hand to it.
+        came: when it came to its hold, and its place, z axis and x axis then; None: it is not there.
         rests: ticks in which it has been at rest on its hold. steady: so many it has to be before it closes.
         waits: the body stands until the hand has landed.
         pauses: hand and body come to rest where they are, and then it goes on. paused: how often they have.
@@ -69,6 +70,7 @@ class Swinging:
     counted: bool = True
     rests: int = 0
     steady: int = 1
+    came: tuple[float, tuple[Array, Array, Array]] | None = None
     waits: bool = False
     pauses: bool = False
     paused: int = 0

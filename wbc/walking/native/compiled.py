@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import CompileError
+from wbc.geometry import HEADERS
 from wbc.native import toolchain
 from wbc.native.kernel import kernel
 from wbc.robots import BodyLimb, WalkerData
@@ -73,7 +74,7 @@ def packed(array: Any) -> NDArray[np.float64]:
 def library() -> ctypes.PyDLL | None:
     """The compiled code; None where it was not compiled ahead and cannot be now, which the log says."""
     try:
-        path = kernel(_SOURCES / "planner.c")
+        path = kernel(_SOURCES / "planner.c", HEADERS)
     except CompileError as error:
         toolchain.fall_back(toolchain.reason(error))
         return None

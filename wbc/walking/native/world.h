@@ -187,7 +187,7 @@ static int apart(const World *world, const Thing *thing, const double *a, const 
             ends[1][k] = thing->origin[k] + thing->size[1] * thing->turn[3 * k + 2];
         }
         const double far = least + thing->size[0];
-        return far <= 0.0 || squared_distance(a, b, ends[0], ends[1]) >= far * far;
+        return far <= 0.0 || segment_square(a, b, ends[0], ends[1]) >= far * far;
     }
     const double gap = from_thing(world, thing, middle, half + larger(fabs(least), 1e-3));
     if (gap >= least + half)
@@ -295,12 +295,12 @@ static int meets_itself(const World *world, long row, const double (*points)[3],
         for (long s = 0; s < world->bodies; ++s) {
             const double *segment = world->own + 7 * (world->bodies * row + s);
             const double far = least + world->radii[link] + segment[6];
-            if (segment[6] >= 0.0 && squared_distance(a, b, segment, segment + 3) < far * far)
+            if (segment[6] >= 0.0 && segment_square(a, b, segment, segment + 3) < far * far)
                 return 1;
         }
     }
     const double far = least + world->radii[1] + world->radii[3];
-    return squared_distance(points[2], points[3], points[4], points[5]) < far * far;
+    return segment_square(points[2], points[3], points[4], points[5]) < far * far;
 }
 
 static void carried(const Frame *frame, const double (*points)[3], double (*out)[3])

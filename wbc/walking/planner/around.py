@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.clearance import TriangleMesh
-from wbc.robot.geometry.segments import bounding_capsule, segment_distances
+from wbc.geometry import segment_distances
 from wbc.robots import Walker
 from wbc.shapes import Box, Cylinder, Sphere
 from wbc.validation import Array
@@ -255,16 +255,14 @@ class Around:
             return out
         still, count = limb.still, len(limb.links)
         for link in range(still + 1, count):
-            a, b = (local[:, end].T for end in limb.links[link])
+            a, b = (local[:, end] for end in limb.links[link])
             for segment in range(self.own.shape[1]):
-                other = self.own[arms, segment].T
-                near = (
-                    segment_distances(a, b, other[:3], other[3:6]) < self.of_body + more + self.radii[link] + other[6]
-                )
-                out |= near & (other[6] >= 0.0)
+                other = self.own[arms, segment]
+                gap = segment_distances(a, b, other[:, :3], other[:, 3:6])
+                out |= (gap < self.of_body + more + self.radii[link] + other[:, 6]) & (other[:, 6] >= 0.0)
         for one in range(still, count):
             for other in range(one + 2, count):
-                ends = [local[:, end].T for end in (*limb.links[one], *limb.links[other])]
+                ends = [local[:, end] for end in (*limb.links[one], *limb.links[other])]
                 out |= segment_distances(*ends) < self.of_body + more + self.radii[one] + self.radii[other]
         return out
 
@@ -413,7 +411,7 @@ def _body_of(walker: Walker, bases: Array) -> Array:
     for link, shapes in walker.robot.shapes.items():
         frame = model.frames[model.getFrameId(link)]
         if int(frame.parentJoint) == BODY_JOINT:
-            for a, b, radius in map(bounding_capsule, shapes):
+            for a, b, radius in (placed.capsule() for placed in shapes):
                 rows.append(np.array([*(frame.placement * a), *(frame.placement * b), radius]))
     points = np.asarray(limb.points(np.zeros((1, len(limb.position_limits)))))[0]
     for base in bases:

@@ -6,7 +6,7 @@ import functools
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +21,7 @@ from wbc.walking.planner.around import NONE_MET, Around, around
 from wbc.walking.planner.detours.beside import ROUTE, Search, plan_beside
 from wbc.walking.planner.fewest import fewer_slices
 from wbc.walking.planner.grips.table import Grips, grip_slices
+from wbc.walking.planner.objective import Objective
 from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp
 from wbc.walking.planner.slices import Allowance, Slices, counted, drained
 from wbc.walking.planner.slower import SLOWER, check_stance, plan_slower
@@ -29,8 +30,6 @@ from wbc.walking.planner.stances.body import BodySearch
 from wbc.walking.planner.stances.nodes import Found
 from wbc.walking.planner.starts import ALL_STARTS, NOTHING, STARTS, Beginning, holding_of, stance_slices
 from wbc.walking.planner.swings.law import SwingLaw
-
-Objective = Literal["velocity", "destination"]
 
 #: Delays of one swing that velocity mode allows one after the other [s]
 DELAYS = (0.0, 0.25, 0.5, 1.0, 2.0, float("inf"))

@@ -17,8 +17,9 @@ from wbc.walking.body_path import BodyPath, straight_path
 from wbc.walking.holds.structure import Structure
 from wbc.walking.planner.grips.conflicts import LimbShapes
 from wbc.walking.planner.grips.table import Grips, Ints, grip_slices
+from wbc.walking.planner.objective import Objective
 from wbc.walking.planner.plan import NoPlanError, Plan
-from wbc.walking.planner.planner import Objective, plan_slices
+from wbc.walking.planner.planner import plan_slices
 from wbc.walking.planner.proof import EVERY, clear_scene
 from wbc.walking.planner.slices import Allowance
 from wbc.walking.planner.stances.body import BodySearch

@@ -7,21 +7,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wbc.extras import MissingPackageError
 from wbc.robots import Walker
 from wbc.track.page import FILE as REPORT
 from wbc.walking.checker import Report, Rules, check_run
 from wbc.walking.checker.clock_and_joints import JUMP, SPIN_JUMP
 from wbc.walking.holds.files import save_structure
 from wbc.walking.log.folder import BEGUN, PLAN, STRUCTURE, URDF, write_whole
-from wbc.walking.log.log import FILE
-from wbc.walking.log.part import PART
-from wbc.walking.log.ticks import TICKS
+from wbc.walking.log.log import FILE, PART
 from wbc.walking.report.animation import save_animation
 from wbc.walking.report.figures import figures_of, save_figures
 from wbc.walking.report.plots import save_plots
 from wbc.walking.report.reach_map import save_reach_map
-from wbc.walking.report.replay_page import save_replay_page
 from wbc.walking.report.run_report import save_report
 from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
@@ -32,7 +28,7 @@ from wbc.walking.two_ended import touching_distance
 CHECK = "check.txt"
 #: All files of a run, which the next one in the same folder does not leave behind
 WRITTEN = (
-    *(BEGUN, FILE, PART, TICKS, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
+    *(BEGUN, FILE, PART, "published.npz", PLAN, STRUCTURE, f"{pathlib.Path(STRUCTURE).stem}-*.stl", URDF),
     *(CHECK, "summary.json", "summary.txt"),
     *(
         f"{name}.png"
@@ -59,7 +55,7 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
         files.append(write_whole(folder / PLAN, run.plan.save))
     report = None
     if run.log is not None and run.ticks is not None:
-        files += [run.ticks.save(folder), run.log.save(folder)]
+        files.append(run.log.save(folder, run.ticks))
         (folder / PART).unlink(missing_ok=True)
         if run.loads is not None:
             files.append(run.loads.save(folder))
@@ -83,30 +79,25 @@ def rules_of(walker: Walker) -> Rules:
 
 def save_pictures(
     run: WalkRun, folder: pathlib.Path, progress: Progress | None = None, stop: Callable[[], bool] | None = None
-) -> tuple[list[pathlib.Path], list[str]]:
-    """Plots, map, stills, animation and page; (files, what could not be made and why).
+) -> list[pathlib.Path]:
+    """Plots, map, stills and film; returns the files.
 
     Args:
         stop: asked between pictures and frames; true ends it.
     """
     told, asked = progress or (lambda what, part: None), stop or (lambda: False)
-    files, missing = list[pathlib.Path](), list[str]()
+    files = list[pathlib.Path]()
     if not run.walker.two_ended:
         told("reach map", None)
         files.append(save_reach_map(run, folder))
     log, ticks = run.log, run.ticks
     if log is None or ticks is None or asked():
-        return files, missing
+        return files
     told("plots", None)
     files += save_plots(run, log, ticks, folder)
-    told("replay page", None)
-    try:
-        files += [page for page in [save_replay_page(run, log, folder, asked)] if page is not None]
-    except MissingPackageError as error:
-        missing.append(str(error))
     if not asked():
         told("stills", None)
         files += save_stills(run, log, folder, stop=asked)
     told("animation", 0.0)
     film = save_animation(run, log, folder, progress=lambda part: told("animation", part), stop=asked)
-    return files + ([film] if film is not None else []), missing
+    return files + ([film] if film is not None else [])

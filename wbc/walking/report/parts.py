@@ -1,4 +1,4 @@
-"""The machine as pictures show it: capsules that links carry, and where they are at a configuration."""
+"""The machine as pictures show it: colours of its links, and the pieces that join their shapes."""
 
 from __future__ import annotations
 
@@ -96,17 +96,6 @@ def link_colours(walker: Walker) -> dict[str, Colour]:
         out |= dict.fromkeys(arm.links, mixed(arm_colour(k), PALE_ARM))
         out[arm.links[-1]] = mixed(arm_colour(k), PALE_HAND)
     return out
-
-
-def parts_of(walker: Walker) -> list[Part]:
-    """All shapes of the machine."""
-    colours = link_colours(walker)
-    out = [
-        Part(link, placed.shape, placed.placement, colours.get(link, BODY))
-        for link, shapes in walker.robot.shapes.items()
-        for placed in shapes
-    ]
-    return out + joining_pieces(walker, colours)
 
 
 def part_poses(walker: Walker, parts: list[Part], q: Array) -> list[pin.SE3]:

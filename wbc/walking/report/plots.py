@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc import style
+from wbc.log.plots import LogPanel, over_time, save_each, tick_histogram
+from wbc.track.page import stretches
+from wbc.validation import Array
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.report.figures import body_speed, wrist_angles
@@ -18,7 +21,7 @@ from wbc.walking.run.request import DriveRequest
 from wbc.walking.run.session import WalkRun
 
 INCH = 0.0254
-Draw = Callable[[Any, WalkRun, WalkLog, TickColumns], Any]
+Draw = Callable[..., Any]
 
 
 def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.Path) -> list[pathlib.Path]:
@@ -41,20 +44,7 @@ def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.P
         del draws["margins"], draws["wrists"]
     if run.loads is not None:
         draws["loads"] = _loads
-    files = []
-    with style.pyplot() as plt:
-        for name, draw in draws.items():
-            figure = draw(plt, run, log, ticks)
-            files.append(folder / f"{name}.png")
-            figure.savefig(files[-1])
-            plt.close(figure)
-    return files
-
-
-def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """(first row, row behind the last) of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    return save_each({name: partial(draw, run=run, log=log, ticks=ticks) for name, draw in draws.items()}, folder)
 
 
 def _holds(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
@@ -63,7 +53,7 @@ def _holds(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     for arm in range(len(log.arms)):
         on = np.isin(log.hand_state[:, arm], (CLOSED, OPENING))
         for hold in np.unique(log.hand_hold[on, arm]):
-            for start, end in spans(on & (log.hand_hold[:, arm] == hold)):
+            for start, end in stretches(on & (log.hand_hold[:, arm] == hold)):
                 left, right = log.t[start], log.t[min(end, len(log) - 1)]
                 panel.barh(arm, right - left, left=left, height=0.62, color=arm_colour(arm), lw=0)
                 name, part = log.hold_id[hold], (right - left) / log.t[-1]
@@ -78,7 +68,7 @@ def _holds(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
                     fontsize=8.5,
                     rotation=turned,
                 )
-        for start, end in spans(~on):
+        for start, end in stretches(~on):
             panel.plot(
                 log.t[[start, min(end, len(log) - 1)]], [arm, arm], color=arm_colour(arm), lw=1.2, ls=(0, (1, 1.5))
             )
@@ -123,69 +113,36 @@ def _margins(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
 
 def _joints(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     limits = run.walker.robot.limits
-    return _grid(
-        plt,
-        run,
-        log,
-        np.degrees(log.q),
-        np.degrees(limits.position_lower[6:]),
-        np.degrees(limits.position_upper[6:]),
-        "deg",
-    )
+    low, high = limits.position_lower[6:], limits.position_upper[6:]
+    return over_time(plt, log.t, _panels(run, log, log.q, (low, high), "deg"), "Joint angles and their limits", 2)
 
 
 def _rates(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
-    top = np.degrees(run.walker.robot.limits.velocity[6:])
-    return _grid(plt, run, log, np.degrees(log.v), -top, top, "deg/s")
+    top = run.walker.robot.limits.velocity[6:]
+    return over_time(plt, log.t, _panels(run, log, log.v, (-top, top), "deg/s"), "Joint rates and their limits", 2)
 
 
-def _grid(plt: Any, run: WalkRun, log: WalkLog, values: Any, low: Any, high: Any, unit: str) -> Any:
-    """A panel a joint number, a curve an arm, limits in red."""
-    count = max(len(arm.joints) for arm in run.walker.arms)
-    columns = 2
-    rows = -(-count // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(9.2, 1.9 * rows + 0.8), sharex=True, layout="constrained")
-    column = {name: k for k, name in enumerate(log.joints)}
-    for number, panel in enumerate(axes.flat):
-        members = [(k, column[arm.joints[number]]) for k, arm in enumerate(run.walker.arms) if number < len(arm.joints)]
-        for k, joint in members:
-            panel.plot(log.t, values[:, joint], color=arm_colour(k), lw=1.1, label=run.walker.arms[k].name)
-        bottom, top = (f(limit[j] for _, j in members) for f, limit in ((min, low), (max, high)))
-        pad = 0.06 * (top - bottom)
-        panel.set_ylim(bottom - pad, top + pad)
-        for edge, end in ((bottom, bottom - pad), (top, top + pad)):
-            panel.axhspan(*sorted((edge, end)), color=style.RED, alpha=0.12, lw=0)
-            panel.axhline(edge, color=style.RED, lw=1.0)
+def _panels(run: WalkRun, log: WalkLog, values: Array, limits: tuple[Array, Array], unit: str) -> list[LogPanel]:
+    """A panel a joint number, a curve an arm; in degrees."""
+    arms, column, out = run.walker.arms, {name: k for k, name in enumerate(log.joints)}, []
+    for number in range(max(len(arm.joints) for arm in arms)):
+        members = {k: column[arm.joints[number]] for k, arm in enumerate(arms) if number < len(arm.joints)}
+        curves = [(np.degrees(values[:, j]), arm_colour(k), arms[k].name) for k, j in members.items()]
+        joints = list(members.values())
+        low, high = float(np.degrees(limits[0][joints].min())), float(np.degrees(limits[1][joints].max()))
         # Joints of the two-ended arm are counted from tip to tip, its halves from the elbow
-        names = dict.fromkeys(log.joints[joint].rpartition("joint")[2] for _, joint in members)
-        panel.set_title(f"joint {', '.join(names)}", fontsize=10)
-        panel.set_ylabel(unit)
-        panel.margins(x=0.01)
-    for panel in axes.flat[-columns:]:
-        panel.set_xlabel("time [s]")
-    what = "Joint angles" if unit == "deg" else "Joint rates"
-    figure.suptitle(f"{what} and their limits", x=0.01, ha="left", fontweight="bold", fontsize=13)
-    axes.flat[1].legend(loc="lower right", ncols=len(run.walker.arms), bbox_to_anchor=(1.0, 1.12))
-    return figure
+        names = dict.fromkeys(log.joints[j].rpartition("joint")[2] for j in joints)
+        out.append(LogPanel(unit, curves, low, high, f"joint {', '.join(names)}"))
+    return out
 
 
 def _drift(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     """How far the body is off its command, and how far held hands are off their holds."""
-    curves = (
-        (1e3 * ticks.body_error, style.BLUE, "body [mm]"),
-        (1e6 * ticks.slip, style.ORANGE, "worst held hand [um]"),
-    )
-    figure, axes = plt.subplots(2, 1, figsize=(9.2, 4.6), sharex=True, layout="constrained")
-    for panel, (values, colour, label) in zip(axes, curves, strict=True):
-        panel.plot(log.t[1:], values, color=colour)
-        panel.set_ylabel(label)
-        panel.set_ylim(bottom=0.0)
-        panel.margins(x=0.01)
-    axes[-1].set_xlabel("time [s]")
-    figure.suptitle(
-        "Drift: body off its command, held hands off their holds", x=0.01, ha="left", fontweight="bold", fontsize=13
-    )
-    return figure
+    panels = [
+        LogPanel("body [mm]", [(1e3 * ticks.body_error, style.BLUE, "")]),
+        LogPanel("worst held hand [um]", [(1e6 * ticks.slip, style.ORANGE, "")]),
+    ]
+    return over_time(plt, log.t[1:], panels, "Drift: body off its command, held hands off their holds")
 
 
 def _loads(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
@@ -268,4 +225,4 @@ def _speed(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
 
 def _tick_time(plt: Any, run: WalkRun, log: WalkLog, ticks: TickColumns) -> Any:
     """Histogram of the controller's tick."""
-    return style.tick_histogram(plt, ticks.cost, f"Tick time, {len(ticks.cost)} ticks")
+    return tick_histogram(plt, ticks.cost, f"Tick time, {len(ticks.cost)} ticks")

@@ -20,6 +20,8 @@ from wbc.walking.run.session import WalkRun
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(30.0)
 #: Holds that are shown lie within this of the body's way [m]
 SHOWN = 1.6
+#: Studs of holds that are held are drawn so many times as large
+HELD = 1.7
 #: Stills of instants at most, and width and height of pictures [pixels]
 COUNT, SIZE = 3, (960, 640)
 
@@ -62,9 +64,9 @@ def save_overview(run: WalkRun, log: WalkLog, file: pathlib.Path, size: tuple[in
     return scene.save(file, size or SIZE, AZIMUTH, ELEVATION)
 
 
-def new_scene(run: WalkRun) -> Scene:
-    """An empty scene for the machine, its arms in their colours."""
-    return Scene(run.walker.robot, colours=link_colours(run.walker), floor=False)
+def new_scene(run: WalkRun, detail: float = 0.0) -> Scene:
+    """An empty scene for the machine, its arms in their colours; ``detail`` as of :class:`Scene`."""
+    return Scene(run.walker.robot, detail=detail, colours=link_colours(run.walker), floor=False)
 
 
 def add_machine(scene: Scene, run: WalkRun, log: WalkLog, row: int, pale: bool = False) -> None:
@@ -84,8 +86,14 @@ def add_structure(scene: Scene, run: WalkRun, log: WalkLog, held: dict[int, int]
     plain = np.setdiff1d(rows, list(held))
     scene.add_triangles(surroundings.stud_triangles(run.structure, plain) @ turn, colour=surroundings.HOLD)
     scene.add_triangles(surroundings.obstacle_triangles(run.structure, rows) @ turn, colour=surroundings.OBSTACLE)
+    add_held(scene, run, log, held)
+
+
+def add_held(scene: Scene, run: WalkRun, log: WalkLog, held: dict[int, int]) -> None:
+    """The holds that are held, in the colours of their arms; ``held``: row of a hold -> arm."""
+    turn = surroundings.upright(log).rotation.T
     for row, arm in held.items():
-        stud = surroundings.stud_triangles(run.structure, np.array([row]), 1.5) @ turn
+        stud = surroundings.stud_triangles(run.structure, np.array([row]), HELD) @ turn
         scene.add_triangles(stud, colour=surroundings.mixed(surroundings.arm_colour(arm), 0.1))
 
 

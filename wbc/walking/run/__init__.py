@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
-from wbc.robots import Walker
-from wbc.walking.modes.commands import Commands
-from wbc.walking.run.places import GridPlace, Place
-from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Site, TwoEndedRequest
-from wbc.walking.run.resume_mode import ResumeRequest
-from wbc.walking.run.session import WalkRun, perform_walk
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.walking.run.places import GridPlace
+    from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, ResumeRequest, Site, TwoEndedRequest
+    from wbc.walking.run.session import WalkRun, perform_walk
+else:
+    __getattr__ = lazy.attach(__name__, __file__)
 
 __all__ = [
     "ArmRequest",
@@ -24,20 +24,3 @@ __all__ = [
     "WalkRun",
     "perform_walk",
 ]
-
-
-def perform_drive(request: DriveRequest, walker: Walker, commands: Commands, **more: Any) -> WalkRun:
-    """``perform_walk(request, walker, commands=commands)``."""
-    return perform_walk(request, walker, commands=commands, **more)
-
-
-def perform_resume(
-    folder: str | os.PathLike[str],
-    walker: Walker,
-    *,
-    at: float | None = None,
-    points: Sequence[Place] = (),
-    **more: Any,
-) -> WalkRun:
-    """``perform_walk(ResumeRequest(folder, at, points), walker)``."""
-    return perform_walk(ResumeRequest(folder, at, tuple(points)), walker, **more)

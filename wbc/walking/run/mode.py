@@ -29,7 +29,8 @@ from wbc.walking.native import compiled
 from wbc.walking.planner.plan import Plan
 from wbc.walking.run.carrying_out import Outcome, Progress
 from wbc.walking.run.recording import Before, WalkRecorder
-from wbc.walking.run.request import Request, record_of
+from wbc.walking.run.records import record_of
+from wbc.walking.run.request import Request
 
 Asked = TypeVar("Asked", bound=Request)
 #: A body that is turned by less has arrived, as one that is off by less than :data:`ARRIVED` [rad]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import radians
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,8 +12,9 @@ import pinocchio as pin
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.validation import Array
-from wbc.walking.holds.built_in import ROWS_A, ROWS_T
-from wbc.walking.holds.structure import Structure
+
+if TYPE_CHECKING:
+    from wbc.walking.holds.structure import Structure
 
 
 class GridPlace(NamedTuple):
@@ -44,6 +45,8 @@ def grid_place(field: str, value: Any) -> GridPlace:
         numbers = validation.real_array(field, value, finite=False).ravel().tolist()
     if len(numbers) not in (2, 3):
         raise ShapeError(field, value, "expected T,A or T,A,heading [deg]")
+    from wbc.walking.holds.built_in import ROWS_A, ROWS_T
+
     t, a, heading = (*numbers, 0.0)[:3]
     validation.scalar(f"{field}.T", t, low=1.0, high=float(ROWS_T))
     validation.scalar(f"{field}.A", a, low=1.0, high=float(ROWS_A))

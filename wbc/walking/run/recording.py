@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -11,12 +12,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wbc.log import FileWriter
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import SPACING, BodyPath
 from wbc.walking.holds.structure import Structure
-from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, WalkLog
-from wbc.walking.log.part import PartWriter
+from wbc.walking.log.log import CLOSED, HAND_STATES, OPEN, OPENING, PART, WalkLog, WalkLogError
 from wbc.walking.log.recorder import LogRecorder
 from wbc.walking.log.ticks import TICK, TickColumns
 from wbc.walking.loop.walk import Event, Tick, Walk
@@ -94,21 +95,17 @@ class WalkRecorder:
         self._hands: list[tuple[int, _Hands]] = [(0, (self._states, self._holds, walk.machine.fixed))]
         self._rows: list[tuple[float, float, float, float, bool]] = []
         self._last: tuple[Any, Any, Any] = ((), (), None)
-        self._count, self._ticks, self._vanished = 0, [np.zeros(0, TICK)], False
+        self._count = 0
         if before is not None:
-            self._recorder.begin_with(before.log, before.count)
-            self._ticks.append(before.ticks.records()[: before.count])
-        self._part = None if folder is None else PartWriter(folder)
-        if self._part is not None:
-            self._part.add([*self._recorder.head(), self._recorder.records(), self._ticks[-1]])
+            self._recorder.begin_with(before.log, before.ticks, before.count)
+        self._ticks = self._recorder.ticks
+        if folder is not None:
+            self._ticks.write_to(FileWriter(pathlib.Path(folder) / PART, overwrite=True, error=WalkLogError))
+        #: that the writer has not got yet
+        self._tables: dict[str, Array] | None = self._recorder.tables()
 
     def __len__(self) -> int:
         return self._count
-
-    @property
-    def error(self) -> str:
-        """Why the log is not written while walking any more, "" where it is."""
-        return "" if self._part is None else self._part.error
 
     def tick(self, tick: Tick, command: Array | None = None) -> None:
         """Keeps the tick that was just made.
@@ -141,9 +138,9 @@ class WalkRecorder:
         """
         self._keep(self._walk.machine.lasting, self._walk.machine.fixed)
         self.write()
-        if self._part is not None:
-            self._part.close()
-        return self._recorder.log(), TickColumns.of(np.concatenate(self._ticks))
+        self._ticks.close()
+        columns = self._ticks.log(self._recorder.tables())
+        return WalkLog.of(columns), TickColumns.of(columns)
 
     def write(self) -> None:
         """What was kept since the last time becomes rows of the log, and is written to the folder, if there is one."""
@@ -152,19 +149,19 @@ class WalkRecorder:
         rows, hands = zip(*self._hands, strict=True)
         lasting = np.diff([*rows, len(self._kept)])
         states, holds, fixed = (np.repeat(np.array(column), lasting, axis=0) for column in zip(*hands, strict=True))
-        begin, before = 0, len(self._recorder)
+        begin = 0
+        # Of a state that no step follows nothing is said
+        said = np.zeros((len(self._kept), len(TICK)))
+        said[: len(self._rows)] = np.reshape(self._rows, (-1, len(TICK)))
         # Commands may be twists first and poses after an abort
         for _, same in groupby(self._kept, key=lambda kept: len(kept[3])):
             times, *numbers = zip(*same, strict=True)
             q, v, command = (np.concatenate(column).reshape(len(times), -1) for column in numbers)
             part = slice(begin, begin := begin + len(times))
-            now = states[part], holds[part], command, fixed[part]
+            now = states[part], holds[part], command, fixed[part], said[part]
             self._recorder.extend(np.array(times), q[:, :7], q[:, 7:], v[:, 6:], v[:, :6], *now)
-        self._ticks.append(np.array(self._rows, TICK))
-        if self._part is not None:
-            vanished = [self._recorder.presence()] if self._vanished else []
-            self._part.add([*vanished, self._recorder.records(before), self._ticks[-1]])
-        self._kept, self._rows, self._hands, self._vanished = [], [], [(0, self._hands[-1][1])], False
+        self._ticks.send(self._tables)
+        self._kept, self._rows, self._hands, self._tables = [], [], [(0, self._hands[-1][1])], None
 
     def _row(self, hold: int) -> int:
         """The log's row of a hold of the walk's structure, which loses holds that vanish; -1 for none."""
@@ -178,7 +175,7 @@ class WalkRecorder:
             self._states[arm], self._holds[arm] = OPENING, self._structure.index(event.hold)
         elif event.what == "vanished":
             self._recorder.vanish(event.time, event.hold)
-            self._vanished = True
+            self._tables = self._recorder.tables()
             row = self._structure.index(event.hold)
             for arm in [arm for arm, hold in enumerate(self._holds) if hold == row]:
                 self._states[arm], self._holds[arm] = OPEN, -1

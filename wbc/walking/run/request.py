@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar, Literal
-
-import numpy as np
-import pinocchio as pin
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError, WbcError
-from wbc.robots import WalkerData
-from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.holds.built_in import BUILT_IN, remove_columns, remove_fraction, remove_rows
-from wbc.walking.holds.files import read_structure
-from wbc.walking.holds.hold import frame_of
-from wbc.walking.holds.structure import Structure
-from wbc.walking.log.log import WalkLogError
-from wbc.walking.modes.commands import read_numbers
-from wbc.walking.planner.planner import Objective
+from wbc.errors import RangeError, ShapeError
+from wbc.walking.planner.objective import OBJECTIVES, Objective
 from wbc.walking.run.places import GridPlace, Place, grid_place, over_holds
-from wbc.walking.two_ended import grapple_row
-from wbc.walking.two_ended.search import GAITS
 
-OBJECTIVES: tuple[Objective, ...] = ("destination", "velocity")
-MODES = (*OBJECTIVES, "arm")
-PLANNERS = ("free", "published")
-ROBOTS = ("three-armed", "two-ended")
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+    from wbc.robots import WalkerData
+    from wbc.walking.body_path import BodyPath
+    from wbc.walking.holds.structure import Structure
+
 #: The structure with a grid of places, and the row of holds for the two-ended arm
 GRID, GRAPPLES = "cylinder", "grapples"
 #: Where a walk begins and ends on a built-in structure when nothing is said
@@ -47,16 +39,18 @@ class Site:
     """On what: a structure less the holds that are taken away.
 
     Attributes:
-        structure: ``cylinder``, ``plane``, ``truss``, ``module``, ``grapples`` or a structure file.
-        rows, columns: holds "T,A" that are taken away, such as ``12-14``, by A and by T.
-        fraction, seed: part of the holds that is taken away at random.
-        rigid: holds fix the tilt of a hand.
+        structure: cylinder, plane, truss, module, grapples, or FILE.csv.
+        rows: Holds T,A that are taken away by A, such as 12-14.
+        columns: Holds T,A that are taken away by T.
+        fraction: Part of the holds that is taken away at random [1].
+        seed: Of the random choice.
+        rigid: Holds fix the tilt of a hand.
     """
 
     structure: str = GRID
-    rows: str = ""
-    columns: str = ""
-    fraction: float = 0.0
+    rows: str = field(default="", metadata={"option": "remove-rows"})
+    columns: str = field(default="", metadata={"option": "remove-columns"})
+    fraction: float = field(default=0.0, metadata={"option": "remove"})
     seed: int = 0
     rigid: bool = False
 
@@ -67,6 +61,8 @@ class Site:
             UnknownNameError: no such structure. StructureFileError: a bad file. RangeError, ShapeError: holds that are
                 not there, or none left.
         """
+        from wbc.walking.holds.built_in import remove_columns, remove_fraction, remove_rows
+
         whole = self.whole()
         if self.rows:
             whole = remove_rows(whole, self.rows)
@@ -76,6 +72,10 @@ class Site:
 
     def whole(self) -> Structure:
         """With all its holds."""
+        from wbc.walking.holds.built_in import BUILT_IN
+        from wbc.walking.holds.files import read_structure
+        from wbc.walking.two_ended import grapple_row
+
         if self.structure == GRAPPLES:
             if self.rigid:
                 raise RangeError("rigid", self.rigid, "these holds fix the tilt of a hand anyway")
@@ -96,12 +96,15 @@ class Site:
 class Route:
     """Where a body with arms goes, and how fast.
 
+    On the cylinder a place is a :class:`GridPlace`, or text T,A or T,A,heading [degrees]; else it is the id of a hold,
+    x of the body towards the next one. Without any, the walk is from end to end, see :data:`ENDS`.
+
     Attributes:
-        site: or the name of its structure.
-        start, points: places that the body is over at the beginning and then. On the cylinder :class:`GridPlace`, or
-            text ``T,A`` or ``T,A,heading`` [deg]; else ids of holds, x of the body towards the next one. Empty:
-            :data:`ENDS`.
-        speed: of the body's origin in the structure's frame [m/s]. turn_rate: largest [rad/s].
+        site: Or the name of its structure.
+        start: Place that the body begins over: T,A[,DEGREES] on the cylinder, else a hold's id.
+        points: Place that it goes to; may be repeated.
+        speed: Largest of the body's origin in the structure's frame [m/s].
+        turn_rate: Largest rate of turning [rad/s].
 
     Raises:
         ShapeError: no place, or a structure file, and not both ends given. RangeError: a place beside the grid, or no
@@ -109,8 +112,8 @@ class Route:
     """
 
     site: Site = Site()
-    start: Place = ""
-    points: tuple[Place, ...] = ()
+    start: Place = field(default="", metadata={"option": "from"})
+    points: tuple[Place, ...] = field(default=(), metadata={"option": "to"})
     speed: float = SPEED
     turn_rate: float = TURN_RATE
 
@@ -141,6 +144,8 @@ class Route:
         Raises:
             ShapeError, RangeError, UnknownNameError: places that are not there.
         """
+        from wbc.walking.body_path import grid_path, straight_path
+
         places = (self.start, *self.points)
         grid = [place for place in places if isinstance(place, GridPlace)]
         if grid:
@@ -155,6 +160,8 @@ class Route:
         Raises:
             as :meth:`path`.
         """
+        import pinocchio as pin
+
         route = self if self.points else replace(self, points=(self.start,))
         return pin.SE3(route.path(data).poses[0])
 
@@ -164,9 +171,9 @@ class PathRequest(Route):
     """The body goes over places, by a plan of the hands.
 
     Attributes:
-        objective: ``velocity``: at the speed, fewest delays first; ``destination``: fewest re-grasps first.
-        free_start: nothing is held at the beginning, and the body is declared fixed until enough hands hold.
-        plan: a file of a plan, which is carried out as it is along its own path; "": plan.
+        objective: Of the plan: velocity: at the speed, fewest delays first; destination: fewest re-grasps first.
+        free_start: Nothing is held at the beginning, and the body is declared fixed until enough hands hold.
+        plan: A plan.json, which is carried out as it is along its own path, instead of planning.
     """
 
     objective: Objective = "velocity"
@@ -175,20 +182,24 @@ class PathRequest(Route):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validation.one_of("mode", self.objective, OBJECTIVES)
+        validation.one_of("objective", self.objective, OBJECTIVES)
         if self.plan and self.free_start:
             raise RangeError("plan", self.plan, "plans of files are of three arms that hold")
 
 
 @dataclass(frozen=True)
 class PublishedRequest(Route):
-    """As :class:`PathRequest`, by the published planner, which knows only the cylinder."""
+    """As :class:`PathRequest`, by the published planner, which knows only the cylinder.
+
+    Attributes:
+        objective: velocity: from point to point at the speed; destination: fewest re-grasps.
+    """
 
     objective: Objective = "velocity"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validation.one_of("mode", self.objective, OBJECTIVES)
+        validation.one_of("objective", self.objective, OBJECTIVES)
         if self.site.structure != GRID:
             raise RangeError("planner", "published", f"the published planner knows only the structure {GRID!r}")
 
@@ -198,10 +209,10 @@ class DriveRequest(Route):
     """The body stands over the start, x towards the first of the points, and is driven by rates.
 
     Attributes:
-        commands: a file of rates, or ``keyboard`` or another word for what else drives it.
+        commands: Rates: a CSV or npz file with columns t, T, A, spin [s, m/s, m/s, rad/s], or keyboard.
     """
 
-    commands: str = ""
+    commands: str = field(default="", metadata={"placed": True})
     goes: ClassVar[bool] = False
 
 
@@ -242,6 +253,11 @@ def arm_task(text: str) -> ArmTask:
     if kind == "hold" and rest:
         return ArmTask("hold", text, hold=rest)
     if kind == "poses" and rest:
+        import pinocchio as pin
+
+        from wbc.walking.holds.hold import frame_of
+        from wbc.walking.modes.commands import read_numbers
+
         rows = read_numbers(rest, POSES)
         poses = (frame_of(f"row {k + 1}", row[:3], row[3:6], row[6:]) for k, row in enumerate(rows))
         return ArmTask("poses", text, poses=tuple(tuple(pin.SE3ToXYZQUAT(pose).tolist()) for pose in poses))
@@ -251,7 +267,7 @@ def arm_task(text: str) -> ArmTask:
             twist, duration = tuple(float(part) for part in numbers.split(",")), float(seconds)
         except ValueError as error:
             raise ShapeError("do", text, "expected 'rate vx,vy,vz,wx,wy,wz for SECONDS'") from error
-        if len(twist) != 6 or not np.isfinite([*twist, duration]).all() or duration <= 0.0:
+        if len(twist) != 6 or not all(map(isfinite, (*twist, duration))) or duration <= 0.0:
             raise ShapeError("do", text, "expected six rates and a time above 0")
         return ArmTask("rate", text, twist=twist, seconds=duration)
     raise ShapeError("do", text, "expected 'hold ID', 'poses FILE' or 'rate vx,vy,vz,wx,wy,wz for SECONDS'")
@@ -262,14 +278,15 @@ class ArmRequest(Route):
     """The body stands as that of :class:`DriveRequest`, and one hand does some tasks.
 
     Attributes:
-        arm: its name; "": the first. tasks: or their texts, see :func:`arm_task`.
+        arm: The arm that moves. Default: the first.
+        tasks: 'hold ID', 'poses FILE' or 'rate vx,vy,vz,wx,wy,wz for SECONDS' [m/s, rad/s]; may be repeated.
 
     Raises:
         ShapeError, NumberTableError, RangeError: no tasks, or one that is none.
     """
 
     arm: str = ""
-    tasks: tuple[ArmTask, ...] = ()
+    tasks: tuple[ArmTask, ...] = field(default=(), metadata={"option": "do"})
     goes: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -286,16 +303,20 @@ class TwoEndedRequest:
     """The two-ended arm goes end over end.
 
     Attributes:
-        site: or the name of its structure. start: ids of the holds of ``arm1`` and ``arm2``.
-        goal: id of the hold, or the place [m], to go to. gait: ``any``, ``inchworm`` or ``turnaround``.
+        site: Or the name of its structure.
+        start: Ids of the holds of its two ends, arm1 and arm2.
+        goal: Id of the hold that it goes to, or the place x,y,z of its elbow [m].
+        gait: any, inchworm or turnaround.
     """
 
     site: Site = Site(GRAPPLES)
-    start: tuple[str, str] = TWO_ENDED_ENDS[0]
-    goal: str | tuple[float, float, float] = TWO_ENDED_ENDS[1]
+    start: tuple[str, str] = field(default=TWO_ENDED_ENDS[0], metadata={"option": "from"})
+    goal: str | tuple[float, float, float] = field(default=TWO_ENDED_ENDS[1], metadata={"option": "to"})
     gait: str = "any"
 
     def __post_init__(self) -> None:
+        from wbc.walking.two_ended.search import GAITS
+
         site = Site(self.site) if isinstance(self.site, str) else validation.instance("site", self.site, Site, "a Site")
         start = validation.strings("from", self.start)
         if len(start) != 2:
@@ -307,130 +328,47 @@ class TwoEndedRequest:
             object.__setattr__(self, name, value)
         validation.one_of("gait", self.gait, tuple(GAITS))
 
+    def to(self, goals: tuple[Place, ...] = ()) -> TwoEndedRequest:
+        """The same to another goal, as text; () for its own. What is no hold is a place x,y,z.
+
+        Raises:
+            ShapeError: several goals. UnknownNameError: holds that are not there.
+        """
+        if len(goals) > 1:
+            raise ShapeError("to", goals, "expected one hold or place x,y,z")
+        goal, structure = str(goals[0]) if goals else self.goal, self.site.build()
+        for name in self.start:
+            structure.index(name)
+        if not isinstance(goal, str):
+            return self
+        if goal not in structure:
+            try:
+                x, y, z = (float(part) for part in goal.split(","))
+            except ValueError:
+                structure.index(goal)
+            return replace(self, goal=(x, y, z))
+        return replace(self, goal=goal)
+
+
+@dataclass(frozen=True)
+class ResumeRequest:
+    """A run goes on, at rest in the state that its log has at a time, to its end.
+
+    Attributes:
+        folder: Of the run, ended or killed.
+        at: Time of the state that it goes on from [s]. Default: the last one.
+        points: Where to go, as of a path; may be repeated. Default: where the run was to go, by the path that it found.
+    """
+
+    folder: str | os.PathLike[str] = field(metadata={"placed": True})
+    at: float | None = None
+    points: tuple[Place, ...] = field(default=(), metadata={"option": "to"})
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", validation.file_path("resume", self.folder))
+        object.__setattr__(self, "points", tuple(validation.items("to", self.points, "places")))
+        if self.at is not None and (isinstance(self.at, bool) or not isinstance(self.at, (int, float))):
+            raise ShapeError("resume.at", self.at, "expected a time in s")
+
 
 Request = PathRequest | PublishedRequest | DriveRequest | ArmRequest | TwoEndedRequest
-#: Names of the modes in records
-KINDS: Mapping[str, type[Any]] = {
-    "path": PathRequest,
-    "published": PublishedRequest,
-    "drive": DriveRequest,
-    "arm": ArmRequest,
-    "two-ended": TwoEndedRequest,
-}
-
-
-def read_request(
-    structure: str = "",
-    mode: str = "velocity",
-    speed: float = SPEED,
-    turn_rate: float = TURN_RATE,
-    start: str = "",
-    points: Sequence[str] = (),
-    rows: str = "",
-    columns: str = "",
-    fraction: float = 0.0,
-    seed: int = 0,
-    planner: str = "free",
-    rigid: bool = False,
-    commands: str = "",
-    arm: str = "",
-    tasks: Sequence[str] = (),
-    free_start: bool = False,
-    robot: str = "three-armed",
-    gait: str = "any",
-    plan: str = "",
-) -> Request:
-    """The request that a user types: the options of ``wbc walk``.
-
-    Raises:
-        UnknownNameError: no such mode, planner, robot or gait. RangeError: what the mode does not take. What the
-            requests raise.
-    """
-    validation.one_of("mode", mode, MODES)
-    validation.one_of("planner", planner, PLANNERS)
-    validation.one_of("robot", robot, ROBOTS)
-    validation.one_of("gait", gait, tuple(GAITS))
-    if commands and mode != "velocity":
-        raise RangeError("commands", commands, "they are for the mode 'velocity'")
-    if (mode == "arm") != bool(tasks):
-        raise RangeError("do", tasks, "say what the hand is to do in the mode 'arm', and in no other")
-    published, two_ended, stands = planner == "published", robot == "two-ended", bool(commands or tasks)
-    if published and (stands or free_start):
-        raise RangeError("planner", planner, "commands, arm mode and a free start are of the planner 'free'")
-    if plan and (two_ended or stands or free_start or published):
-        raise RangeError("plan", plan, "plans of files are of three arms that hold, and of the planner 'free'")
-    if two_ended and (stands or free_start or published):
-        raise RangeError("robot", robot, "the two-ended arm goes to a hold or a place, by the planner 'free'")
-    if gait != "any" and not two_ended:
-        raise RangeError("gait", gait, "gaits are of the robot 'two-ended'")
-    site = Site(structure or (GRAPPLES if two_ended else GRID), rows, columns, fraction, seed, rigid)
-    if two_ended:
-        for name, value in (("speed", speed), ("turn_rate", turn_rate)):
-            validation.scalar(name, value, low=0.0, open_low=True)
-        return two_ended_request(site, start, points, gait)
-    objective: Objective = "velocity" if mode == "velocity" else "destination"
-    route: dict[str, Any] = {"site": site, "start": start, "points": tuple(points)}
-    route |= {"speed": speed, "turn_rate": turn_rate}
-    if published:
-        return PublishedRequest(**route, objective=objective)
-    if commands:
-        return DriveRequest(**route, commands=commands)
-    if tasks:
-        return ArmRequest(**route, arm=arm, tasks=tuple(arm_task(text) for text in tasks))
-    return PathRequest(**route, objective=objective, free_start=free_start, plan=plan)
-
-
-def two_ended_request(site: Site, start: str, points: Sequence[str], gait: str) -> TwoEndedRequest:
-    """A goal is a hold if there is such a one, else a place x,y,z."""
-    ends = TWO_ENDED_ENDS if site.structure == GRAPPLES else ((), "")
-    first, goals = tuple(start.split()) or ends[0], tuple(points) or (ends[1],)
-    if len(first) != 2 or len(goals) != 1 or not goals[0]:
-        raise ShapeError("from, to", (start, *goals), "expected two holds, 'ID1 ID2', and one hold or place x,y,z")
-    structure = site.build()
-    for name in first:
-        structure.index(name)
-    goal = goals[0]
-    if goal not in structure:
-        try:
-            place = [float(part) for part in goal.split(",")]
-        except ValueError:
-            place = []
-        if len(place) == 3:
-            return TwoEndedRequest(site, (first[0], first[1]), (place[0], place[1], place[2]), gait)
-    structure.index(goal)
-    return TwoEndedRequest(site, (first[0], first[1]), goal, gait)
-
-
-def record_of(request: Request) -> dict[str, Any]:
-    """A request as plain data, for the log of its run; :func:`request_of` reads it."""
-    kind = next(name for name, cls in KINDS.items() if type(request) is cls)
-    return {"kind": kind, **asdict(request)}
-
-
-def request_of(record: Any) -> Request:
-    """The request of a log: what :func:`record_of` made, or the texts that logs had before.
-
-    Raises:
-        WalkLogError: it is none.
-    """
-    try:
-        values = dict(record)
-        if "kind" not in values:
-            return read_request(**values)
-        kind = KINDS[values.pop("kind")]
-        known = {field.name for field in fields(kind)}
-        if values.keys() - known:
-            raise KeyError(min(values.keys() - known))
-        values["site"] = Site(**values["site"])
-        if "tasks" in values:
-            values["tasks"] = tuple(_task(**task) for task in values["tasks"])
-        request: Request = kind(**values)
-        return request
-    except (KeyError, TypeError, ValueError, WbcError) as error:
-        reason = f"the log does not say what the run was asked to do: {error}"
-        raise WalkLogError("request", type(record).__name__, reason) from error
-
-
-def _task(**values: Any) -> ArmTask:
-    values["poses"] = tuple(tuple(float(x) for x in pose) for pose in values["poses"])
-    return ArmTask(**{**values, "twist": tuple(values["twist"])})

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import pathlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wbc import validation
-from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.errors import RangeError, WbcError
 from wbc.robots import Walker
 from wbc.robots import walker as made_walker
 from wbc.simulation import Plant
@@ -23,7 +21,7 @@ from wbc.walking.holds.files import read_structure
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.body_paths import path_of
 from wbc.walking.log.folder import BEGUN, STRUCTURE, machine_made, read_begun, walked
-from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError
+from wbc.walking.log.log import CLOSED, OPENING, WalkLog, WalkLogError, load_columns
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
@@ -32,13 +30,14 @@ from wbc.walking.loop.state import Manual, State
 from wbc.walking.loop.stopping import Stops
 from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import plan_from_state
+from wbc.walking.planner.objective import Objective
 from wbc.walking.planner.plan import Plan
-from wbc.walking.planner.planner import Objective
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Ending, Mode, Result, compiled_stack, off_goal
 from wbc.walking.run.places import GridPlace, Place
 from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
-from wbc.walking.run.request import PathRequest, Request, TwoEndedRequest, request_of, two_ended_request
+from wbc.walking.run.records import request_of
+from wbc.walking.run.request import PathRequest, Request, ResumeRequest, TwoEndedRequest
 
 #: A body goes back along its log for so long at most [s], by straight lines over so many ticks
 TRAIL, EVERY = 20.0, 25
@@ -97,44 +96,6 @@ def row_at(log: WalkLog, at: float | None) -> int:
     return int(np.searchsorted(log.t, at + 1e-9, side="right")) - 1
 
 
-@dataclass(frozen=True)
-class ResumeRequest:
-    """A run goes on, at rest in the state that its log has at a time, to its end.
-
-    Attributes:
-        folder: of the run. at: [s]; None: the last state.
-        points: where to go, as of :class:`wbc.walking.run.request.Route`; (): where the run was to go, by the path that
-            it had found.
-    """
-
-    folder: str | os.PathLike[str]
-    at: float | None = None
-    points: tuple[Place, ...] = ()
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "folder", validation.file_path("resume", self.folder))
-        object.__setattr__(self, "points", tuple(validation.items("to", self.points, "places")))
-        if self.at is not None and (isinstance(self.at, bool) or not isinstance(self.at, (int, float))):
-            raise ShapeError("resume.at", self.at, "expected a time in s")
-
-
-def read_resume(text: str, points: tuple[str, ...] = ()) -> ResumeRequest:
-    """From ``FOLDER`` or ``FOLDER@SECONDS``.
-
-    Raises:
-        RangeError: no such folder.
-    """
-    name, sign, seconds = text.rpartition("@")
-    try:
-        at = float(seconds) if sign else None
-    except ValueError:
-        at = None
-    folder = validation.file_path("resume", text if at is None else name)
-    if not validation.exists("resume", folder) or not folder.is_dir():
-        raise RangeError("resume", text, "expected the folder of a run, or FOLDER@SECONDS")
-    return ResumeRequest(folder, at, points)
-
-
 def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset()) -> Request | ResumeRequest:
     """The request itself; of a run that was ended before it walked what it was asked to do, which is then begun.
 
@@ -150,9 +111,7 @@ def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset())
     if begun.get("kind") != RESUME:
         request = request_of(begun)
         if resume.points and isinstance(request, TwoEndedRequest):
-            return two_ended_request(
-                request.site, " ".join(request.start), tuple(map(str, resume.points)), request.gait
-            )
+            return request.to(resume.points)
         return _goal(request, resume.points) if resume.points else request
     try:
         at, points = begun["at"], tuple(_place(place) for place in begun["points"])
@@ -207,7 +166,8 @@ class ResumeMode(Mode[PathRequest]):
     def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
         super().__init__(walker)
         self._resume, self._folder = resume, pathlib.Path(resume.folder)
-        self._old, self._ticks = WalkLog.load(self._folder), TickColumns.load(self._folder)
+        columns = load_columns(self._folder)
+        self._old, self._ticks = WalkLog.of(columns), TickColumns.of(columns)
         old = self._old
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
         if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pathlib
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.walking.holds.files import read_structure
 from wbc.walking.log.folder import STRUCTURE
-from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog
+from wbc.walking.log.log import CLOSED, CLOSING, OPEN, WalkLog, load_columns
 from wbc.walking.log.ticks import TickColumns
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
@@ -24,8 +25,9 @@ from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.run.mode import Result
 from wbc.walking.run.path_mode import TwoEndedMode
 from wbc.walking.run.recording import Before, as_walked
-from wbc.walking.run.request import TwoEndedRequest, request_of, two_ended_request
-from wbc.walking.run.resume_mode import RESUME, ResumeRequest, resumed_state, row_at
+from wbc.walking.run.records import request_of
+from wbc.walking.run.request import ResumeRequest, TwoEndedRequest
+from wbc.walking.run.resume_mode import RESUME, resumed_state, row_at
 from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
 from wbc.walking.two_ended.planner import plan_from_air
 from wbc.walking.two_ended.postures import Grip, from_hand_to_hand
@@ -46,14 +48,15 @@ class TwoEndedResumeMode(TwoEndedMode):
 
     def __init__(self, resume: ResumeRequest, walker: Walker) -> None:
         self._resume, self._folder = resume, pathlib.Path(resume.folder)
-        self._old, self._ticks = WalkLog.load(self._folder), TickColumns.load(self._folder)
+        columns = load_columns(self._folder)
+        self._old, self._ticks = WalkLog.of(columns), TickColumns.of(columns)
         request = request_of(self._old.meta.get("request"))
         if not isinstance(request, TwoEndedRequest) or not walker.two_ended:
             raise RangeError("resume", str(self._folder), "the run is of another machine")
         if walker.data.digest != self._old.meta["robot_digest"]:
             raise RangeError("resume", self._old.meta["robot_digest"], "the run has another robot; use the same --set")
         if resume.points:
-            request = two_ended_request(request.site, " ".join(request.start), tuple(map(str, resume.points)), "any")
+            request = replace(request, gait="any").to(resume.points)
         super().__init__(request, walker)
         self.structure = read_structure(self._folder / STRUCTURE)
         self._row = row = row_at(self._old, resume.at)

@@ -30,8 +30,9 @@ from wbc.walking.run.mode import Mode
 from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
 from wbc.walking.run.plausible import far_apart
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, TwoEndedRequest, record_of
-from wbc.walking.run.resume_mode import ResumeMode, ResumeRequest, going_on
+from wbc.walking.run.records import record_of
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, ResumeRequest, TwoEndedRequest
+from wbc.walking.run.resume_mode import ResumeMode, going_on
 from wbc.walking.run.resume_two_ended import TwoEndedResumeMode
 from wbc.walking.torque.loads import Loads
 from wbc.walking.torque.loop import TorqueLoop

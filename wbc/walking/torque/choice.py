@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from wbc import validation
 from wbc.errors import RangeError, WbcError
-from wbc.robots import Walker, with_masses
-from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
-from wbc.simulation.drives import PLANTS
-from wbc.walking.holds.structure import Structure
-from wbc.walking.log.part import WalkLogError
-from wbc.walking.loop.stack import hold_kind
 from wbc.walking.torque.faults import Fault, delay_of
-from wbc.walking.torque.loop import TorqueLoop
-from wbc.walking.torque.stack import TorqueStack
-from wbc.walking.torque.tested import Tested
+
+if TYPE_CHECKING:
+    from wbc.robots import Walker
+    from wbc.walking.holds.structure import Structure
+    from wbc.walking.torque.loop import TorqueLoop
+    from wbc.walking.torque.tested import Tested
 
 
 @dataclass(frozen=True)
@@ -25,19 +22,24 @@ class PlantChoice:
     """What moves under a walk.
 
     Attributes:
-        name: of :data:`PLANTS`; kinematic: the joints do exactly as they are commanded, and there are no torques.
-        gravity: along the structure's axes [m/s^2]. faults: texts as of :meth:`Fault.read`.
+        name: kinematic: joints do exactly as they are commanded; or under torques, on holds that fix the tilt of a
+            hand, --rigid: pinocchio (rigid grips) or mujoco (soft ones).
+        gravity: x,y,z along the structure's axes; of plants with torques [m/s^2].
+        faults: 'slip ARM METRES at SECONDS', 'limp JOINT at SECONDS', 'break ARM at SECONDS' or 'delay SECONDS'; may
+            be repeated.
 
     Raises:
         UnknownNameError, ShapeError, RangeError: a name or a text that is none; gravity or faults of the kinematic
             plant.
     """
 
-    name: str = "kinematic"
+    name: str = field(default="kinematic", metadata={"option": "plant"})
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    faults: tuple[str, ...] = ()
+    faults: tuple[str, ...] = field(default=(), metadata={"option": "fault"})
 
     def __post_init__(self) -> None:
+        from wbc.simulation.drives import PLANTS
+
         validation.one_of("plant", self.name, PLANTS)
         gravity = validation.real_array("gravity", self.gravity, (3,)).tolist()
         object.__setattr__(self, "gravity", tuple(gravity))
@@ -52,6 +54,8 @@ class PlantChoice:
         Raises:
             WalkLogError: it is none.
         """
+        from wbc.walking.log.log import WalkLogError
+
         try:
             x, y, z = about.get("gravity", (0.0, 0.0, 0.0))
             return cls(about.get("name", "kinematic"), (x, y, z), tuple(about.get("faults", ())))
@@ -75,6 +79,11 @@ class PlantChoice:
             MissingPackageError: MuJoCo is not installed. ShapeError: the two-ended arm, which has no masses.
             RangeError: holds that let hands tilt. UnknownNameError: a fault of an arm or a joint that is not there.
         """
+        from wbc.robots import with_masses
+        from wbc.simulation import GripKind, GrippingMujocoPlant, Motors, PinocchioPlant
+        from wbc.walking.torque.loop import TorqueLoop
+        from wbc.walking.torque.stack import TorqueStack
+
         heavy, faults = with_masses(walker, self.gravity), tuple(map(Fault.read, self.faults))
         for fault in faults:
             if fault.kind == "limp":
@@ -100,6 +109,8 @@ def hold_kind_of(structure: Structure, hold: int) -> str:
     Raises:
         RangeError: it lets the hand tilt but not roll.
     """
+    from wbc.walking.loop.stack import hold_kind
+
     kind = hold_kind(structure, hold)
     if kind == "roll":
         reason = "torques know holds that fix a hand, leave its roll, or leave tilt and roll; not the tilt alone"

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.walking.torque.tested import Tested
+
+if TYPE_CHECKING:
+    from wbc.walking.torque.tested import Tested
 
 #: Time in which a grip slips [s]
 SLIPPING = 0.2

@@ -6,11 +6,9 @@ import os
 import pathlib
 from dataclasses import dataclass
 
-import numpy as np
-
+from wbc.log import Log, save
 from wbc.robots import HoldRating
 from wbc.validation import Array
-from wbc.walking.log.folder import write_whole
 
 #: Name of the file in a run's folder
 LOADS = "loads.npz"
@@ -37,18 +35,18 @@ class Loads:
     noted: tuple[tuple[float, str], ...]
 
     def save(self, folder: str | os.PathLike[str]) -> pathlib.Path:
-        """Write all numbers as ``loads.npz``; returns the file.
+        """Write ``loads.npz``, a :class:`wbc.log.Log` of these periods, hands by their numbers; returns the file.
 
         Raises:
-            WalkLogError: it cannot be written.
+            LogFileError: it cannot be written.
         """
-        arrays = {name: getattr(self, name) for name in ("time", "force", "moment", "off", "given")}
-        rating = np.array([self.rating.force, self.rating.torque])
-        noted = np.array([text for _, text in self.noted], dtype=str)
-        times = np.array([time for time, _ in self.noted])
-
-        def write(file: pathlib.Path) -> None:
-            with file.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **arrays, rating=rating, noted=noted, noted_at=times)
-
-        return write_whole(pathlib.Path(folder) / LOADS, write)
+        units = {"force": "N", "moment": "N m", "off": "m"}
+        columns, found = {"t": self.time}, {"t": "s"}
+        for name, unit in units.items():
+            for hand, values in enumerate(getattr(self, name).T, start=1):
+                columns[f"{name}.{hand}"], found[f"{name}.{hand}"] = values, unit
+        for values, kind, unit in zip(self.given.T, ("linear", "angular"), ("N s", "N m s"), strict=True):
+            columns[f"given.{kind}"], found[f"given.{kind}"] = values, unit
+        rating = {"force": self.rating.force, "torque": self.rating.torque}
+        log = Log(columns, found, {"rating": rating, "noted": [list(one) for one in self.noted]})
+        return save(log, pathlib.Path(folder), "npz", pathlib.Path(LOADS).stem)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robot.geometry.segments import segment_distances
+from wbc.geometry import segment_distances
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.two_ended import TwoEndedKinematics
@@ -73,7 +73,7 @@ class ArmShapes:
             near = np.linalg.norm(places[:, None] - holds, axis=2).min(axis=1) <= self.exempt
             free[near, tip] = np.inf
         i, j = np.array(PAIRS).T
-        gaps = segment_distances(*(np.moveaxis(side[:, k], -1, 0) for k in (i, j) for side in (starts, stops)))
+        gaps = segment_distances(*(side[:, k] for k in (i, j) for side in (starts, stops)))
         apart = gaps - self._radii[i] - self._radii[j] - self.least
         out: NDArray[np.bool_] = (free >= 0.0).all(axis=1) & (apart >= 0.0).all(axis=1)
         return out

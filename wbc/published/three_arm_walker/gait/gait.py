@@ -21,10 +21,10 @@ from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
 from wbc.published.three_arm_walker.gait.swing import swing_poses
 from wbc.published.three_arm_walker.gait.tracking import has_arrived, tracking_command
-from wbc.published.three_arm_walker.machine.calibration import Calibration, Variant
+from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import Place, Terrain
 from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion
-from wbc.published.three_arm_walker.machine.plant import CycleCommand, Plant
+from wbc.published.three_arm_walker.machine.plant import CycleCommand, WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders, View
 from wbc.validation import Array
 
@@ -70,7 +70,7 @@ class Gait:
 
     shoulders: Shoulders
     terrain: Terrain
-    calibration: Calibration
+    calibration: WalkerCalibration
     threshold: float = 1.0
     margin: Variant = "listing"
     places: list[Place | None] = field(default_factory=lambda: [None] * ARMS)
@@ -101,7 +101,7 @@ class Gait:
         for record in (self.lifts, self.replans, self.late, self.least):
             record.clear()
 
-    def step(self, plant: Plant, twist: Array) -> CycleCommand:
+    def step(self, plant: WalkerPose, twist: Array) -> CycleCommand:
         """One cycle, with the body's twist in fixed axes [in/s, rad/s]; the clock is not moved on."""
         arm = self.in_air
         if arm is not None:
@@ -120,7 +120,7 @@ class Gait:
         """What goes to the arms."""
         return CycleCommand(tuple(self.supporting), arm, command)
 
-    def track(self, arm: int, plant: Plant) -> Array:
+    def track(self, arm: int, plant: WalkerPose) -> Array:
         """The hand's twist on its way; once it has arrived it holds."""
         if self._motion is None:
             return np.zeros(6)
@@ -139,12 +139,12 @@ class Gait:
         self._motion, self._since = motion, self.cycle
         self.places[arm], self.supporting[arm] = place, False
 
-    def swing(self, arm: int, plant: Plant, place: Place) -> BodyMotion:
+    def swing(self, arm: int, plant: WalkerPose, place: Place) -> BodyMotion:
         """The motion from where a hand is to a place."""
         old = self.places[arm] if self.supporting[arm] else None
         return BodyMotion(swing_poses(plant.hands[arm], old, place), self.calibration)
 
-    def plan(self, arm: int, plant: Plant, twist: Array, least: float | None) -> bool:
+    def plan(self, arm: int, plant: WalkerPose, twist: Array, least: float | None) -> bool:
         """Send an arm to the hold where its margin is largest, if it exceeds ``least``; whether it goes."""
         view = View(self.shoulders, plant.body)
         hand = view.place(plant.hands[arm][:3, 3])
@@ -162,13 +162,13 @@ class Gait:
         self.start(arm, motion, new)
         return True
 
-    def held_margins(self, plant: Plant, twist: Array) -> Array:
+    def held_margins(self, plant: WalkerPose, twist: Array) -> Array:
         """Margins of the three arms at the places they have [grid units]."""
         view = View(self.shoulders, plant.body)
         places = np.array([place or (0, 0) for place in self.places], dtype=float)
         return margins(view, np.arange(ARMS), twist, places, self.margin)
 
-    def _consider(self, plant: Plant, twist: Array) -> None:
+    def _consider(self, plant: WalkerPose, twist: Array) -> None:
         """All hold: lift, or stay."""
         values = self.held_margins(plant, twist)
         worst = int(np.round(values, TIE).argmin())

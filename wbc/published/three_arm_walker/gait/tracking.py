@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.calibration import WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.published.three_arm_walker.machine.motion import CYCLE, RATE, BodyMotion
 from wbc.validation import Array
@@ -29,7 +29,7 @@ def tracking_command(motion: BodyMotion, cycles: int, actual: Array) -> Array:
     return np.asarray(twist + pose_error(desired, actual) / CYCLE)
 
 
-def has_arrived(motion: BodyMotion, cycles: int, actual: Array, command: Array, tolerances: Calibration) -> bool:
+def has_arrived(motion: BodyMotion, cycles: int, actual: Array, command: Array, tolerances: WalkerCalibration) -> bool:
     """Whether the hand may grasp."""
     if cycles / RATE < motion.duration:
         return False

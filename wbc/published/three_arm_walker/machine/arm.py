@@ -12,8 +12,16 @@ import numpy as np
 
 from wbc.validation import Array
 
-#: Base to neck, neck to shoulder, shoulder to elbow, elbow to wrist, wrist to hand [in]
-NO, SN, ES, WE, HW = 26.0, 6.0, 17.0, 17.0, 6.0
+#: Base to neck [in]
+NO = 26.0
+#: Neck to shoulder [in]
+SN = 6.0
+#: Shoulder to elbow [in]
+ES = 17.0
+#: Elbow to wrist [in]
+WE = 17.0
+#: Wrist to hand [in]
+HW = 6.0
 
 #: Table II: offsets, alpha [rad]; a, s [in]
 OFFSET = np.radians([180.0, 90.0, 90.0, 180.0, 180.0, 0.0])

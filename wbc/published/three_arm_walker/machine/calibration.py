@@ -17,7 +17,7 @@ Variant = Literal["listing", "text"]
 
 
 @dataclass(frozen=True)
-class Calibration:
+class WalkerCalibration:
     """Assumed numbers, none of which is printed but ``grasp_tolerance``.
 
     The hand's speed and acceleration were chosen so that the model walks along the cylinder at the published 3 in/s
@@ -57,7 +57,7 @@ class Calibration:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            name, value = f"Calibration.{field.name}", getattr(self, field.name)
+            name, value = f"WalkerCalibration.{field.name}", getattr(self, field.name)
             if field.name == "joint_rates":
                 rates = validation.real_array(name, value, (6,)).tolist()
                 checked: float | tuple[float, ...] = tuple(

@@ -28,7 +28,8 @@ RADIUS = 100.0
 PITCH = 9.25
 #: Between columns [rad]
 STEP = float(np.radians(5.0))
-COLUMNS, ROWS = 25, 24
+COLUMNS = 25
+ROWS = 24
 
 #: A hold: (T, A)
 Place = tuple[int, int]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.published.three_arm_walker.machine.calibration import Calibration
+from wbc.published.three_arm_walker.machine.calibration import WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.trajectory import via_points
 from wbc.validation import Array
@@ -29,7 +29,7 @@ class BodyMotion:
         duration: [s]. end: the last pose.
     """
 
-    def __init__(self, poses: Sequence[Array], calibration: Calibration) -> None:
+    def __init__(self, poses: Sequence[Array], calibration: WalkerCalibration) -> None:
         law = via_points(
             [_scaled(pose, INCH) for pose in poses],
             speed=calibration.hand_speed,

@@ -41,7 +41,7 @@ class Fault:
         return f"JOINT {self.joint} OF ARM {self.arm} IS OUT OF LIMITS."
 
 
-class Plant(Protocol):
+class WalkerPose(Protocol):
     """The body (4 x 4) and the hands (3 x 4 x 4), fixed frame [in]."""
 
     @property

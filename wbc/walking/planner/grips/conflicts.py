@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.robot.geometry.segments import segment_distances
+from wbc.geometry import segment_distances
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of
@@ -71,7 +71,7 @@ class LimbShapes:
     def between(self, one: Array, other: Array) -> Array:
         """Least distance beyond radii and clearance of two arms given by their points ``[m, points, 3]``: ``[m]``."""
         arms = (one, self._one), (other, self._other)
-        ends = [np.moveaxis(p[:, at][:, link], -1, 0) for p, link in arms for at in (self._from, self._to)]
+        ends = [p[:, at][:, link] for p, link in arms for at in (self._from, self._to)]
         out: Array = (segment_distances(*ends) - self.least).min(axis=1)
         return out
 
@@ -95,7 +95,7 @@ class LimbShapes:
         row, pair = np.nonzero((gap * gap).sum(axis=2) < reach * reach)
         i, j = np.array(self._one)[pair], np.array(self._other)[pair]
         each = np.broadcast_to(least, reach.shape)[row, pair]
-        close = segment_distances(a[row, i].T, b[row, i].T, c[row, j].T, d[row, j].T) < each
+        close = segment_distances(a[row, i], b[row, i], c[row, j], d[row, j]) < each
         out[row[close]] = True
         return out
 

@@ -36,7 +36,7 @@ __all__ = ["Found", "Node", "StanceSearch"]
 SPARE = 2
 #: Hands land so many samples before the end of a grip at least
 INSIDE = 1
-#: What a swing usually takes (the median of bench.walk.fits is 2.4 s, over all grips and not those of plans), and how
+#: What a swing usually takes (the median over all grips, and not those of plans, is 2.4 s), and how
 #: much more than enough time for swings is worth something [s]
 USUAL, SLACK = 2.1, 0.5
 #: Moves to one stance that are looked at, and stances that are checked together, in widths

@@ -24,7 +24,7 @@ LOOKS = 9
 #: Way over which the direction away from all that stands around is measured [m]
 NEAR = 1e-3
 #: Curves that are tried, the first that is clear is taken: how much higher in the middle, in ``Margins.higher``, and
-#: what part of the arc. ``python -m bench.walk.fits`` prints how often each is the first
+#: what part of the arc
 ALTERNATIVES = ((0.0, 1.0), (0.0, 0.6), (0.0, 0.2), (1.0, 1.0), (1.0, 0.4), (0.0, 1.4))
 
 

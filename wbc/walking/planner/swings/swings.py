@@ -37,9 +37,9 @@ TOGETHER, QUICKLY = 24, 12
 LONG = 60
 #: Parts of the estimate: of every swing [s], of the slowest joint's least time, of the distance [s/m]. It is low, so
 #: that the search drops no swing that would do: of ten swings between all grips of the published courses, eight last
-#: from 0.02 s less to 0.56 s more. ``python -m bench.walk.fits`` prints that, and least squares over all of them
+#: from 0.02 s less to 0.56 s more
 ESTIMATE = (1.11, 0.64, 0.59)
-#: Samples after lifting at which the body stands that curves go by: before a swing is half over, see bench.walk.fits
+#: Samples after lifting at which the body stands that curves go by: before a swing is half over
 HALFWAY = 14
 #: Hands land at least so many samples inside a grip
 INSIDE = 1

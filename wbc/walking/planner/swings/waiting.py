@@ -24,8 +24,8 @@ from wbc.walking.planner.swings.least_time import Speeds, speeds
 
 #: Part of the guided joints' change that is made while the hand waits: with more, a hand turns onto its next axis too
 #: early, with less, too late, where it is near the surface. It comes down so many times slower than it could, upright
-#: when it is near the surface. Of 200 sampled swings over a trench 119 to 127 are possible with 0.5 to 0.8 and 1 to 2
-#: (``python -m bench.walk.fits``); what they change is how the hand comes down under feedback
+#: when it is near the surface. Of 200 sampled swings over a trench 119 to 127 are possible with 0.5
+#: to 0.8 and 1 to 2; what they change is how the hand comes down under feedback
 HALFWAY, SLOWLY = 0.65, 1.5
 #: How often a curve is made, each time with the body where the last law has it; how long it takes at first [s]
 PASSES, GUESS = 4, 1.0

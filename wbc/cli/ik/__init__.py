@@ -1,1 +1,0 @@
-"""Inverse kinematics on the command line."""

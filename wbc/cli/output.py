@@ -1,0 +1,45 @@
+"""What runs leave: their folders, and what is written there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from wbc.cli.scene import Backend
+
+
+@dataclass(frozen=True)
+class TrackOutput:
+    """Of a run along a path."""
+
+    out: Annotated[Path | None, "Run folder. Default: runs/ROBOT-PATH-TIME."] = None
+    force: Annotated[bool, "Write into a folder that has a run."] = False
+    log: Annotated[Literal["parquet", "npz"], "Format of the log."] = "parquet"
+    record: Annotated[bool, "Record the inputs of every tick, for `wbc replay`."] = True
+    plots: Annotated[bool, "Draw the plots, the picture and the page that plays the run."] = True
+
+
+@dataclass(frozen=True)
+class Where:
+    """Of a walk: its folder."""
+
+    out: Annotated[Path | None, "Run folder. Default: runs/walk-STRUCTURE-TIME."] = None
+    force: Annotated[bool, "Write into a folder that has a run."] = False
+
+
+@dataclass(frozen=True)
+class WalkOutput(Where):
+    """Of a walk: how it is done, and what is drawn."""
+
+    backend: Backend = "auto"
+    check: Annotated[bool, "Run the external checker."] = True
+    pictures: Annotated[bool, "Draw plots, stills, animation and the replay page."] = True
+
+
+#: What a track leaves where nothing else is asked for
+TRACKED = TrackOutput()
+#: Where a run goes where nothing else is asked for
+FOLDER = Where()
+#: What a walk leaves where nothing else is asked for
+WALKED = WalkOutput()

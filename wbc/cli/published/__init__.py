@@ -1,0 +1,1 @@
+"""Commands of published methods, as they were."""

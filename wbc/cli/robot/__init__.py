@@ -1,1 +1,0 @@
-"""Commands that show robots and the pairs of links that must not touch."""

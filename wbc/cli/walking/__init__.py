@@ -1,1 +1,0 @@
-"""Walks on the command line: options, modes, keys, the published planner."""
