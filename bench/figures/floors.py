@@ -9,6 +9,12 @@ from bench.pool import ROOT
 
 PICTURE = ROOT / "docs" / "images" / "floors.svg"
 WIDTH, ROW, BOX = 1000, 44, 30
+#: Size of the font [pixels]
+SIZE = 12
+#: Width of a letter, over the size of the font
+WIDEST = 0.52
+#: Letters of room that a name has in its box
+BESIDE = 2
 #: Colours of parts: what everybody uses, models, what is wanted, solving, what is built on it, the user's seat
 COLOURS = ("#eceff1", "#e3f2fd", "#e8f5e9", "#fff8e1", "#fce4ec", "#ede7f6")
 OF_FLOOR = (0, 0, 1, 2, 2, 3, 3, 4, 4, 4, 5)
@@ -33,21 +39,25 @@ def house(parts: Mapping[str, int], x: int, width: int, base: int, colour: Calla
     out = []
     for floor in range(max(parts.values()) + 1):
         names = [name.removeprefix("wbc.") for name, level in parts.items() if level == floor]
-        y, step = base - ROW * (floor + 1), width / max(len(names), 1)
+        y, letters = base - ROW * (floor + 1), sum(len(name) + BESIDE for name in names)
+        size = min(SIZE, (width - 8 * len(names)) / (WIDEST * max(letters, 1)))
         out.append(text(x - 6, y + 19, str(floor), "end"))
-        for k, name in enumerate(names):
-            place = x + k * step
+        place = float(x)
+        for name in names:
+            step = width * (len(name) + BESIDE) / letters
             out.append(
                 f'<rect x="{place + 3:.0f}" y="{y}" width="{step - 6:.0f}" height="{BOX}" rx="4" '
                 f'fill="{colour(floor)}" stroke="#90a4ae"/>'
             )
-            out.append(text(place + step / 2, y + 19, name, "middle"))
+            out.append(text(place + step / 2, y + 19, name, "middle", size))
+            place += step
     return out
 
 
-def text(x: float, y: float, words: str, anchor: str) -> str:
-    """A line of text."""
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}">{words}</text>'
+def text(x: float, y: float, words: str, anchor: str, size: float = SIZE) -> str:
+    """A line of text; size: of the font [pixels]."""
+    font = f' font-size="{size:.1f}"' if size < SIZE else ""
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}"{font}>{words}</text>'
 
 
 def picture() -> str:
