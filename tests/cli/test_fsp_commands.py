@@ -1,4 +1,4 @@
-"""``wbc ikor`` and ``wbc explore``: what they print and write, and what they refuse."""
+"""``wbc published ikor`` and ``wbc ik explore``: what they print and write, and what they refuse."""
 
 from __future__ import annotations
 
