@@ -7,6 +7,9 @@ PEERS_VENV ?= .venv-peers
 PYTEST_ARGS ?=
 # Processes of pytest; "auto" is one a core
 PYTEST_JOBS ?= auto
+# Tests of `make without`
+WITHOUT ?= $(addprefix tests/,multibody robots/test_bases.py robots/test_couplings_and_locks.py robots/test_dh.py \
+	robots/test_limits_and_frames.py robots/test_refused_files.py robots/test_urdf.py trajectory/test_joint_paths.py)
 # Random cases of a test, as a multiple of the usual number
 REPEATS ?= 1
 
@@ -20,7 +23,7 @@ PUBLIC := build/public
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock platforms clean
+.PHONY: help setup demo test check without slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock platforms clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -36,6 +39,10 @@ test: $(READY)  ## all tests; REPEATS=3 with three times as many random cases; b
 check: $(READY) lint types  ## between edits: lint, types and the tests that are quick
 	$(BIN)/python -m pytest -n $(PYTEST_JOBS) -q -m "not slow" $(PYTEST_ARGS)
 
+without: $(READY)  ## a part of the tests in an environment without Pinocchio, Coal, toppra and ruckig; all: WITHOUT=tests
+	$(BIN)/python -m tests.without build/without
+	build/without/bin/python -m pytest -n $(PYTEST_JOBS) -q -m "not slow" $(WITHOUT) $(PYTEST_ARGS)
+
 slow: $(READY)  ## find the tests that are not quick
 	$(BIN)/python -m pytest -n 0 -q --find-slow $(PYTEST_ARGS)
 
@@ -48,11 +55,12 @@ format: $(READY)  ## apply ruff's fixes and format
 	$(BIN)/ruff format .
 
 # tasks/ and robots/ install as wbc.tasks and wbc.robots; mypy gets the same picture as a tree of links.
-types: $(READY)  ## mypy --strict on the package
+types: $(READY)  ## mypy --strict on the package, and on values of handles that are misspelt
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/wbc
 	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(TYPES)/wbc/
+	@ln -sf $(CURDIR)/tests/controller/misspelt.py $(TYPES)/
 	cd $(TYPES) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml \
-		--cache-dir $(CURDIR)/.mypy_cache --strict -p wbc
+		--cache-dir $(CURDIR)/.mypy_cache --strict -p wbc -m misspelt
 
 docs: $(READY)  ## write what the code declares into the pages of tasks and constraints
 	$(BIN)/wbc docs

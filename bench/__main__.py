@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from bench.figures.store import stamp
 from bench.harness import Plan, machine, measure, measure_startup
 from bench.pool import ROOT
 from bench.prepare import prepare
+from bench.program import publish
 from bench.versions import versions
 from wbc.interrupts import obey_kill
 from wbc.native import toolchain
@@ -48,12 +48,9 @@ def main() -> None:
     # Not resolved: a virtual environment's interpreter is a link
     peers = str(Path(chosen.peers_python).absolute()) if chosen.peers_python else None
     plan = Plan(sys.executable, peers, chosen.work, chosen.rounds, [n for n in PROBLEMS if n in chosen.problems])
-    console, progress = Console(), Console(stderr=True)
-    if not console.is_terminal:
-        console = Console(width=160)
     about, begun = machine(), stamp()
     prepare(plan.folder)
-    with progress.status("") as status:
+    with Console(stderr=True).status("") as status:
         results = {
             "stamp": begun,
             "machine": about,
@@ -67,14 +64,11 @@ def main() -> None:
             results[CODE] = {name: measure_code(plan, name, status.update) for name in PROBLEMS}
         if DEADLINES in chosen.problems and toolchain.available():
             results[DEADLINES] = {name: measure_deadlines(plan, name, status.update) for name in KINDS}
-    chosen.output.mkdir(parents=True, exist_ok=True)
-    (chosen.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
-    (chosen.output / "results.md").write_text(report.markdown(results))
+    publish(chosen.output / "results", report.sheets(results), report.notes(results), results)
     if CURVES in results and peers is not None:
         draw(results[CURVES], (ROOT / "docs" / "images" if whole else chosen.output) / "bench_curves.png")
     if whole:
         write_blocks()
-    report.show(results, console)
 
 
 if __name__ == "__main__":

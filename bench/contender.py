@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from pathlib import Path
-from time import perf_counter_ns
 
 import numpy as np
 
@@ -41,10 +40,6 @@ class Contender(ABC):
     def state(self) -> Array:
         """The configuration: base position and quaternion (x, y, z, w) if floating, joints in the problem's order."""
 
-    @abstractmethod
-    def phases(self) -> dict[str, float]:
-        """One tick as :meth:`call`, its duration split by phase [ns]."""
-
     def native(self) -> int | None:
         """As :meth:`call`, through the native function alone; its duration [ns], None where there is no such thing."""
         return None
@@ -61,13 +56,6 @@ class Contender(ABC):
         solution of the same QP; None where the package does not show its QP.
         """
         return None
-
-
-def stopwatch(phases: dict[str, float], name: str, start: int) -> int:
-    """Book the time since ``start`` under a name; returns the time now [ns]."""
-    now = perf_counter_ns()
-    phases[name] = float(now - start)
-    return now
 
 
 def exact_solution(hessian: Array, linear: Array, rows: Array, upper: Array) -> Array:

@@ -55,7 +55,7 @@ def curve_sheets(curves: Sequence[dict[str, Any]]) -> list[Sheet]:
     for curve, title in TITLES.items():
         found = [point for point in curves if point["curve"] == curve]
         if found:
-            out += [medians(title, curve, found), same_job(curve, found), own_phases(curve, found)]
+            out += [medians(title, curve, found), same_job(curve, found)]
     return out
 
 
@@ -83,16 +83,6 @@ def same_job(curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
         rows.append((point["label"], *cells))
     what = "End error / least clearance [mm]" if curve in ("spheres", "sensed", "g1") else "End error [mm]"
     return Sheet(what, (AXES[curve], *names), rows)
-
-
-def own_phases(curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
-    """Where this package's time goes."""
-    names = list(dict.fromkeys(phase for point in found for phase in point["phases"]))
-    rows = [
-        (point["label"], *(us(point["phases"][name]) if name in point["phases"] else "-" for name in names))
-        for point in found
-    ]
-    return Sheet("Phases of wbc's tick, medians [us]", (AXES[curve], *names), rows)
 
 
 def curve_readme(curves: Sequence[dict[str, Any]]) -> list[str]:

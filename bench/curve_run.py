@@ -25,7 +25,6 @@ PEERS = ("pink + daqp", "mink + daqp", "placo")
 DEFAULTS = "mink + daqp, rows within 1 cm"
 #: Rounds of a problem, and seconds that a contender has in each
 ROUNDS, BUDGET = 3, 0.25
-PHASE_TICKS = 100
 #: Every how many ticks clearances are measured
 STRIDE = 5
 Say = Callable[[str], None]
@@ -83,11 +82,9 @@ def measure_point(point: Point, folder: Path, workers: Mapping[str, Worker], rou
             answer = workers[name].ask("sample", budget=BUDGET)
             calls[name] += answer["call"]
             states[name] = answer["states"]
-    phases = workers[OURS].ask("phases", ticks=min(PHASE_TICKS, case.ticks))
     judge = Judge(case)
     return {
         "curve": point.curve, "x": point.x, "label": point.label, "title": case.problem.title,
-        "phases": {phase: float(np.median(spent)) / 1e3 for phase, spent in phases.items()},
         "contenders": {
             name: {
                 "median": float(np.median(calls[name])) / 1e3, "p99": float(np.percentile(calls[name], 99)) / 1e3,

@@ -19,8 +19,8 @@ import pinocchio as pin
 from PIL import Image, ImageDraw, ImageFont
 
 from bench.pool import ROOT
+from tests.chromium import Chromium, Page
 from wbc.viewer import Viewer, show
-from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.presets import PRESETS, Playground, playground
 
 FOLDER = ROOT / "docs" / "images"

@@ -20,7 +20,6 @@ OURS = "wbc"
 PEERS = ("pink + daqp", "pink + quadprog", "mink + daqp", "placo")
 #: Rounds of a problem: the slower the peers, the fewer
 ROUNDS = {"panda": 25, "ur5": 10, "talos": 25}
-PHASE_TICKS = 200
 Say = Callable[[str], None]
 
 
@@ -42,11 +41,10 @@ class Plan:
     rounds: int | None = None
     names: Sequence[str] = ("panda", "ur5", "talos")
 
-    def contenders(self, problem: str) -> dict[str, str]:
+    def contenders(self) -> dict[str, str]:
         """Contender -> its interpreter."""
-        own = [OURS] + (["wbc+expression"] if problem == "panda" else [])
         peers = {} if self.peers_python is None else dict.fromkeys(PEERS, self.peers_python)
-        return dict.fromkeys(own, self.python) | peers
+        return {OURS: self.python} | peers
 
 
 @dataclass
@@ -54,7 +52,6 @@ class Samples:
     """Everything measured of one contender on one problem; durations [ns]."""
 
     durations: dict[str, list[float]] = field(default_factory=dict)
-    phases: dict[str, float] = field(default_factory=dict)
     facts: dict[str, float] = field(default_factory=dict)
     tracking: dict[str, float | None] = field(default_factory=dict)
 
@@ -68,7 +65,7 @@ def measure(plan: Plan, name: str, say: Say) -> dict[str, Any]:
     """All contenders on one problem."""
     case = load(plan.folder / name)
     core, _ = cores()
-    contenders = plan.contenders(name)
+    contenders = plan.contenders()
     samples = {contender: Samples() for contender in contenders}
     rounds = plan.rounds or ROUNDS[name]
     with contextlib.ExitStack() as stack:
@@ -85,10 +82,8 @@ def measure(plan: Plan, name: str, say: Say) -> dict[str, Any]:
             for worker in workers[turn:] + workers[:turn]:
                 samples[worker.contender].add(worker.ask("time", ticks=case.ticks))
         for worker in workers:
-            say(f"{name}: phases and accuracy of {worker.contender}")
-            phases = worker.ask("phases", ticks=min(PHASE_TICKS, case.ticks))
+            say(f"{name}: accuracy of {worker.contender}")
             own = samples[worker.contender]
-            own.phases = {phase: float(np.median(spent)) for phase, spent in phases.items()}
             own.tracking = tracking(case, worker.ask("path")["states"])
             own.tracking["solver_error"] = worker.ask("accuracy")["error"]
     return {
@@ -113,7 +108,6 @@ def summary(samples: Samples) -> dict[str, Any]:
     """Medians and tails [us]."""
     return {
         "durations": {name: statistics(values) for name, values in samples.durations.items()},
-        "phases": {name: value / 1e3 for name, value in samples.phases.items()},
         "facts": samples.facts,
         "tracking": samples.tracking,
     }
@@ -139,7 +133,7 @@ def measure_startup(plan: Plan, say: Say) -> dict[str, Any]:
         say(f"{name}: compile with an empty cache, then with a full one")
         out["compile"][name] = startup.compile_seconds(plan.python, OURS, plan.folder / name)
     if "panda" in plan.names:
-        for contender, python in plan.contenders("talos").items():
+        for contender, python in plan.contenders().items():
             say(f"panda: memory of {contender}")
             out["memory"][contender] = startup.peak_memory(python, contender, plan.folder / "panda", core, 400)
     return out

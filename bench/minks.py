@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import functools
 import xml.etree.ElementTree as ET
-from time import perf_counter_ns
 
 import mink
 import mujoco
 import numpy as np
 import qpsolvers
 
-from bench.contender import Contender, exact_solution, stopwatch
+from bench.contender import Contender, exact_solution
 from bench.descriptions import mujoco_urdf, solid_name
 from bench.problems import Array, Case
 
@@ -100,17 +99,6 @@ class Mink(Contender):
         return mink.build_ik(
             self.configuration, self.tasks, self.problem.dt, damping=self.problem.damping, limits=self.limits
         )
-
-    def phases(self) -> dict[str, float]:
-        spent: dict[str, float] = {}
-        clock = perf_counter_ns()
-        problem = self._build()
-        clock = stopwatch(spent, "assemble", clock)
-        solution = qpsolvers.solve_problem(problem, solver="daqp")
-        clock = stopwatch(spent, "solve", clock)
-        self.configuration.integrate_inplace(solution.x / self.problem.dt, self.problem.dt)
-        stopwatch(spent, "integrate", clock)
-        return spent
 
     def reference_error(self) -> float | None:
         problem = self._build()

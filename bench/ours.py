@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from pathlib import Path
 from time import perf_counter, perf_counter_ns
@@ -23,10 +22,9 @@ from wbc.tick.native import NativeTick
 class Ours(Contender):
     """``controller.step(q)``; the velocity is integrated by whoever called it."""
 
-    def __init__(self, case: Case, expression: bool = False, calm: bool = True) -> None:
-        """Declare and compile the stack, with one more task of the user's own if ``expression``; ``calm`` as there."""
+    def __init__(self, case: Case, calm: bool = True) -> None:
+        """Declare and compile the stack; ``calm`` as there."""
         super().__init__(case)
-        self.expression = expression
         problem = self.problem
         shapes = {
             link: [wbc.shapes.PlacedShape(wbc.shapes.Sphere(radius), pin.SE3(np.eye(3), np.array(center)))]
@@ -42,8 +40,6 @@ class Ours(Contender):
         if problem.com:
             stack.add(wbc.tasks.CenterOfMass(), name="com")
         stack.add(wbc.tasks.Posture(), name="posture", weight=problem.posture_weight)
-        if expression:
-            stack.add(height_over_reach(problem.frames[0]), name="expression", weight=1e-6)
         stack.add(wbc.tasks.JointLimits(acceleration=False))
         for k, (place, radius) in enumerate(problem.obstacles):
             pose = pin.SE3(np.eye(3), np.array(place))
@@ -53,7 +49,7 @@ class Ours(Contender):
             stack.add(constraint, name=name)
         self.tasks = [e.name for e in stack.tasks]
         start, cpu = perf_counter(), processor_time()
-        self.controller = stack.compile()
+        self.controller = stack.compile(wait=True)
         self.facts |= {"compile": perf_counter() - start, "compile cpu": processor_time() - cpu}
         self.controller.reset(self.case.q0)
         for name in self.tasks:
@@ -120,32 +116,6 @@ class Ours(Contender):
     def state(self) -> Array:
         return self.q
 
-    def phases(self) -> dict[str, float]:
-        tick = core_of(self.controller).tick
-        start = perf_counter_ns()
-        self.call()
-        whole = perf_counter_ns() - start
-        spent: dict[str, float] = {}
-        if isinstance(tick, NativeTick):
-            library = tick._library
-            for name in ("check", "assemble", "solve", "certify", "look_ahead"):
-                function = getattr(library, f"wbc_tick_{name}")
-                start = perf_counter_ns()
-                function(tick.pointer)
-                spent[name] = float(perf_counter_ns() - start)
-            start = perf_counter_ns()
-            library.wbc_tick_size()
-            crossing = float(perf_counter_ns() - start)
-            # A call from Python costs about as much as a phase; it is taken off each and counted once, as Python's
-            spent = {name: max(0.0, value - crossing) for name, value in spent.items()}
-        if self.problem.sensed:
-            start = perf_counter_ns()
-            core_of(self.controller).sense(tick.q)
-            spent = {"sense": float(perf_counter_ns() - start)} | spent
-        spent["python"] = whole - sum(spent.values())
-        self.settle()
-        return spent
-
     def reference_error(self) -> float | None:
         tick = core_of(self.controller).tick
         tick.q[:] = self.q
@@ -164,14 +134,3 @@ class Ours(Contender):
 def processor_time() -> float:
     """Processor time of this process and of the compilers it ran [s]."""
     return sum(os.times()[:4])
-
-
-def height_over_reach(frame: str) -> Any:
-    """A user's own task in three lines: the frame's height is half its horizontal distance from the base."""
-    return wbc.tasks.Expression(
-        lambda kin, p: kin.position(frame)[2] ** 2 - 0.25 * (kin.position(frame)[0] ** 2 + kin.position(frame)[1] ** 2),
-        units="m",
-    )
-
-
-with_expression = functools.partial(Ours, expression=True)

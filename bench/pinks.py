@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import functools
-from time import perf_counter_ns
 
 import numpy as np
 import pink
 import pinocchio as pin
 import qpsolvers
 
-from bench.contender import Contender, exact_solution, stopwatch
+from bench.contender import Contender, exact_solution
 from bench.descriptions import solid_index
 from bench.problems import Array, Case
 
@@ -97,17 +96,6 @@ class Pink(Contender):
             limits=self.limits,
             barriers=self.barriers,
         )
-
-    def phases(self) -> dict[str, float]:
-        spent: dict[str, float] = {}
-        clock = perf_counter_ns()
-        problem = self._build()
-        clock = stopwatch(spent, "assemble", clock)
-        solution = qpsolvers.solve_problem(problem, solver=self.solver)
-        clock = stopwatch(spent, "solve", clock)
-        self.configuration.integrate_inplace(solution.x / self.problem.dt, self.problem.dt)
-        stopwatch(spent, "integrate", clock)
-        return spent
 
     def reference_error(self) -> float | None:
         problem = self._build()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from time import perf_counter_ns
 
 import numpy as np
 import placo
 
-from bench.contender import Contender, stopwatch
+from bench.contender import Contender
 from bench.descriptions import solid_index
 from bench.problems import Array, Case
 
@@ -87,12 +86,3 @@ class Placo(Contender):
     def state(self) -> Array:
         q = np.array(self.robot.state.q)
         return q if self.problem.floating else q[7:]
-
-    def phases(self) -> dict[str, float]:
-        spent: dict[str, float] = {}
-        clock = perf_counter_ns()
-        self.robot.update_kinematics()
-        clock = stopwatch(spent, "kinematics", clock)
-        self.solver.solve(True)
-        stopwatch(spent, "assemble + solve + integrate", clock)
-        return spent

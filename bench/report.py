@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
-
-from rich.console import Console
 
 from bench.code import tables as code
 from bench.curve_report import NOTES, curve_readme, curve_sheets
 from bench.deadlines import run as deadlines
-from bench.goals import Goal, goals
 from bench.sheet import Sheet, us
 
 #: Contender that ratios are taken to
@@ -38,9 +34,9 @@ def sheets(results: dict[str, Any]) -> list[Sheet]:
     """All tables of a run."""
     out = []
     for problem in results["problems"].values():
-        out += [ticks(problem), answers(problem), phases(problem)]
+        out += [ticks(problem), answers(problem)]
     out += curve_sheets(results.get("curves", ()))
-    return [*out, *code_sheets(results), startup(results["startup"]), goal_sheet(goals(results))]
+    return [*out, *code_sheets(results), startup(results["startup"])]
 
 
 def code_sheets(results: dict[str, Any]) -> list[Sheet]:
@@ -108,15 +104,6 @@ def answers(problem: dict[str, Any]) -> Sheet:
     return Sheet("The same job", columns, rows)
 
 
-def phases(problem: dict[str, Any]) -> Sheet:
-    """Medians of the phases of a tick, in the order in which they come."""
-    rows = [
-        (name, "  ".join(f"{phase} {us(value)}" for phase, value in measured["phases"].items()) or "-")
-        for name, measured in problem["contenders"].items()
-    ]
-    return Sheet("Phases of a tick, medians [us]", ("", "phases"), rows)
-
-
 def startup(measured: dict[str, Any]) -> Sheet:
     """Import, compilation, memory."""
     rows = [(f"import {package}", f"{seconds:.3f} s") for package, seconds in measured["import"].items()]
@@ -126,16 +113,6 @@ def startup(measured: dict[str, Any]) -> Sheet:
             rows.append((f"{name}: stack.compile(), {label}", text))
     rows += [(f"memory of a Panda process, {n}", f"{peak / 1e6:.0f} MB") for n, peak in measured["memory"].items()]
     return Sheet("Before the first tick", ("", "measured"), rows)
-
-
-def goal_sheet(found: Iterable[Goal]) -> Sheet:
-    """Goals beside what was measured."""
-    rows = [
-        (goal.text, f"{goal.value:.3g} {goal.unit}".strip(), f"{goal.limit:.3g} {goal.unit}".strip(),
-         "yes" if goal.met else "no")
-        for goal in found
-    ]  # fmt: skip
-    return Sheet("Goals", ("", "measured", "at most", "met"), rows)
 
 
 def notes(results: dict[str, Any]) -> list[str]:
@@ -154,27 +131,10 @@ def notes(results: dict[str, Any]) -> list[str]:
     ]
 
 
-def show(results: dict[str, Any], console: Console) -> None:
-    """Print everything."""
-    for sheet in sheets(results):
-        console.print(sheet.rich())
-        console.print()
-    for note in notes(results):
-        console.print(note, markup=False, highlight=False)
-
-
-def markdown(results: dict[str, Any]) -> str:
-    """Everything as one page."""
-    parts = [sheet.markdown() for sheet in sheets(results)]
-    return "\n\n".join([*parts, *notes(results)]) + "\n"
-
-
 def readme(results: dict[str, Any]) -> str:
     """The README's table: medians of ticks of random problems of growing size."""
     lines = [*curve_readme(results["curves"]), "", "![Tick against size](docs/images/bench_curves.png)", ""]
-    lines.append(
-        "What each call contains, percentiles, phases, compile times and goals: [bench/results.md](bench/results.md)."
-    )
+    lines.append("What each call contains, percentiles and compile times: [bench/results.md](bench/results.md).")
     return "\n".join(lines)
 
 

@@ -1,7 +1,6 @@
 """A process with one package on one problem: reads one JSON command a line, writes one JSON answer a line.
 
     {"do": "time", "ticks": 400}    ->  {"call": [ns, ...], "cycle": [ns, ...], ...}
-    {"do": "phases", "ticks": 100}  ->  {"assemble": [ns, ...], ...}
     {"do": "path"}                  ->  {"states": [[...], ...]}        one pass along the path
     {"do": "accuracy"}              ->  {"error": largest difference to the exact solution, or null}
     {"do": "memory"}                ->  {"peak": bytes}
@@ -31,7 +30,6 @@ from bench.worker_process import begin
 #: Contender -> module and the callable that builds it
 CONTENDERS = {
     "wbc": ("bench.ours", "Ours"),
-    "wbc+expression": ("bench.ours", "with_expression"),
     "pink + daqp": ("bench.pinks", "with_daqp"),
     "pink + quadprog": ("bench.pinks", "with_quadprog"),
     "mink + daqp": ("bench.minks", "Mink"),
@@ -99,17 +97,6 @@ def time_sample(contender: Contender, budget: float) -> dict[str, Any]:
     return {"call": out, "states": states}
 
 
-def time_phases(contender: Contender, ticks: int) -> dict[str, Any]:
-    """Durations of each phase along the path [ns]."""
-    contender.reset()
-    out: dict[str, list[float]] = {}
-    for k in range(ticks):
-        contender.aim(k)
-        for phase, spent in contender.phases().items():
-            out.setdefault(phase, []).append(spent)
-    return out
-
-
 def walk(contender: Contender) -> dict[str, Any]:
     """The configuration after every tick of one pass."""
     contender.reset()
@@ -163,7 +150,6 @@ def answer(contender: Contender, command: dict[str, Any]) -> dict[str, Any]:
     """What a command about the open problem is answered with."""
     answers: dict[str, Callable[[], dict[str, Any]]] = {
         "time": lambda: time_calls(contender, command["ticks"]),
-        "phases": lambda: time_phases(contender, command["ticks"]),
         "path": lambda: walk(contender),
         "accuracy": lambda: accuracy(contender),
         "memory": peak_memory,

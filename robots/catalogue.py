@@ -9,10 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import pinocchio as pin
-
 from wbc import validation
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.loops import AnyLoop
 from wbc.robot.recipe import Recipe, lock_mapping

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.sources.description import ROOT
 from wbc.shapes import Capsule, Convex, PlacedShape, Sphere
@@ -92,10 +92,8 @@ def write_urdf(path: str | os.PathLike[str], robot: Robot, root: str, links: Ite
         RobotFileError: the file cannot be written.
     """
     file = validation.file_path("path", path)
-    try:
+    with validation.writing("path", path, RobotFileError):
         file.write_text(urdf_text(robot, root, links), encoding="utf-8")
-    except OSError as error:
-        raise RobotFileError("path", str(path), f"cannot be written: {error.strerror}") from error
     return file
 
 

@@ -12,9 +12,9 @@ from math import pi
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe

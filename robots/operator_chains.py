@@ -78,6 +78,7 @@ def ssrms(
 
 
 def spdm_arm(
+    *,
     boom: float,
     y_shoulder: float,
     z_shoulder: float,

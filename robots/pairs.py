@@ -7,8 +7,7 @@ from typing import Any
 
 from wbc import validation
 from wbc.robot import Robot
-from wbc.robot.pairs.collision_pairs import SelfPairs
-from wbc.robot.pairs.collision_pairs import find_self_pairs as find
+from wbc.robot.pairs.collision_pairs import SelfPairs, find_self_pairs as find
 from wbc.robot.pairs.search import Progress
 from wbc.robot.sources.files import example_data_folder
 from wbc.robots.catalogue import table

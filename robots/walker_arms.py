@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot import DHRow
 from wbc.robots.link_tree import TreeLink
 from wbc.robots.walker_data import TwoEndedData, WalkerData

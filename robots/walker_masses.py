@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robots.walker_arms import BODY
 from wbc.robots.walker_robot import Walker
 from wbc.shapes import Capsule, PlacedShape, Sphere

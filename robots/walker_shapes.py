@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import cos, pi
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot.recipe import segment_shape
 from wbc.robots.walker_arms import BODY, WalkerArm
 from wbc.robots.walker_data import TwoEndedData, WalkerData

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 from wbc.tasks.hold import Hold
 
 if TYPE_CHECKING:
@@ -56,6 +56,8 @@ class Contact(Constraint):
     ``"<name> force"``, a task for the wrench.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame",)
+
     abstract: ClassVar[bool] = True
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
@@ -72,16 +74,6 @@ class Contact(Constraint):
     def components(self) -> int:
         """How many numbers the wrench has."""
         return len(self.axes)
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frame.
-
-        Raises:
-            UnknownNameError: no such frame. RangeError: a frame that no joint moves.
-        """
-        field = f"{type(self).__name__}.frame"
-        robot.check_frame(field, self.frame)
-        require_motion(robot, field, self.frame)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``gain`` of the motion, then :meth:`limits`."""

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, PlacedShape, Shape, Solid, Sphere
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.gaps import Gap

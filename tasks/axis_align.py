@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -15,7 +15,7 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn
 from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -63,6 +63,8 @@ class AxisAlign(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     frame: str
     axis: Triple = (0.0, 0.0, 1.0)
     relative_to: str = WORLD
@@ -71,12 +73,6 @@ class AxisAlign(Task):
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_axis("AxisAlign.axis", self.axis))
         object.__setattr__(self, "around", checked_around("AxisAlign.around", self.around, self.axis))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("AxisAlign.frame", self.frame)
-        robot.check_frame("AxisAlign.relative_to", self.relative_to)
-        require_motion(robot, "AxisAlign.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``feedforward``, see the class."""

@@ -14,7 +14,6 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs
 from wbc.tasks._stereographic import Triple, triple, unit
 from wbc.tasks.base import Constraint, Input, Row, Values
-from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -61,6 +60,8 @@ class AxisCone(Constraint):
         RangeError: a vector without length, a half angle out of range, or a frame that no joint moves.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     initial_only: ClassVar[tuple[str, ...]] = ("half_angle", "direction")
 
     frame: str
@@ -74,12 +75,6 @@ class AxisCone(Constraint):
             vector = validation.unit_vector(f"AxisCone.{name}", getattr(self, name))
             object.__setattr__(self, name, triple(vector))
         object.__setattr__(self, "half_angle", checked_half_angle("AxisCone.half_angle", self.half_angle))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("AxisCone.frame", self.frame)
-        robot.check_frame("AxisCone.relative_to", self.relative_to)
-        require_motion(robot, "AxisCone.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``direction`` and ``half_angle`` with their rates."""

@@ -32,7 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import pickling
-from wbc.symbolic.kinematics import Kinematics
+from wbc.errors import RangeError
+from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
 from wbc.tasks.units import UNITS, checked_unit
@@ -170,6 +171,9 @@ class Item:
     #: Abstract classes stay out of the registry
     abstract: ClassVar[bool] = True
 
+    #: Fields that name frames: the frame that it is about, and the one that it is seen from, if any
+    frame_fields: ClassVar[tuple[str, ...]] = ()
+
     #: Fields that only give an input its first value. Expressions must not read them (the input holds the present
     #: value); in return the compiled code is the same for all of their values.
     initial_only: ClassVar[tuple[str, ...]] = ()
@@ -195,11 +199,18 @@ class Item:
         return pickling.deep_copy(self, memo)
 
     def validate(self, robot: Robot) -> None:
-        """Check the declaration against a robot; called by ``stack.add``.
+        """Check the declaration against a robot; called by ``stack.add``. Here: :attr:`frame_fields`, whose first
+        one moves against the second one, or against the world where there is no other.
 
         Raises:
-            WbcError: an unknown frame or joint, a wrong shape, a value out of range.
+            UnknownNameError: an unknown frame or joint. RangeError: frames that no joint moves against each other.
+            WbcError: a wrong shape, a value out of range.
         """
+        owner, names = type(self).__name__, [getattr(self, field) for field in self.frame_fields]
+        for field, name in zip(self.frame_fields, names, strict=True):
+            robot.check_frame(f"{owner}.{field}", name)
+        if names:
+            require_motion(robot, f"{owner}.{self.frame_fields[0]}", *names[:2])
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """Run-time inputs, besides those that every item has (see :class:`Task`, :class:`Constraint`)."""
@@ -324,6 +335,9 @@ class Constraint(Item):
 
     #: What the rows keep at 0, :meth:`residual`, is 0 at q (+) v dt to rounding, whatever that costs
     exact: ClassVar[bool] = False
+
+    #: Rows are of the velocity at the end of a tick, v + a dt, where accelerations are commanded
+    later: ClassVar[bool] = False
 
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
@@ -451,3 +465,17 @@ def registry() -> dict[str, type[Item]]:
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{__package__}.{module.name}")
     return dict(_registry)
+
+
+def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD) -> None:
+    """Refuse a frame that no joint moves against the reference.
+
+    Raises:
+        RangeError: both are fixed to the same body.
+    """
+    if _joint(robot, frame) == _joint(robot, reference):
+        raise RangeError(field, frame, f"no joint moves this frame against {reference!r}")
+
+
+def _joint(robot: Robot, frame: str) -> int:
+    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)

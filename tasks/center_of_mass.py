@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values

@@ -16,7 +16,7 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._nearest import distance
 from wbc.tasks._stereographic import Triple, triple
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -62,6 +62,8 @@ class Distance(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "other")
+
     initial_only: ClassVar[tuple[str, ...]] = ("gain", "point")
 
     frame: str
@@ -73,12 +75,6 @@ class Distance(Task):
         for name in ("offset", "point"):
             given = validation.real_array(f"Distance.{name}", getattr(self, name), (3,))
             object.__setattr__(self, name, triple(given))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("Distance.frame", self.frame)
-        robot.check_frame("Distance.other", self.other)
-        require_motion(robot, "Distance.frame", self.frame, self.other)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target``, ``feedforward``, ``point`` and ``point_velocity``, see the class."""

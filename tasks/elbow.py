@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,6 @@ from wbc.tasks.frames import (
     frame_pose,
     into_axes,
     point_rows,
-    require_motion,
     resolve_axes,
     weights_of_rows,
 )
@@ -59,6 +58,8 @@ class Elbow(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame",)
+
     frame: str
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axes: str = WORLD
@@ -71,8 +72,7 @@ class Elbow(Task):
 
     def validate(self, robot: Robot) -> None:
         """Check frame and axes, see :meth:`Item.validate`."""
-        robot.check_frame("Elbow.frame", self.frame)
-        require_motion(robot, "Elbow.frame", self.frame)
+        super().validate(robot)
         resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,6 @@ from wbc.tasks.frames import (
     frame_pose,
     into_axes,
     point_rows,
-    require_motion,
     resolve_axes,
     weights_of_rows,
 )
@@ -73,6 +72,8 @@ class EndEffector(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     frame: str
     kind: Literal["pose", "position", "orientation"] = "pose"
     relative_to: str = WORLD
@@ -86,9 +87,7 @@ class EndEffector(Task):
 
     def validate(self, robot: Robot) -> None:
         """Check frames and axes, see :meth:`Item.validate`."""
-        robot.check_frame("EndEffector.frame", self.frame)
-        robot.check_frame("EndEffector.relative_to", self.relative_to)
-        require_motion(robot, "EndEffector.frame", self.frame, self.relative_to)
+        super().validate(robot)
         resolve_axes(robot, "EndEffector.axes", self.axes, self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:

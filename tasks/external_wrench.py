@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from wbc.symbolic.kinematics import Kinematics
 from wbc.tasks._load import Load
 from wbc.tasks.base import Input, Values
-from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -48,12 +47,9 @@ class ExternalWrench(Load):
         UnknownNameError, RangeError: in :meth:`validate`: no such frame, or one that no joint moves.
     """
 
-    frame: str
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame",)
 
-    def validate(self, robot: Robot) -> None:
-        """Check the frame, see :meth:`Item.validate`."""
-        robot.check_frame("ExternalWrench.frame", self.frame)
-        require_motion(robot, "ExternalWrench.frame", self.frame)
+    frame: str
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``wrench``."""

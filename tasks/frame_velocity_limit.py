@@ -13,7 +13,6 @@ from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
-from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -53,6 +52,8 @@ class FrameVelocityLimit(Constraint):
         >>> stack.add(slow, name="slow hand")
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to", "axes")
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
 
     frame: str
@@ -76,17 +77,6 @@ class FrameVelocityLimit(Constraint):
             for axis, limit in enumerate(box)
             if limit < np.inf
         ]
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames.
-
-        Raises:
-            UnknownNameError: no such frame.
-            RangeError: a frame that cannot move relative to ``relative_to``.
-        """
-        for name in ("frame", "axes", "relative_to"):
-            robot.check_frame(f"FrameVelocityLimit.{name}", getattr(self, name))
-        require_motion(robot, "FrameVelocityLimit.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``linear`` and ``angular``, as far as limited."""

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.tracer import Tracer
@@ -35,20 +35,6 @@ def resolve_axes(robot: Robot, field: str, axes: Any, frame: str | None, referen
     if isinstance(axes, str) and axes in words:
         return words[axes]
     return validation.one_of(field, axes, (*words, *robot.frame_names))
-
-
-def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD) -> None:
-    """Refuse a frame that no joint moves against the reference.
-
-    Raises:
-        RangeError: both are fixed to the same body.
-    """
-    if _joint(robot, frame) == _joint(robot, reference):
-        raise RangeError(field, frame, f"no joint moves this frame against {reference!r}")
-
-
-def _joint(robot: Robot, frame: str) -> int:
-    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
 
 
 def into_axes(kin: Tracer, vector: ca.SX, axes: str) -> ca.SX:

@@ -15,7 +15,6 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs, reach
 from wbc.tasks._stereographic import Triple, triple
 from wbc.tasks.base import Constraint, Input, Row, Values
-from wbc.tasks.frames import require_motion
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -67,6 +66,8 @@ class GazeCone(Constraint):
             other.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "point_frame")
+
     initial_only: ClassVar[tuple[str, ...]] = ("half_angle", "point")
 
     frame: str
@@ -82,12 +83,6 @@ class GazeCone(Constraint):
             given = validation.real_array(f"GazeCone.{name}", getattr(self, name), (3,))
             object.__setattr__(self, name, triple(given))
         object.__setattr__(self, "half_angle", checked_half_angle("GazeCone.half_angle", self.half_angle))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("GazeCone.frame", self.frame)
-        robot.check_frame("GazeCone.point_frame", self.point_frame)
-        require_motion(robot, "GazeCone.frame", self.frame, self.point_frame)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``point`` and ``half_angle`` with their rates."""

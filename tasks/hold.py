@@ -14,7 +14,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import shortest_turn
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -65,6 +65,8 @@ class Hold(Constraint):
         >>> stack.add(wbc.tasks.Hold("right_sole_link", "position"), name="right foot")
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame",)
+
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
     equality: ClassVar[bool] = True
     initial_only: ClassVar[tuple[str, ...]] = ("gain",)
@@ -76,16 +78,6 @@ class Hold(Constraint):
     def __post_init__(self) -> None:
         validation.one_of("Hold.kind", self.kind, HELD_KINDS)
         object.__setattr__(self, "gain", validation.scalar("Hold.gain", self.gain, low=0.0, unit="1/s"))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frame.
-
-        Raises:
-            UnknownNameError: no such frame.
-            RangeError: a frame that no joint moves.
-        """
-        robot.check_frame("Hold.frame", self.frame)
-        require_motion(robot, "Hold.frame", self.frame)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``gain``."""

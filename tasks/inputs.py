@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.shapes import FAR
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind

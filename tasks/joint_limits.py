@@ -24,6 +24,9 @@ from wbc.tasks.stopping import allowed_accelerations
 if TYPE_CHECKING:
     from wbc.robot import Robot
 
+#: Part of its limit of acceleration by which a joint of a linkage counts on braking before a limit of position: the
+#: rest is for what the linkage asks of it on the way, and for the other joints that it takes along
+LINKAGE_BRAKING = 0.25
 #: Of a coordinate that goes on without end, or none
 FREE = (-math.inf, math.inf)
 
@@ -43,6 +46,8 @@ class JointLimits(Constraint):
     v0 is the velocity that accelerations are counted from (that given to ``step``, else the last command); V and A are
     ``robot.limits.velocity`` and ``.acceleration``; s is ``velocity_scale``. A joint that follows others has one
     interval with its leaders. In stacks that command accelerations or torques these are bounds on the acceleration.
+    Joints of closed loops count on A / 4 in b, and rows ``"<name> linkages"`` slow loops down before they bend more
+    than A allows (docs/robots.md).
 
     Where limits exclude each other actuators come first, acceleration before velocity. From a viable state (v0^2 / (2
     A) <= d, limits unchanged) that does not happen and the position limit is not passed, whatever is commanded and
@@ -175,7 +180,8 @@ class JointLimits(Constraint):
         **own: Mapping[int, ca.SX],
     ) -> Bounds:
         """What ``interval`` allows each chosen degree of freedom, of which ``own`` has more arguments."""
-        limits, count = self.limits(robot), robot.nv
+        limits, count, shares = self.limits(robot), robot.nv, np.ones(robot.nv)
+        shares[[dof for linkage in robot.loops.linkages for dof in linkage.dofs]] = LINKAGE_BRAKING
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
         for i in range(count):
             k = int(robot.position_index[i])
@@ -185,6 +191,7 @@ class JointLimits(Constraint):
                 position=(float(limits.position_lower[i]), float(limits.position_upper[i])) if k >= 0 else FREE,
                 velocity=float(limits.velocity[i]),
                 acceleration=float(limits.acceleration[i]),
+                braking=float(limits.acceleration[i] * shares[i]),
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
                 **{name: values[i] for name, values in own.items() if i in values},
@@ -203,11 +210,14 @@ def allowed_interval(
     velocity_scale: ca.SX,
     return_rate: ca.SX,
     shortest_dt: float | None = None,
+    braking: float = math.inf,
 ) -> tuple[ca.SX, ca.SX]:
     """The interval of :class:`JointLimits` for one coordinate, lower <= upper always.
 
-    Limits are numbers, infinite where there is none, and cost no operation there.
+    Limits are numbers, infinite where there is none, and cost no operation there. ``braking``, before a limit of
+    position, is no more than ``acceleration``.
     """
+    braking = min(braking, acceleration)
     low, high = -ca.SX.inf(1), ca.SX.inf(1)
     bounded = math.isfinite(velocity) or math.isfinite(acceleration)
     if math.isfinite(velocity):
@@ -222,10 +232,10 @@ def allowed_interval(
         )
     lower, upper = low, high
     if math.isfinite(position[1]):
-        upper = _approach(position[1] - q, acceleration, dt, return_rate, shortest_dt)
+        upper = _approach(position[1] - q, braking, dt, return_rate, shortest_dt)
         upper = clip(upper, low, high) if bounded else upper
     if math.isfinite(position[0]):
-        lower = -_approach(q - position[0], acceleration, dt, return_rate, shortest_dt)
+        lower = -_approach(q - position[0], braking, dt, return_rate, shortest_dt)
         lower = clip(lower, low, high) if bounded else lower
         if math.isfinite(position[1]):
             # Equal in exact arithmetic at worst (a range of width 0 seen from outside)

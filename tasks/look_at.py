@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -16,7 +16,7 @@ from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest_turn
 from wbc.tasks._stereographic import INNER, Triple, fade, square, triple
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -69,6 +69,8 @@ class LookAt(Task):
         UnknownNameError, ShapeError, NotFiniteError, RangeError: on construction or in :meth:`validate`.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     frame: str
     axis: Triple = (0.0, 0.0, 1.0)
     offset: Triple = (0.0, 0.0, 0.0)
@@ -82,12 +84,6 @@ class LookAt(Task):
         object.__setattr__(self, "offset", triple(validation.real_array("LookAt.offset", self.offset, (3,))))
         width = validation.scalar("LookAt.width", self.width, low=0.0, open_low=True, high=1.0)
         object.__setattr__(self, "width", width)
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("LookAt.frame", self.frame)
-        robot.check_frame("LookAt.relative_to", self.relative_to)
-        require_motion(robot, "LookAt.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``target`` and ``feedforward``, see the class."""

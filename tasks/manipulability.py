@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.manipulability import FLOOR
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.frames import frame_pose
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -84,6 +84,8 @@ class Manipulability(Task):
         RangeError: w is zero wherever the arm is, or length <= 0.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     stands_in_world: ClassVar[bool] = False
 
     frame: str
@@ -107,9 +109,7 @@ class Manipulability(Task):
 
     def validate(self, robot: Robot) -> None:
         """Check the frames, and that the arm is not singular in every configuration, see :meth:`Item.validate`."""
-        robot.check_frame("Manipulability.frame", self.frame)
-        robot.check_frame("Manipulability.relative_to", self.relative_to)
-        require_motion(robot, "Manipulability.frame", self.frame, self.relative_to)
+        super().validate(robot)
         rng = np.random.default_rng(0)
         drawn = (pin.integrate(robot.model, robot.neutral, rng.uniform(-2.0, 2.0, robot.nv)) for _ in range(_TRIED))
         if all(self._singular_values(robot, q)[-1] < _SINGULAR for q in drawn):

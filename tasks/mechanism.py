@@ -79,7 +79,7 @@ class Mechanism(Constraint):
         if robot.loops:
             error = robot.loops.error(kin)
             most = ca.SX([robot.characteristic_length if unit == "m" else 1.0 for _, unit in robot.loops.rows])
-            matrix = ca.vertcat(matrix, kin.slope(error))
+            matrix = ca.vertcat(matrix, robot.loops.moving(kin.slope(error)))
             right = ca.vertcat(right, clip(-error / dt, -CLOSING * most, CLOSING * most))
         return Rows(matrix, right, right)
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, Values
 

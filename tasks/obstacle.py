@@ -9,16 +9,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.proximity import OBSTACLE, Body, PairSensor
 from wbc.shapes import Capsule, Convex, Shape, Solid, Sphere
 from wbc.shapes.solid import names_of_shapes
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import _bodies as bodies
-from wbc.tasks import _gap as gap
+from wbc.tasks import _bodies as bodies, _gap as gap
 from wbc.tasks._ball import BallRow
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values

@@ -14,7 +14,7 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows, require_motion, weights_of_rows
+from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows, weights_of_rows
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -76,6 +76,8 @@ class RelativePose(Task):
         RangeError: no joint moves the two frames against each other, or a negative weight.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame_b", "frame_a")
+
     stands_in_world: ClassVar[bool] = False
 
     initial_only: ClassVar[tuple[str, ...]] = ("gain", "at")
@@ -100,9 +102,7 @@ class RelativePose(Task):
 
     def validate(self, robot: Robot) -> None:
         """Check frames and axes, see :meth:`Item.validate`."""
-        robot.check_frame("RelativePose.frame_a", self.frame_a)
-        robot.check_frame("RelativePose.frame_b", self.frame_b)
-        require_motion(robot, "RelativePose.frame_b", self.frame_b, self.frame_a)
+        super().validate(robot)
         validation.one_of("RelativePose.axes", self.axes, (MIDWAY, *robot.frame_names))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:

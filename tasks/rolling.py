@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values

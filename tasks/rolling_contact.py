@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.symbolic.tracer import Tracer

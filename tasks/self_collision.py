@@ -15,11 +15,9 @@ import numpy as np
 from wbc import validation
 from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError
 from wbc.proximity import Body, PairSensor
-from wbc.robot.pairs.link_pairs import link_pairs as every_link_pair
-from wbc.robot.pairs.link_pairs import neighbours, shaped_links
+from wbc.robot.pairs.link_pairs import link_pairs as every_link_pair, neighbours, shaped_links
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import _bodies as bodies
-from wbc.tasks import _gap as gap
+from wbc.tasks import _bodies as bodies, _gap as gap
 from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 from wbc.validation import Array
 

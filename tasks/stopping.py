@@ -61,6 +61,7 @@ def allowed_accelerations(
     return_rate: ca.SX,
     longest: float,
     motor: ca.SX | None = None,
+    braking: float = math.inf,
 ) -> tuple[ca.SX, ca.SX]:
     """The interval of the module for one coordinate, lower <= upper always. Infinite limits cost no operation.
 
@@ -68,6 +69,7 @@ def allowed_accelerations(
     none, that is nearest to what the limits ask for; from outside the position limits a joint brakes, then returns at
     ``return_rate`` times the violation at least, but no faster than it can stop. ``motor`` is a deceleration that may
     change with the state, such as that which a motor has: B is no more than that, and a state may cease to be viable.
+    Nor is B more than ``braking``.
     """
     low, high = -ca.SX.inf(1), ca.SX.inf(1)
     if math.isfinite(velocity):
@@ -77,7 +79,8 @@ def allowed_accelerations(
         most_a = ca.SX(acceleration)
         low, high = clip(low, -most_a, most_a), clip(high, -most_a, most_a)
     bounded = math.isfinite(velocity) or math.isfinite(acceleration)
-    deceleration: ca.SX | float = stopping_deceleration(acceleration, velocity, position[1] - position[0], longest)
+    most_b = min(acceleration, braking)
+    deceleration: ca.SX | float = stopping_deceleration(most_b, velocity, position[1] - position[0], longest)
     if motor is not None:
         deceleration = ca.fmin(deceleration, ca.fmax(motor, WEAKEST))
     lower, upper = low, high

@@ -12,7 +12,7 @@ from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits, limit_inputs, limit_margins, limit_rows
 from wbc.tasks.base import Constraint, Input, Row, Values
-from wbc.tasks.frames import point_in, point_rows, require_motion
+from wbc.tasks.frames import point_in, point_rows
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -58,6 +58,8 @@ class WorkspaceBox(Constraint):
         RangeError: no joint moves the frame against the reference.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     initial_only: ClassVar[tuple[str, ...]] = ("lower", "upper")
 
     frame: str
@@ -72,12 +74,6 @@ class WorkspaceBox(Constraint):
         object.__setattr__(self, "upper", upper)
         offset = validation.real_array("WorkspaceBox.offset", self.offset, (3,))
         object.__setattr__(self, "offset", tuple(offset.tolist()))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("WorkspaceBox.frame", self.frame)
-        robot.check_frame("WorkspaceBox.relative_to", self.relative_to)
-        require_motion(robot, "WorkspaceBox.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """Both bounds and their rates, as far as they are not None."""

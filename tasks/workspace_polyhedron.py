@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import NotFiniteError, ShapeError
+from wbc.multibody import pin
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Values
-from wbc.tasks.frames import point_in, require_motion
+from wbc.tasks.frames import point_in
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -69,6 +69,8 @@ class WorkspacePolyhedron(Constraint):
         UnknownNameError, ShapeError, NotFiniteError, RotationError: a bad field.
     """
 
+    frame_fields: ClassVar[tuple[str, ...]] = ("frame", "relative_to")
+
     initial_only: ClassVar[tuple[str, ...]] = ("offsets", "pose")
 
     frame: str
@@ -92,12 +94,6 @@ class WorkspacePolyhedron(Constraint):
         object.__setattr__(self, "offset", tuple(offset.tolist()))
         if self.pose is not None:
             object.__setattr__(self, "pose", validation.pose(f"{owner}.pose", self.pose))
-
-    def validate(self, robot: Robot) -> None:
-        """Check the frames, see :meth:`Item.validate`."""
-        robot.check_frame("WorkspacePolyhedron.frame", self.frame)
-        robot.check_frame("WorkspacePolyhedron.relative_to", self.relative_to)
-        require_motion(robot, "WorkspacePolyhedron.frame", self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         """``offsets`` and ``pose`` with their rates."""

@@ -1,13 +1,10 @@
-"""What ``backend="auto"`` means in tests: the virtual machine, where compiled code is not the point.
+"""What ``backend="auto"`` means in tests: the virtual machine, and nothing behind it, where compiled code is not the
+point.
 
 A stack's own library takes half a second to compile, its functions for the virtual machine a tenth of that; both run
 the same C (``tests/stack/test_generic.py``) and give the same answers (``tests/controller/test_backends.py``). Tests
-that are there for the compiled tick ask for ``native``, or are marked ``compiled``; with ``make test REPEATS=3`` all
-tests get what a user gets.
-
-Most tests evaluate the virtual machine's functions a few times, so there expressions that occur twice stay: to find
-them takes as long as thousands of evaluations, and a third of the time of a new stack. The numbers are the same bits
-(``tests/stack/test_program.py``).
+that are there for the compiled tick ask for ``native``, or are marked ``compiled``, as all are with ``make test
+REPEATS=3``; those marked ``at_once`` get what a user gets, code that is compiled behind the ticks.
 """
 
 from __future__ import annotations
@@ -16,15 +13,12 @@ from typing import Any
 
 import pytest
 
-from tests import optimised, repeats
+from tests import repeats
 from wbc.api import stack
 from wbc.native import toolchain
 from wbc.qp import solvers
-from wbc.stack import artifact, program
 from wbc.stack.artifact import Artifact, compile_stack
 from wbc.stack.declaration import Declaration
-from wbc.stack.layout import Layout
-from wbc.stack.program import TickProgram
 from wbc.symbolic import operators
 
 #: With all repeats every stack has a library of its own
@@ -46,25 +40,12 @@ def way(name: str) -> dict[str, Any]:
 
 
 def _compile(declared: Declaration, backend: str, version: str, wait: bool = True) -> Artifact:
-    marked = any(item.get_closest_marker("compiled") for item in _running)
-    virtual = backend == "auto" and wait and not _ALWAYS and not marked and not toolchain.missing()
-    return compile_stack(declared, "vm" if virtual else backend, version, wait=wait)
+    marks = {name for name in ("compiled", "at_once") for item in _running if item.get_closest_marker(name)}
+    virtual = backend == "auto" and not _ALWAYS and not marks and not toolchain.missing()
+    return compile_stack(declared, "vm" if virtual else backend, version, wait=wait or "at_once" not in marks)
 
 
 stack.compile_stack = _compile
-_build, _shared = program.build, program.shared
-
-
-def _quickly(declared: Declaration, layout: Layout, loops: bool = False) -> TickProgram:
-    program.shared = _shared if loops or _ALWAYS or optimised.busy() else list
-    try:
-        return _build(declared, layout, loops)
-    finally:
-        program.shared = _shared
-
-
-artifact.build = _quickly
-
 # What CasADi asks of an SX is answered quickly also where tests make expressions of their own
 operators._outside = operators._ANSWERS
 operators._answer(True)

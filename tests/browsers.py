@@ -7,7 +7,7 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
-from wbc.viewer.chromium import program
+from tests.chromium import program
 
 NONE = "no Chromium is installed (apt-get install chromium)"
 #: Files of tests/viewer that cannot run here, and why

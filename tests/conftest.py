@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 
 pytest_plugins = [
     f"tests.{name}"
-    for name in ("processes", "slow", "pictures", "browsers", "seeds", "backends", "loading", "failures")
+    for name in ("lacking", "processes", "slow", "pictures", "browsers", "seeds", "backends", "loading", "failures")
 ]
 
 os.environ.setdefault("MPLBACKEND", "Agg")

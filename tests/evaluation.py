@@ -16,8 +16,7 @@ from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.rotations import rotation_rate
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import Constraint, Input, Item, Task
-from wbc.tasks import inputs as run_time
+from wbc.tasks import Constraint, Input, Item, Task, inputs as run_time
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ import casadi as ca
 
 from tests.assembly import assembled
 from wbc.errors import CompileError
-from wbc.native import toolchain
+from wbc.native import kernel, toolchain
 
 _run, _compiler = toolchain._run, toolchain.compiler()
 #: Empty file beside a tick that is not optimised
@@ -39,9 +39,9 @@ def keep(folder: pathlib.Path) -> None:
     """From now on this process takes object files from the folder where it can. Another compiler is always asked."""
     folder.mkdir(parents=True, exist_ok=True)
 
-    def run(command: list[str], place: pathlib.Path, behind: bool = False) -> None:
+    def run(command: list[str], place: pathlib.Path) -> None:
         if command[0] != _compiler:
-            _run(command, place, behind)
+            _run(command, place)
             return
         try:
             compile_or_take(command, place)
@@ -72,6 +72,8 @@ def keep(folder: pathlib.Path) -> None:
         os.replace(file.name, kept)
 
     toolchain._run = run
+    # What was compiled when the package was installed need not be made again for this very processor
+    kernel.library = functools.partial(kernel.library, at_once=True)
 
 
 def _made(command: list[str], place: pathlib.Path) -> None:

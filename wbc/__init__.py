@@ -17,59 +17,28 @@ from wbc import lazy
 __version__ = "0.2.0"
 
 if TYPE_CHECKING:
-    from wbc import analysis as analysis
-    from wbc import coordinates as coordinates
-    from wbc import errors as errors
-    from wbc import proximity as proximity
-    from wbc import resolvers as resolvers
-    from wbc import robots as robots
-    from wbc import shapes as shapes
-    from wbc import tasks as tasks
-    from wbc import teleop as teleop
-    from wbc import track as track
-    from wbc import trajectory as trajectory
-    from wbc import viewer as viewer
-    from wbc import walking as walking
-    from wbc.api import Controller, Stack
-    from wbc.controller import Certificate, Policy, Status, Step
-    from wbc.errors import WbcError
-    from wbc.explain import Explanation
-    from wbc.ik import InverseKinematics, Solution
-    from wbc.record import Recording
-    from wbc.replaying import Replay as Replay
-    from wbc.replaying import replay
+    from wbc import (
+        analysis as analysis,
+        coordinates as coordinates,
+        errors as errors,
+        proximity as proximity,
+        resolvers as resolvers,
+        robots as robots,
+        shapes as shapes,
+        tasks as tasks,
+        teleop as teleop,
+        track as track,
+        trajectory as trajectory,
+        viewer as viewer,
+        walking as walking,
+    )
+    from wbc.api import Controller as Controller, Stack as Stack
+    from wbc.controller import Certificate as Certificate, Policy as Policy, Status as Status, Step as Step
+    from wbc.errors import WbcError as WbcError
+    from wbc.explain import Explanation as Explanation
+    from wbc.ik import InverseKinematics as InverseKinematics, Solution as Solution
+    from wbc.multibody import SE3 as SE3
+    from wbc.record import Recording as Recording
+    from wbc.replaying import Replay as Replay, replay as replay
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = [
-    "Certificate",
-    "Controller",
-    "Explanation",
-    "InverseKinematics",
-    "Policy",
-    "Recording",
-    "Solution",
-    "Stack",
-    "Status",
-    "Step",
-    "WbcError",
-    "__version__",
-    "analysis",
-    "coordinates",
-    "errors",
-    "proximity",
-    "replay",
-    "resolvers",
-    "robots",
-    "shapes",
-    "tasks",
-    "teleop",
-    "track",
-    "trajectory",
-    "viewer",
-    "walking",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__, "__version__")

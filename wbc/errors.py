@@ -6,7 +6,6 @@ from a list, the valid *choices* with the nearest one first. Raising leaves ever
 
 from __future__ import annotations
 
-import difflib
 import pickle
 from collections.abc import Iterable
 from typing import Any
@@ -132,6 +131,9 @@ class CompileError(WbcError):
 
 def nearest(name: str, choices: Iterable[str]) -> tuple[str, ...]:
     """All choices, the most similar to ``name`` first."""
+    # Imported for a mistake only
+    import difflib
+
     lowered = name.lower()
 
     def distance(choice: str) -> tuple[float, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Iterable
 
 from wbc.errors import WbcError
 
@@ -41,3 +42,28 @@ def require(extra: str, what: str, module: str = "") -> None:
         if sys.modules.get(name) is None and importlib.util.find_spec(name) is None:
             reason = f"{what} needs this package: pip install 'wbc[{extra}]'"
             raise MissingPackageError(extra, name, reason)
+
+
+def missing(module: str, package: str, what: str) -> MissingPackageError:
+    """The error for a package that is installed by itself where there is a wheel of it.
+
+    Args:
+        module: what is imported. package: its name on the package index. what: needs it, in the words of the text.
+    """
+    reason = f"{what} needs this package: pip install {package}"
+    if sys.platform == "win32":
+        reason += " (there is no wheel of it for Windows)"
+    return MissingPackageError(module, package, reason)
+
+
+def versions(packages: Iterable[str]) -> dict[str, str]:
+    """Package -> its version, or ``"not installed"``."""
+    from importlib import metadata  # it imports the parsers of mail
+
+    out = {}
+    for name in packages:
+        try:
+            out[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            out[name] = "not installed"
+    return out

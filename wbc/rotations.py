@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Entries of a quaternion x, y, z, w, which is Pinocchio's order, in MuJoCo's and viser's, which is w, x, y, z

@@ -6,8 +6,6 @@ import contextlib
 import os
 import select
 import sys
-import termios
-import tty
 from collections.abc import Callable, Iterator
 
 from wbc.errors import WbcError
@@ -47,8 +45,15 @@ def terminal_keys(file: int | None = None) -> Iterator[Callable[[], str]]:
         What was typed since the last call, "" for nothing; :data:`END_OF_INPUT` after the end.
 
     Raises:
-        NoTerminalError: the standard input is none.
+        NoTerminalError: the standard input is none, or the platform is Windows, whose terminals are not read.
     """
+    try:
+        import termios
+        import tty
+    except ModuleNotFoundError as error:
+        raise NoTerminalError(
+            "keyboard", "keyboard", "keys are not read on Windows; give a file of commands"
+        ) from error
     number = terminal() if file is None else file
     before = termios.tcgetattr(number)
 

@@ -6,19 +6,19 @@ the field; nothing is changed when it raises.
 
 from __future__ import annotations
 
+import contextlib
 import decimal
-import difflib
 import math
 import os
 import pathlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
+from wbc.multibody import pin
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -249,8 +249,32 @@ def exists(field: str, value: Any) -> bool:
         return False
 
 
+@contextlib.contextmanager
+def writing(field: str, file: Any, refusal: type[WbcError], *also: type[Exception]) -> Iterator[None]:
+    """A file or folder that is written within; what the file system refuses, or ``also``, is raised as the caller's."""
+    refused: tuple[type[Exception], ...] = (OSError, *also)
+    try:
+        yield
+    except refused as error:
+        raise refusal(field, str(file), f"cannot be written: {getattr(error, 'strerror', None) or error}") from error
+
+
+def text_of(field: str, file: Any, refusal: type[WbcError]) -> str:
+    """What a text file holds; one that is missing, is no text or cannot be read is the caller's error."""
+    path = file_path(field, file)
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise refusal(field, str(path), no_such(path)) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise refusal(field, str(path), f"cannot be read: {error}") from error
+
+
 def no_such(path: str | os.PathLike[str], reason: str = "there is no such file") -> str:
     """The reason why a file or folder that is not there is refused, with the nearest name in its folder."""
+    # Imported for a mistake only
+    import difflib
+
     place = pathlib.Path(path)
     try:
         near = [] if place.exists() else difflib.get_close_matches(place.name, os.listdir(place.parent), 1)

@@ -77,6 +77,7 @@ _ALL = (
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
     Figure("identification", ("wbc/identification",), 2.0),
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/published/newton_euler"), 3.0),
+    Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
     Figure("levels", TICK, 0.5),

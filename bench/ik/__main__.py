@@ -6,13 +6,11 @@ Ctrl-C ends the measuring; what was measured until then is printed and written.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress
 
 from bench.figures.index import write_blocks
 from bench.figures.store import stamp
@@ -21,6 +19,7 @@ from bench.ik import tables
 from bench.ik.chains import CHAINS, Chain, prepare
 from bench.ik.run import BLOCKS, OURS, PEERS, Protocol, about, many, measure, rows, write
 from bench.pool import ROOT
+from bench.program import bars, publish, terminal
 from bench.versions import versions
 from wbc.interrupts import obey_kill
 
@@ -99,26 +98,14 @@ def one(
 def main(given: list[str] | None = None) -> None:
     """Parse the arguments, run, print and write."""
     chosen = arguments(given)
-    console, errors = Console(), Console(stderr=True)
-    if not console.is_terminal:
-        console = Console(width=160)
     if chosen.peers_python is None:
-        console.print("pink and mink are left out: no --peers-python was given")
-    bars = (TextColumn("{task.description:12}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
+        terminal().print("pink and mink are left out: no --peers-python was given")
+    with bars() as progress:
         results = run(chosen, progress)
-    for sheet in tables.sheets(results):
-        console.print(sheet.rich())
-        console.print()
-    for note in tables.notes(results):
-        console.print(note, markup=False, highlight=False)
-    chosen.output.mkdir(parents=True, exist_ok=True)
-    (chosen.output / "ik.md").write_text(tables.markdown(results))
-    (chosen.output / "ik.json").write_text(json.dumps(results, indent=1) + "\n")
+    publish(chosen.output / "ik", tables.sheets(results), tables.notes(results), results)
     complete = results["interrupted"] is None and len(results["chains"]) == len(CHAINS) and chosen.peers_python
     if complete and chosen.full and chosen.output == ROOT / "bench":
         write_blocks()
-    console.print(f"Written to {chosen.output / 'ik.md'}", markup=False, highlight=False)
 
 
 if __name__ == "__main__":

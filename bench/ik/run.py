@@ -121,8 +121,6 @@ def rows(problem: Problem, found: Mapping[str, Answers], tolerance: float) -> li
             "rate": 100.0 * rate, "error": 100.0 * deviation(rate, count),
             **(published(problem.chain, count) if name == OURS else {}),
             "mean": float(micro.mean()), "median": median, "p95": p95, "p99.9": p999,
-            "compared": {peer: float(micro[: len(other.seconds)].mean()) for peer, other in found.items()
-                         if name == OURS and peer != OURS and other.seconds},
         })  # fmt: skip
     return out
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench.goals import Goal
 from bench.ik.run import OURS, PEERS
-from bench.report import goal_sheet
 from bench.sheet import Sheet
 
 Results = dict[str, Any]
@@ -19,8 +17,7 @@ limits of the URDF are kept, as Pinocchio judges. Times are those of the whole P
 failures too; "+-" is one binomial standard error.
 
 pink and mink: their own convergence loop, gain 1, Levenberg-Marquardt damping 1e-3, position limits, DAQP, no \
-restarts, the same budget, on the first poses of the same draw, in turns with wbc. "Mean on the same poses" in the \
-goals is wbc's mean on those.
+restarts, the same budget, on the first poses of the same draw, in turns with wbc.
 
 Published: the rates that TRAC-IK's authors give, of another machine. Goal: that rate less two \
 binomial standard errors of it at so many poses."""
@@ -47,17 +44,6 @@ def met(row: dict[str, Any]) -> str:
     return "yes" if row["rate"] >= row["goal"] else "no"
 
 
-def goals(results: Results) -> list[Goal]:
-    """Mean time against each peer's, on the poses that both had."""
-    means = {(row["chain"], row["solver"]): row["mean"] for row in results["rows"]}
-    out = []
-    for row in results["rows"]:
-        for peer, own in row["compared"].items():
-            text = f"{row['chain']}: mean on the same poses as a fraction of {peer}'s"
-            out.append(Goal(text, own / means[row["chain"], peer], 1.0, ""))
-    return out
-
-
 def batch_sheet(results: Results) -> Sheet:
     """Many targets in one call."""
     columns = ("chain", "poses", "threads", "solved [%]", "whole call [s]", "us a pose", "of it searches [us]")
@@ -77,7 +63,7 @@ def chain_sheet(results: Results) -> Sheet:
 
 def sheets(results: Results) -> list[Sheet]:
     """All tables that have rows."""
-    every = [main_sheet(results), batch_sheet(results), goal_sheet(goals(results)), chain_sheet(results)]
+    every = [main_sheet(results), batch_sheet(results), chain_sheet(results)]
     return [sheet for sheet in every if sheet.rows]
 
 
@@ -92,11 +78,6 @@ def notes(results: Results) -> list[str]:
         *text.split("\n\n"),
     ]
     return [f"Ended by Ctrl-C in {results['interrupted']}.", *out] if results["interrupted"] else out
-
-
-def markdown(results: Results) -> str:
-    """Everything as one page."""
-    return "\n\n".join([sheet.markdown() for sheet in sheets(results)] + notes(results)) + "\n"
 
 
 def summary(results: Results) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from bench.sheet import Sheet
 from wbc.errors import RangeError
 from wbc.motion_control.comparison import TrialCondition, compare
+from wbc.motion_control.motion import TorqueController
 from wbc.motion_control.trial import AWAY
 from wbc.published.newton_euler import (
     Adaptive,
@@ -21,7 +22,6 @@ from wbc.published.newton_euler import (
     simulate,
 )
 from wbc.published.newton_euler.comparison import PUBLISHED, published_scenario
-from wbc.published.newton_euler.control import ControlLaw
 from wbc.published.newton_euler.simulation import PLANTS
 from wbc.published.newton_euler.three_link import ELECTRIC, HYDRAULIC, MOTOR, arm, task, tip
 
@@ -33,7 +33,7 @@ def parts() -> dict[str, Sheet | str]:
 
 def _tracking() -> Sheet:
     chosen, motion, drive, rows = arm(), task(), DriveTrain([MOTOR] * 3), []
-    laws: dict[str, Callable[[], ControlLaw]] = {
+    laws: dict[str, Callable[[], TorqueController]] = {
         "nominal torque": lambda: Nominal(chosen, motion),
         "1 linearised": lambda: Linearised(chosen, motion, 0.01),
         "2 decoupled": lambda: DecoupledTwo(motion, 0.01),

@@ -28,7 +28,7 @@ def controller(levels: tuple[int, int, int], velocity_scale: float) -> Controlle
     stack.add(EndEffector("panda_hand_tcp", kind="position"), name="hand", level=levels[0])
     stack.add(Elbow("panda_link4"), name="elbow", level=levels[1])
     stack.add(Posture(), name="posture", weight=1e-3, level=levels[2])
-    out = stack.add(JointLimits(), name="limits").compile()
+    out = stack.add(JointLimits(), name="limits").compile(wait=True)
     out["limits"].velocity_scale = velocity_scale
     out.reset(START)
     out.step(START)

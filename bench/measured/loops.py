@@ -11,9 +11,9 @@ import pinocchio as pin
 
 import wbc
 from bench.sheet import Sheet, us
-from tests.loops.mechanisms import NAMED
+from tests.loops.mechanisms import MOTORS, NAMED, with_motors
 from wbc.controller import core_of
-from wbc.robot import Robot
+from wbc.robot import Loop, Robot
 from wbc.tick.native import NativeTick
 from wbc.validation import Array
 
@@ -22,6 +22,8 @@ MOVED = {"four_bar": "coupler", "ankle": "foot", "gripper": "left_finger", "delt
 TICKS, ROUNDS, DT = 600, 3, 0.005
 #: Ticks towards one target; gain of postures [1/s] and the fastest that joints move [rad/s, m/s]
 EACH, GAIN, SPEED = 60, 5.0, 3.0
+#: States of ticks of torques, and the limit of accelerations of their robots [rad/s^2, m/s^2]
+STATES, ACCELERATION = 60, 200.0
 
 
 def parts() -> dict[str, Sheet | str]:
@@ -37,7 +39,115 @@ def parts() -> dict[str, Sheet | str]:
         size = f"{robot.nv}, {len(robot.loops.rows)}"
         rows.append((name, size, us(tree), *(text.replace("nan", "not installed") for text in shown)))
     head = ("mechanism", "dofs, loop rows", "tick of its tree [us]", "tick [us]", "open [m]", "mink [us]", "open [m]")
-    return {"ticks": Sheet("", (*head, "Pinocchio and numpy [us]", "open [m]"), rows)}
+    ticks = Sheet("", (*head, "Pinocchio and numpy [us]", "open [m]"), rows)
+    return {"ticks": ticks, "torques": Sheet("", TORQUES, [_torques(name) for name in MOVED])}
+
+
+#: Columns of ticks of torques
+TORQUES = (
+    "mechanism",
+    "tick of its tree [us]",
+    "tick [us]",
+    "accelerations off Pinocchio's",
+    "Pinocchio [us]",
+    "accelerations off MuJoCo's, whose loops are springs",
+    "MuJoCo [us]",
+)
+
+
+def _torques(name: str) -> tuple[str, ...]:
+    """Native ticks that command motors, and how far off Pinocchio's and MuJoCo's accelerations for their torques are,
+    relative to the largest.
+    """
+    text = with_motors(NAMED[name], MOTORS[name])
+    robot = wbc.robots.load(text, shapes="none", velocity=SPEED, acceleration=ACCELERATION)
+    states = [_state(robot, np.random.default_rng(seed)) for seed in range(STATES)]
+    own, answers = _torque_ticks(robot, states)
+    tree, _ = _torque_ticks(robot.with_loops().with_actuated(robot.joint_names), states)
+    pinocchio, mujoco_says = _by_pinocchio(robot, states, answers), _by_mujoco(robot, text, states, answers)
+    return (
+        name,
+        us(tree),
+        us(own),
+        *(f"{x:.0e}" if k == 0 else us(x) for pair in (pinocchio, mujoco_says) for k, x in enumerate(pair)),
+    )
+
+
+def _state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
+    """A closed configuration near neutral, and a velocity that keeps it closed."""
+    q, v = robot.integrate(robot.neutral, 0.3 * rng.normal(size=robot.nv)), 0.5 * rng.normal(size=robot.nv)
+    rows = robot._tied(q)
+    return q, v - np.linalg.pinv(rows, 1e-7) @ rows @ v
+
+
+def _torque_ticks(robot: Robot, states: list[tuple[Array, Array]]) -> tuple[float, list[wbc.Step]]:
+    """(median time of a native tick of torques [us], the steps)."""
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture")
+    stack.add(wbc.tasks.JointLimits(acceleration=False))
+    controller = stack.compile(command="torque", backend="native")
+    tick = core_of(controller).tick
+    assert isinstance(tick, NativeTick)
+    spent, steps = np.full((ROUNDS, len(states)), np.inf), []
+    for turn in range(ROUNDS):
+        for k, (q, v) in enumerate(states):
+            controller.reset(q)
+            steps.append(controller.step(q, v))
+            controller.reset(q)
+            tick.q[:], tick.v_in[: robot.nv], tick.use_v[:] = q, v, 1.0
+            began = perf_counter()
+            tick.step_function(tick.pointer)
+            spent[turn, k] = perf_counter() - began
+    return 1e6 * float(np.median(spent.min(axis=0))), steps[: len(states)]
+
+
+def _off(found: list[Array], steps: list[wbc.Step]) -> float:
+    return max(
+        float(np.abs(a - step.a).max() / max(1.0, np.abs(step.a).max())) for a, step in zip(found, steps, strict=True)
+    )
+
+
+def _by_pinocchio(robot: Robot, states: list[tuple[Array, Array]], steps: list[wbc.Step]) -> tuple[float, float]:
+    """(relative error of accelerations, median time [us]) of ``pin.constraintDynamics`` under the ticks' torques; NaN
+    where it has no constraint of a loop's kind.
+    """
+    model, data, loops = robot.model, robot.model.createData(), robot.loops.loops
+    if any(getattr(loop, "kind", "") != "connect" for loop in loops):
+        return np.nan, np.nan
+    models, datas, spent, found = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData(), [], []
+    for loop in loops:
+        assert isinstance(loop, Loop)
+        ends = [model.frames[model.getFrameId(end)] for end in (loop.first, loop.second)]
+        places = [part for end in ends for part in (int(end.parentJoint), end.placement)]
+        models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, *places, pin.ReferenceFrame.LOCAL))
+        datas.append(models[-1].createData())
+    pin.initConstraintDynamics(model, data, models, datas)
+    for (q, v), step in zip(states, steps, strict=True):
+        torque, settings = np.array(step.torque), pin.ProximalSettings(1e-13, 1e-10, 50)
+        began = perf_counter()
+        a = pin.constraintDynamics(model, data, q, v, torque, models, datas, settings)
+        spent.append(perf_counter() - began)
+        found.append(np.array(a))
+    return _off(found, steps), 1e6 * float(np.median(spent))
+
+
+def _by_mujoco(
+    robot: Robot, text: str, states: list[tuple[Array, Array]], steps: list[wbc.Step]
+) -> tuple[float, float]:
+    """(relative error of accelerations, median time of ``mj_forward`` [us]), its constraints as stiff as they go."""
+    model = mujoco.MjModel.from_xml_string(text)
+    model.eq_solimp[:, :3] = 0.9999, 0.9999, 1e-6
+    model.opt.tolerance, model.opt.iterations = 1e-14, 200
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    data, joints, spent, found = mujoco.MjData(model), wbc.robots.MujocoJoints(model, robot), [], []
+    for (q, v), step in zip(states, steps, strict=True):
+        joints.put_q(data.qpos, q)
+        joints.put_v(data.qvel, q, v)
+        joints.put_v(data.qfrc_applied, q, np.array(step.torque))
+        began = perf_counter()
+        mujoco.mj_forward(model, data)
+        spent.append(perf_counter() - began)
+        found.append(joints.v(data.qpos, data.qacc))
+    return _off(found, steps), 1e6 * float(np.median(spent))
 
 
 def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float]:
@@ -65,7 +175,7 @@ def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float]
 
 
 def _gap(robot: Robot, q: Array) -> float:
-    return float(np.abs(robot._closing.look(q)[0]).max()) if robot.loops else 0.0
+    return max(robot.loop_gaps(q).values(), default=0.0)
 
 
 def _mink(robot: Robot, name: str, targets: list[Array]) -> tuple[float, float]:

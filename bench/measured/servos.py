@@ -69,7 +69,7 @@ def controller() -> Controller:
     stack.add(wbc.tasks.EndEffector("tool", gain=10.0), name="hand")
     stack.add(wbc.tasks.Posture(), name="posture", weight=1e-3)
     stack.add(wbc.tasks.JointLimits())
-    return stack.compile()
+    return stack.compile(wait=True)
 
 
 class ByHand:

@@ -33,22 +33,28 @@ def parts() -> dict[str, Sheet | str]:
     rows = []
     arm, states = fixed_arm(), near(wbc.robots.load("panda"), 0.05)
     target = wbc.robots.load("panda").neutral
-    before = median(arm.compile(), states, target)
+    before = median(arm.compile(wait=True), states, target)
     rows.append(("Panda, hand and posture: velocities", us(before), ""))
     arm.add(TorqueLimits())
     peer = placo("panda_description/urdf/panda.urdf", states, False, ["panda_hand"], False, [])
     rows.append(
-        ("the same: torques with their limits", us(median(arm.compile(command="torque"), states, target)), peer)
+        (
+            "the same: torques with their limits",
+            us(median(arm.compile(command="torque", wait=True), states, target)),
+            peer,
+        )
     )
     grips = two_grips()
     states = near(grips.robot, 0.001)
-    rows.append(("three-armed walker, two grips", us(median(grips.compile(command="torque"), states, None)), ""))
+    rows.append(
+        ("three-armed walker, two grips", us(median(grips.compile(command="torque", wait=True), states, None)), "")
+    )
     stack = humanoid()
     states = near(stack.robot, 0.002)
     contacts = [{"kind": "surface", "frame": f"{side}_sole_link", **FOOT} for side in ("left", "right")]
     contacts.append({"kind": "grasp", "frame": "gripper_right_base_link"})
     peer = placo("talos_data/robots/talos_reduced.urdf", states, True, [], True, contacts)
-    ours = us(median(stack.compile(command="torque"), states, None))
+    ours = us(median(stack.compile(command="torque", wait=True), states, None))
     rows.append(("Talos, two surface contacts and a hand", ours, peer))
     columns = ("one tick, median [us]", "wbc", "placo")
     return {"cost": Sheet("", columns, rows)}

@@ -39,7 +39,7 @@ while True:
 def parts() -> dict[str, Sheet | str]:
     """Blocks without a viewer, with one that nobody watches, with one page's worth of clients, and with ten."""
     chosen = playground("panda")
-    controller = chosen.stack.compile()
+    controller = chosen.stack.compile(wait=True)
     dt, q = chosen.stack.dt, chosen.start
     controller.reset(q)
     found: dict[str, list[np.ndarray]] = {}

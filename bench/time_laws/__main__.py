@@ -7,23 +7,18 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
-import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from bench.figures.store import stamp
 from bench.harness import machine
 from bench.pool import ROOT
-from bench.records import measure
-from bench.report import goal_sheet
+from bench.program import Record, bars, measure, publish
 from bench.time_laws import least_time, states, ticks
-from bench.time_laws.goals import goals
-from bench.time_laws.tables import Parts, Record, sheets
+from bench.time_laws.tables import sheets
 from tests.trajectory.suite import INSTANCES
 from wbc.interrupts import obey_kill
 
@@ -32,11 +27,10 @@ PACKAGES = ("wbc", "toppra", "ruckig", "numpy", "scipy", "pin")
 #: Sizes of a quick run and of a full one: problems of each size, or states, or blocks of ticks for each course
 QUICK = {
     "random set": 8, "small moves": 25, "torques": 6, "states": 20_000, "straight": 200, "walls": 300, "ticks": 12,
-    "along": 1,
 }  # fmt: skip
 FULL = {
     "random set": 100, "small moves": 200, "torques": 30, "states": 1_000_000, "straight": 2000, "walls": 3000,
-    "ticks": 80, "along": 10,
+    "ticks": 80,
 }  # fmt: skip
 
 NOTES = """\
@@ -73,16 +67,9 @@ def parts_of(sizes: dict[str, int], seed: int, repeats: int, processes: int) -> 
         "torques": (n["torques"], least_time.torques(rng(3), n["torques"])),
         "straight": (n["straight"], states.straight_moves(rng(4), n["straight"])),
         "walls": (n["walls"], states.walls(rng(5), n["walls"])),
-        "along": (2 * n["along"], least_time.jerk_limited_paths(rng(7), n["along"])),
         # Last: it takes the longest, and a run that is ended in it has everything else
         "states": (states.chunks(n["states"]), states.random_states(seed, n["states"], processes)),
     }
-
-
-def markdown(parts: Parts, about: list[str]) -> str:
-    """Everything as one page."""
-    tables = [sheet.markdown() for sheet in (*sheets(parts), goal_sheet(goals(parts)))]
-    return "\n\n".join([*tables, *about, *NOTES.split("\n\n")]) + "\n"
 
 
 def setting(chosen: argparse.Namespace, sizes: dict[str, int]) -> list[str]:
@@ -127,19 +114,6 @@ def sizes_of(chosen: argparse.Namespace) -> dict[str, int]:
     return sizes
 
 
-def write(folder: Path, parts: Parts, about: list[str], interrupted: str | None, begun: dict[str, str]) -> None:
-    """time_laws.md and time_laws.json."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "time_laws.md").write_text(markdown(parts, about))
-    kept = {
-        "stamp": begun, "about": about, "interrupted": interrupted,
-        "tables": [{"title": s.title, "columns": s.columns, "rows": s.rows} for s in sheets(parts)],
-        "goals": [{"text": g.text, "value": float(g.value), "limit": g.limit, "unit": g.unit, "met": bool(g.met)}
-                  for g in goals(parts)],
-    }  # fmt: skip
-    (folder / "time_laws.json").write_text(json.dumps(kept, indent=1) + "\n")
-
-
 def main(given: list[str] | None = None) -> None:
     """Parse the arguments and run."""
     chosen = arguments(given)
@@ -147,22 +121,14 @@ def main(given: list[str] | None = None) -> None:
     work = parts_of(sizes, chosen.seed, 2, max(1, chosen.processes))
     if chosen.parts:
         work = {name: part for name, part in work.items() if name in chosen.parts}
-    console, errors = Console(), Console(stderr=True)
-    if not console.is_terminal:
-        console = Console(width=160)
     about, begun = setting(chosen, sizes), stamp()
-    bars = (TextColumn("{task.description:12}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
+    with bars() as progress:
         parts, interrupted = measure(work, progress)
     if interrupted:
         about.insert(0, f"Ended by Ctrl-C in: {interrupted}.")
-    for sheet in (*sheets(parts), goal_sheet(goals(parts))):
-        console.print(sheet.rich())
-        console.print()
-    for note in about:
-        console.print(note, markup=False, highlight=False)
-    write(chosen.output, parts, about, interrupted, begun)
-    console.print(f"Written to {chosen.output / 'time_laws.md'}", markup=False, highlight=False)
+    tables = sheets(parts)
+    kept = {"stamp": begun, "about": about, "interrupted": interrupted, "tables": [vars(sheet) for sheet in tables]}
+    publish(chosen.output / "time_laws", tables, [*about, *NOTES.split("\n\n")], kept)
 
 
 if __name__ == "__main__":

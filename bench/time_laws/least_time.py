@@ -15,7 +15,7 @@ import wbc.robots
 from bench.time_laws import raw
 from tests.trajectory.suite import INSTANCES, PROBLEMS
 from wbc.errors import WbcError
-from wbc.trajectory import Law, MotionLimits, PolynomialPath, jerk_limited_along, spline_path, time_optimal
+from wbc.trajectory import Law, MotionLimits, spline_path, time_optimal
 from wbc.trajectory.least_time.checks import TorqueCheck
 from wbc.trajectory.paths.waypoints import Ends
 from wbc.validation import Array
@@ -24,8 +24,6 @@ Record = dict[str, Any]
 
 #: Grid points of toppra beside which durations are compared
 REFERENCE = 6401
-#: Jerk limits of the random set over its acceleration limits [1/s]
-JERK = 10.0
 
 
 def random_problem(rng: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
@@ -179,23 +177,3 @@ def _torque(law: Law | None) -> Record:
         return {"duration": None, "seen": None, "bound": None}
     worst = law.certificate.worst["torque"]
     return {"duration": law.duration, "seen": worst.ratio - worst.between, "bound": worst.ratio}
-
-
-def jerk_limited_paths(rng: np.random.Generator, count: int) -> Iterator[Record]:
-    """Jerk-limited laws along splines through waypoints, beside laws of least time along the same paths."""
-    for number in (5, 10):
-        for _ in range(count):
-            waypoints, velocity, acceleration = random_problem(rng, number)
-            path: PolynomialPath = raw.polynomial(raw.spline(np.linspace(0.0, 1.0, number), waypoints))
-            least = time_optimal(path, velocity, acceleration).duration
-            sizes = {"velocity": velocity, "acceleration": acceleration, "jerk": JERK * acceleration}
-            spent, law = timed(partial(jerk_limited_along, path, **sizes), 1)
-            worst = law.certificate.worst
-            yield {
-                "waypoints": number,
-                "ms": spent,
-                "longer": law.duration / least - 1.0,
-                "ratio": law.certificate.ratio,
-                "exact": all(w.kind == "exact" for w in worst.values()),
-                "jerk": worst["jerk"].ratio,
-            }

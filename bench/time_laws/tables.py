@@ -34,7 +34,7 @@ def sheets(parts: Parts) -> list[Sheet]:
     """The tables of those parts that were measured."""
     makers = {
         "random set": random_set, "small moves": small_moves, "suite": suite, "torques": torques,
-        "states": states, "straight": straight, "walls": walls, "ticks": ticks, "along": along,
+        "states": states, "straight": straight, "walls": walls, "ticks": ticks,
     }  # fmt: skip
     return [make(parts[name]) for name, make in makers.items() if parts.get(name)]
 
@@ -202,30 +202,6 @@ def ticks(records: list[Record]) -> Sheet:
             for name, text in (("raw", "Ruckig.update, state as numpy"), ("ours", "wbc online, within position limits"))
         ]
     return Sheet("Online, 7 joints: microseconds of one tick", ("", "ticks", "median", "p99", "max"), rows)
-
-
-def along(records: list[Record]) -> Sheet:
-    """Jerk-limited laws along paths."""
-    rows = []
-    for number, some in grouped(records, "waypoints").items():
-        rows.append((
-            f"{number} waypoints", f"{len(some)}", f"{max(r['ratio'] for r in some):.7f}",
-            f"{max(r['jerk'] for r in some):.7f}", "exact" if all(r["exact"] for r in some) else "sampled",
-            f"{_percent(median(r['longer'] for r in some))} / {_percent(max(r['longer'] for r in some))}",
-            f"{median(r['ms'] for r in some):.0f}",
-        ))  # fmt: skip
-    columns = (
-        "",
-        "laws",
-        "worst ratio",
-        "of jerk",
-        "certificate",
-        "longer than time_optimal: median / worst",
-        "ms",
-    )
-    return Sheet(
-        "Jerk-limited laws through waypoints, exactly on the spline (neither toppra nor ruckig has them)", columns, rows
-    )
 
 
 def _each(groups: dict[Any, Sequence[Record]]) -> str:

@@ -6,27 +6,21 @@ Ctrl-C ends the measuring; what was measured until then is printed and written.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
 import wbc
 from bench.figures.store import stamp
-from bench.goals import Goal
 from bench.harness import machine as host
 from bench.pool import ROOT
-from bench.records import measure
-from bench.report import goal_sheet
+from bench.program import bars, measure, publish
 from bench.sheet import Sheet
 from bench.walk import tables
 from bench.walk.courses import course_jobs, highest_jobs, spin_jobs
 from bench.walk.machine import Job, Machine, Record
 from bench.walk.planning import planning_jobs
-from bench.walk.planning_tables import planning_goals, planning_sheet
+from bench.walk.planning_tables import planning_sheet
 from wbc.errors import RangeError
 from wbc.interrupts import obey_kill
 from wbc.robots import WalkerData
@@ -42,19 +36,18 @@ controller, simulator and log, by processor time. The checker recomputes the wal
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a run: its jobs, and of their records the table and the goals."""
+    """One part of a run: its jobs, and of their records the table."""
 
     jobs: Callable[[Machine], list[Job]]
     sheet: Callable[[list[Record]], Sheet]
-    goals: Callable[[list[Record]], list[Goal]]
 
 
 #: In the order in which they are measured
 PARTS = {
-    "courses": Part(course_jobs, tables.course_sheet, tables.course_goals),
-    "spins": Part(spin_jobs, tables.spin_sheet, tables.spin_goals),
-    "planning": Part(planning_jobs, planning_sheet, planning_goals),
-    "highest": Part(highest_jobs, tables.highest_sheet, lambda records: []),
+    "courses": Part(course_jobs, tables.course_sheet),
+    "spins": Part(spin_jobs, tables.spin_sheet),
+    "planning": Part(planning_jobs, planning_sheet),
+    "highest": Part(highest_jobs, tables.highest_sheet),
 }
 
 
@@ -74,11 +67,7 @@ def main(given: list[str] | None = None) -> None:
         raise RangeError("walker.toml", data.digest, f"figures are reported for the data {WALKER_DIGEST} only")
     about, begun = host(), stamp()
     it = Machine(wbc.robots.walker(), collisions=chosen.collisions)
-    console, errors = Console(), Console(stderr=True)
-    if not console.is_terminal:
-        console = Console(width=230)
-    bars = (TextColumn("{task.description:10}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*bars, TimeRemainingColumn(), console=errors) as progress:
+    with bars() as progress:
         jobs = {name: PARTS[name].jobs(it) for name in chosen.parts}
         parts, interrupted = measure({k: (len(v), (job.run() for job in v)) for k, v in jobs.items()}, progress)
     lines = [
@@ -90,17 +79,7 @@ def main(given: list[str] | None = None) -> None:
         lines.insert(0, f"Ended by Ctrl-C in: {interrupted}.")
     found = {name: some for name, some in parts.items() if some}
     sheets = [PARTS[name].sheet(some) for name, some in found.items()]
-    sheets.append(goal_sheet([goal for name, some in found.items() for goal in PARTS[name].goals(some)]))
-    for sheet in sheets:
-        console.print(sheet.rich())
-        console.print()
-    for text in lines:
-        console.print(text, markup=False, highlight=False)
-    file = chosen.output / "walk"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.with_suffix(".md").write_text("\n\n".join([*(sheet.markdown() for sheet in sheets), *lines]) + "\n")
-    file.with_suffix(".json").write_text(json.dumps({"stamp": begun, "about": lines, "parts": found}, indent=1) + "\n")
-    console.print(f"Written to {file}.md", markup=False, highlight=False)
+    publish(chosen.output / "walk", sheets, lines, {"stamp": begun, "about": lines, "parts": found}, width=230)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bench.sheet import Sheet
 from bench.walk import tables
+from bench.walk.courses import SPEED
 from bench.walk.machine import Record
 from bench.walk.planning_tables import planning_sheet
 
@@ -18,4 +19,4 @@ def kept_sheet(parts: dict[str, list[Record]]) -> Sheet:
     fastest = {r["course"]: f"{r['highest']:.2f}" for r in parts["highest"]}
     rows = [(*row[:1], *row[2:-1], fastest.get(row[0], "-")) for row in tables.course_sheet(parts["courses"]).rows]
     columns = ("", "mean, in/s", "of it", *tables.WALK, "highest speed kept, in/s")
-    return Sheet(f"Courses at {tables.SPEED:g} in/s", columns, rows)
+    return Sheet(f"Courses at {SPEED:g} in/s", columns, rows)

@@ -1,10 +1,9 @@
-"""The tables of walks: courses, the highest speeds, turns; and what is asked of them."""
+"""The tables of walks: courses, the highest speeds, turns."""
 
 from __future__ import annotations
 
-from bench.goals import Goal
 from bench.sheet import Sheet
-from bench.walk.courses import RATE, SPEED, binding, keeps
+from bench.walk.courses import binding, keeps
 from bench.walk.machine import INCH, Record
 
 #: Columns of a walk that was carried out
@@ -35,30 +34,6 @@ def spin_sheet(records: list[Record]) -> Sheet:
         rows.append((name, *_speed(r, "turn_rate", 1.0), *_walk(r), lacks))
     columns = ("", "asked, rad/s", "mean, rad/s", "of it", *WALK, "what limits it")
     return Sheet("Turning on the spot", columns, rows)
-
-
-def course_goals(records: list[Record]) -> list[Goal]:
-    """0.98 of 6 in/s everywhere, in time, and nothing that the checker finds."""
-    slow = sum(not keeps(r) for r in records)
-    out = [Goal(f"courses of {len(records)} on which 0.98 of {SPEED:g} in/s is not kept", slow, 0, "")]
-    done = [r for r in records if r.get("arrived")]
-    if done:
-        out += [
-            Goal("body off its command", max(r["body_mm"] for r in done), 2.0, "mm"),
-            Goal("hands off their holds", max(r["slip_mm"] for r in done), 2.0, "mm"),
-            Goal("99 % of ticks, by the clock", max(r["tick_p99_us"] for r in done), 2000.0, "us"),
-            Goal("99 % of the loop, processor time", max(r["loop_p99_us"] for r in done), 2000.0, "us"),
-            Goal("one over real time, with planning", max(1 / r["real_time_planned"] for r in done), 0.05, ""),
-        ]
-    return out
-
-
-def spin_goals(records: list[Record]) -> list[Goal]:
-    """Three turns at the usual rate."""
-    asked = [r for r in records if "highest" not in r]
-    return (
-        [Goal(f"turns at {RATE:g} rad/s that are not kept", sum(not keeps(r) for r in asked), 0, "")] if asked else []
-    )
 
 
 def _speed(r: Record, key: str, unit: float) -> tuple[str, str, str]:

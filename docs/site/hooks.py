@@ -18,8 +18,8 @@ LINK = re.compile(r"(\]\()([^)#\s]+)([^)\s]*\))")
 
 
 def packages() -> list[str]:
-    """Packages and modules whose names are public."""
-    listed = [file.parent for file in (ROOT / "wbc").glob("*/__init__.py") if "__all__" in file.read_text()]
+    """Packages and modules whose names are public: the packages that import what they offer."""
+    listed = [file.parent for file in (ROOT / "wbc").glob("*/__init__.py") if "from wbc." in file.read_text()]
     names = {folder.name for folder in listed} - INNER | {"tasks", "robots", "shapes", "errors"}
     return ["wbc", *(f"wbc.{name}" for name in sorted(names))]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wbc.analysis.loci.level_surface import zero_surface
+from wbc.analysis.loci.pictures import zero_surface
 from wbc.errors import ShapeError
 
 TICKS = np.linspace(-1.0, 1.0, 41)

@@ -25,7 +25,7 @@ from wbc.analysis import (
     certify,
     published_sets,
 )
-from wbc.analysis.algebra.emptiness import proved_empty
+from wbc.analysis.algebra.deficiency import proved_empty
 from wbc.analysis.algebra.half_angles import HalfAngles
 from wbc.analysis.algebra.points import angle, form_grid, form_value, real_point
 from wbc.analysis.algebra.ring import Coordinate, Poly, TrigRing

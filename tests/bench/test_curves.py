@@ -9,9 +9,8 @@ import pinocchio as pin
 import pytest
 
 from bench import curves, worker
-from bench.curve_report import TITLES, curve_sheets
-from bench.descriptions import roll_pitch_yaw, solid_index
-from bench.goals import curve_goals
+from bench.curve_report import TITLES
+from bench.descriptions import solid_index
 from bench.ours import Ours
 from bench.problems import Case, load
 from bench.reference import Referee
@@ -88,40 +87,3 @@ def test_links_of_the_humanoid_stay_clear_on_the_path(tmp_path: Path) -> None:
     assert len(case.problem.pairs) == 20
     joints = {name: case.q0[7 + k] for k, name in enumerate(case.problem.joints)}
     assert joints["left_shoulder_roll_joint"] == pytest.approx(0.25)
-
-
-def test_rotations_are_written_as_angles() -> None:
-    rng = np.random.default_rng(0)
-    for turn in rng.normal(size=(50, 4)):
-        unit = turn / np.linalg.norm(turn)
-        wanted = pin.Quaternion(unit).toRotationMatrix()
-        np.testing.assert_allclose(pin.rpy.rpyToMatrix(*roll_pitch_yaw(unit.tolist())), wanted, atol=1e-12)
-
-
-def test_tables_and_goals_of_made_up_figures() -> None:
-    one = {
-        "median": 10.0,
-        "p99": 12.0,
-        "ticks": 5,
-        "pairs": None,
-        "position": None,
-        "rotation": None,
-        "clearance": 0.01,
-    }
-    point = {"phases": {"solve": 1.0}, "title": "", "compile": 1.0}
-    made = [
-        point
-        | {"curve": "spheres", "x": 50.0, "label": "50", "contenders": {"wbc": one, "placo": one | {"median": 25.0}}},
-        point
-        | {"curve": "g1", "x": 20.0, "label": "20", "contenders": {"wbc": one, "mink + daqp": one | {"median": 40.0}}},
-    ]
-    found = {goal.text: goal for goal in curve_goals(made)}
-    assert found["panda tick with 50 spheres"].met
-    assert not found["G1 tick, self-collision of 20 pairs, as a fraction of mink + daqp's"].met
-    pages = [sheet.markdown() for sheet in curve_sheets(made)]
-    assert "| 50 | 10.0 | 25.0 (2.5x) |" in pages[0]
-    assert "| 50 | - / 10.00 | - / 10.00 |" in pages[1]
-
-
-def test_sensing_is_a_phase_of_measured_pairs(boxed: Case) -> None:
-    assert {"sense", "python"} <= set(worker.time_phases(Ours(boxed), 5))

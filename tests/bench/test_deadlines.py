@@ -60,30 +60,3 @@ def test_what_is_timed_is_the_same_loop(short: Course, monkeypatch: pytest.Monke
     assert min(spent) > 0
     c = short.controller
     np.testing.assert_allclose(core_of(c).tick.q + course.DT * c.last_command, seen[-1], atol=1e-12)
-
-
-def test_the_table_tells_shares_and_tails() -> None:
-    row = {
-        "cap": 5, "times": {"median": 1.0, "p99": 2.0, "p99.9": 3.0, "max": 4.0}, "shares": {"capped": 0.25},
-        "least": {"median": 0.5, "p99": 0.6, "p99.9": 0.7, "max": 0.8},
-        "error": 0.001, "settled": 0.0005, "margin": -0.002, "iterations": {"median": 1.0, "p99.9": 5.0, "max": 5},
-    }  # fmt: skip
-    sheet = run.sheet("panda", {"rows": [row], "ticks": 9, "constraints": 7, "dofs": 6, "balls": 2})
-    expected = (
-        "cap 5",
-        "1.00",
-        "2.00",
-        "3.00",
-        "4.00",
-        "0.60",
-        "0.70",
-        "0.80",
-        "5",
-        "5",
-        "25.00",
-        "0.00",
-        "1.0",
-        "0.5",
-        "-2.0",
-    )
-    assert sheet.rows == [expected]

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from bench import measured
-from bench.figures import __main__ as command
-from bench.figures import floors, index, pages, store
+from bench.figures import __main__ as command, floors, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
 from bench.sheet import Sheet
 from tests.project.test_floors import FLOORS, WALKING

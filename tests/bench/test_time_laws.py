@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from rich.progress import Progress
 
-from bench.time_laws import __main__ as run
-from bench.time_laws import least_time, raw, states
-from bench.time_laws.goals import goals
+from bench.time_laws import __main__ as run, least_time, raw, states
 from bench.time_laws.tables import sheets
 from tests.trajectory import random_motions as families
 from wbc.trajectory import Law, PolynomialPath, jerk_limited
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +25,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, An
     folder = tmp_path_factory.mktemp("laws")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(least_time, "REFERENCE", 1601)
-        patch.setattr(least_time, "jerk_limited_along", partial(least_time.jerk_limited_along, cells=60))
         run.main(["--problems", "1", "--count", "16", "--processes", "1", "--seed", "3", "--output", str(folder)])
     return (folder / "time_laws.md").read_text(), json.loads((folder / "time_laws.json").read_text())
 
 
-def test_every_part_has_a_table_and_goals(written: tuple[str, dict[str, Any]]) -> None:
+def test_every_part_has_a_table(written: tuple[str, dict[str, Any]]) -> None:
     page, found = written
     assert found["interrupted"] is None
     assert len(found["tables"]) == len(run.QUICK) + 1
@@ -49,13 +39,6 @@ def test_every_part_has_a_table_and_goals(written: tuple[str, dict[str, Any]]) -
         assert table["title"] in page
     assert "toppra 0." in page
     assert "seed 3" in page
-
-
-def test_goals_that_do_not_hang_on_the_clock_are_met(written: tuple[str, dict[str, Any]]) -> None:
-    clocked = ("time for a law", "median above")
-    met = {goal["text"]: goal["met"] for goal in written[1]["goals"] if not any(c in goal["text"] for c in clocked)}
-    assert len(met) > 12
-    assert [text for text, yes in met.items() if not yes] == []
 
 
 def test_ctrl_c_keeps_what_was_measured() -> None:
@@ -71,46 +54,6 @@ def test_ctrl_c_keeps_what_was_measured() -> None:
     assert set(parts) == {"straight"}
     assert 3 <= len(parts["straight"]) < 1000
     assert len(sheets(parts)) == 1
-    assert len(goals(parts)) == 1
-
-
-def test_ctrl_c_ends_a_run_with_its_workers(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "bench.time_laws",
-        "--parts",
-        "straight",
-        "states",
-        "--problems",
-        "2",
-    ]
-    command += ["--count", "10000000", "--processes", "2", "--output", str(tmp_path)]
-    # As on a terminal, where bars show how far it is
-    shown = {**os.environ, "FORCE_COLOR": "1"}
-    process = subprocess.Popen(command, cwd=ROOT, env=shown, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    seen = ""
-    while "states" not in seen:
-        letter = process.stderr.read(1)
-        assert letter, seen
-        seen += letter
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert "Ended by Ctrl-C in: states" in out
-    assert json.loads((tmp_path / "time_laws.json").read_text())["interrupted"] == "states"
-
-
-def test_states_hang_on_the_seed_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Forked, since the interrupted runs above start theirs afresh, which takes a second each
-    fork = multiprocessing.get_context("fork")
-    monkeypatch.setattr(multiprocessing, "get_context", lambda _: fork)
-    one = list(states.random_states(5, 16, 1))
-    other = sorted(states.random_states(5, 16, 2), key=lambda r: families.FAMILIES.index(r["family"]))
-    assert [r["raw"] for r in one] == [r["raw"] for r in other]
-    assert sum(r["states"] for r in one) == 16
-    assert not any(r["ours"] for r in one)
 
 
 @pytest.mark.parametrize("family", families.FAMILIES)

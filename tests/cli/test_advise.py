@@ -20,10 +20,10 @@ def test_advice_on_a_locus() -> None:
     assert out.splitlines()[-1] == "use: tip | beta"
 
 
-def test_the_page_has_the_written_restrictions() -> None:
+def test_restrictions_are_written_as_recorded() -> None:
     code, out, _ = run("restrictions", "spherical_4r")
     assert code == 0
-    assert out.strip() in (Path(__file__).parents[2] / "docs" / "written_restrictions.md").read_text()
+    assert out.strip() in (Path(__file__).parents[1] / "published" / "data" / "written_restrictions.md").read_text()
 
 
 def test_a_survey_of_random_configurations() -> None:

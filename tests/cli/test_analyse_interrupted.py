@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.processes import IN_BACKGROUND
+from tests.repeats import ALL, MORE
 from wbc.cli.app import app
 
 #: The command, with every piece of the subdivision slowed so that there is time to interrupt it
@@ -36,23 +37,14 @@ main()
 """
 
 
-@pytest.mark.parametrize("background", [False, True])
+@pytest.mark.parametrize("background", [False, True] if MORE >= ALL else [False])
 def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool, tmp_path: Path) -> None:
     """SIGINT while boxes are looked at: what is known is told and kept, and the rest is done by the next call. In the
     background of a shell that ignores SIGINT the same with SIGTERM.
     """
     begun, states = tmp_path / "begun", tmp_path / "states"
-    command = [
-        "coordinates",
-        "analyse",
-        "spherical_4r",
-        "--set",
-        "elbow, beta",
-        "--certify",
-        "--resume",
-        str(states),
-        "--data",
-    ]
+    command = ["coordinates", "analyse", "spherical_4r", "--set", "elbow, beta"]
+    command += ["--certify", "--resume", str(states), "--data"]
     cut, whole = tmp_path / "cut.json", tmp_path / "whole.json"
     child = subprocess.Popen(
         [*(IN_BACKGROUND if background else ()), sys.executable, "-c", CHILD, str(begun), *command, str(cut)],

@@ -203,7 +203,7 @@ def test_track_with_holds_and_start(tmp_path: Path) -> None:
         (["walk", "compare", "none.json", "none.json"], "plan: there is no such file"),
         (["study", "none.yaml"], "study: there is no such file"),
         (["study", "--resume", "first"], "resume: there is no such folder, did you mean 'first_'?"),
-        (["coordinates", "drive", "ur5", "--rates", "none.csv"], "path: cannot be read"),
+        (["coordinates", "drive", "ur5", "--rates", "none.csv"], "path: there is no such file"),
         (["ik", "ur5", "--targets", "none.csv"], "targets: there is no such file"),
         (["walk", "drive", "none.csv"], "file: cannot be read"),
         (["track", "--frame", "panda_hand_tpc"], "did you mean 'panda_hand_tcp'?"),

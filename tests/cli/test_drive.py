@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.cli.test_commands import run as wbc_command
+from tests.repeats import ALL, MORE
 from wbc.log import load
 
 run = functools.partial(wbc_command, "coordinates", "drive")
@@ -55,7 +56,7 @@ MODES = {
 ARM = "0.3,0.4,-0.5,1.2,0.7,-0.6,0.9"
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", MODES if MORE >= ALL else ["M1", "M4", "M5", "M7"])
 def test_every_mode_is_driven_from_a_file(mode: str, tmp_path: Path) -> None:
     """15 joints, with a carrier 22: what the mode commands moves, joints that it brakes do not."""
     robot, starts = ("spdm_on_ssrms", (ARM, ARM, ARM, "0.2")) if mode == "M7" else ("spdm", ("0.2", ARM, ARM))

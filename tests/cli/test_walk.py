@@ -22,8 +22,7 @@ from wbc.walking.checker.report import Finding, Report
 from wbc.walking.holds.built_in import plane
 from wbc.walking.log.log import WalkLog
 from wbc.walking.loop.walk import Walk
-from wbc.walking.planner.detours import ALONG, beside
-from wbc.walking.planner.detours import route as detours
+from wbc.walking.planner.detours import ALONG, beside, route as detours
 from wbc.walking.report.figures import CHECKED
 from wbc.walking.run.places import over_holds
 from wbc.walking.run.request import Site

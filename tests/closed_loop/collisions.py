@@ -19,6 +19,7 @@ from tests.closed_loop.eyes import Array, Gaps, Standing, length
 from tests.closed_loop.loop import Loop, Run
 from tests.closed_loop.machines import FEWER, STARTS, anywhere, machine
 from tests.random_robots import unit
+from tests.repeats import repeats
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Shape
@@ -26,6 +27,8 @@ from wbc.tasks import EndEffector, Item, JointLimits, Obstacle
 from wbc.tasks.self_collision import SelfCollision
 
 DT, RATE, TICKS, MARGIN = 0.01, 20.0, 80, 0.01
+#: Random starts of a hand that folds, of which a third comes to the limit
+FOLDED = repeats(5)
 
 #: How much nearer than the row's points others may be one tick later, and the tolerance of Coal's iterations [m]
 JUMP = 1e-3
@@ -160,7 +163,7 @@ def beyond(loop: Loop, thing: Thing, gaps: Gaps, rng: np.random.Generator) -> tu
     raise AssertionError("the obstacle is always in the way")
 
 
-def folded(loop: Loop, name: str, starts: int = FEWER, seed: int = 32) -> Figures:
+def folded(loop: Loop, name: str, starts: int = FOLDED, seed: int = 32) -> Figures:
     """The hand is pulled to the origin of the link that it must not touch."""
     rng, shapes = np.random.default_rng(seed), loop.robot.shapes
     pairs = self_pairs(loop.known, loop.frames)

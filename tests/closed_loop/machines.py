@@ -22,7 +22,7 @@ CONSTRAINT_ROBOTS = ("panda", "talos") if MORE < ALL else ("panda", "ur5", "talo
 
 #: Random starts of a check, and of one that repeats what another shows, or whose robot takes longer; so many show every
 #: mutation
-STARTS, FEWER = repeats(8), repeats(5)
+STARTS, FEWER = repeats(5), repeats(3)
 
 
 @cache

@@ -5,8 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from wbc.tasks.braking import braking_bound
 
@@ -46,13 +45,6 @@ def test_constant_ticks_exact_largest_speed(a: float, dt: float, x: float) -> No
     lengths = np.full(enough(1.001 * v, a, dt), dt)
     assert stopping_distance(v, a, lengths) <= d * (1 + 1e-12)
     assert stopping_distance(v * (1 + 1e-6), a, lengths) > d
-
-
-@given(a=accelerations, dt=ticks, x=distances)
-def test_constant_ticks_closed_form_with_n(a: float, dt: float, x: float) -> None:
-    d = x * a * dt**2
-    n = max(1, np.ceil((np.sqrt(1 + 8 * d / (a * dt**2)) - 1) / 2))
-    assert bound(d, a, dt, shortest=dt) == pytest.approx(d / (n * dt) + (n - 1) * a * dt / 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("ticks_to_stop", [1, 2, 3, 10, 1000, 10**6])
@@ -98,12 +90,6 @@ def test_ticks_of_a_least_length_stop_in_time(a: float, shortest: float, ratio: 
         assert stopping_distance(v, a, np.concatenate([[dt], later])) <= d * (1 + 1e-12)
     worst = np.concatenate([[dt], np.full(count + 3, shortest)])
     assert stopping_distance(v * (1 + 1e-6), a, worst) > d
-
-
-@given(a=accelerations, dt=ticks, x=distances, shortest=st.sampled_from([None, 1e-4, 0.01]))
-def test_bound_grows_with_the_distance(a: float, dt: float, x: float, shortest: float | None) -> None:
-    d = x * a * dt**2
-    assert 0.0 < bound(d, a, dt, shortest) <= bound(d * (1 + 1e-9), a, dt, shortest)
 
 
 @pytest.mark.parametrize("shortest", [None, 0.005])

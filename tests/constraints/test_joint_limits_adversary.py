@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.repeats import repeats
 from wbc.tasks.joint_limits import allowed_interval
@@ -153,14 +152,6 @@ def test_many_equal_ticks(shortest: float | None) -> None:
     worst = attack(draw(np.random.default_rng(1), 35), np.full(TICKS, 0.005), shortest, seed=2)
     check(worst)
     assert worst["near"] < 1e-6, "joints that are pushed outwards do come to their limits"
-
-
-@pytest.mark.parametrize("shortest", [None, 0.001])
-def test_many_ticks_of_changing_length(shortest: float | None) -> None:
-    """Long, short, and mixed ticks: 1 to 8 ms, jumping between the ends half of the time."""
-    rng = np.random.default_rng(3)
-    lengths = np.where(rng.random(TICKS) < 0.5, rng.choice([0.001, 0.008], TICKS), rng.uniform(0.001, 0.008, TICKS))
-    check(attack(draw(rng, 35), lengths, shortest, seed=4))
 
 
 @settings(max_examples=8)

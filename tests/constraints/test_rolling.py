@@ -64,15 +64,6 @@ def test_wheels_turn_as_in_the_textbook(name: str) -> None:
         assert not here["upper"].any()
 
 
-def test_differential_drive_cannot_go_sideways() -> None:
-    known = vehicle("tiago")
-    rows = numbers(Rolling(known.wheels), known.robot)(known.robot.neutral, LEVEL)["matrix"]
-    wheels = [known.robot.dofs(wheel.joint).start for wheel in known.wheels]
-    assert np.linalg.matrix_rank(rows, tol=1e-9) == 3
-    free = np.linalg.svd(rows[:, [0, 1, 2, *wheels]])[2][3:]
-    assert np.abs(free[:, 1]).max() < 1e-9
-
-
 def test_rows_labels_and_order() -> None:
     tiago, legs = vehicle("tiago"), vehicle("centauro")
     labels = [row.label for row in Rolling(tiago.wheels).rows(tiago.robot)]

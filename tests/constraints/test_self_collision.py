@@ -25,8 +25,7 @@ from wbc.proximity import MAX_PAIRS, Body, distances
 from wbc.robot import Robot
 from wbc.robot.pairs.link_pairs import link_pairs, neighbours
 from wbc.shapes import Box, Capsule, Convex, Cylinder, PlacedShape, Sphere
-from wbc.tasks import JointLimits, Obstacle, Posture
-from wbc.tasks import self_collision as module
+from wbc.tasks import JointLimits, Obstacle, Posture, self_collision as module
 from wbc.tasks.self_collision import SelfCollision
 
 #: A link of the Panda without shapes

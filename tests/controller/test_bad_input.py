@@ -13,11 +13,14 @@ import pytest
 
 from tests.controller.stacks import DT, robot
 from tests.controller.twins import BACKENDS, POSE, TURN, make, next_ticks, prepare, state
+from tests.repeats import ALL, MORE, covering
 from wbc import Controller, WbcError
 from wbc.controller.handle import UnknownValueError
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 
 SKEWED = TURN + 1e-3 * np.eye(3)
+#: Of calls before the first tick every so many is tried
+FRESH = 1 if MORE >= ALL else 3
 NAN, INF = np.full(7, np.nan), np.array([0.0, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -285,23 +288,22 @@ def check_fresh(name: str, case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    ("case", "backend"), [(case, b) for case in PANDA for b in (BACKENDS if case in STEP else BACKENDS[:1])]
+    ("case", "backend"), [*covering(STEP, BACKENDS), *((k, BACKENDS[0]) for k in PANDA if k not in STEP)]
 )
 def test_refused_after_some_ticks(case: str, backend: str) -> None:
     check_running("panda", backend, PANDA[case])
 
 
-@pytest.mark.parametrize("case", [k for k in PANDA if not k.startswith("name")])
+@pytest.mark.parametrize("case", [k for k in PANDA if not k.startswith("name")][::FRESH])
 def test_refused_before_the_first_tick(case: str) -> None:
     check_fresh("panda", PANDA[case])
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-@pytest.mark.parametrize("case", MANIFOLD)
+@pytest.mark.parametrize(("case", "backend"), covering(MANIFOLD, BACKENDS))
 def test_off_the_manifold(case: str, backend: str) -> None:
     check_running(MANIFOLD[case][0], backend, MANIFOLD[case][1])
 
 
-@pytest.mark.parametrize("case", MANIFOLD)
+@pytest.mark.parametrize("case", [*MANIFOLD][::FRESH])
 def test_off_the_manifold_before_the_first_tick(case: str) -> None:
     check_fresh(*MANIFOLD[case])

@@ -14,9 +14,9 @@ import pytest
 
 import wbc
 from tests.backends import COMPILED, IN_PYTHON, way
-from tests.controller.stacks import DT, FRAMES, controller, inside, robot
+from tests.controller.stacks import DT, controller, inside, robot
 from wbc import Controller, Stack
-from wbc.tasks import EndEffector, JointLimits, Posture
+from wbc.tasks import JointLimits, Posture
 
 BACKENDS = (IN_PYTHON, COMPILED)
 
@@ -70,45 +70,6 @@ def test_the_same_inputs_give_the_same_bits_in_any_process() -> None:
 
 
 # --- the loop ---------------------------------------------------------------------------------------
-
-
-def reachable(name: str, rng: np.random.Generator) -> tuple[np.ndarray, pin.SE3]:
-    """A start, and where the tip is at another configuration nearby."""
-    bot = robot(name)
-    q = inside(bot, rng, 0.3)
-    goal = pin.integrate(bot.model, q, 0.3 * rng.uniform(-1.0, 1.0, bot.nv))
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, goal)
-    return q, data.oMf[bot.model.getFrameId(FRAMES[name].tip)].copy()
-
-
-def distance(name: str, q: np.ndarray, goal: pin.SE3) -> float:
-    bot = robot(name)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    tip = data.oMf[bot.model.getFrameId(FRAMES[name].tip)]
-    return float(np.linalg.norm(pin.log6(goal.actInv(tip)).vector))
-
-
-@pytest.mark.parametrize("name", ["panda", "kinova", "talos"])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_open_loop_reaches_the_target(name: str, seed: int) -> None:
-    """q is what pin.integrate makes of the commands; unbounded joints and a floating base included."""
-    bot = robot(name)
-    stack = Stack(bot, DT).add(EndEffector(FRAMES[name].tip, gain=5.0), name="hand")
-    stack.add(Posture(), name="posture", weight=1e-6).add(JointLimits(), name="limits")
-    one = stack.compile(backend=COMPILED)
-    q, goal = reachable(name, np.random.default_rng(seed))
-    one["hand"].target = goal
-    start, last = distance(name, q, goal), np.zeros(bot.nv)
-    for _ in range(500):
-        step = one.step(q)
-        assert step.status == "solved"
-        assert (np.abs(step.v - last) <= bot.limits.acceleration * DT + 1e-9).all()
-        last, q = step.v, pin.integrate(bot.model, q, DT * step.v)
-    assert start > 0.05
-    assert distance(name, q, goal) < 1e-3 * start
-    one.stack.robot.configuration("q", q)
 
 
 def test_a_robot_of_one_joint() -> None:

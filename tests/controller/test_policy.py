@@ -13,6 +13,7 @@ import wbc
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
+from tests.repeats import covering
 from wbc.api import Controller
 from wbc.controller import Policy, Status, core_of
 from wbc.controller.policy import CHAIN
@@ -72,8 +73,7 @@ def spread(tick: Controller, monkeypatch: pytest.MonkeyPatch, link: str) -> None
     monkeypatch.setattr(core_of(tick), "call", unsound(tick, 1))
 
 
-@pytest.mark.parametrize("link", CHAIN)
-@pytest.mark.parametrize("conflict", [False, True])
+@pytest.mark.parametrize(("link", "conflict"), covering(CHAIN, [False, True]))
 def test_every_link_gives_a_certified_answer(
     tick: Controller, monkeypatch: pytest.MonkeyPatch, link: str, conflict: bool
 ) -> None:

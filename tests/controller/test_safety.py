@@ -9,11 +9,10 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.backends import COMPILED, IN_PYTHON, way
-from tests.controller.stacks import DT, FRAMES, aim, controller, near_limits, quarrel, random_configuration, robot
+from tests.controller.stacks import DT, FRAMES, controller, near_limits, quarrel, robot
 from tests.controller.test_sacrifice import within_actuators
 from wbc.api import Stack
 from wbc.controller import Status, Step, core_of
@@ -63,20 +62,6 @@ def test_any_state_and_any_target(seed: int, reach: float, speed: float, factor:
         assert np.isfinite(numbers(step)).all()
         within_actuators(step, v, dt, bot)
         v, q = step.v.copy(), q + step.v * dt
-
-
-@settings(max_examples=25)
-@given(seed=seeds)
-def test_any_state_with_every_item_on_the_virtual_machine(seed: int) -> None:
-    tick, rng = controller("arm", "ur5"), np.random.default_rng(seed)
-    bot = tick.stack.robot
-    q, v = near_limits(bot, rng), rng.normal(size=bot.nv)
-    tick.reset(q, v)
-    aim(tick, rng)
-    tick["hand"].target = pin.SE3(pin.exp3(rng.normal(0.0, 3.0, 3)), 10.0 ** rng.uniform(-1, 6) * rng.normal(size=3))
-    step = tick.step(q, v)
-    assert np.isfinite(numbers(step)).all()
-    within_actuators(step, v, DT, bot)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -223,15 +208,3 @@ def test_bounds_that_cross_by_rounding_only_are_one_value(backend: str) -> None:
     step = tick.step(robot("panda").neutral)
     assert step.status is Status.SOLVED
     assert step.v[2] == pytest.approx(0.03, abs=1e-11)
-
-
-def test_random_robot_states_with_free_bases() -> None:
-    tick, rng = controller("humanoid", backend=COMPILED), np.random.default_rng(6)
-    bot = tick.stack.robot
-    for _ in range(40):
-        q, v = random_configuration(bot, rng), rng.normal(size=bot.nv)
-        tick.reset(q, v)
-        aim(tick, rng)
-        step = tick.step(q, v)
-        assert np.isfinite(numbers(step)).all()
-        within_actuators(step, v, DT, bot)

@@ -69,20 +69,6 @@ def test_dt_counts_for_its_own_step(backend: str) -> None:
     assert same(one.step(START), twin.step(START, dt=DT))
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_dt_enters_what_a_margin_looks_ahead_to(backend: str) -> None:
-    """h(q + v dt) by Pinocchio, for the shortest and the longest step."""
-    one, model = arm(backend), robot("panda").model
-    one.step(START)
-    one["hand"].target = FAR
-    for dt in one.stack.dt_range:
-        one.reset(START)
-        step = one.step(START, dt=dt)
-        after = one.step(pin.integrate(model, START, dt * step.v))
-        np.testing.assert_allclose(step.margins_ahead["ball"], after.margins["ball"], atol=1e-12)
-        assert np.abs(step.margins_ahead["ball"] - step.margins["ball"]).max() > 1e-6
-
-
 # --- reset ------------------------------------------------------------------------------------------
 
 
@@ -132,14 +118,6 @@ def test_reset_before_the_first_step(backend: str) -> None:
     np.testing.assert_array_equal(one["posture"].target, START)
     assert same(one.step(START), twin.step(START))
     np.testing.assert_allclose(one["hand"].target.homogeneous, twin["hand"].target.homogeneous)
-
-
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_reset_gives_the_velocity_that_accelerations_count_from(backend: str) -> None:
-    one = pulled(arm(backend))
-    moving = np.linspace(-0.5, 0.5, 7)
-    one.reset(START, moving)
-    np.testing.assert_allclose(one.step(START).v, moving + PULL * ACCELERATION * DT, atol=1e-9)
 
 
 # --- Step -------------------------------------------------------------------------------------------

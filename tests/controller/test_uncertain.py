@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.optimize import linprog
 
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
 from tests.soak import machines, stacks
+from tests.soak.both import feasible
 from tests.soak.levels import with_levels
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
 from wbc.qp.polish import polish
-from wbc.qp.problem import QP, QPSolution
+from wbc.qp.problem import QPSolution
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tasks import EndEffector, FrameVelocityLimit, JointLimits, Posture, WorkspacePolyhedron
@@ -81,17 +81,6 @@ def provoke(controller: Controller, rng: np.random.Generator) -> None:
     controller["hand"].target = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(0.0, 0.5, 3))
     controller["elbow"].target = rng.normal(0.0, 0.5, 3)
     core_of(controller).begin(q, rng.normal(0.0, 0.3, 7))
-
-
-def feasible(qp: QP) -> bool:
-    """Whether a linear program finds a point that keeps all hard rows."""
-    qp = qp.hard()
-    n, ends = qp.n, (qp.lower[qp.n :], qp.upper[qp.n :])
-    rows = np.vstack((qp.A[np.isfinite(ends[1])], -qp.A[np.isfinite(ends[0])]))
-    sides = np.concatenate((ends[1][np.isfinite(ends[1])], -ends[0][np.isfinite(ends[0])]))
-    box = list(zip(qp.lower[:n], qp.upper[:n], strict=True))
-    found = linprog(np.zeros(n), A_ub=rows if len(rows) else None, b_ub=sides if len(rows) else None, bounds=box)
-    return bool(found.status == 0)
 
 
 def test_weights_of_every_size_are_solved_within_the_stated_bound() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.repeats import ALL, MORE
 from wbc.coordinates import (
     Adviser,
     Arm,
@@ -91,7 +92,7 @@ def test_random_arms_have_modes_whose_pairs_determine_their_joints(seed: int) ->
     assert len(first.constraint) == spare
 
 
-@pytest.mark.parametrize("seed", [0, 3, 5, 8])
+@pytest.mark.parametrize("seed", [0, 3, 5, 8][:: 1 if MORE >= ALL else 2])
 def test_an_arm_of_another_size_has_the_same_modes_and_advice(seed: int) -> None:
     """In millimetres, and as small as a watch: the same pairs, and ranks that are lost at the same places."""
     arms = [random_arm(seed, scale) for scale in (1.0, 1e3, 1e-2)]
@@ -108,7 +109,7 @@ def test_an_arm_of_another_size_has_the_same_modes_and_advice(seed: int) -> None
         assert [one.sigma for one in same] == pytest.approx([same[0].sigma] * 3, rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 4, 6])
+@pytest.mark.parametrize("seed", [1, 2, 4, 6][:: 1 if MORE >= ALL else 2])
 def test_a_random_arm_is_driven_and_tells_what_it_loses(seed: int) -> None:
     """From a regular start every pair of M1 and M2 moves as it is told, or says why it does not."""
     arm = random_arm(seed)

@@ -20,7 +20,7 @@ from wbc.coordinates import (
     parts,
 )
 from wbc.errors import PicklingError
-from wbc.replaying.unpickle import _Careful
+from wbc.replaying.ticks import _Careful
 
 ARM = parts("spherical_4r").arms[0]
 

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import wbc.robots
 from tests.constraints.robots import robot as limited_robot
-from tests.repeats import ALL, MORE
+from tests.repeats import ALL, MORE, covering
 from wbc.api import Controller, Stack
 from wbc.controller import Policy, Step
 from wbc.explain.reason import Reason
@@ -54,8 +54,7 @@ def reason(step: Step, task: str = "hand") -> Reason:
     return next(each for each in step.explain().reasons if each.task == task)
 
 
-@pytest.mark.parametrize("name", ARMS)
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("name", "seed"), covering(ARMS, [0, 1]))
 def test_a_stretched_arm_is_singular_towards_itself_and_out_of_reach_beyond(name: str, seed: int) -> None:
     robot, tip, tick = arm(name)
     random = np.random.default_rng(seed)

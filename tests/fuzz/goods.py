@@ -18,8 +18,7 @@ from wbc import shapes, tasks, trajectory
 from wbc.errors import CommandError
 from wbc.robot import Robot
 from wbc.robots import DHRow, LinkPair, SelfPairs, from_dh, operator_arm, walker
-from wbc.trajectory import Law
-from wbc.trajectory import Path as Way
+from wbc.trajectory import Law, Path as Way
 
 
 class Goods:

@@ -87,12 +87,13 @@ def _of_modules() -> Iterator[Callee]:
     for module in MODULES:
         found = importlib.import_module(module)
         for name in getattr(found, "__all__", None) or [
-            k for k, v in vars(found).items() if getattr(v, "__module__", "") == module and not k.startswith("_")
+            k for k, v in vars(found).items() if getattr(v, "__module__", "").startswith(module) and k[0] != "_"
         ]:
             value = getattr(found, name)
             # a protocol is for type checkers: it has no objects
             protocol = getattr(value, "_is_protocol", False)
-            if callable(value) and not protocol and name not in MADE and id(value) not in seen:
+            own = getattr(value, "__module__", "").startswith("wbc")
+            if callable(value) and own and not protocol and name not in MADE and id(value) not in seen:
                 seen.add(id(value))
                 # "load" is the name of two functions
                 key = name if inspect.isclass(value) else f"{module.removeprefix('wbc.')}.{name}"

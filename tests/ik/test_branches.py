@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 from tests.ik.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
+from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.ik import InverseKinematics
 from wbc.tasks import Damping, Posture
@@ -92,7 +93,7 @@ def test_the_closed_form_is_of_this_robot() -> None:
 
 def test_all_branches_of_the_ur5_are_found() -> None:
     robot, rng, ik, counts = arm("ur5"), np.random.default_rng(1), solver("ur5"), []
-    for _ in range(10):
+    for _ in range(repeats(5)):
         q = rng.uniform(-np.pi, np.pi, 6)
         ik["hand"].target = tip(robot, q, "tool0")
         found = ik.branches(robot.neutral, budget=None)
@@ -113,7 +114,7 @@ def test_all_branches_of_the_ur5_are_found() -> None:
                 assert not (allowed & nearer).any()
         assert found.hits.min() >= 1
         assert found.complete
-    assert counts.count(8) >= 5
+    assert counts.count(8) >= 2
 
 
 def test_answers_are_sorted_and_of_one_seed() -> None:
@@ -147,7 +148,7 @@ def test_on_a_redundant_arm_they_are_where_the_wishes_rest() -> None:
     robot, name = arm("panda"), TIPS["panda"]
     ik, low, high = decided(), robot.limits.position_lower, robot.limits.position_upper
     ik["posture"].target = robot.neutral
-    for seed in range(4):
+    for seed in range(repeats(2)):
         goal = tip(robot, random_q(robot, np.random.default_rng(seed)), name)
         ik["hand"].target = goal
         found = ik.branches(robot.neutral, budget=None)

@@ -31,7 +31,7 @@ from wbc.program import (
     Runner,
     Wait,
 )
-from wbc.program.reference import ACCELERATION
+from wbc.program.hand import ACCELERATION
 
 DT = 0.02
 START = np.array([0.0, -0.3, 0.0, -2.0, 0.0, 1.8, 0.7])

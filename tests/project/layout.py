@@ -19,9 +19,15 @@ def sources(*folders: str) -> list[Path]:
 
 
 @functools.cache
+def tree(path: Path) -> ast.Module:
+    """The parsed file; all rules read the same."""
+    return ast.parse(path.read_text())
+
+
+@functools.cache
 def nodes(path: Path) -> tuple[ast.AST, ...]:
-    """Every node of the parsed file, the module first; all rules read the same."""
-    return tuple(ast.walk(ast.parse(path.read_text())))
+    """Its nodes, the module first."""
+    return tuple(ast.walk(tree(path)))
 
 
 def relative(path: Path) -> str:

@@ -19,6 +19,7 @@ FLOORS = {
     "wbc.cores": 0,
     "wbc.interrupts": 0,
     "wbc.lazy": 0,
+    "wbc.multibody": 0,
     "wbc.pickling": 0,
     "wbc.rotations": 0,
     "wbc.validation": 0,
@@ -61,6 +62,7 @@ FLOORS = {
     "wbc.track": 12,
     "wbc.published": 12,
     "wbc.walking": 12,
+    "wbc.climb": 12,
     "wbc.pages": 12,
     "wbc.replaying": 12,
     "wbc.study": 13,
@@ -88,7 +90,7 @@ ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0, 1}}
 #: A module in a string, as importlib takes it; f-strings end where their first value begins
 NAMED = re.compile(r"wbc(\.[a-z_]+)+\.?")
 #: Modules in strings that are not imported by who names them: classes that a pickle may ask for
-LISTED = {("wbc.replaying.unpickle", "wbc.coordinates"), ("wbc.replaying.unpickle", "wbc.analysis")}
+LISTED = {("wbc.replaying.ticks", "wbc.coordinates"), ("wbc.replaying.ticks", "wbc.analysis")}
 #: What a controller and its steps offer and packages above do: these are imported when somebody asks for it
 LISTED |= {("wbc.controller.hooks", f"wbc.{package}") for package in ("batch", "explain", "export", "ik", "record")}
 #: The package's own __init__ collects names from every floor
@@ -317,3 +319,16 @@ def test_relative_imports_are_not_used() -> None:
     ]
     assert relative_imports == []
     assert (ROOT / "wbc").is_dir()
+
+
+def test_pinocchio_is_imported_in_one_place() -> None:
+    """Where it is not installed, ``wbc.multibody.pin`` is the package's own."""
+    places = {
+        module_name(path)
+        for path in PACKAGE_FILES
+        for node in telling(path)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in ([a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""])
+        if name.split(".")[0] == "pinocchio"
+    }
+    assert places == {"wbc.multibody"}

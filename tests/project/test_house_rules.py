@@ -3,51 +3,55 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from pathlib import Path
 
-import pytest
+from tests.project.layout import ROOT, relative, sources, tree
 
-from tests.project.layout import ROOT
-
-FILES = [
-    file
-    for folder in ("wbc", "tasks", "robots")
-    for file in sorted((ROOT / folder).rglob("*.py"))
-    if "walking" not in file.parts
-]
-TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in FILES}
+FILES = [file for file in sources("wbc", "tasks", "robots") if "walking" not in file.parts]
+CLASS = re.compile(r"\s*class (\w+)[:([]")
 
 
-def _constants(tree: ast.Module) -> dict[str, str]:
+def _constants(file: Path) -> dict[str, str]:
     """Name -> value, as written, of the capitals that a file sets alone."""
     out: dict[str, str] = {}
-    for node in tree.body:
+    for node in tree(file).body:
         if isinstance(node, ast.Assign) and isinstance(target := node.targets[0], ast.Name) and target.id.isupper():
             out[target.id] = ast.unparse(node.value)
     return out
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(ROOT)))
-def test_one_constant_a_line(file: Path) -> None:
-    for node in TREES[file].body:
-        if isinstance(node, ast.Assign) and isinstance(target := node.targets[0], ast.Tuple):
-            capitals = [each.id for each in target.elts if isinstance(each, ast.Name) and each.id.isupper()]
-            assert not capitals, f"line {node.lineno}: {', '.join(capitals)}"
+def test_one_constant_a_line() -> None:
+    for file in FILES:
+        for node in tree(file).body:
+            if isinstance(node, ast.Assign) and isinstance(target := node.targets[0], ast.Tuple):
+                capitals = [each.id for each in target.elts if isinstance(each, ast.Name) and each.id.isupper()]
+                assert not capitals, f"{relative(file)}:{node.lineno}: {', '.join(capitals)}"
 
 
 def test_a_constant_means_one_thing_in_a_package() -> None:
     meanings: dict[tuple[Path, str], set[str]] = defaultdict(set)
-    for file, tree in TREES.items():
-        for name, value in _constants(tree).items():
+    for file in FILES:
+        for name, value in _constants(file).items():
             meanings[file.parent.relative_to(ROOT), name].add(value)
     assert not [(str(package), name, *values) for (package, name), values in meanings.items() if len(values) > 1]
 
 
 def test_a_class_name_is_used_once() -> None:
     places: dict[str, list[str]] = defaultdict(list)
-    for file, tree in TREES.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ClassDef):
-                places[node.name.lstrip("_")].append(f"{file.relative_to(ROOT)}:{node.lineno}")
-    assert not {name: found for name, found in places.items() if len(found) > 1}
+    for file in FILES:
+        for line, text in enumerate(file.read_text().splitlines(), 1):
+            if found := CLASS.match(text):
+                places[found[1].lstrip("_")].append(f"{relative(file)}:{line}")
+    assert not {name: where for name, where in places.items() if len(where) > 1}
+
+
+def test_a_call_by_position_has_six_arguments_at_most() -> None:
+    """More are a value object, or options that are named where it is called; Pinocchio's interface has more."""
+    for file in (file for file in FILES if "multibody" not in file.parts):
+        for node in ast.walk(tree(file)):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                arguments = (*node.args.posonlyargs, *node.args.args)
+                given = [each.arg for each in arguments if each.arg not in ("self", "cls")]
+                assert len(given) <= 6, f"{relative(file)}:{node.lineno}: {node.name}({', '.join(given)})"

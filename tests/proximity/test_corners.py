@@ -14,8 +14,7 @@ from wbc.errors import RangeError
 from wbc.proximity import FAR, Body, PairSensor
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Sphere
-from wbc.shapes.convex import CORNERS as HULL_CORNERS
-from wbc.shapes.convex import spread
+from wbc.shapes.convex import CORNERS as HULL_CORNERS, spread
 
 CORNERS = 4
 

@@ -21,6 +21,7 @@ from wbc.published.ikor import (
     Switch,
     airarm,
     arc_from,
+    files as ikor_files,
     hermies,
     line_to,
     machine_of,
@@ -28,11 +29,9 @@ from wbc.published.ikor import (
     posed,
     straight,
 )
-from wbc.published.ikor import files as ikor_files
-from wbc.published.ikor.criteria import step_criterion
 from wbc.published.ikor.lines import INCREMENTS, rotation_of
 from wbc.published.ikor.polygons import convex_parts, from_polygon
-from wbc.published.ikor.settings import AXES, CRITERIA, DT
+from wbc.published.ikor.settings import AXES, CRITERIA, DT, step_criterion
 
 FLAT = ("x", "y")
 

@@ -33,6 +33,7 @@ from wbc.published.ikor import (
     airarm,
     case,
     differences,
+    files as ikor_files,
     film,
     hermies,
     line_to,
@@ -42,7 +43,6 @@ from wbc.published.ikor import (
     straight,
     without_platform,
 )
-from wbc.published.ikor import files as ikor_files
 from wbc.published.ikor.avoidance import gaps
 from wbc.published.ikor.cases import BETWEEN, unmatched
 from wbc.published.ikor.legacy import legacy_hermies

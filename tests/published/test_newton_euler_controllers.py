@@ -328,7 +328,7 @@ def test_n9_any_relative_degree() -> None:
     B, C, D = ca.SX.zeros(6, 4), ca.vertcat(x[0] * x[1], x[0] + t, x[1], x[3]), ca.SX.zeros(4, 4)
     B[0, 1], B[2, 2], B[5, 3], D[0, 0] = 2 + ca.cos(x[1]), 1.5, 1 + x[0] ** 2, 3.0
     poles = ((), (-2.0,), (-1 + 2j, -1 - 2j), (-1.0, -2.0, -3.0))
-    law = Decoupling(x, t, A, B, C, D, poles)
+    law = Decoupling(x, t, A, B, C, D, poles=poles)
     assert law.degrees == [0, 1, 2, 3]
     function = ca.Function("f", [x, t], [A, B, C, D])
     state, v, h = np.array([0.3, -0.2, 0.5, 0.1, 0.4, -0.3]), np.array([0.7, -0.5, 0.3, 0.6]), 1e-3
@@ -365,7 +365,7 @@ def test_n9_arm_by_the_general_law() -> None:
     D = 0.018 + 2.51 + m3 * out**2
     c = ca.vertcat(-out * m3 * (2 * x[2] * x[3] - GRAVITY * ca.sin(x[0])) / D, out * x[2] ** 2 - GRAVITY * ca.cos(x[0]))
     A, B = ca.vertcat(x[2:], c), ca.vertcat(ca.SX.zeros(2, 2), ca.diag(ca.vertcat(1 / D, 1 / m3)))
-    law = Decoupling(x, t, A, B, x[:2], ca.SX.zeros(2, 2), ((-100, -100),) * 2)
+    law = Decoupling(x, t, A, B, x[:2], ca.SX.zeros(2, 2), poles=((-100, -100),) * 2)
     assert law.degrees == [2, 2]
     for k in (0, 30, 99):
         q, v, _ = at(k)
@@ -565,8 +565,8 @@ def test_more_bad_input() -> None:
         equations(SerialChain((Link(*LINK), needle), z, x), np.zeros(2), np.zeros(2)).acceleration(np.zeros(2))
     s, t = ca.SX.sym("x", 2), ca.SX.sym("t")
     with pytest.raises(RangeError, match="no input reaches"):
-        Decoupling(s, t, ca.vertcat(s[0], s[1]), ca.DM([0, 1]), s[0], ca.SX.zeros(1, 1), ((),))
-    law = Decoupling(s, t, ca.vertcat(s[1], 0), ca.vertcat(0, s[0]), s[0], ca.SX.zeros(1, 1), ((-1, -1),))
+        Decoupling(s, t, ca.vertcat(s[0], s[1]), ca.DM([0, 1]), s[0], ca.SX.zeros(1, 1), poles=((),))
+    law = Decoupling(s, t, ca.vertcat(s[1], 0), ca.vertcat(0, s[0]), s[0], ca.SX.zeros(1, 1), poles=((-1, -1),))
     with pytest.raises(RangeError, match="decouple"):
         law.input(np.zeros(2), np.zeros(1))
     with pytest.raises(RangeError, match="ran away"):

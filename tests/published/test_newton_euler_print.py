@@ -206,7 +206,9 @@ def test_c128_sign_of_gravity() -> None:
 def test_sign_of_g_in_the_decoupling_law() -> None:
     """G = D*^-1 Lambda: with a minus, as the smeared print can be read, y'' + a1 y' + a0 y = -a0 v."""
     x, t = ca.SX.sym("x", 2), ca.SX.sym("t")
-    law = Decoupling(x, t, ca.vertcat(x[1], -ca.sin(x[0])), ca.vertcat(0, 2), x[0], ca.SX.zeros(1, 1), ((-100, -100),))
+    law = Decoupling(
+        x, t, ca.vertcat(x[1], -ca.sin(x[0])), ca.vertcat(0, 2), x[0], ca.SX.zeros(1, 1), poles=((-100, -100),)
+    )
     state, v = np.array([0.3, -2.0]), np.array([0.5])
     second = -np.sin(0.3) + 2 * law.input(state, v)[0]
     assert second + 200 * state[1] + 1e4 * state[0] == pytest.approx(1e4 * v[0])

@@ -17,7 +17,7 @@ import pytest
 from tests.evaluation import quick
 from wbc.coordinates import ClosedForm, CoordinatePair, closed_form, expressions, mode_pairs, parts, restriction_table
 
-PAGE = (Path(__file__).parents[2] / "docs" / "written_restrictions.md").read_text()
+PAGE = (Path(__file__).parent / "data" / "written_restrictions.md").read_text()
 ROBOTS = ("planar_3r", "spherical_4r", "ssrms_simplified", "ssrms", "spdm_arm_simplified", "spdm_arm", "spdm")
 Function = Callable[[np.ndarray], float]
 #: Steps of a way through joint space on which zeros are looked for

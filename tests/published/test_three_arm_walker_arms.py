@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wbc.published.three_arm_walker.literal import joint_rates, saturated
 from wbc.published.three_arm_walker.machine import arm
 from wbc.published.three_arm_walker.machine.calibration import Variant
-from wbc.published.three_arm_walker.machine.rates import joint_rates, saturated
 
 SHOULDER_AND_WRIST: tuple[Variant, ...] = ("listing", "text")
 

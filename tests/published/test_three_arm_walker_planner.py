@@ -13,10 +13,9 @@ import pytest
 
 from tests.published.three_arms import INCH
 from wbc.published.three_arm_walker import WalkerCalibration
-from wbc.published.three_arm_walker.gait.gait import Gait
+from wbc.published.three_arm_walker.gait.gait import Gait, swing_poses
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
-from wbc.published.three_arm_walker.gait.swing import swing_poses
 from wbc.published.three_arm_walker.machine import grid
 from wbc.published.three_arm_walker.machine.body import body_twist
 from wbc.published.three_arm_walker.machine.grid import Place, Terrain, frame

@@ -11,8 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.published.via_walker import place
 from wbc.trajectory import Law, via_points

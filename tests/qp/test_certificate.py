@@ -7,7 +7,7 @@ import pytest
 
 from tests.judges.exact_qp import reference
 from tests.qp.samples import SIZES, WEIGHTS, whole_body
-from tests.repeats import repeats
+from tests.repeats import covering, repeats
 from wbc.qp import QP, QPSolution, certify, make_solver
 from wbc.qp.polish import polish
 
@@ -28,8 +28,7 @@ def disturbed(rng: np.random.Generator, answer: QPSolution) -> list[QPSolution]:
     return out
 
 
-@pytest.mark.parametrize("weight", WEIGHTS)
-@pytest.mark.parametrize("shape", SIZES, ids=str)
+@pytest.mark.parametrize(("shape", "weight"), covering(SIZES, WEIGHTS), ids=str)
 def test_bound_is_never_exceeded(shape, weight):
     rng = np.random.default_rng([shape[0], shape[3], int(1e6 * weight)])
     solver = make_solver("daqp", shape[0], shape[2] + shape[3])

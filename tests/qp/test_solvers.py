@@ -7,6 +7,7 @@ import pytest
 
 from tests.qp.problems import RECORDS, quadprog_solution
 from tests.qp.samples import SIZES, WEIGHTS, whole_body
+from tests.repeats import covering
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, SolverError, UnknownNameError
 from wbc.qp import QP, available_solvers, certify, make_solver
 from wbc.qp.solvers.conic import Conic
@@ -36,8 +37,7 @@ def test_solvers_agree_on_recorded_ticks(robot, weight):
     assert active > 3 * len(ticks)  # the record does exercise bounds
 
 
-@pytest.mark.parametrize("weight", WEIGHTS)
-@pytest.mark.parametrize("shape", SIZES, ids=str)
+@pytest.mark.parametrize(("shape", "weight"), covering(SIZES, WEIGHTS), ids=str)
 def test_solvers_agree_on_samples(shape, weight):
     rng = np.random.default_rng([1, shape[0], shape[3], int(1e6 * weight)])
     solvers = [make_solver(name, shape[0], shape[2] + shape[3]) for name in SUPPORTED]

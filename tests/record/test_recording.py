@@ -21,8 +21,7 @@ from wbc import Controller, Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
 from wbc.log import FileWriter
-from wbc.record import recorder
-from wbc.record import recording as files
+from wbc.record import recorder, recording as files
 from wbc.record.recorder import INPUTS
 from wbc.record.recording import RecordingError
 from wbc.replaying import replayed

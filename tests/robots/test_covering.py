@@ -14,8 +14,7 @@ import wbc.robots
 from tests.robots.files import example
 from tests.robots.test_shapes import hull_distance, outside, surface, urdf_points
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.robot.geometry.ball import least_excess_ball
-from wbc.robot.geometry.covering import cover
+from wbc.robot.geometry.covering import cover, least_excess_ball
 from wbc.robot.geometry.hull import Hull
 from wbc.robot.geometry.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh, read_mesh
 from wbc.shapes import Box, Capsule, Cylinder, Sphere

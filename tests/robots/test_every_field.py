@@ -14,7 +14,7 @@ import pytest
 import wbc.robots
 from tests.robots.files import example
 from wbc.errors import RangeError
-from wbc.robot.rebuilt import OF_COORDINATES, OF_DOFS
+from wbc.multibody.model import OF_COORDINATES, OF_DOFS
 from wbc.shapes import Sphere
 
 WHOLE = {"name", "gravity", "referenceConfigurations"}

@@ -32,6 +32,21 @@ def test_poses_jacobians_and_steps_are_those_of_pinocchio(name: str) -> None:
     np.testing.assert_array_equal(robot.pose(q, "world").homogeneous, np.eye(4))
 
 
+@pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
+def test_joints_of_one_number_move_by_a_sum(name: str) -> None:
+    """To the bits of Pinocchio, whatever the sizes are; what is no number is refused all the same."""
+    robot, rng = wbc.robots.load(name), np.random.default_rng(0)
+    q, v = robot.neutral, np.zeros(robot.nv)
+    for seed in range(40):
+        q, v = robot.random(seed), rng.normal(size=robot.nv) * 10.0 ** rng.integers(-9, 9)
+        dt = float(rng.normal() * 10.0 ** rng.integers(-6, 3))
+        wanted = pin.normalize(robot.model, pin.integrate(robot.model, q, v * dt))
+        assert robot.integrate(q, v, dt).tobytes() == np.asarray(wanted).tobytes()
+    for given in ((q * np.nan, v, 1.0), (q, v * np.inf, 0.0), (q, v, np.nan), (q, v[:-1], 1.0), (q + 1j, v, 1.0)):
+        with pytest.raises(wbc.WbcError):
+            robot.integrate(*given)
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_configurations_are_within_the_limits_and_repeat(name: str) -> None:
     robot = wbc.robots.load(name)

@@ -19,17 +19,6 @@ from wbc.shapes import Capsule, Sphere
 CRAWLER = DATA / "crawler.xml"
 INF = math.inf
 
-#: Positions and first rows of the rotations of the bodies at Q, computed once with MuJoCo 4.0.0
-Q = np.array([0.1, 0.2, 0.9, 0.1, 0.2, 0.3, math.sqrt(0.86), 0.3, 0.1, 0.0, 0.6, 0.0, 0.8, 0.2, 0.3])
-MUJOCO = {
-    "trunk": ((0.1, 0.2, 0.9), (0.74, -0.51642, 0.43094)),
-    "imu": ((0.143094, 0.193453, 0.99), (0.74, -0.51642, 0.43094)),
-    "upper": ((0.248, 0.319283, 0.837811), (0.5796, -0.51642, 0.63038)),
-    "slider": ((0.121924, 0.296542, 0.684229), (0.5796, -0.51642, 0.63038)),
-    "palm": ((0.058885, 0.285172, 0.607437), (-0.44288, -0.51642, 0.73292)),
-    "two": ((-0.011056, 0.225483, 0.644936), (-0.66569, -0.36051, 0.65336)),
-}
-
 
 def write(folder: Path, body: str, head: str = "") -> Path:
     """A model with one body."""
@@ -44,26 +33,6 @@ def test_structure_and_floating_base() -> None:
     assert robot.joint_names == ("base", "hinge", "slide", "ball", "h1", "h2")
     np.testing.assert_allclose(robot.neutral, [0, 0, 1, 0, 0, 0, 1, 0.1, 0.05, 0, 0, 0, 1, 0.1, 0.1])
     assert "home" in robot.notes["neutral"]
-
-
-def test_ranges_of_the_file_in_radians_and_metres() -> None:
-    limits = wbc.robots.load(CRAWLER).limits
-    lower = [-INF] * 6 + [-math.pi / 2, -0.1] + [-INF] * 3 + [-math.pi / 6, -INF]
-    upper = [INF] * 6 + [math.pi / 4, 0.2] + [INF] * 3 + [math.pi / 6, INF]
-    np.testing.assert_allclose(limits.position_lower, lower, atol=1e-12)
-    np.testing.assert_allclose(limits.position_upper, upper, atol=1e-12)
-    assert limits.effort[6] == 5.0
-    assert np.isinf(limits.velocity).all()
-
-
-def test_poses_against_mujoco() -> None:
-    robot = wbc.robots.load(CRAWLER)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, Q)
-    for name, (position, row) in MUJOCO.items():
-        pose = data.oMf[robot.model.getFrameId(name)]
-        np.testing.assert_allclose(pose.translation, position, atol=1e-6)
-        np.testing.assert_allclose(pose.rotation[0], row, atol=1e-5)
 
 
 def test_shapes_of_the_file() -> None:

@@ -1,4 +1,4 @@
-"""Compiled MuJoCo models: random machines against MuJoCo itself, scenes, and what must not be silent."""
+"""Compiled MuJoCo models: scenes, and what must not be silent; random ones are in test_random_mjcf.py."""
 
 from __future__ import annotations
 
@@ -12,84 +12,9 @@ import pytest
 
 import wbc
 from tests.refusals import assert_refused
-from tests.repeats import repeats
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError, UnsupportedJointError
 from wbc.extras import MissingPackageError
 from wbc.robots import MujocoJoints
-
-KINDS = ("hinge", "hinge", "slide", "ball")
-
-
-def machine(seed: int) -> str:
-    """A random machine: free or fixed, bodies in frames, several joints of a body, ref, geoms that only weigh."""
-    rng = np.random.default_rng(seed)
-
-    def numbers(count: int, size: float = 1.0) -> str:
-        return " ".join(f"{x:.4f}" for x in rng.uniform(-size, size, count))
-
-    def joints(name: str) -> str:
-        out = ""
-        for k in range(rng.integers(1, 4)):
-            kind = "ball" if k == 0 and rng.random() < 0.2 else str(rng.choice(KINDS[:3]))
-            ref = f' ref="{rng.uniform(-0.5, 0.5):.3f}"' if kind != "ball" and rng.random() < 0.4 else ""
-            label = f' name="{name}_{k}"' if rng.random() < 0.8 else ""
-            limit = ' range="-1 1.5"' if kind != "ball" and rng.random() < 0.5 else ""
-            out += (
-                f'<joint{label} type="{kind}" axis="{numbers(3)}" pos="{numbers(3, 0.2)}" armature=".02"{ref}{limit}/>'
-            )
-            if kind == "ball":
-                break
-        return out
-
-    def body(depth: int, name: str) -> str:
-        drawn = ' contype="0" conaffinity="0"' if rng.random() < 0.5 else ""
-        geom = f'<geom type="box" size=".1 .2 .05" pos="{numbers(3, 0.1)}" quat="{numbers(4)}"{drawn}/>'
-        inner = "".join(body(depth - 1, f"{name}{k}") for k in range(rng.integers(1, 3))) if depth else ""
-        text = (
-            f'<body name="{name}" pos="{numbers(3, 0.5)}" quat="{numbers(4)}">{joints(name)}{geom}'
-            f'<site name="s{name}" pos="{numbers(3, 0.1)}"/>{inner}</body>'
-        )
-        return f'<frame pos="{numbers(3)}" euler="{numbers(3)}">{text}</frame>' if rng.random() < 0.3 else text
-
-    free = '<freejoint/><geom size=".1"/>' if seed % 2 else '<geom size=".1"/>'
-    extra = '<body name="ball" pos="2 0 0"><freejoint/><geom size=".05"/></body><body name="target" mocap="true"/>'
-    return (
-        f'<mujoco model="machine"><compiler angle="radian"/><worldbody>{extra}<body name="root" pos="{numbers(3)}">'
-        f"{free}{body(2, 'a')}</body></worldbody></mujoco>"
-    )
-
-
-@pytest.mark.parametrize("seed", range(repeats(6)))
-def test_a_random_machine_moves_and_weighs_as_in_mujoco(seed: int) -> None:
-    model = mujoco.MjModel.from_xml_string(machine(seed))
-    robot = wbc.robots.load(model, shapes="none")
-    assert robot.name == "machine"
-    assert (robot.base == "floating") == bool(seed % 2)
-    assert "ball" in robot.notes["objects"]
-    assert "target" not in robot.frame_names
-    joints, data, rng = MujocoJoints(model, robot), mujoco.MjData(model), np.random.default_rng(seed)
-    q, v = robot.random(seed), rng.uniform(-1.0, 1.0, robot.nv)
-    joints.put_q(data.qpos, q)
-    joints.put_v(data.qvel, q, v)
-    assert joints.q(data.qpos) == pytest.approx(q)
-    assert joints.v(data.qpos, data.qvel) == pytest.approx(v)
-    mujoco.mj_forward(model, data)
-    for name in (f.name for f in robot.model.frames if f.name.startswith("sa")):
-        assert robot.pose(q, name).translation == pytest.approx(data.site(name).xpos, abs=1e-9)
-    # The same motion after one small step, and the same energy
-    later, dt = robot.integrate(q, v, 1e-4), 1e-4
-    mujoco.mj_integratePos(model, data.qpos, data.qvel, dt)
-    assert joints.q(data.qpos) == pytest.approx(later, abs=1e-7)
-    mass, full = pin.crba(robot.model, robot.model.createData(), q), np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, full)
-    rates = np.zeros(model.nv)
-    joints.put_v(rates, q, v)
-    mass = np.triu(mass) + np.triu(mass, 1).T
-    assert v @ mass @ v == pytest.approx(rates @ full @ rates, rel=1e-9)
-    assert [float(x) for x in robot.limits.position_upper if np.isfinite(x)] == pytest.approx(
-        [float(model.jnt_range[j, 1]) for j in range(model.njnt) if model.jnt_limited[j]]
-    )
-
 
 SCENE = """<mujoco model="cell"><include file="arm.xml"/><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
 <body name="wall" pos=".5 0 .1"><geom name="wall" type="box" size=".1 .1 .1"/></body>

@@ -14,11 +14,16 @@ from wbc.robots.operator_arms import OPERATOR_ARMS
 
 LINKS = '<link name="a"/><link name="b"/>'
 JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="{child}"/>{limit}</joint>'
+LIMIT = '<limit effort="1" velocity="1"/>'
 BAD_URDFS = {
-    "no_name": (f"<robot>{LINKS}</robot>", "No name given"),
+    "no_name": (f"<robot>{LINKS}</robot>", "no name"),
     "no_links": ('<robot name="r"/>', "link"),
     "no_limit": (f'<robot name="r">{LINKS}{JOINT.format(child="b", limit="")}</robot>', "limit"),
-    "lost_child": (f'<robot name="r">{LINKS}{JOINT.format(child="c", limit="")}</robot>', "parser refused"),
+    "kind": (
+        f'<robot name="r">{LINKS}{JOINT.format(child="b", limit="").replace("revolute", "rotary")}</robot>',
+        "rotary",
+    ),
+    "lost_child": (f'<robot name="r">{LINKS}{JOINT.format(child="c", limit=LIMIT)}</robot>', "does not have"),
     "not_xml": ('<robot name="r">', "not well-formed"),
     "empty": ("", "not well-formed"),
     "html": ("<html><body/></html>", "neither URDF, SDF nor MJCF"),

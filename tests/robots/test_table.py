@@ -49,7 +49,7 @@ def test_rows_with_a_problem_are_listed_and_refused(name: str) -> None:
     assert name not in wbc.robots.names()
     with pytest.raises(RobotFileError) as caught:
         wbc.robots.load(name)
-    reason = {"ur3_xacro": "No name given for the robot"}[name]
+    reason = {"ur3_xacro": "the robot has no name"}[name]
     assert reason in str(caught.value)
 
 

@@ -58,7 +58,7 @@ def test_what_was_compiled_ahead_is_taken(folder: Path, monkeypatch: pytest.Monk
     """At once where any code will do; else only for want of a compiler; and only if it is of these texts."""
     kernel.AHEAD.mkdir()
     toolchain.compile_kernel(TEXTS, kernel.ahead(TEXTS), portable=True)
-    own = kernel.library(TEXTS, toolchain.compile_kernel)
+    own = kernel.library(TEXTS, toolchain.compile_kernel, at_once=False)
     assert own.parents[1] == folder / "cache"
     assert kernel.library(TEXTS, toolchain.compile_kernel, at_once=True) == kernel.ahead(TEXTS)
     monkeypatch.setattr(toolchain, "compiler", lambda: None)

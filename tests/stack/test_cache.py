@@ -466,12 +466,12 @@ def test_of_two_finished_builds_the_first_stays(folder: Folder) -> None:
 
     def slow(place: Folder) -> None:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(cache.fcntl, "flock", lambda *arguments: None)
+            patch.setattr(cache, "lock", lambda *arguments: None)
             cache.fetch("name", fill("first"))
         fill("second")(place)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cache.fcntl, "flock", lambda *arguments: None)
+        patch.setattr(cache, "lock", lambda *arguments: None)
         place, _ = cache.fetch("name", slow)
     assert (place / "a").read_text() == "first"
     assert cache.fetch("name", fill("third")) == (place, True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from functools import cached_property
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.robot.sources.files import example_data_folder
 from wbc.symbolic import Centroidal, Dynamics, Kinematics, Velocities
 from wbc.symbolic.kinematics import WORLD, frame_index
 
@@ -22,7 +22,7 @@ TOLERANCE = 1e-10
 
 REFERENCES = {"world_aligned": pin.LOCAL_WORLD_ALIGNED, "local": pin.LOCAL, "world": pin.WORLD}
 
-DESCRIPTIONS = Path(pin.__file__).parents[4] / "share" / "example-robot-data" / "robots"
+DESCRIPTIONS = example_data_folder()
 #: The one file of the wheel that does not parse: it names no robot.
 BROKEN = "ur_description/urdf/ur3.urdf"
 FILES = tuple(

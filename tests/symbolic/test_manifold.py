@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.symbolic.chains import chain, composite
 from wbc.symbolic import Kinematics

@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from wbc.symbolic import rotations as rot

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.symbolic.referee import distance, load, random_state
 from wbc.errors import UnknownNameError
-from wbc.symbolic import Kinematics, Pose, Tracer
-from wbc.symbolic import rotations as rot
+from wbc.symbolic import Kinematics, Pose, Tracer, rotations as rot
 
 OFFSET = (0.1, -0.2, 0.3)
 TARGET = Rotation.from_rotvec((0.4, -1.1, 0.7)).as_matrix()

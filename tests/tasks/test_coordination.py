@@ -12,8 +12,7 @@ import pytest
 
 import wbc
 from tests.evaluation import numbers, sample, slope
-from tests.models import X, Z, arm
-from tests.models import robot as bare
+from tests.models import X, Z, arm, robot as bare
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
@@ -55,24 +54,6 @@ def test_neither_hand_is_preferred(name: str) -> None:
         turn = np.kron(np.eye(2), target.rotation.T)
         for what in ("value", "jacobian"):
             assert two(q, back)[what] == pytest.approx(-turn @ one(q, values)[what], abs=1e-9)
-
-
-def test_point_of_the_object_stays_while_the_rotation_is_corrected() -> None:
-    """Velocities that serve the rotation rows alone turn the hand about the point."""
-    machine = robot("talos")
-    left, right = FRAMES["talos"].tip, "gripper_right_base_link"
-    item = RelativePose(left, right)
-    q, values = drawn(item, machine, 5)
-    values["target"] = placement(machine, left, q).actInv(placement(machine, right, q))
-    rows = numbers(item, machine)(q, values)["jacobian"]
-    v = np.linalg.lstsq(rows, np.array([0.0, 0.0, 0.0, 0.3, -0.2, 0.5]), rcond=None)[0]
-    grasp = values["target"].actInv(values["at"])
-
-    def apart(time: float) -> np.ndarray:
-        moved = pin.integrate(machine.model, q, time * v)
-        return placement(machine, left, moved).actInv(placement(machine, right, moved).act(grasp)) - values["at"]
-
-    assert slope(apart) == pytest.approx(np.zeros(3), abs=1e-8)
 
 
 def test_default_point_is_halfway_between_the_hands_and_may_be_declared() -> None:

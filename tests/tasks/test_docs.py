@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wbc import pages
-from wbc.pages import docstring, example, folder
+from wbc.pages import docstring, folder
 from wbc.pages.docstring import PageError
 from wbc.stack.declaration import Declaration, Entry
 from wbc.stack.layout import Layout
@@ -25,7 +25,7 @@ NAMES = tuple(sorted(pages.page_name(cls) for cls in pages.shipped().values()))
 
 def item_of(cls: type[Item]) -> tuple[Declaration, Entry]:
     """The item of the example in the docstring, and its stack."""
-    return example.find(cls, docstring.read(cls).example)
+    return folder.example_of(cls, docstring.read(cls).example)
 
 
 @pytest.mark.parametrize("cls", pages.shipped().values(), ids=lambda cls: cls.__name__)

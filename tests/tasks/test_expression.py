@@ -23,7 +23,6 @@ from wbc.errors import (
     WbcError,
 )
 from wbc.tasks import Expression, Input
-from wbc.tasks.end_effector import EndEffector
 
 HEIGHT = Input("height", unit="m", default=0.4)
 
@@ -84,27 +83,6 @@ def test_key_is_the_same_in_another_process() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == repr(height().declaration(robot("panda")))
-
-
-def test_same_rows_as_the_class_that_it_imitates() -> None:
-    """A position task written by hand has the Jacobian and the drift of EndEffector."""
-    machine = robot("talos")
-    frame, base = "gripper_left_base_link", "right_sole_link"
-    by_hand = Expression(
-        lambda kin, p: kin.pose(base).inverse_point(kin.position(frame)) - p["target"],
-        units="m",
-        inputs=(
-            Input("target", size=3, default=np.zeros(3), rate="feedforward"),
-            Input("feedforward", size=3, default=np.zeros(3)),
-        ),
-    )
-    ours = numbers(by_hand, machine)
-    theirs = numbers(EndEffector(frame, kind="position", relative_to=base), machine)
-    rng = np.random.default_rng(1)
-    values = {"target": rng.normal(size=3), "feedforward": rng.normal(size=3)}
-    q = random_configuration(machine, rng)
-    for name, array in ours(q, values).items():
-        np.testing.assert_allclose(array, theirs(q, values)[name], rtol=0, atol=1e-13)
 
 
 def raising(kin: Any, p: Any) -> Any:

@@ -38,9 +38,9 @@ from wbc.tasks import (
     Posture,
     Rolling,
     Task,
+    inputs as run_time,
     registry,
 )
-from wbc.tasks import inputs as run_time
 from wbc.tasks._contact import Contact
 
 #: Those that have no meaning for velocities are in the tests of accelerations
@@ -61,7 +61,10 @@ class Program:
         stack.add(item, name="item", relative_to="table" if moving else None)
         stack = stack.commanding(command)
         self.layout, self.machine = Layout(stack), machine
-        self.rows = program.build(stack, self.layout).rows
+        with pytest.MonkeyPatch.context() as patch:
+            # All rows as expressions, those too that a tick leaves to its loops
+            patch.setattr(program, "loops", lambda _: False)
+            self.rows = program.build(stack, self.layout).rows
         self.block = self.layout.blocks["item"]
 
     def __call__(
@@ -311,8 +314,8 @@ def off_by(kind: Callable[[str], Item], before: pin.SE3, now: pin.SE3) -> float:
 
 @pytest.mark.parametrize(
     ("kind", "seed"),
-    [(EndEffector, s) for s in range(repeats(8))]
-    + [(kind, 2 * s) for kind in (Hold, AxisAlign, LookAt) for s in range(repeats(2))],
+    [(EndEffector, s) for s in range(repeats(4))]
+    + [(kind, 2 * s) for kind in (Hold, AxisAlign, LookAt) for s in range(repeats(1))],
 )
 def test_an_item_in_a_frame_that_turns_and_accelerates_stays_to_second_order(
     kind: Callable[[str], Item], seed: int

@@ -21,7 +21,6 @@ from tests.tasks.planes import (
     evaluate,
     robot,
     seen,
-    wrap,
 )
 from wbc.errors import RangeError, UnknownNameError
 from wbc.tasks._stereographic import PlaneReference
@@ -48,25 +47,6 @@ def test_angle_in_a_moving_base_ignores_the_base() -> None:
         np.testing.assert_array_equal(np.delete(evaluate("talos", rate, q)[1], arm), np.zeros(len(q) - 1 - len(arm)))
 
 
-def test_axis_and_points_agree_where_the_arm_is_planar() -> None:
-    """Panda: shoulder, elbow and wrist lie in the plane perpendicular to joint 4, so the angles differ by 0 or pi."""
-    axis = replace(PANDA, axis="panda_joint4", reference=PlaneReference())
-    for q in clear("panda", axis, 20, seed=8):
-        if evaluate("panda", PANDA, q)[2][0] < 1.0:
-            continue
-        off = evaluate("panda", axis, q)[0][0] - evaluate("panda", PANDA, q)[0][0]
-        assert abs(np.sin(off)) < 1e-11
-
-
-def test_axis_form_points_to_the_elbow() -> None:
-    """Arm without offsets: the two angles are equal for a positive elbow angle, opposite for a negative one."""
-    points = PitchPlane("F3", "F4", "tip")
-    axis = replace(points, axis="joint3", reference=PlaneReference())
-    for q in clear("four", points, 20, seed=18):
-        off = wrap(evaluate("four", axis, q)[0][0] - evaluate("four", points, q)[0][0])
-        assert abs(off) == pytest.approx(0.0 if q[3] > 0 else np.pi, abs=1e-11)
-
-
 @pytest.mark.parametrize(
     ("name", "item"),
     [
@@ -89,20 +69,6 @@ def test_angle_rate_is_alpha_and_the_transport_of_the_reference(name: str, item:
         alpha = (evaluate(name, item, q)[1] @ v).item()
         psi = (evaluate(name, angled, q)[1] @ v).item()
         assert psi == pytest.approx(alpha + transport, abs=1e-7)
-
-
-def test_alpha_is_no_derivative() -> None:
-    """Round a closed loop of joint angles the angle returns, the integral of alpha does not (Gauss-Bonnet)."""
-    item = replace(OFFSET, axis="joint3")
-    centre = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
-    total, count = 0.0, 2000
-    for t in 2 * np.pi * (np.arange(count) + 0.5) / count:
-        q, v = centre.copy(), np.zeros(7)
-        q[0] += 0.5 * np.cos(t)
-        q[2] += 0.5 * np.sin(t)
-        v[0], v[2] = -0.5 * np.sin(t), 0.5 * np.cos(t)
-        total += (evaluate("ssrms", item, q)[1] @ v).item() * 2 * np.pi / count
-    assert abs(total) > 0.05
 
 
 def test_rate_form_counts_from_the_present_plane() -> None:

@@ -14,8 +14,7 @@ from tests.evaluation import numbers, slope
 from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
 from wbc.robot import Robot
 from wbc.symbolic import Kinematics, Tracer
-from wbc.tasks import CenterOfMass, Elbow, EndEffector, Posture
-from wbc.tasks import inputs as run_time
+from wbc.tasks import CenterOfMass, Elbow, EndEffector, Posture, inputs as run_time
 
 STATES = 2
 

@@ -30,7 +30,7 @@ from wbc.teleop.bilateral import (
 )
 from wbc.teleop.bilateral.arms import FollowingArm
 from wbc.teleop.bilateral.run import _largest
-from wbc.teleop.bilateral.stability import Side, absolute_stability
+from wbc.teleop.bilateral.scheme import Side, absolute_stability
 
 DEVICE = Device(2.0, 15.0)
 SCHEMES = {"pp": position_position(), "pf": position_force(), "4c": four_channel()}

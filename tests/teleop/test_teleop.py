@@ -225,7 +225,7 @@ def test_bad_sessions_and_files(tmp_path: Path) -> None:
         file.write_text(text)
         with pytest.raises(RateFileError):
             RateFile(file)
-    with pytest.raises(RateFileError, match="cannot be read"):
+    with pytest.raises(RateFileError, match="no such file"):
         RateFile(tmp_path / "none.csv")
 
 

@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import wbc.robots
 from tests.repeats import repeats

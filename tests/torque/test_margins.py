@@ -6,8 +6,7 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.constraints.robots import with_test_shapes
 from tests.torque.problems import robot

@@ -23,8 +23,7 @@ from wbc.errors import CommandError
 from wbc.robot import Robot
 from wbc.stack.layout import Block, Layout
 from wbc.stack.program import build
-from wbc.tasks import Constraint, Task, TorqueLimits
-from wbc.tasks import inputs as run_time
+from wbc.tasks import Constraint, Task, TorqueLimits, inputs as run_time
 
 DT = 0.003
 #: Classes with rows of which a constraint on velocities has no rate of its own

@@ -35,8 +35,8 @@ def drawn(name: str, rng: np.random.Generator) -> dict[str, Array]:
     return out | {"velocity": speed, "acceleration": push, "jerk": jerk}
 
 
-def misses(laws: Sequence[Law], asked: Sequence[dict[str, Array]]) -> tuple[float, float]:
-    """(largest excess over a limit as a share, largest error of a state at an end or at a break), over all laws.
+def judged(laws: Sequence[Law], asked: Sequence[dict[str, Array]]) -> tuple[Array, Array]:
+    """(excess over a limit as a share, error of a state at an end or at a break) of each law.
 
     Cubics of time: velocities peak at ends or where the acceleration vanishes, accelerations at ends.
     """
@@ -54,19 +54,24 @@ def misses(laws: Sequence[Law], asked: Sequence[dict[str, Array]]) -> tuple[floa
     with np.errstate(divide="ignore", invalid="ignore"):
         top = np.clip(np.nan_to_num(-c[1] / (3.0 * c[0]), nan=0.0, posinf=0.0, neginf=0.0), 0.0, span)
     states = [_at(c, u) for u in (0.0 * span, top, span)]
-    speed = max(float((np.abs(s[1]) / limit[0]).max()) for s in states)
-    push = max(float((np.abs(s[2]) / limit[1]).max()) for s in states)
-    excess = max(speed, push, float((np.abs(6.0 * c[0]) / limit[2]).max())) - 1.0
+    shares = [np.abs(6.0 * c[0]) / limit[2]]
+    shares += [np.abs(s[1]) / limit[0] for s in states] + [np.abs(s[2]) / limit[1] for s in states]
     last = np.cumsum(count) - 1
     first = last - np.array(count) + 1
     inner = np.setdiff1d(np.arange(len(owner)), last)
-    error = 0.0
+    excess, error = np.maximum.reduceat(np.max(shares, axis=(0, 2)), first) - 1.0, np.zeros(len(laws))
     for k, suffix in enumerate(("", "_velocity", "_acceleration")):
         begin, end = states[0][k], states[2][k]
         for name, found in (("start", begin[first]), ("target", end[last])):
-            error = max(error, float(np.abs(found - np.array([a[name + suffix] for a in asked])).max()))
-        error = max(error, float(np.abs(end[inner] - begin[inner + 1]).max(initial=0.0)))
+            error = np.maximum(error, np.abs(found - np.array([a[name + suffix] for a in asked])).max(axis=1))
+        np.maximum.at(error, owner[inner], np.abs(end[inner] - begin[inner + 1]).max(axis=1))
     return excess, error
+
+
+def misses(laws: Sequence[Law], asked: Sequence[dict[str, Array]]) -> tuple[float, float]:
+    """The largest of both over all laws."""
+    excess, error = judged(laws, asked)
+    return float(excess.max()), float(error.max())
 
 
 def _at(c: Array, u: Array) -> tuple[Array, Array, Array]:

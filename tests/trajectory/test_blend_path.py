@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tests.trajectory.path_checks import steps_at_knots, worst_derivative
+from tests.trajectory.path_checks import steps_at_knots
 from wbc.errors import NotFiniteError, RangeError
 from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing, blend_path
 from wbc.validation import Array
@@ -96,12 +95,6 @@ def test_straight_back_stops_short_of_the_waypoint() -> None:
     path = blend_path([[0.0], [1.0], [0.0]], 0.01)
     assert path.evaluate(np.array([1.0]))[0, 0] == pytest.approx(0.99, rel=1e-14)
     assert abs(path.evaluate(np.array([1.0]), 1)[0, 0]) < 1e-13
-
-
-def test_derivatives_against_differences() -> None:
-    path = blend_path(np.random.default_rng(8).normal(size=(6, 5)), 0.03)
-    for order in (1, 2, 3):
-        assert worst_derivative(path, order) < 1e-8
 
 
 def test_laws_along_it_have_exact_certificates() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.trajectory.path_checks import steps_at_knots, worst_derivative
 from wbc.errors import ContinuityError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import Law, MotionLimits, Timing, function_path
+from wbc.trajectory import function_path
 from wbc.validation import Array
 
 
@@ -82,13 +82,6 @@ def test_a_constant_stands() -> None:
     assert path.knots.tolist() == [0.0, 1.0]
     assert path.deviation == 0.0
     assert path.evaluate(np.array([0.4])).tolist() == [[1.0, 2.0]]
-
-
-def test_laws_along_it_have_exact_certificates() -> None:
-    path = function_path(curve, 0.0, 1.0)
-    law = Law(path, Timing.identity(path.length), MotionLimits(velocity=np.full(3, 10.0)))
-    assert law.certificate.worst["velocity"].kind == "exact"
-    assert law.certificate.satisfied
 
 
 @pytest.mark.parametrize(

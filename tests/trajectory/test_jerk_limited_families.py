@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.repeats import repeats
-from tests.trajectory.families import judged
-from tests.trajectory.random_motions import FAMILIES, drawn
+from tests.trajectory.random_motions import FAMILIES, drawn, judged
+from wbc.trajectory import jerk_limited
 
 #: Members of a family; `python -m bench.time_laws --full` judges 10^6
 MANY = repeats(200)
@@ -17,7 +17,8 @@ MANY = repeats(200)
 def test_limits_are_kept_and_ends_met(name):
     rng = np.random.default_rng(17)
     family = [drawn(name, rng) for _ in range(MANY)]
-    laws, excess, off = judged(family)
+    laws = [jerk_limited(**arguments) for arguments in family]
+    excess, off = judged(laws, family)
     worst = int(excess.argmax())
     assert excess[worst] <= 1e-9, family[worst]
     spans = np.array([law.duration for law in laws])

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import wbc.trajectory as trajectory
 from tests.trajectory.path_checks import steps_at_knots, worst_derivative
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.trajectory import Law, PolynomialPath, Timing, blend_path, spline_path, standing_path, straight_path
@@ -159,7 +158,3 @@ def test_bad_ends_and_vectors_are_named() -> None:
     for bad in (1.0, [], [[1.0]]):
         with pytest.raises(ShapeError, match=r"path\.position"):
             standing_path(bad)
-
-
-def test_names_of_the_package() -> None:
-    assert {"spline_path", "blend_path", "straight_path", "standing_path", "function_path"} <= set(trajectory.__all__)

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.trajectory.random_laws import inner_times, ragged, smooth
 from wbc.errors import ContinuityError, NotFiniteError, RangeError, ShapeError
@@ -119,45 +118,6 @@ def test_parts_joined_are_the_whole(seed: int, share: float) -> None:
     )
     for name, worst in law.certificate.worst.items():
         assert both.certificate.worst[name].ratio == pytest.approx(worst.ratio, rel=1e-8)
-
-
-@given(seeds, st.integers(2, 6))
-@settings(max_examples=7)
-def test_there_and_back_many_times(seed: int, count: int) -> None:
-    law = smooth(seed)
-    rest = Law(law.path, _eased(law), law.limits)
-    whole = rest
-    for k in range(count):
-        whole = whole.then(rest.reversed() if k % 2 == 0 else rest)
-    times = inner_times(rest, 40)
-    for k in range(count + 1):
-        local = times if k % 2 == 0 else rest.duration - times
-        sign = 1.0 if k % 2 == 0 else -1.0
-        state = rest.at(local)
-        assert_states(whole.at(k * rest.duration + times), state.position, sign * state.velocity, state.acceleration)
-
-
-def _eased(law: Law) -> Timing:
-    """s from rest to rest along the whole path: 3 u^2 - 2 u^3."""
-    length = law.path.length
-    return Timing([0.0, 2.0], [[-0.25 * length], [0.75 * length], [0.0], [law.path.knots[0]]])
-
-
-@given(seeds)
-@settings(max_examples=10)
-def test_the_algebra_goes_together(seed: int) -> None:
-    """Scaling and slicing commute, and reversal turns joined laws round."""
-    law = smooth(seed)
-    a, b = 0.3 * law.duration, 0.8 * law.duration
-    first, second = law.scaled(2.0).sliced(2.0 * a, 2.0 * b), law.sliced(a, b).scaled(2.0)
-    times = inner_times(second)
-    for ours, theirs in zip(first.at(times), second.at(times), strict=True):
-        assert np.abs(ours - theirs).max() < 1e-7 * (1.0 + np.abs(theirs).max())
-    joined = law.sliced(0.0, a).then(law.sliced(a, law.duration)).reversed()
-    turned = law.sliced(a, law.duration).reversed().then(law.sliced(0.0, a).reversed())
-    times = inner_times(turned)
-    assert np.abs(joined.at(times).position - turned.at(times).position).max() < 1e-9
-    assert np.abs(joined.at(times).velocity - turned.at(times).velocity).max() < 1e-7
 
 
 @given(seeds)

@@ -54,7 +54,7 @@ def near_repeats(rng: np.random.Generator, gap: float) -> tuple[Array, Array, li
 def test_near_repeats(kind: str) -> None:
     law, deviation = KINDS[kind]
     rng = np.random.default_rng(11)
-    for gap in 10.0 ** rng.uniform(-12.0, -3.0, repeats(3)):
+    for gap in 10.0 ** rng.uniform(-12.0, -3.0, repeats(2)):
         plain, points, clusters = near_repeats(rng, float(gap))
         found = law(points)
         assert found.certificate.ratio <= 1.0 + 1e-8

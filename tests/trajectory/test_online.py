@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.repeats import covering
 from wbc import errors
 from wbc.trajectory import online
 from wbc.trajectory.jerk.braking import reach
 
 DOF, DT = 7, 0.004
+SYNCHRONISATIONS = ("time", "phase", "none")
 
 
 def filtered(rng, **changes):
@@ -70,8 +72,7 @@ def mixed(rng, motion, k, memory):
         ][rng.integers(3)]()
 
 
-@pytest.mark.parametrize("synchronisation", ["time", "phase", "none"])
-@pytest.mark.parametrize("course", [walk, passing, driving, mixed])
+@pytest.mark.parametrize(("course", "synchronisation"), covering([walk, passing, driving, mixed], SYNCHRONISATIONS))
 def test_streams_keep_every_limit(course, synchronisation):
     rng = np.random.default_rng(5)
     motion, memory = filtered(rng, synchronisation=synchronisation), {}
@@ -295,7 +296,7 @@ def test_bad_filters_are_refused(changes, error):
         online(arguments.pop("dof"), arguments.pop("dt"), **arguments)
 
 
-@pytest.mark.parametrize("synchronisation", ["time", "phase", "none"])
+@pytest.mark.parametrize("synchronisation", SYNCHRONISATIONS)
 @pytest.mark.parametrize("far", [1e3, 1e6])
 def test_moves_of_hours_are_begun(far, synchronisation):
     """Longer than the 7e3 s that ruckig takes: its binding answers with a ValueError."""

@@ -74,15 +74,3 @@ def test_speeds_are_those_of_metres_and_radians_together(name: str) -> None:
         assert speed.max() < 1.0 + 1e-12
     else:
         np.testing.assert_allclose(speed, 1.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", PATHS)
-def test_tiny_steps_of_s_agree_with_the_exponential(name: str) -> None:
-    path = PATHS[name](4)
-    s = path.knots[0] + path.length * np.linspace(0.0, 0.999, 30)
-    h, at = 1e-5 * path.length, path.pieces_at(s)
-    here, there = path.evaluate(s, 0, at), path.evaluate(s + h, 0, at)
-    middle = path.evaluate(s + 0.5 * h, 1, at)
-    for a, b, twist in zip(here, there, middle, strict=True):
-        np.testing.assert_allclose(pin.exp3(h * twist[3:]) @ a[:3, :3], b[:3, :3], atol=1e-10)
-        np.testing.assert_allclose(a[:3, 3] + h * twist[:3], b[:3, 3], atol=1e-10)

@@ -7,8 +7,7 @@ import itertools
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
@@ -148,17 +147,6 @@ def test_certificates_are_exact_where_each_corner_turns_about_one_axis() -> None
         seen = np.abs(law.at(np.linspace(0.0, law.duration, 4001)).acceleration).max() / 10.0
         assert law.certificate.worst["acceleration"].ratio >= seen - 1e-12
     assert kinds == ["exact", "sampled"]
-
-
-def test_laws_of_poses() -> None:
-    path = pose_polyline(random_poses(8, 3), 0.05)
-    # s = (3 t^2 - 2 t^3) length, at rest at both ends
-    law = Law(path, Timing([0.0, 1.0], [[-2.0 * path.length], [3.0 * path.length], [0.0], [0.0]]))
-    back = law.reversed()
-    t = np.linspace(0.0, law.duration, 20)
-    np.testing.assert_allclose(back.at(t).position, law.at(law.duration - t).position, atol=1e-13)
-    both = law.then(back)
-    np.testing.assert_allclose(both.at(law.duration + t).position, back.at(t).position, atol=1e-12)
 
 
 def test_bad_input_is_named() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
 from wbc.errors import RangeError, ShapeError, UnknownNameError
-from wbc.trajectory import Law, MotionLimits, Timing, geodesic_path, pose_spline
+from wbc.trajectory import geodesic_path, pose_spline
 
 ENDS = ("not-a-knot", "clamped", "natural")
 
@@ -74,15 +74,6 @@ def test_repeated_poses_are_dropped_and_equal_ones_stand() -> None:
     standing = pose_spline([poses[0]] * 3)
     assert standing.degree == 0
     assert not standing.evaluate(np.array([0.5]), 1).any()
-
-
-def test_certificates_are_sampled() -> None:
-    path = pose_spline(random_poses(8, 4))
-    law = Law(path, Timing.identity(path.length), MotionLimits(velocity=np.full(6, 10.0)))
-    worst = law.certificate.worst["velocity"]
-    assert worst.kind == "sampled"
-    seen = np.abs(law.at(np.linspace(0.0, law.duration, 20001)).velocity).max() / 10.0
-    assert seen <= worst.ratio < 1.2 * seen
 
 
 def test_bad_input_is_named() -> None:

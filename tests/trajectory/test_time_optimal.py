@@ -81,22 +81,6 @@ def test_small_straight_moves_never_fail(size):
         assert law.duration == pytest.approx(2.0 / np.sqrt(pull), rel=2e-3)
 
 
-def test_small_paths_of_several_waypoints_never_fail():
-    rng = np.random.default_rng(4)
-    for size in 10.0 ** -np.arange(2.0, 9.0):
-        waypoints = rng.uniform(-1.0, 1.0, 6) + size * rng.standard_normal((4, 6))
-        law = time_optimal(waypoints, 2.0, 5.0)
-        assert max(ratios(law)) <= CLAIM
-        np.testing.assert_allclose(law.at(law.duration).position, waypoints[-1], atol=1e-6 * size + 1e-15)
-
-
-def test_repeated_waypoints_are_one():
-    waypoints, velocity, acceleration = random_problem(np.random.default_rng(8), 5)
-    once = time_optimal(waypoints, velocity, acceleration)
-    twice = time_optimal(np.repeat(waypoints, 2, axis=0), velocity, acceleration)
-    assert twice.duration == once.duration
-
-
 @pytest.mark.parametrize("asked", [None, 2.5])
 def test_nowhere_to_go_stands(asked):
     law = time_optimal([[0.3, -0.2], [0.3, -0.2]], 1.0, 1.0, duration=asked)
@@ -134,14 +118,6 @@ def test_limits_of_very_different_sizes(velocity, acceleration):
     law = time_optimal(waypoints, velocity, per_joint)
     assert max(ratios(law)) <= CLAIM
     assert max(ratios(law)) > 1.0 - 1e-6
-
-
-def test_time_scales_with_the_path():
-    waypoints, _, acceleration = random_problem(np.random.default_rng(10), 5)
-    whole = time_optimal(waypoints, 1e9, acceleration).duration
-    for size in (1e-6, 1e6):
-        part = time_optimal(size * waypoints, 1e9 * size, acceleration).duration
-        assert part == pytest.approx(whole * np.sqrt(size), rel=1e-6)
 
 
 def test_longer_duration_on_request():

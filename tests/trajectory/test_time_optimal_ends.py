@@ -51,30 +51,6 @@ def named(error):
     return float(re.search(r"is ([0-9.eE+-]+) \(got", str(error)).group(1))
 
 
-@pytest.mark.parametrize(("which", "distance", "asked"), [("start_speed", 0.1, 0.9), ("end_speed", 0.1, 0.9)])
-def test_largest_speed_is_named_and_works(which, distance, asked):
-    line = [[0.0, 0.0], [distance, 0.0]]
-    with pytest.raises(InfeasibleError) as caught:
-        time_optimal(line, 1.0, 1.0, **{which: asked})
-    assert caught.value.field == which
-    assert caught.value.value == asked
-    largest = named(caught.value)
-    assert largest == pytest.approx(np.sqrt(2.0 * distance), rel=1e-4)
-    law = time_optimal(line, 1.0, 1.0, **{which: largest})
-    assert worst(law) <= CLAIM
-
-
-@pytest.mark.parametrize("which", ["start_speed", "end_speed"])
-def test_largest_speed_on_a_bent_path_works(which):
-    waypoints, velocity, acceleration = problem(6)
-    with pytest.raises(InfeasibleError) as caught:
-        time_optimal(waypoints, velocity, acceleration, **{which: 500.0})
-    largest = named(caught.value)
-    assert worst(time_optimal(waypoints, velocity, acceleration, **{which: 0.99 * largest})) <= CLAIM
-    with pytest.raises(InfeasibleError):
-        time_optimal(waypoints, velocity, acceleration, **{which: 1.01 * largest})
-
-
 def test_a_start_that_is_too_slow_names_the_end_speed():
     with pytest.raises(InfeasibleError) as caught:
         time_optimal([[0.0], [0.5]], 10.0, 1.0, start_speed=0.2, end_speed=2.0)

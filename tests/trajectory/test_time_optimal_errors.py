@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wbc.errors import BoundsError, InfeasibleError, NotFiniteError, RangeError, ShapeError
-from wbc.trajectory import MotionLimits, PolynomialPath, time_optimal
+from wbc.trajectory import MotionLimits, time_optimal
 
 LINE = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 1.0]])
 
@@ -45,12 +45,6 @@ def test_bad_input(change, kind, field):
         time_optimal(**arguments)
     assert type(caught.value) is kind
     assert caught.value.field == field
-
-
-def test_knots_of_paths_increase():
-    with pytest.raises(RangeError) as caught:
-        time_optimal(PolynomialPath([0.0, 1.0, 1.0], np.ones((2, 2, 1))), 1.0, 1.0)
-    assert caught.value.field == "path.knots"
 
 
 def test_paths_beyond_position_limits_are_refused_with_joint_and_place():

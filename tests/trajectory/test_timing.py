@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.trajectory.random_laws import ragged
 from wbc.errors import NotFiniteError, RangeError, ShapeError
@@ -32,23 +31,6 @@ def test_derivatives_are_those_of_the_polynomials(seed: int, degree: int) -> Non
             here = piece == k
             p = np.poly1d(timing.coefficients[:, k]).deriv(order)
             assert timing.evaluate(times[here], order) == pytest.approx(p(times[here] - timing.times[k]), abs=1e-9)
-
-
-@given(seeds, st.integers(1, 6), st.floats(0.01, 100.0))
-@settings(max_examples=15)
-def test_the_algebra(seed: int, degree: int, factor: float) -> None:
-    timing = random_timing(seed, degree)
-    times = np.linspace(0.0, timing.duration, 57)
-    times = times[np.abs(times[:, None] - timing.times).min(axis=1) > 1e-9]
-    size = 1.0 + np.abs(timing.coefficients).max()
-    s = timing.evaluate(times)
-    assert np.abs(timing.scaled(factor).evaluate(factor * times) - s).max() < 1e-10 * size
-    back = timing.reversed()
-    assert back.duration == timing.duration
-    assert np.abs(back.evaluate(timing.duration - times) - s).max() < 1e-10 * size
-    joined = timing.then(back, 5.0)
-    assert joined.duration == pytest.approx(2.0 * timing.duration)
-    assert np.abs(joined.evaluate(2.0 * timing.duration - times) - 5.0 - s).max() < 1e-10 * size
 
 
 @given(seeds, st.integers(1, 5))

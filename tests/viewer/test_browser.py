@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.chromium import Chromium, Page
 from tests.viewer import arms
 from wbc.controller.step import state_of
 from wbc.viewer import Viewer, show
-from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.drawing import FIELD, GIZMO, viewpoint
 from wbc.viewer.link import SharedTick
 from wbc.viewer.tick import Tick

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from tests.chromium import Chromium, Page
 from wbc.viewer import Viewer
-from wbc.viewer.chromium import Chromium, Page
 from wbc.viewer.climbing import climb
 from wbc.viewer.operating import operate
 

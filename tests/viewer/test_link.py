@@ -8,8 +8,7 @@ import sys
 import threading
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from wbc.viewer.link import NOTE, RING, SLOTS, LoopEnd, ViewerEnd
 

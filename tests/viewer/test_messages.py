@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from wbc.errors import WbcError
 from wbc.viewer.messages import FORMAT, LONGEST, MessageError, read, sent_pose, value_of, write

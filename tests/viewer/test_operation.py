@@ -7,8 +7,7 @@ import time
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.viewer.arms import ACCELERATION, DT, fresh
 from wbc.api import Controller

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
+from tests.repeats import ALL, MORE
 from tests.viewer import arms
 from wbc.viewer import ViewerError, show
 
@@ -44,7 +45,7 @@ def test_a_loop_is_driven_and_its_viewer_lost() -> None:
     assert np.abs(controller.step(q).v).max() < 1e-6
 
 
-@pytest.mark.parametrize("end", [subprocess.Popen.kill, subprocess.Popen.terminate])
+@pytest.mark.parametrize("end", [subprocess.Popen.kill, subprocess.Popen.terminate][: 2 if MORE >= ALL else 1])
 def test_a_viewer_that_dies_while_somebody_operates_stops_the_robot(
     end: Callable[[subprocess.Popen[bytes]], None],
 ) -> None:

@@ -10,7 +10,7 @@ import zmq
 
 from tests.viewer import arms
 from wbc.viewer import ViewerError, show
-from wbc.viewer.local import require_local
+from wbc.viewer.errors import require_local
 
 
 @pytest.mark.parametrize("address", ["tcp://0.0.0.0:5555", "tcp://*:5555", "tcp://192.168.0.1:1", "inproc://a", "5555"])

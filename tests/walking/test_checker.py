@@ -528,6 +528,7 @@ def test_the_checker_shares_no_code_with_planning_and_control() -> None:
     """Whatever the checker imports, itself or through other modules, is neither planner nor stack nor controller."""
     allowed = {
         *("wbc.errors", "wbc.validation", "wbc.shapes", "wbc.robot", "wbc.clearance", "wbc.geometry", "wbc.log"),
+        "wbc.multibody",
         *("wbc.walking.log.log", "wbc.walking.log.ticks"),
         *(f"wbc.walking.holds.{name}" for name in ("hold", "obstacle", "structure", "files", "surface")),
         "wbc.walking.checker",

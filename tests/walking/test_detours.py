@@ -19,12 +19,10 @@ from wbc.robots import Walker
 from wbc.walking import Structure, plane, remove_columns, remove_rows
 from wbc.walking.arms.puma import limb_of
 from wbc.walking.body_path import BodyPath, grid_path, straight_path
-from wbc.walking.planner.detours import CellSpacing, beside, find_route, route
-from wbc.walking.planner.detours import cell_grips as gripping
+from wbc.walking.planner.detours import CellSpacing, beside, cell_grips as gripping, find_route, route
 from wbc.walking.planner.detours.cell_graph import CellGraph
 from wbc.walking.planner.detours.cell_grips import CellGrips, cell_grips
-from wbc.walking.planner.detours.cells import BESIDE, WIDE, Cells, cells_about
-from wbc.walking.planner.detours.cells import NARROW as CLOSE
+from wbc.walking.planner.detours.cells import BESIDE, NARROW as CLOSE, WIDE, Cells, cells_about
 from wbc.walking.planner.follow import follow_plan
 from wbc.walking.planner.plan import NoPlanError, Plan
 from wbc.walking.planner.planner import plan_slices, plan_walk, rest_of

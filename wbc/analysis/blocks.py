@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.analysis.certificates.certificate import INCOMPLETE
 from wbc.analysis.completeness import RankWitness, find_witness
@@ -18,6 +17,7 @@ from wbc.analysis.jacobians.tree_joints import JointBlock, TreeJoints, joint_blo
 from wbc.analysis.loci.budget import Budget, processor_seconds
 from wbc.analysis.loci.loci import LOOSE, STRICT, UNDECIDED, Loci, loci
 from wbc.analysis.rows import Rows, checked
+from wbc.multibody import pin
 from wbc.robots import load
 from wbc.validation import Array
 

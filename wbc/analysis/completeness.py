@@ -126,7 +126,9 @@ def analyse(
         text = f"expected more: the exact Jacobian of {model.robot.nv} joints takes longer"
         raise RangeError("minutes", budget.minutes, text)
     search = budget.part(_SEARCH)
-    found, certificate, done = _searched(model, wanted, added, algorithm, search, certificate, progress)
+    found, certificate, done = _searched(
+        model, wanted, added, algorithm, search, certificate=certificate, progress=progress
+    )
     witness = None
     if certificate is not None and certificate.witness is not None:
         at = certificate.witness
@@ -161,6 +163,7 @@ def _searched(
     added: tuple[Rows, ...],
     algorithm: str,
     budget: Budget,
+    *,
     certificate: RankCertificate | None,
     progress: Callable[[str], None] | None,
 ) -> tuple[Loci, RankCertificate | None, bool]:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robots import operator_arm
 

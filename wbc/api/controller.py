@@ -22,7 +22,6 @@ class Controller(CompiledStack):
     Attributes:
         stack: the declaration that it was compiled from.
         solver: name of the QP solver.
-        backend: ``native`` or ``vm``.
         cached: the compiled stack was found in the cache.
     """
 
@@ -49,6 +48,8 @@ class Controller(CompiledStack):
             batch.set(hand=poses)                   # [10_000, 4, 4]
             v = batch.step(q).v                     # [10_000, nq] -> [10_000, nv]
 
+        It waits for native code in the making, see :meth:`wbc.Stack.compile`.
+
         Args:
             count: how many. threads: that tick at a time; default: one a core.
 
@@ -57,7 +58,7 @@ class Controller(CompiledStack):
         """
         from wbc.batch import Batch
 
-        return Batch(self, count, threads)
+        return Batch(self.settled(), count, threads)
 
     def export(
         self,

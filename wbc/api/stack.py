@@ -13,7 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.api.controller import Controller
 from wbc.controller import core_of
-from wbc.qp.solvers import available_solvers
+from wbc.qp.solvers import require_solver
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration, bends
 from wbc.tasks import Constraint, Fixed, FrameVelocityLimit, JointLimits
@@ -101,17 +101,18 @@ class Stack(Declaration):
             log.warning("%r was added after compile(): controllers that exist do not have it; compile again", name)
 
     def compile(
-        self, solver: str = "daqp", backend: str = "auto", command: str | None = None, wait: bool = True
+        self, solver: str = "daqp", backend: str = "auto", command: str | None = None, wait: bool = False
     ) -> Controller:
         """A controller with its own memory; compiled code comes from the cache where it can.
 
         Args:
             command: what ticks command: ``velocity`` (default), ``acceleration`` or ``torque``. docs/torque.md.
             solver: ``daqp`` (native where gcc is), ``osqp``, ``qpoases``, or an experimental one.
-            backend: ``native``, ``vm``, or ``auto``: native where gcc is, else ``vm``: rows on the CasADi virtual
-                machine, all else in code that is compiled once for all stacks.
-            wait: False: ``auto`` is ``vm`` at once; where gcc is its rows are compiled in the background, and the
-                controller changes over between two ticks, to the same bits (:attr:`Controller.tier`).
+            backend: ``native`` waits for gcc; ``vm``: rows on the CasADi virtual machine, all else in code that is
+                compiled once for all stacks; ``auto``: ``vm`` at once, and where gcc is native code, which is compiled
+                in the background: the controller changes over between two ticks, to the same bits
+                (:attr:`Controller.tier`, :attr:`Controller.may_change`).
+            wait: True: ``auto`` waits for the native code.
 
         Raises:
             UnknownNameError: unknown solver, backend or command. CompileError: native without gcc, or gcc failed;
@@ -120,7 +121,7 @@ class Stack(Declaration):
         """
         from wbc import __version__
 
-        validation.one_of("solver", solver, available_solvers(experimental=True))
+        require_solver(solver)
         wait = validation.flag("wait", wait)
         declared = self.commanding(self.command if command is None else command)
         controller = Controller(declared, compile_stack(declared, backend, __version__, wait=wait), solver)

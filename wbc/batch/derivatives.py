@@ -6,9 +6,9 @@ import ctypes
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.tick.context import Context
 from wbc.tick.native import NativeTick
 from wbc.validation import Array

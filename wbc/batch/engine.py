@@ -81,8 +81,7 @@ class Compiled:
         self._tick, self._count = tick, count
         self._ticks = [tick.twin() for _ in range(threads)]
         self._busy = min(threads, -(-count // _SMALL))
-        size = int(tick.library_function("wbc_tick_carried_size", ctypes.c_longlong)())
-        self._carried = np.zeros((count, size), np.uint8)
+        self._carried = np.zeros((count, tick.library_function("wbc_tick_carried", ctypes.c_int)()), np.intc)
         self._many, self._take, self._fit = (
             tick.library_function(name, ctypes.c_int, unlocked=True)
             for name in ("wbc_tick_many", "wbc_many_take", "wbc_many_fit")

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.tasks import inputs
 from wbc.tasks.base import Input

@@ -1,25 +1,16 @@
 """Proven clearances of moving bodies: exact distances, and bounds on motion between instants (floor 3)."""
 
-from wbc.clearance.motion import Motion
-from wbc.clearance.scene import Exemption, Pair, SweptBody, SweptScene, bodies_of, self_pairs
-from wbc.clearance.sweep import Nearest, Sweep, Sweeper
-from wbc.clearance.tree import Tree
-from wbc.clearance.triangle_mesh import TriangleMesh
-from wbc.clearance.walls import CylinderInside, EndlessCylinder
-
-__all__ = [
-    "CylinderInside",
-    "EndlessCylinder",
-    "Exemption",
-    "Motion",
-    "Nearest",
-    "Pair",
-    "Sweep",
-    "Sweeper",
-    "SweptBody",
-    "SweptScene",
-    "Tree",
-    "TriangleMesh",
-    "bodies_of",
-    "self_pairs",
-]  # fmt: skip
+from wbc.clearance.motion import Motion as Motion
+from wbc.clearance.scene import (
+    CylinderInside as CylinderInside,
+    EndlessCylinder as EndlessCylinder,
+    Exemption as Exemption,
+    Pair as Pair,
+    SweptBody as SweptBody,
+    SweptScene as SweptScene,
+    bodies_of as bodies_of,
+    self_pairs as self_pairs,
+)
+from wbc.clearance.sweep import Nearest as Nearest, Sweep as Sweep, Sweeper as Sweeper
+from wbc.clearance.tree import Tree as Tree
+from wbc.clearance.triangle_mesh import TriangleMesh as TriangleMesh

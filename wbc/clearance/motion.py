@@ -7,11 +7,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance.tree import Tree
 from wbc.errors import ContinuityError, RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.rotations import matrices
 from wbc.validation import Array
 

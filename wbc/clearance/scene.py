@@ -8,17 +8,44 @@ from math import inf
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance.tree import Moves, Tree
 from wbc.clearance.triangle_mesh import TriangleMesh
-from wbc.clearance.walls import CylinderInside, EndlessCylinder
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.robot import Robot
-from wbc.shapes import HalfSpace, Solid
-from wbc.shapes.solid import why_apart
+from wbc.shapes import Geometry, HalfSpace, Solid
+from wbc.shapes.solid import Kind, why_apart
 from wbc.validation import Array
+
+
+@dataclass(frozen=True)
+class _Endless(Geometry):
+    radius: float
+
+    def __post_init__(self) -> None:
+        name = f"{type(self).__name__}.radius"
+        object.__setattr__(self, "radius", validation.scalar(name, self.radius, low=0.0, open_low=True, unit="m"))
+
+    @property
+    def sizes(self) -> tuple[float, float, float, float, float]:
+        return (0.0, 0.0, 0.0, self.radius, 0.0)
+
+
+@dataclass(frozen=True)
+class CylinderInside(_Endless):
+    """The wall round the endless cylinder of ``radius`` [m] about z: distances count from the wall inwards."""
+
+    kind = Kind.TUBE
+
+
+@dataclass(frozen=True)
+class EndlessCylinder(_Endless):
+    """Points within ``radius`` [m] of the z axis."""
+
+    kind = Kind.ROD
+
 
 #: Those that have no end, and are fixed in the world
 Unbounded = HalfSpace | CylinderInside | EndlessCylinder

@@ -8,10 +8,10 @@ from enum import IntEnum
 from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, UnsupportedJointError
+from wbc.multibody import pin
 from wbc.symbolic.joint_steps import JointKind, joint_steps, place
 from wbc.validation import Array
 

@@ -64,6 +64,7 @@ COMMANDS = {
             "compare": "walk.Compare",
         },
     ),
+    "climb": Listed("Climb and walk with any limbs on any scene.", {"": "climb.ClimbTo"}),
     "view": Listed(
         "See and drive robots, and see runs, in the browser.",
         {"show": "view.ViewShow", "play": "view.Play", "pairs": "view.ViewPairs", "climb": "view.Climb"},

@@ -115,10 +115,10 @@ class Explore(SceneOptions):
     ) -> dict[str, Any]:
         """Straight to a place, resolved as a whole, beside step by step."""
         import numpy as np
-        import pinocchio as pin
 
         from wbc import validation
         from wbc.cli.console import say
+        from wbc.multibody import pin
 
         validation.integer("points", self.points, 2)
         pose = machine.pose(q, name)

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from wbc import validation
 from wbc.cli.console import OutputError
 
 
@@ -32,7 +33,7 @@ def run_folder(
         OutputError: it has a file of a run and ``force`` is off, or it cannot be written.
     """
     folder = wanted or _new(name)
-    try:
+    with validation.writing("out", folder, OutputError, ValueError):
         there = [file for pattern in written for file in folder.glob(pattern)]
         if there and not force:
             reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
@@ -47,8 +48,6 @@ def run_folder(
         probe.unlink()
         if not made and not known:
             folder.rmdir()
-    except (OSError, ValueError) as error:
-        raise OutputError("out", str(folder), f"cannot be written: {getattr(error, 'strerror', error)}") from error
     return folder
 
 

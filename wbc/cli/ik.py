@@ -59,10 +59,10 @@ class Solve(SceneOptions):
         report(plan.robot, plan.frame, answers)
         data([answer.data() for answer in answers])
         if self.out is not None:
-            try:
+            from wbc import validation
+
+            with validation.writing("out", self.out, OutputError):
                 save_answers(self.out, plan.robot, answers)
-            except OSError as error:
-                raise OutputError("out", str(self.out), f"cannot be written: {error.strerror}") from error
         return 0 if all(answer.solved for answer in answers) else UNSOLVED
 
     def _answers(self, solver: InverseKinematics, first: Array, number: int, target: Target) -> list[TargetAnswer]:

@@ -58,8 +58,7 @@ class MovingTarget(SensingOptions):
         from wbc.cli.folders import filled, run_folder
         from wbc.cli.scene import tip_frame
         from wbc.cli.session import INTERRUPTED, Stopper
-        from wbc.moving_target import folder as files
-        from wbc.moving_target import pictures
+        from wbc.moving_target import folder as files, pictures
         from wbc.moving_target.knowledge import Knowledge, Measurement
         from wbc.moving_target.study import grasp, outcome, peg, trials
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from wbc import validation
 from wbc.cli.console import OutputError
 from wbc.cli.reading import Option
 
@@ -71,10 +72,7 @@ def save_table(recording: Recording, file: Path) -> None:
         OutputError: there is such a file, or it cannot be written. RecordingError: of an older version.
     """
     columns, units = recording.table(), recording.units
-    try:
-        with file.open("x", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(f"{name} [{units[name]}]" if name in units else name for name in columns)
-            writer.writerows(zip(*columns.values(), strict=True))
-    except OSError as error:
-        raise OutputError("table", str(file), f"cannot be written: {error.strerror}") from error
+    with validation.writing("table", file, OutputError), file.open("x", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(f"{name} [{units[name]}]" if name in units else name for name in columns)
+        writer.writerows(zip(*columns.values(), strict=True))

@@ -44,9 +44,9 @@ class SceneOptions:
             ShapeError, RangeError, NotFiniteError: a sphere or a floor that is none.
         """
         import numpy as np
-        import pinocchio as pin
 
         from wbc import shapes, validation
+        from wbc.multibody import pin
         from wbc.track.setup import MovingObstacle
 
         found = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +65,10 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
     stopper = Stopper()
     with progress_bar() as bar:
         stage = bar.add_task("compiling", total=None)
+
+        def tell_stage(text: str) -> None:
+            bar.update(stage, description=text, total=None)
+
         recording = folder / RECORDING if output.record else None
         log = _tracked(plan, bar, stage, stopper, recording, plant)
         with stopper.listening():
@@ -75,8 +79,8 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
                 files.append(recording)
             with filled(folder) as fresh:
                 if output.plots:
-                    files += _drawn(plan, log, fresh, bar, stage)
-                files += _pages(log, figures, fresh, recording, output.plots, bar, stage)
+                    files += _drawn(plan, log, fresh, tell_stage)
+                files += _pages(log, figures, fresh, recording, output.plots, tell_stage)
     title = f"{plan.robot.name} follows {plan.label} with {plan.frame}"
     show_figures(title, ((figure.label, figure.text) for figure in figures), folder, files)
     for warning in start_warnings(log):
@@ -106,19 +110,19 @@ def _tracked(
         return track(plan, progress, stopper, compiled, plant=plant)
 
 
-def _drawn(plan: PathRun, log: Log, folder: Path, bar: Progress, stage: Any) -> list[Path]:
-    bar.update(stage, description="plots", total=None)
-    files = save_plots(log, folder, lambda name: bar.update(stage, description=f"plots: {name}"))
-    bar.update(stage, description="picture")
+def _drawn(plan: PathRun, log: Log, folder: Path, told: Callable[[str], None]) -> list[Path]:
+    told("plots")
+    files = save_plots(log, folder, lambda name: told(f"plots: {name}"))
+    told("picture")
     picture = save_picture(log, plan.robot, folder / "overview.png")
     return files if picture is None else [*files, picture]
 
 
 def _pages(
-    log: Log, figures: list[Figure], folder: Path, recorded: Path | None, plots: bool, bar: Progress, stage: Any
+    log: Log, figures: list[Figure], folder: Path, recorded: Path | None, plots: bool, told: Callable[[str], None]
 ) -> list[Path]:
     """The report; with a recording also why there were conflicts, and the page that plays the run."""
-    bar.update(stage, description="report")
+    told("report")
     out: list[Path] = []
     said: dict[int, str] = {}
     if recorded is not None and len(log):
@@ -128,7 +132,7 @@ def _pages(
         if wanted := conflicts(log):
             said = sentences_of(recording, wanted)
         if plots:
-            bar.update(stage, description="replay page")
+            told("replay page")
             # A run is worth keeping where what draws the page is not installed
             with contextlib.suppress(MissingPackageError):
                 out.append(save_page(*states_of(recording, rate=PAGE_RATE), folder / REPLAY))

@@ -54,7 +54,7 @@ class Driven(PageOptions, ABC):
 
     def run(self) -> None:
         from wbc import extras
-        from wbc.viewer.local import require_local
+        from wbc.viewer.errors import require_local
 
         extras.require("viewer", "a page in the browser")
         if self.zeromq:

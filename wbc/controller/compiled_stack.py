@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.core import Core
@@ -15,11 +14,12 @@ from wbc.controller.handles import Handles
 from wbc.controller.policy import Policy
 from wbc.controller.step import Step
 from wbc.errors import BusyError, PicklingError, RangeError, ShapeError, SolverError
+from wbc.multibody import pin
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
-from wbc.tick.native import CompiledTick
+from wbc.tick.native import REFUSED, CompiledTick
 from wbc.validation import Array
 
 _Array = np.ndarray
@@ -35,7 +35,6 @@ class CompiledStack(Handles):
     Attributes:
         stack: the declaration that it was compiled from.
         solver: name of the QP solver.
-        backend: ``native`` or ``vm``.
         cached: the compiled stack was found in the cache.
     """
 
@@ -43,7 +42,6 @@ class CompiledStack(Handles):
         self, stack: Declaration, artifact: Artifact, solver: str, assembly: CompiledTick | None = None
     ) -> None:
         self.stack, self.solver, self.cached = stack, solver, artifact.cached
-        self.backend = artifact.backend
         self._artifact = artifact
         self._core = core = Core(stack, artifact, solver, assembly)
         super().__init__(core.handles, stack)
@@ -53,11 +51,13 @@ class CompiledStack(Handles):
         self._v_in, self._use_v = core.tick.v_in[: core.layout.nv], core.tick.use_v
         self._q_shape, self._v_shape = (core.layout.nq,), (core.layout.nv,)
         self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.sensors)
-        self._plans = core.together.plans
+        self._plans, self._cycle = core.together.plans, core.together.none.cycle
         self._busy = False
 
-    def step(self, q: Any, v: Any = None, dt: Any = None) -> Step:
+    def step(self, q: Any, v: Any = None, dt: Any = None, **targets: Any) -> Step:
         """One control cycle: the command v for the next dt seconds.
+
+            command = controller.step(q, hand=pose, posture=q).v      # targets in, command out: one call of C
 
             minimise   sum over task rows of w (J v + gain e + de/dt)^2 + damping |v|^2
             subject to the constraints' rows and bounds
@@ -67,16 +67,35 @@ class CompiledStack(Handles):
             v: measured velocity [nv] that acceleration bounds are counted from; default: the last command
                 (zero after a reset).
             dt: time until the next command [s], within ``stack.dt_range``; default: the declared one.
+            targets: what :meth:`set` sets before; arrays of doubles, poses as 4x4 matrices, cost the least.
 
         Raises:
             ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
-            BusyError: another thread is within ``step`` of this controller.
+            UnknownNameError: as of :meth:`set`. BusyError: another thread is within ``step`` of this controller.
         """
         if self._busy:
             raise BusyError("step", self.stack.robot.name, "this controller is in use by another thread; clone() it")
+        core = self._core
+        if v is None and dt is None and not core.waits and core.call is core.plain_call:
+            # In one call, with the interpreter's lock, so that no other thread is within
+            if not targets:
+                done = self._cycle(q)
+            elif (plan := self._plans.get(tuple(targets))) is None:
+                done = REFUSED
+            else:
+                done = plan.cycle(q, *targets.values())
+                if done == REFUSED:
+                    done = plan.cycle(q, *[x.homogeneous if type(x) is _SE3 else x for x in targets.values()])
+                if core.first and (isinstance(done, bytes) or done >= 0):
+                    core.let_go(plan.slots)
+            if isinstance(done, bytes):
+                return Step(done, self._context)
+            if done >= 0:
+                return self._finished(done, q)
+        if targets:
+            self._set_first(q, v, dt, targets)
         try:
             self._busy = True
-            core = self._core
             if waits := dt is not None or core.waits:
                 self._prepare(q, v, dt)
             if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
@@ -97,6 +116,21 @@ class CompiledStack(Handles):
             return Step(self._snapshot(), self._context)
         finally:
             self._busy = False
+
+    def _finished(self, flag: int, q: Any) -> Step:
+        """A step after its tick."""
+        try:
+            self._busy = True
+            if self._core.finish(flag) < 0:
+                self._core.refuse(q, None)
+            return Step(self._snapshot(), self._context)
+        finally:
+            self._busy = False
+
+    def _set_first(self, q: Any, v: Any, dt: Any, targets: dict[str, Any]) -> None:
+        """Targets of a step whose other arguments are checked before."""
+        self._require(q, v, dt)
+        self.set(**targets)
 
     def set(self, **values: Any) -> None:
         """Set the targets of several items in one call: all are checked before any is written.
@@ -148,7 +182,15 @@ class CompiledStack(Handles):
 
         Its solver and sensors start as after a reset. Nothing is read from disk or compiled.
         """
-        out = type(self)(self.stack, self._artifact, self.solver, self._core.assembly.twin())
+        return self._copy(self._artifact, self._core.assembly.twin())
+
+    def settled(self) -> Self:
+        """The same for what needs a library: it waits for one in the making, see :meth:`wbc.Stack.compile`."""
+        artifact = self._artifact.settled(wait=True)
+        return self._copy(artifact, None if artifact is not self._artifact else self._core.assembly.twin())
+
+    def _copy(self, artifact: Artifact, assembly: CompiledTick | None) -> Self:
+        out = type(self)(self.stack, artifact, self.solver, assembly)
         out._core.assume(self._core)
         return out
 
@@ -169,11 +211,30 @@ class CompiledStack(Handles):
         return self._core.tick.qp()
 
     @property
+    def backend(self) -> str:
+        """``native`` or ``vm``, as asked for: the second of a stack that answered at once, see :attr:`tier`."""
+        return self._artifact.backend
+
+    @property
     def tier(self) -> str:
-        """What ticks run now: ``native``: code that was compiled for the stack; ``rows``: its rows, in code that all
-        stacks share; ``vm``: its rows on CasADi's virtual machine, in the same code.
+        """What ticks run now, to the same bits: ``native``: code that was compiled for the stack; ``vm``: code that all
+        stacks share, with the rows on CasADi's virtual machine.
         """
         return self._core.assembly.tier
+
+    @property
+    def may_change(self) -> bool:
+        """Whether a tick may change over from ``vm`` to ``native`` code. A loop under a deadline that must not spend
+        what the first native tick costs more, some hundred microseconds, sets it to false; true lets the next change.
+
+        Raises:
+            ShapeError: no bool.
+        """
+        return self._core.may_change
+
+    @may_change.setter
+    def may_change(self, may: bool) -> None:
+        self._core.permit(validation.flag("may_change", may))
 
     @property
     def last_command(self) -> Array:
@@ -250,14 +311,21 @@ class CompiledStack(Handles):
 
     def _prepare(self, q: Any, v: Any, dt: Any) -> None:
         """Check everything before anything is changed; the first configuration, where it is waited for."""
+        configuration = self._require(q, v, dt)
+        if self._core.waiting:
+            self._core.take_first(configuration)
+        if self._core.may_change:
+            self._core.assembly.change_over()
+
+    def _require(self, q: Any, v: Any, dt: Any) -> Array:
+        """All arguments of a step are good; the configuration."""
         if dt is not None:
             low, high = self.stack.dt_range
             validation.scalar("dt", dt, low=low, high=high, unit="s")
-        configuration = self.stack.robot.configuration("q", q)
+        configuration = np.asarray(self.stack.robot.configuration("q", q))
         if v is not None:
             validation.real_array("v", v, self._v_shape)
-        if self._core.waiting:
-            self._core.take_first(configuration)
+        return configuration
 
 
 def core_of(controller: CompiledStack) -> Core:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
-from wbc.controller.escape import Escape
 from wbc.controller.handle import POSE, Directions, Handle
 from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
 from wbc.controller.step import Step
 from wbc.controller.together import Plan, Together
-from wbc.controller.watch import BrakingAuthority, Watch
 from wbc.errors import SolverError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
@@ -30,6 +28,9 @@ from wbc.tick.native import CompiledTick, NativeTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
+if TYPE_CHECKING:
+    from wbc.controller.escape import Escape
+
 
 def assembly_of(stack: Declaration, artifact: Artifact) -> CompiledTick:
     """The native tick, or that of rows on the virtual machine.
@@ -40,7 +41,7 @@ def assembly_of(stack: Declaration, artifact: Artifact) -> CompiledTick:
     if artifact.library is not None:
         return NativeTick(artifact.library, artifact.layout)
     if artifact.program is not None:
-        return GenericTick(artifact.program, stack, artifact.layout, artifact.rows)
+        return GenericTick(artifact.program, stack, artifact.layout, artifact.behind)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
 
 
@@ -77,7 +78,9 @@ class Core:
         directions, ramps: of scaled tasks, and of weights that change. together: sets values of several items.
         call: one tick on the buffers as they are, returns its flag; a recorder puts its own in place.
         resets: how many there were. recording: the file that ticks are recorded into, or None.
-        waits: the next step has more to do than to copy q: defaults to take from it, ramps, or dt to set back.
+        waits: the next step has more to do than to copy q: defaults to take from it, ramps, dt to set back, or native
+            code to change over to, which it may not where ``may_change`` is false.
+        plain_call: the native tick that is all of a step's work where it is ``call``; None where there is more.
     """
 
     def __init__(
@@ -91,7 +94,9 @@ class Core:
         self.tick: CompiledTick | SolvedTick = solved or self.assembly
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
         self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
-        self._plain_call = self.call
+        self._tick_call = self.call
+        self.plain_call = self.call if isinstance(self.tick, CompiledTick) else None
+        self.may_change, self.assembly.wake = True, self._wake
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
@@ -110,7 +115,6 @@ class Core:
         #: sensors with the handles of their items
         self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
         self._escape: Escape | None = None
-        self._braking = BrakingAuthority(stack, layout)
         self.follow(self.fallback.policy)
         self.tick.dt[0] = stack.dt
         self.tick.q[:] = stack.robot.neutral
@@ -135,17 +139,23 @@ class Core:
         if other.fallback.prepared:
             self.fallback.prepare()
         self.first, self.waiting, self.waits = dict(other.first), dict(other.waiting), other.waits
+        self.permit(other.may_change)
 
     def follow(self, policy: Policy) -> None:
         """Another policy from now on."""
         self.fallback.policy = policy
-        self.call, self._escape = self._plain_call, None
+        self.call, self._escape = self._tick_call, None
         if policy.escape:
+            from wbc.controller.escape import Escape
+
             self.call = self._escape = Escape(self.call, self.tick, self.fallback, self.context, self.snapshot)
         self._unwatched = self.call
         if self.sensors:
+            from wbc.controller.watch import BrakingAuthority, Watch
+
+            braking = BrakingAuthority(self.stack, self.layout)
             drifts = [self.layout.blocks[h.item_name].slots["drift"].start for _, h in self.sensors]
-            self.call = Watch(self.call, self._forget, self.tick, self.fallback, self.sensors, drifts, self._braking)
+            self.call = Watch(self.call, self._forget, self.tick, self.fallback, self.sensors, drifts, braking=braking)
 
     def again(self) -> Step:
         """A tick on the buffers as they are, sensed inputs included."""
@@ -190,6 +200,18 @@ class Core:
         self.tick.dt[0] = step
         self.ramps.advance(step)
         self.waits = dt is not None or bool(self.ramps)
+        # Native code may have been offered meanwhile
+        self._wake()
+
+    def _wake(self) -> None:
+        """The next step changes over to native code, if some waits and it may."""
+        if self.assembly.offered and self.may_change:
+            self.waits = True
+
+    def permit(self, change: bool) -> None:
+        """Whether ticks may change over to native code."""
+        self.may_change = change
+        self._wake()
 
     # Values of items
 

@@ -7,11 +7,11 @@ from math import hypot, isfinite
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.ramps import Ramps
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot

@@ -22,7 +22,6 @@ from wbc.tick.buffers import (
     SOLVED,
     UNSOUND,
 )
-from wbc.tick.elastic import ElasticTick
 from wbc.tick.native import CompiledTick
 from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
@@ -165,6 +164,10 @@ class Fallback:
     def _link(self, name: str) -> SolvedTick:
         if name not in self._links:
             assembly, stack, layout = self._given
-            link = ElasticTick(assembly, stack, layout) if name == "elastic" else None
-            self._links[name] = link or SolvedTick(assembly, stack, layout, name)
+            if name == "elastic":
+                from wbc.tick.elastic import ElasticTick
+
+                self._links[name] = ElasticTick(assembly, stack, layout)
+            else:
+                self._links[name] = SolvedTick(assembly, stack, layout, name)
         return self._links[name]

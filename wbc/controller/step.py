@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc import explain
 from wbc.errors import CommandError
-from wbc.explain import Explanation
 from wbc.qp.certificate import Certificate
+from wbc.robot import DeadPoint
 from wbc.stack.declaration import bends
 from wbc.stack.layout import CLOSED, rate_unit
 from wbc.tick.buffers import INFINITE
@@ -27,6 +27,9 @@ from wbc.tick.outcome import (
     scales,
 )
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.explain import Explanation
 
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
@@ -110,6 +113,11 @@ class Step:
         """
         self._require("loop_forces", "torque")
         return self._context.loop_forces(self._part("v"))
+
+    @property
+    def dead_points(self) -> tuple[DeadPoint, ...]:
+        """Linkages within 0.1 rad of a dead point, see :meth:`wbc.robot.Robot.dead_points`."""
+        return self._context.stack.robot.dead_points(self._part("q"))
 
     def _require(self, field: str, *commands: str) -> None:
         command = self._context.command
@@ -252,6 +260,8 @@ class Step:
         Raises:
             SolverError: the step comes from a pickle, which holds no code to set its tick up with.
         """
+        from wbc import explain
+
         return explain.explain(self._data, self._context, str(self.status), self.answered_by)
 
     def derivative(self, name: str, value: str | None = None) -> Array:
@@ -268,6 +278,8 @@ class Step:
             UnknownNameError: no such item or value.
             SolverError: the step comes from a pickle, rows gave way, or there is no optimum.
         """
+        from wbc import explain
+
         return explain.derivative(self._data, self._context, name, value)
 
     def __repr__(self) -> str:

@@ -22,6 +22,7 @@ class Plan:
     Attributes:
         places: where each value's bytes wait. shapes: of its array. slots: of the inputs.
         take: check them all and write them; 0, and nothing written, where one is refused.
+        cycle: the same, and a tick, see :meth:`wbc.tick.native.CompiledTick.cycler`.
     """
 
     def __init__(self, assembly: CompiledTick, slots: list[Slot], kinds: list[int]) -> None:
@@ -37,6 +38,7 @@ class Plan:
         whole = staged.data.cast("B")
         self.places = [whole[end - 8 * size : end] for end, size in zip(ends.tolist(), sizes, strict=True)]
         self.take = assembly.taker(staged, table)
+        self.cycle = assembly.cycler(staged, table)
 
 
 class Together:
@@ -46,6 +48,8 @@ class Together:
         self._handles, self._assembly = handles, assembly
         #: of names that were given together and can be taken quickly
         self.plans: dict[tuple[str, ...], Plan] = {}
+        #: of no names
+        self.none = Plan(assembly, [], [])
 
     def plan(self, values: Mapping[str, Any]) -> Plan | None:
         """How the targets of these items are taken quickly, from now on; None where they cannot be.

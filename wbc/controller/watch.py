@@ -47,6 +47,7 @@ class Watch:
         fallback: Fallback,
         sensors: list[tuple[Sensor, Handle]],
         drifts: list[int],
+        *,
         braking: BrakingAuthority,
     ) -> None:
         self._call, self._forget, self._tick, self._fallback = call, forget, tick, fallback

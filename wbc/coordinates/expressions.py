@@ -22,8 +22,8 @@ from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._stereographic import unit
-from wbc.tasks.base import Input, Row
-from wbc.tasks.frames import frame_pose, require_motion
+from wbc.tasks.base import Input, Row, require_motion
+from wbc.tasks.frames import frame_pose
 from wbc.validation import Array
 
 REFERENCE = "reference"

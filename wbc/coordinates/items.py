@@ -14,8 +14,7 @@ from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
 from wbc.coordinates.expressions import DRIFT, REFERENCE
 from wbc.coordinates.pair import is_pose
-from wbc.coordinates.rows import Coordinate
-from wbc.coordinates.rows import coordinates as checked_coordinates
+from wbc.coordinates.rows import Coordinate, coordinates as checked_coordinates
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer

@@ -88,10 +88,8 @@ def plot_drives(
             axis.set_title(title)
         axes[0].legend()
         axes[-1].set_xlabel("time [s]")
-        try:
+        with validation.writing("path", file, RobotFileError, ValueError):
             file.parent.mkdir(parents=True, exist_ok=True)
             figure.savefig(file)
-        except (OSError, ValueError) as error:
-            raise RobotFileError("path", str(file), f"cannot be written: {error}") from error
         plt.close(figure)
     return file

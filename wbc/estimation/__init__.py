@@ -2,19 +2,12 @@
 what acts on a robot that nobody commanded.
 """
 
-from wbc.estimation.calibration import Calibration, calibrate
-from wbc.estimation.momentum_observer import MomentumObserver
-from wbc.estimation.pose_filter import FrameMotion, PoseFilter
-from wbc.estimation.pose_stream import DropoutPolicy, FrameEstimate, PoseStream, StreamState
-
-__all__ = [
-    "Calibration",
-    "DropoutPolicy",
-    "FrameEstimate",
-    "FrameMotion",
-    "MomentumObserver",
-    "PoseFilter",
-    "PoseStream",
-    "StreamState",
-    "calibrate",
-]
+from wbc.estimation.calibration import Calibration as Calibration, calibrate as calibrate
+from wbc.estimation.momentum_observer import MomentumObserver as MomentumObserver
+from wbc.estimation.pose_filter import FrameMotion as FrameMotion, PoseFilter as PoseFilter
+from wbc.estimation.pose_stream import (
+    DropoutPolicy as DropoutPolicy,
+    FrameEstimate as FrameEstimate,
+    PoseStream as PoseStream,
+    StreamState as StreamState,
+)

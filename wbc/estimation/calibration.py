@@ -18,14 +18,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from wbc import validation
 from wbc.errors import RangeError, SolverError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 Kind = Literal["rigid", "similarity", "affine"]
+#: M, b and the delay
+Parameters = tuple[Array, Array, float]
 KINDS = ("rigid", "similarity", "affine")
 #: Least singular value of the Jacobian with columns of unit length, below which data do not tell parameters apart
 EXCITED = 1e-3
@@ -114,20 +116,20 @@ def calibrate(times: Any, readings: Any, positions: Any, kind: Kind = "affine", 
     if seek and (np.diff(t) <= 0.0).any():
         raise RangeError("times", times, "expected increasing times")
     path = CubicSpline(t, x) if seek else None
-    matrix, offset, late = _start(kind, x, y)
+    data, parameters = (t, x, y), _start(kind, x, y)
     for _ in range(STEPS):
-        residual, jacobian = _linearised(kind, path, t, x, y, matrix, offset, late)
+        residual, jacobian = _linearised(kind, path, data, parameters)
         step = _solved(jacobian, residual, names)
-        matrix, offset, late = _moved(kind, matrix, offset, late, step)
+        parameters = _moved(kind, parameters, step)
         if np.abs(step * np.linalg.norm(jacobian, axis=0)).max() <= SETTLED * np.linalg.norm(y - y.mean(axis=0)):
             break
     else:
         raise SolverError("calibrate", kind, f"no minimum in {STEPS} steps")
-    residual, jacobian = _linearised(kind, path, t, x, y, matrix, offset, late)
+    residual, jacobian = _linearised(kind, path, data, parameters)
     variance = float(residual @ residual) / (len(residual) - len(names))
     covariance = np.array(variance * np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64)
     left = np.sqrt(np.mean(residual.reshape(-1, 3) ** 2, axis=0))
-    return Calibration(matrix, offset, late, names, covariance, left)
+    return Calibration(*parameters, names, covariance, left)
 
 
 def _names(kind: Kind, delay: bool) -> tuple[str, ...]:
@@ -137,7 +139,7 @@ def _names(kind: Kind, delay: bool) -> tuple[str, ...]:
     return (*own, *(f"offset {axis}" for axis in "xyz"), *(("delay",) if delay else ()))
 
 
-def _start(kind: Kind, x: Array, y: Array) -> tuple[Array, Array, float]:
+def _start(kind: Kind, x: Array, y: Array) -> Parameters:
     """M and b without delay: least squares, or the nearest rotation (Arun, Huang and Blostein 1987)."""
     middle, centre = x.mean(axis=0), y.mean(axis=0)
     if kind == "affine":
@@ -149,9 +151,10 @@ def _start(kind: Kind, x: Array, y: Array) -> tuple[Array, Array, float]:
 
 
 def _linearised(
-    kind: Kind, path: CubicSpline | None, t: Array, x: Array, y: Array, matrix: Array, offset: Array, late: float
+    kind: Kind, path: CubicSpline | None, data: tuple[Array, Array, Array], parameters: Parameters
 ) -> tuple[Array, Array]:
     """Residuals y - M x - b, point by point, and the Jacobian of M x + b by the parameters."""
+    (t, x, y), (matrix, offset, late) = data, parameters
     place = x if path is None else path(t - late)
     seen = place @ matrix.T
     count = len(x)
@@ -185,8 +188,9 @@ def _solved(jacobian: Array, residual: Array, names: tuple[str, ...]) -> Array:
     return np.array((right.T @ ((left.T @ residual) / values)) / lengths)
 
 
-def _moved(kind: Kind, matrix: Array, offset: Array, late: float, step: Array) -> tuple[Array, Array, float]:
+def _moved(kind: Kind, parameters: Parameters, step: Array) -> Parameters:
     """The parameters after a step."""
+    matrix, offset, late = parameters
     if kind == "affine":
         matrix, rest = matrix + step[:9].reshape(3, 3, order="F"), step[9:]
     else:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.validation import Array
 
 

@@ -32,10 +32,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, SolverError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 Model = Literal["constant_twist", "constant_acceleration"]

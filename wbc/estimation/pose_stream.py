@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-import pinocchio as pin
-
 from wbc import validation
 from wbc.errors import SolverError
 from wbc.estimation.pose_filter import FrameMotion, PoseFilter
+from wbc.multibody import pin
 from wbc.validation import Array
 
 

@@ -29,8 +29,8 @@ def derivative(data: bytes, context: Context, name: str, value: str | None) -> A
 
 
 def escape(data: bytes, context: Context, way: Array | None) -> Array | None:
-    """See :func:`wbc.explain.way_out.way_out`; ``data`` is a step's copy of its tick."""
+    """See :func:`wbc.explain.reasons.way_out`; ``data`` is a step's copy of its tick."""
     from wbc.explain.past import past_of
-    from wbc.explain.way_out import way_out
+    from wbc.explain.reasons import way_out
 
     return way_out(past_of(data, context), way)

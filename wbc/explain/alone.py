@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.explain.past import PastTick, kept_rows, rows_of
+from wbc.multibody import pin
 from wbc.stack.layout import Block
 from wbc.stack.tables import stops
 from wbc.tasks.mechanism import Mechanism

@@ -68,6 +68,7 @@ class Explainer:
             ),
             reasons(past, v, tuple(binding.values()), missed),
             self._lost(v),
+            past.stack.robot.dead_points(past.tick.q),
         )
 
     def _lost(self, v: Array) -> tuple[Give, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.explain.reason import Reason, amount
+from wbc.robot import DeadPoint
 
 RELATIONS = {"lower": "at least", "upper": "at most", "equal": "exactly"}
 
@@ -248,6 +249,7 @@ class Explanation:
         scales: lambda of each scaled task that is slowed down; the rows that keep its direction are not in ``binding``.
         reasons: why each task does or does not converge, see :class:`Reason`.
         lost: of equality rows, what they lose until the next tick per second of it, see :attr:`wbc.Step.lost`.
+        dead_points: linkages near one, see :attr:`wbc.Step.dead_points`.
     """
 
     status: str
@@ -265,9 +267,11 @@ class Explanation:
     scales: tuple[tuple[str, float], ...] = ()
     reasons: tuple[Reason, ...] = ()
     lost: tuple[Give, ...] = ()
+    dead_points: tuple[DeadPoint, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{self.status} (by {self.answered_by})." if self.answered_by else f"{self.status}."]
+        lines += [f"{point}." for point in self.dead_points]
         if self.broken:
             lines.append(f"Without usable numbers: {', '.join(self.broken)}.")
         lines += [str(conflict) for conflict in self.conflicts]

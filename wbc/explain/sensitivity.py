@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import SolverError
 from wbc.explain.past import Frozen, PastTick
+from wbc.multibody import pin
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxed
 from wbc.qp.sensitivity import Sensitivity

@@ -9,11 +9,11 @@ from itertools import groupby, pairwise, product
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.explore.rows import StackRows
+from wbc.multibody import pin
 from wbc.resolvers.fsp import Criterion, SolutionSpace, best, orthogonal
 from wbc.stack.declaration import Declaration
 from wbc.trajectory import Law, time_optimal

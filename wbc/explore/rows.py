@@ -7,15 +7,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.stack.declaration import Declaration, Entry
 from wbc.stack.evaluation import SingleState
 from wbc.symbolic import Kinematics, Tracer
-from wbc.tasks import Fixed, Hold, Mechanism
-from wbc.tasks import inputs as run_time
+from wbc.tasks import Fixed, Hold, Mechanism, inputs as run_time
 from wbc.tasks.base import Constraint, Task
 from wbc.validation import Array
 

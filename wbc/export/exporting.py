@@ -6,13 +6,13 @@ import os
 import pathlib
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.step import Step
 from wbc.errors import RangeError
 from wbc.export.folder import checked_folder, write
 from wbc.export.snapshot import Snapshot
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Task
@@ -66,7 +66,7 @@ def export(
         __version__,
         vectors(controller.clone(), states),
         f"the {controller.backend} tick with {controller.solver}",
-        SAME if controller.backend == "native" and controller.solver == "daqp" else SIMILAR,
+        SAME if controller.solver == "daqp" else SIMILAR,
     )
     return write(snapshot, folder, overwrite, solver_source)
 
@@ -91,7 +91,7 @@ def vectors(controller: CompiledStack, count: int, seed: int = 0) -> Array:
             _vary(controller, q, rng)
         step = controller.step(q, v)
         first = not step.answered_by  # exported code has no chain
-        if first and ((controller.backend == "native" and controller.solver == "daqp") or _certain(step)):
+        if first and (controller.solver == "daqp" or _certain(step)):
             rows.append(np.concatenate([q, v, core.tick.p, [STATUSES.index(step.status)], step.command]))
         q, v = pin.integrate(model, q, step.v * controller.stack.dt), step.v.copy()
     width = core.layout.nq + 2 * core.layout.nv + core.layout.parameters + 1

@@ -48,7 +48,7 @@ def write(
     """
     place = checked_folder(folder, overwrite)
     files = _files(snapshot, solver_source)
-    try:
+    with validation.writing("folder", place, ExportError):
         place.parent.mkdir(parents=True, exist_ok=True)
         fresh = pathlib.Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
         try:
@@ -64,8 +64,6 @@ def write(
             shutil.rmtree(old, ignore_errors=True)
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
-    except OSError as error:
-        raise ExportError("folder", str(place), f"cannot be written: {error.strerror}") from error
     return pathlib.Path(folder)
 
 

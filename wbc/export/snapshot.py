@@ -46,7 +46,7 @@ class Snapshot:
     @cached_property
     def sources(self) -> dict[str, str]:
         """Text of the files that make the tick, by name: what ``tick.c`` includes, and the generated rows."""
-        every = codegen.sources(self.stack, self.layout, build(self.stack, self.layout, loops=True))
+        every = codegen.sources(self.stack, self.layout, build(self.stack, self.layout), moves=True)
         wanted, waiting = {"rows.c": every["rows.c"]}, ["tick.c"]
         while waiting:
             name = waiting.pop()

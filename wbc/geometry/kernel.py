@@ -52,7 +52,8 @@ def library() -> ctypes.PyDLL:
     Raises:
         CompileError: it was not compiled ahead, and there is no compiler, or it fails; or it is of another layout.
     """
-    return checked(load_library(kernel(HEADERS / "geometry.c")), wbc_shape_size=ShapeNumbers)
+    # Loading a robot with shapes asks for it, and may not wait for a compiler
+    return checked(load_library(kernel(HEADERS / "geometry.c", at_once=True)), wbc_shape_size=ShapeNumbers)
 
 
 def checked(found: ctypes.PyDLL, **sizes: type[ctypes.Structure]) -> ctypes.PyDLL:

@@ -7,27 +7,14 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.identification.base_parameters import BaseParameters, base_parameters, identifiable
-    from wbc.identification.exciting import ExcitingMotion, exciting_motion
-    from wbc.identification.fit import Identified, identify
-    from wbc.identification.information import Information
-    from wbc.identification.regression import Regression, Samples
+    from wbc.identification.base_parameters import (
+        BaseParameters as BaseParameters,
+        base_parameters as base_parameters,
+        identifiable as identifiable,
+    )
+    from wbc.identification.exciting import ExcitingMotion as ExcitingMotion, exciting_motion as exciting_motion
+    from wbc.identification.fit import Identified as Identified, identify as identify
+    from wbc.identification.information import Information as Information
+    from wbc.identification.regression import Regression as Regression, Samples as Samples
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = [
-    "BaseParameters",
-    "ExcitingMotion",
-    "Identified",
-    "Information",
-    "Regression",
-    "Samples",
-    "base_parameters",
-    "exciting_motion",
-    "identifiable",
-    "identify",
-]
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

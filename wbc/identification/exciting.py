@@ -14,12 +14,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import InfeasibleError, UnsupportedJointError
 from wbc.identification.base_parameters import BaseParameters, base_parameters, identifiable
 from wbc.identification.regression import Regression
+from wbc.multibody import pin
 from wbc.trajectory import Law, MotionLimits, Timing, spline_path
 from wbc.validation import Array
 

@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from scipy.signal import butter, filtfilt
 
 from wbc import validation
 from wbc.errors import RangeError
@@ -22,6 +20,7 @@ from wbc.identification.exciting import ExcitingMotion, exciting_motion
 from wbc.identification.fit import Identified, identify
 from wbc.identification.pseudo_inertia import from_log_cholesky, is_body, log_cholesky, model_parameters
 from wbc.identification.regression import SLOW, Regression, Samples
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation import Command, CommandKind, Motors, PinocchioPlant
 from wbc.trajectory import Law
@@ -128,6 +127,9 @@ def record(plant: PinocchioPlant, believed: Robot, law: Law, noise: float = 0.0,
 
 def filtered(q: Array, torque: Array, dt: float) -> Samples:
     """Samples without the ends: q, its differences and torques behind one low-pass filter, forwards and backwards."""
+    # It imports scipy.stats: two fifths of the time that importing this module took
+    from scipy.signal import butter, filtfilt
+
     b, a = butter(4, CUT * 2.0 * dt)
     smooth, load = filtfilt(b, a, q, axis=0), filtfilt(b, a, torque, axis=0)
     v = np.gradient(smooth, dt, axis=0)

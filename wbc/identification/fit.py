@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.linalg import qr
 from scipy.optimize import least_squares
 
@@ -26,10 +25,11 @@ from wbc.identification.pseudo_inertia import (
     log_cholesky,
     model_parameters,
     nearest_body,
+    parameters as of_pseudo,
     pseudo_inertia,
 )
-from wbc.identification.pseudo_inertia import parameters as of_pseudo
 from wbc.identification.regression import Regression, Samples
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.two_velocities import PER_BODY
 from wbc.validation import Array

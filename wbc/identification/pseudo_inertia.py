@@ -10,10 +10,10 @@ in the order of ``pin.Inertia.toDynamicParameters``: m, h, and I about the origi
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Places of the moments in phi: xx, xy, yy, xz, yz, zz

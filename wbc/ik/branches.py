@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import InfeasibleError, RangeError
 from wbc.ik.engine import SearchEngine
 from wbc.ik.search import FOUND, Query, SearchResult
 from wbc.ik.solution import Ending, Solution
+from wbc.multibody import pin
 from wbc.tasks import Damping, Momentum
 from wbc.validation import Array
 
@@ -143,7 +143,7 @@ class Gathering:
 
 
 def branches(
-    engine: SearchEngine, first: Array, most: int, seed: int, seconds: float, restarts: int, tolerance: float
+    engine: SearchEngine, first: Array, *, most: int, seed: int, seconds: float, restarts: int, tolerance: float
 ) -> Branches:
     """Descents from a configuration and from random ones, until there are as many branches as wanted."""
     _refuse_free_directions(engine, first)

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.controller.step import Step
 from wbc.errors import ContinuityError, InfeasibleError
 from wbc.ik.engine import SearchEngine
 from wbc.ik.search import FOUND
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Neighbouring configurations farther apart than this [rad, or characteristic lengths] have a jump between them if

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.ik.search import EXHAUSTED, FOUND, OUT_OF_TIME, REFUSED, Query, SearchResult
+from wbc.multibody import pin
 from wbc.qp.problem import QP
 from wbc.stack.codegen import row_units
 from wbc.stack.declaration import Declaration

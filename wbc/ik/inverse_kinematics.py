@@ -284,7 +284,9 @@ class InverseKinematics(Handles):
         engine = self._engine
         seconds, near, starts, number = _options(budget, tolerance, restarts, seed)
         wanted = sys.maxsize if most is None else validation.integer("most", most, 1)
-        return branches(engine, engine.begin(q0), wanted, number, seconds, starts, near)
+        return branches(
+            engine, engine.begin(q0), most=wanted, seed=number, seconds=seconds, restarts=starts, tolerance=near
+        )
 
 
 def _options(budget: Any, tolerance: Any, restarts: Any, seed: Any) -> tuple[float, float, int, int]:

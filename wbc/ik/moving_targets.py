@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.tasks.base import Input
 from wbc.validation import Array

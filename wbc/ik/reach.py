@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.stack.declaration import Entry
 from wbc.symbolic.kinematics import WORLD, frame_index

@@ -13,6 +13,7 @@ from wbc.errors import LevelError, RangeError
 from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 from wbc.tasks import Damping, JointLimits, Posture
+from wbc.tasks._linkage_speed import LinkageSpeed
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
 
@@ -46,6 +47,8 @@ def timeless(stack: Declaration) -> Declaration:
     out = Declaration(robot, 0.5 * TICK, damping=stack.damping, length=stack.length)
     for entry in stack.entries:
         item = entry.item
+        if isinstance(item, LinkageSpeed):
+            continue
         if isinstance(item, JointLimits):
             item = dataclasses.replace(item, velocity=True, acceleration=False, shortest_dt=None)
         if entry.name not in out:

@@ -15,12 +15,12 @@ from math import inf
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnsupportedJointError
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion
 from wbc.motion_control.trial import loaded
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

@@ -22,7 +22,6 @@ from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from scipy.linalg import block_diag
 
 from wbc import validation
@@ -30,6 +29,7 @@ from wbc.errors import RangeError
 from wbc.identification.information import Information
 from wbc.identification.pseudo_inertia import model_parameters, nearest_body, parameters, pseudo_inertia
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
+from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robot import Robot
 from wbc.stack.evaluation import SingleState

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import style, validation
 from wbc.errors import UnsupportedJointError
@@ -18,6 +17,7 @@ from wbc.motion_control.motion import Motion, TorqueController
 from wbc.motion_control.perturbation import OneStepPerturbation
 from wbc.motion_control.stack_tracking import StackTracking
 from wbc.motion_control.trial import Trial, loaded, make_plant, run_trial
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

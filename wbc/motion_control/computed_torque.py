@@ -9,9 +9,9 @@ joints follow. Source: Luh, Walker and Paul 1980; of free bases, Umetani and Yos
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

@@ -13,11 +13,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, UnsupportedJointError
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError, UnsupportedJointError
 from wbc.identification.pseudo_inertia import is_body
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

@@ -11,11 +11,11 @@ of velocities, left positions without stiffness: here they weigh 1/dt^2 times as
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import SolverError, UnsupportedJointError
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion, mass_matrix, measured
+from wbc.multibody import pin
 from wbc.qp import QP, make_solver
 from wbc.robot import Robot
 from wbc.validation import Array

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, WbcError
 from wbc.motion_control.motion import Motion, TorqueController
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation import Command, CommandKind, PinocchioPlant, PlantState
 from wbc.symbolic.kinematics import frame_index

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.estimation import DropoutPolicy, FrameMotion, PoseFilter, PoseStream, StreamState
 from wbc.moving_target.motions import TargetMotion
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Measurements begin this long before the trial, as long as a filter takes to settle [s]

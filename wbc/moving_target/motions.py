@@ -8,10 +8,10 @@ from math import pi
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from wbc.estimation import FrameMotion
+from wbc.multibody import pin
 from wbc.rotations import quaternion
 from wbc.validation import Array
 

@@ -6,13 +6,13 @@ import pathlib
 from collections.abc import Callable, Mapping
 
 import numpy as np
-import pinocchio as pin
 from PIL import Image, ImageDraw
 
 from wbc import style
 from wbc.moving_target.knowledge import Knowledge
 from wbc.moving_target.study import TargetStudy
 from wbc.moving_target.trial import TargetTrial
+from wbc.multibody import pin
 from wbc.shapes import Box, Cylinder, Solid
 from wbc.track import render
 from wbc.track.film import save_film

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import chain, product
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.estimation import DropoutPolicy
 from wbc.moving_target.knowledge import Knowledge, Measurement
 from wbc.moving_target.motions import TargetMotion, sea, swing, tumble
 from wbc.moving_target.trial import HAND, WORK, Bench, TargetScenario, TargetTrial
+from wbc.multibody import pin
 from wbc.program import Approach, Guard, Move, PoseTarget, Program, Retreat, Wait
 from wbc.robot import Robot
 from wbc.simulation import Plant
@@ -29,6 +29,8 @@ PERIOD = 6.0
 RATE = float(np.radians(3.0))
 #: How long a tool has to be aligned before it goes in [s]
 STEADY = 0.25
+#: Speed of an object that tumbles [m/s]
+DRIFT = 0.005
 #: What ends every program
 LOST = Guard(signal="lost", above=0.5)
 
@@ -89,7 +91,9 @@ class Outcome:
     reasons: dict[str, int]
 
 
-def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Measurement, **more: float) -> TargetStudy:
+def peg(
+    robot: Robot, tip: str, motion: str, clearance: float, measurement: Measurement, severity: float = 1.0
+) -> TargetStudy:
     """A peg into a hole of 40 mm in a table below the tool, from 25 mm before it and out again, ``clearance`` all round
     [m].
     """
@@ -112,10 +116,10 @@ def peg(robot: Robot, tip: str, motion: str, clearance: float, measurement: Meas
         robot, tip, tool, robot.neutral, goal, program, lead=0.04, clearance=clearance, size=0.065, timeout=15.0,
         measurement=measurement,
     )  # fmt: skip
-    return _placed(scenario, motion, np.array([0.0, 0.0, 0.12]), (0.03, 0.1), 0.15, 0.005, **more)
+    return _placed(scenario, motion, np.array([0.0, 0.0, 0.12]), (0.03, 0.1), 0.15, severity)
 
 
-def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more: float) -> TargetStudy:
+def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, severity: float = 1.0) -> TargetStudy:
     """A grapple fixture on a free body, a twentieth of the arm's length before the tool: the tool comes within a
     fiftieth, goes on to the fixture and holds, within 20 mm and 1 degree.
     """
@@ -137,7 +141,7 @@ def grasp(robot: Robot, tip: str, motion: str, measurement: Measurement, **more:
         clearance=0.02, size=near, timeout=40.0, rate=25.0, gain=2.0, measurement=measurement, process=(1e-3, 1e-3),
         policy=DropoutPolicy(1.0, 2.0),
     )  # fmt: skip
-    return _placed(scenario, motion, np.array([0.0, 0.0, 0.05 * length]), (0.01 * length, 0.1), 1.0, 0.005, **more)
+    return _placed(scenario, motion, np.array([0.0, 0.0, 0.05 * length]), (0.01 * length, 0.1), 1.0, severity)
 
 
 def _approach(speed: float, depth: float, at_most: float, unless: tuple[Guard, ...]) -> Approach:
@@ -152,8 +156,7 @@ def _placed(
     ahead: Array,
     spread: tuple[float, float],
     lever: float,
-    drift: float,
-    **more: float,
+    severity: float,
 ) -> TargetStudy:
     """The object where its goal is ``ahead`` of the tool at first, in the tool's axes."""
     validation.one_of("motion", motion, MOTIONS)
@@ -162,7 +165,7 @@ def _placed(
     pin.framesForwardKinematics(robot.model, data, scenario.start)
     tool = data.oMf[robot.model.getFrameId(scenario.tip)] * scenario.tool
     home = tool * pin.SE3(np.eye(3), ahead) * scenario.goal.inverse()
-    return TargetStudy(scenario, motion, home, spread, lever, drift, **more)
+    return TargetStudy(scenario, motion, home, spread, lever, DRIFT, severity)
 
 
 def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: float = 18.0) -> Array:
@@ -208,7 +211,7 @@ def nimble(robot: Robot, tip: str, ahead: float, rate: float = RATE, seconds: fl
 
 
 def trials(
-    study: TargetStudy, runs: int, kinds: Iterable[Knowledge], plant: Plant | None = None, backend: str = "auto",
+    study: TargetStudy, runs: int, kinds: Iterable[Knowledge], *, plant: Plant | None = None, backend: str = "auto",
     told: Callable[[Knowledge, int, TargetTrial], None] | None = None, stop: Callable[[], bool] | None = None,
 ) -> dict[Knowledge, list[TargetTrial]]:  # fmt: skip
     """Trials 0 to ``runs`` with each knowledge, on the same motions; fewer where ``stop`` says so.

@@ -16,12 +16,12 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.api import Controller, Stack
 from wbc.estimation import DropoutPolicy, FrameMotion
 from wbc.moving_target.knowledge import Knowledge, Known, Measurement
 from wbc.moving_target.motions import TargetMotion
+from wbc.multibody import pin
 from wbc.program import Program, Runner
 from wbc.robot import Robot
 from wbc.simulation import Connection, Plant

@@ -6,7 +6,10 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
+#: ``METH_NOARGS`` and ``METH_FASTCALL``
 _NO_ARGUMENTS = 4
+#: See _NO_ARGUMENTS
+_ARGUMENTS = 0x80
 
 
 class _MethodDef(ctypes.Structure):
@@ -32,7 +35,17 @@ def builtin(function: Any, argument: int) -> Callable[[], int]:
     Args:
         function: of a loaded library that is never unloaded.
     """
-    address = ctypes.cast(function, ctypes.c_void_p).value or 0
-    method = _methods.setdefault(address, _MethodDef(b"call", address, _NO_ARGUMENTS, None))
-    made: Callable[[], int] = _make(ctypes.byref(method), argument, None)
+    made: Callable[[], int] = _made(function, argument, _NO_ARGUMENTS)
     return made
+
+
+def builtin_of_some(function: Any, argument: int) -> Callable[..., Any]:
+    """The same, of any arguments: ``PyObject *function(PyObject *argument, PyObject *const *, Py_ssize_t count)``."""
+    made: Callable[..., Any] = _made(function, argument, _ARGUMENTS)
+    return made
+
+
+def _made(function: Any, argument: int, flags: int) -> Any:
+    address = ctypes.cast(function, ctypes.c_void_p).value or 0
+    method = _methods.setdefault(address, _MethodDef(b"call", address, flags, None))
+    return _make(ctypes.byref(method), argument, None)

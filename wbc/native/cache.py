@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import fcntl
 import functools
 import hashlib
 import json
@@ -27,6 +26,8 @@ from collections.abc import Callable, Iterator
 
 import platformdirs
 
+from wbc.native.file_lock import lock, unlock
+
 log = logging.getLogger("wbc")
 
 MANIFEST = "manifest.json"
@@ -40,6 +41,19 @@ def root() -> pathlib.Path:
     return pathlib.Path(chosen) if chosen else pathlib.Path(platformdirs.user_cache_dir("wbc"))
 
 
+def find(name: str, library: bool) -> pathlib.Path | None:
+    """Folder of an entry that is there; ``library`` as of :func:`fetch`."""
+    folder = base_of(name, library) / name
+    return folder if _valid(folder) else None
+
+
+def base_of(name: str, library: bool) -> pathlib.Path:
+    """The directory that :func:`fetch` looks for an entry in: made if it is not there, or one in place of it."""
+    base = root()
+    problem = _problem(base, name, library)
+    return _instead(base, problem) if problem else base
+
+
 def fetch(
     name: str, build: Callable[[pathlib.Path], None], *, library: bool = False, what: str = "C code", advice: str = ""
 ) -> tuple[pathlib.Path, bool]:
@@ -49,10 +63,7 @@ def fetch(
         library: files of the entry will be loaded as code, so its file system must allow that.
         what, advice: what is built, and what spares the wait, for the log where it takes long.
     """
-    base = root()
-    problem = _problem(base, name, library)
-    if problem:
-        base = _instead(base, problem)
+    base = base_of(name, library)
     final = base / name
     if _valid(final):
         return final, True
@@ -113,6 +124,8 @@ def _problem(base: pathlib.Path, name: str, library: bool) -> str:
         info = base.stat()
     except OSError as error:
         return error.strerror or type(error).__name__
+    if sys.platform == "win32":  # where access is by lists that stat does not know
+        return "" if os.access(base, os.R_OK | os.W_OK) or _valid(base / name) else "it cannot be written to"
     # Who may rename entries could swap one between its check and its loading; a sticky folder prevents that
     if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not info.st_mode & stat.S_ISVTX:
         return "others may write to it"
@@ -142,13 +155,13 @@ def _locked(path: pathlib.Path) -> Iterator[None]:
     with path.open("a") as file:
         # Some network file systems have no locks: then parallel builds do the work twice
         with contextlib.suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
+            lock(file)
         try:
             yield
         finally:
             # Closing would leave it to a process that was forked meanwhile
             with contextlib.suppress(OSError):
-                fcntl.flock(file, fcntl.LOCK_UN)
+                unlock(file)
 
 
 def _seal(folder: pathlib.Path) -> None:
@@ -194,6 +207,8 @@ def _private(path: pathlib.Path) -> bool:
     info = path.lstat()
     if stat.S_ISLNK(info.st_mode):
         return False
+    if sys.platform == "win32":
+        return True
     return info.st_uid == os.getuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 

@@ -19,16 +19,16 @@ AHEAD = Path(__file__).parent / "ahead"
 Texts = Mapping[str, str]
 
 
-def kernel(main: Path, *folders: Path) -> Path:
+def kernel(main: Path, *folders: Path, at_once: bool = False) -> Path:
     """The library of a C file and of the headers that it includes.
 
     Args:
-        folders: of headers of other packages.
+        folders: of headers of other packages. at_once: as of :func:`library`.
 
     Raises:
         CompileError: it was not compiled ahead, and there is no compiler, or it fails.
     """
-    return library(texts_of(main, *folders), toolchain.compile_kernel)
+    return library(texts_of(main, *folders), toolchain.compile_kernel, at_once=at_once)
 
 
 def texts_of(main: Path, *folders: Path) -> dict[str, str]:

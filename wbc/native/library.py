@@ -7,13 +7,15 @@ import ctypes
 import hashlib
 import os
 import pathlib
+import sys
 import tempfile
 import threading
 
 _loaded: dict[str, ctypes.PyDLL] = {}
 _lock = threading.Lock()
-# A forked process has no other thread that would release it
-os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
+# A forked process has no other thread that would release it; Windows forks none
+if sys.platform != "win32":
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 
 
 def load_library(path: pathlib.Path) -> ctypes.PyDLL:

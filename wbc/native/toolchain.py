@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import importlib.util
 import logging
 import os
 import pathlib
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -47,9 +44,7 @@ COMMON_FLAGS = (
 
 #: What makes a shared library; names of the interpreter that loads it are found when it is loaded, which the linker of
 #: macOS has to be told
-_SHARED = ("-shared",) if sys.platform == "linux" else ("-shared", "-Wl,-undefined,dynamic_lookup")
-#: Priority of compilers that work behind (nice)
-_LOW = 10
+_SHARED = ("-shared", "-Wl,-undefined,dynamic_lookup") if sys.platform == "darwin" else ("-shared",)
 #: What needs no compiler
 WITHOUT = "a wheel of `make wheel`, or an installation made where a compiler is, brings compiled code"
 
@@ -191,16 +186,14 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         _run([*_command(cc), "rows.o", "tick.o", *_with_solver(cc, output)], place)
 
 
-def compile_rows(text: str, output: pathlib.Path, behind: bool = False) -> None:
+def compile_rows(text: str, output: pathlib.Path) -> None:
     """Compile generated straight-line code to a shared library at ``output``.
-
-    ``behind``: the process has more urgent work: at low priority, not ended by Ctrl-C, but by :func:`end_behind`.
 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
     flags = ROWS_FLAGS if len(text) <= LONG_ROWS else ("-O0",)
-    _compile_visible({"rows.c": text}, output, flags, COMMON_FLAGS, behind)
+    _compile_visible({"rows.c": text}, output, flags, COMMON_FLAGS)
 
 
 def compile_kernel(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
@@ -215,17 +208,13 @@ def compile_kernel(files: Mapping[str, str], output: pathlib.Path, portable: boo
 
 
 def _compile_visible(
-    files: Mapping[str, str],
-    output: pathlib.Path,
-    optimisation: tuple[str, ...],
-    common: tuple[str, ...],
-    behind: bool = False,
+    files: Mapping[str, str], output: pathlib.Path, optimisation: tuple[str, ...], common: tuple[str, ...]
 ) -> None:
     with _written(files) as (cc, place):
         # What it exports must be seen by who loads the library
         flags = [f for f in common if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
         command = [*_command(cc), *flags, *optimisation, *_SHARED, next(iter(files)), "-lm", "-o", str(output)]
-        _run(command, place, behind)
+        _run(command, place)
 
 
 def compile_generic(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
@@ -275,46 +264,19 @@ def _output(command: list[str]) -> str:
         return ""
 
 
-#: Compilers that work behind, and the process that started them: a fork must not end those of its parent
-_behind: set[tuple[int, subprocess.Popen[str]]] = set()
-_ending = threading.Event()
-
-
-def ends() -> bool:
-    """The process ends, and so have compilers that worked behind."""
-    return _ending.is_set()
-
-
-def end_behind() -> None:
-    """End them, for good."""
-    _ending.set()
-    for owner, child in list(_behind):
-        if owner == os.getpid():
-            with contextlib.suppress(OSError):
-                os.killpg(child.pid, signal.SIGTERM)
-
-
-def _run(command: list[str], folder: pathlib.Path, behind: bool = False) -> None:
+def _run(command: list[str], folder: pathlib.Path) -> None:
     try:
         child = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
-            start_new_session=behind,
-        )  # fmt: skip
+            command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace"
+        )
     except OSError as error:
         raise CompileError("compiler", command[0], f"cannot be started: {error.strerror}") from error
-    mine = (os.getpid(), child)
     with child:
         try:
-            if behind:
-                _behind.add(mine)
-                with contextlib.suppress(OSError):
-                    os.setpriority(os.PRIO_PGRP, child.pid, _LOW)
             _, errors = child.communicate()
         except BaseException:
             child.kill()
             raise
-        finally:
-            _behind.discard(mine)
     if child.returncode != 0:
         said = " / ".join(errors.splitlines()[:4]) or f"exit status {child.returncode}, no message"
         raise CompileError("compiler", command[0], f"failed: {said}")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
+from typing import Any
 
-from wbc.pages import docstring, example, section
+from wbc.pages import docstring, section
+from wbc.pages.docstring import PageError
+from wbc.stack.declaration import Declaration, Entry
 from wbc.tasks.base import Item, Task, registry
 
 INDEX = "README.md"
@@ -41,6 +45,33 @@ from the next tick on. A bad value raises a typed error of `wbc.errors` that nam
 """
 
 
+def example_of(cls: type, code: str) -> tuple[Declaration, Entry]:
+    """The first item of a class in an example, and the stack that it is in.
+
+    The example runs up to where a stack is compiled: what is declared is known by then.
+
+    Raises:
+        PageError: it has no such item.
+    """
+    names: dict[str, Any] = {}
+    exec(compile(_declaring(code), cls.__name__, "exec"), names)
+    for value in names.values():
+        if isinstance(value, Declaration):
+            for entry in value.entries:
+                if type(entry.item) is cls:
+                    return value, entry
+    raise PageError(f"{cls.__name__}.__doc__", "Example", "it adds no such item to a stack that has a name")
+
+
+def _declaring(code: str) -> ast.Module:
+    tree = ast.parse(code)
+    for k, statement in enumerate(tree.body):
+        if any(isinstance(node, ast.Attribute) and node.attr == "compile" for node in ast.walk(statement)):
+            tree.body = tree.body[:k]
+            break
+    return tree
+
+
 def shipped() -> dict[str, type[Item]]:
     """The classes of this package by name; others, a user's too, are in the registry but have no page here."""
     return {name: cls for name, cls in sorted(registry().items()) if cls.__module__.startswith("wbc.tasks.")}
@@ -58,7 +89,7 @@ def made(cls: type[Item]) -> str:
         PageError: the docstring lacks something.
     """
     text = docstring.read(cls)
-    part = section.page(cls, text, *example.find(cls, text.example))
+    part = section.page(cls, text, *example_of(cls, text.example))
     pages = {name: page_name(other) for name, other in shipped().items() if other is not cls}
     names = re.compile(rf"(?<!\[)`({'|'.join(pages)})`")
 

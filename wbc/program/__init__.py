@@ -7,51 +7,25 @@ from typing import TYPE_CHECKING
 from wbc import extras, lazy
 
 if TYPE_CHECKING:
-    from wbc.program.hand import Gripper
-    from wbc.program.reference import HandReference
-    from wbc.program.runner import Event, Report, Runner
+    from wbc.program.hand import Gripper as Gripper, HandReference as HandReference
+    from wbc.program.runner import Event as Event, Report as Report, Runner as Runner
     from wbc.program.steps import (
-        Activate,
-        Alternatives,
-        Approach,
-        Grasp,
-        Guard,
-        Move,
-        Operate,
-        PoseTarget,
-        Program,
-        ProgramError,
-        Release,
-        Retreat,
-        Wait,
+        Activate as Activate,
+        Alternatives as Alternatives,
+        Approach as Approach,
+        Grasp as Grasp,
+        Guard as Guard,
+        Move as Move,
+        Operate as Operate,
+        PoseTarget as PoseTarget,
+        Program as Program,
+        ProgramError as ProgramError,
+        Release as Release,
+        Retreat as Retreat,
+        Wait as Wait,
     )
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = [
-    "Activate",
-    "Alternatives",
-    "Approach",
-    "Event",
-    "Grasp",
-    "Gripper",
-    "Guard",
-    "HandReference",
-    "Move",
-    "Operate",
-    "PoseTarget",
-    "Program",
-    "ProgramError",
-    "Release",
-    "Report",
-    "Retreat",
-    "Runner",
-    "Wait",
-]
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)
 
 
 extras.require("programs", "a program of steps")
-
-
-def __dir__() -> list[str]:
-    return __all__

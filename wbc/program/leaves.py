@@ -7,13 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector
-from py_trees.composites import Sequence as InOrder
+from py_trees.composites import Selector, Sequence as InOrder
 
 from wbc.api import Controller
+from wbc.multibody import pin
 from wbc.program import steps
 from wbc.program.hand import Gripper, ProgramHand
 from wbc.program.steps import AnyStep, Guard

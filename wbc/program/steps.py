@@ -6,12 +6,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import pinocchio as pin
 import yaml
 from pydantic import ConfigDict, Field, PositiveFloat, ValidationError, model_validator
 from pydantic.dataclasses import dataclass, rebuild_dataclass
 
 from wbc.errors import RobotFileError, WbcError, nearest
+from wbc.multibody import pin
 
 Three = tuple[float, float, float]
 

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import pinocchio as pin
-
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.shapes import Shape
 from wbc.shapes.solid import names_of_shapes, why_apart
 from wbc.symbolic.kinematics import WORLD, frame_index

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: How much of what its row allows a pair closes by: up to half of it; up to 0.999 of it, or the pair is

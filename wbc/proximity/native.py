@@ -7,9 +7,9 @@ import functools
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.geometry.kernel import HEADERS, ShapeTable, Tolerance, checked
+from wbc.multibody import pin
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
 from wbc.proximity.corners import NEAR

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.proximity.body import Body, Pair, joint_of
 from wbc.symbolic.kinematics import WORLD, frame_index
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.proximity.body import OBSTACLE, Body, checked_pairs
 from wbc.proximity.native import Sensing
 from wbc.proximity.scene import PairScene

@@ -1,22 +1,8 @@
 """Kept solvers for the quadratic program of a tick, certificates of their answers, and relaxation of conflicts."""
 
-from wbc.qp.certificate import Certificate, certify
-from wbc.qp.equalities import Equalities, independent
-from wbc.qp.polish import Polished, polish
-from wbc.qp.problem import QP, QPSolution
-from wbc.qp.solvers import available_solvers, make_solver
-from wbc.qp.solvers.backend import Backend
-
-__all__ = [
-    "QP",
-    "Backend",
-    "Certificate",
-    "Equalities",
-    "Polished",
-    "QPSolution",
-    "available_solvers",
-    "certify",
-    "independent",
-    "make_solver",
-    "polish",
-]
+from wbc.qp.certificate import Certificate as Certificate, certify as certify
+from wbc.qp.equalities import Equalities as Equalities, independent as independent
+from wbc.qp.polish import Polished as Polished, polish as polish
+from wbc.qp.problem import QP as QP, QPSolution as QPSolution
+from wbc.qp.solvers import available_solvers as available_solvers, make_solver as make_solver
+from wbc.qp.solvers.backend import Backend as Backend

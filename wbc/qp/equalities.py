@@ -108,32 +108,15 @@ def independent(qp: QP, threshold: float = THRESHOLD, order: NDArray[np.int_] | 
                 along = rest @ basis[k]
                 rest -= along[:, None] * basis[k]
                 coordinates[:, k] += along
-    coordinates *= length[:, None]
-    independent_part = basis[: len(chosen)], coordinates[:, : len(chosen)]
-    return _finish(rows, free, right, *independent_part, chosen, threshold * whole, constant)
-
-
-def _finish(
-    rows: Index,
-    free: Array,
-    right: Array,
-    basis: Array,
-    coordinates: Array,
-    chosen: list[int],
-    hidden: Array,
-    constant: Array,
-) -> Equalities:
-    kept = np.array(chosen, dtype=np.intp)
-    rest = np.ones(rows.size, dtype=np.bool_)
-    rest[kept] = False
-    left = np.flatnonzero(rest)
-    triangle = np.ascontiguousarray(coordinates[kept])
+    basis, kept = basis[: len(chosen)], np.array(chosen, dtype=np.intp)
+    left = np.setdiff1d(np.arange(rows.size), kept)
+    triangle = np.ascontiguousarray((coordinates * length[:, None])[kept, : kept.size])
     target = np.zeros(kept.size)
     for k in range(kept.size):
         target[k] = (right[kept[k]] - triangle[k, :k] @ target[:k]) / triangle[k, k]
     point = target @ basis
     inconsistency = np.abs(free[left] @ point - right[left])
-    tolerance = _TOLERANCE + hidden[left] * float(np.linalg.norm(point + constant))
+    tolerance = _TOLERANCE + threshold * whole[left] * float(np.linalg.norm(point + constant))
     return Equalities(rows[kept], rows[left], inconsistency, inconsistency <= tolerance, basis, target, triangle)
 
 

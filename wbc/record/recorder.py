@@ -12,10 +12,9 @@ import os
 import pickle
 import platform
 import struct
-from importlib import metadata
 from typing import Any
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.log.file import FileWriter, LogWriter
 from wbc.record.recording import FORMAT, RecordingError
@@ -206,7 +205,7 @@ def about(controller: CompiledStack) -> dict[str, Any]:
         "solver": controller.solver,
         "backend": controller.backend,
         "policy": [controller.policy.conflict, list(controller.policy.chain)],
-        "versions": {name: metadata.version(name) for name in PACKAGES},
+        "versions": extras.versions(PACKAGES),
         "machine": f"{platform.system()} {platform.machine()}",
         "command": controller.stack.command,
         "names": names(controller),

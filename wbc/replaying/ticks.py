@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+import io
 import os
+import pickle
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +17,68 @@ from wbc.api import Controller, Stack
 from wbc.controller import core_of
 from wbc.controller.policy import Policy
 from wbc.controller.step import Step
-from wbc.errors import ShapeError
+from wbc.errors import PicklingError, ShapeError
 from wbc.record.recorder import about, declaration_key, recorded_inputs
 from wbc.record.recording import Recording, RecordingError
-from wbc.replaying.unpickle import load_stack
 from wbc.stack.artifact import BACKENDS
 from wbc.stack.declaration import Declaration
 from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
+
+_PLACES = (
+    *("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.api.stack"),
+    *("wbc.coordinates.items", "wbc.coordinates.rows", "wbc.coordinates.point_sets", "wbc.analysis.rows"),
+)
+#: Models and poses where Pinocchio is not installed; all classes there are values
+_ALGEBRA = "wbc.multibody."
+_OTHERS = {
+    ("numpy", "ndarray"),
+    ("numpy", "dtype"),
+    ("numpy._core.multiarray", "_reconstruct"),
+    ("numpy._core.multiarray", "scalar"),
+    ("numpy.core.multiarray", "_reconstruct"),
+    ("numpy.core.multiarray", "scalar"),
+    ("pinocchio.pinocchio_pywrap_default", "Model"),
+    ("pinocchio.pinocchio_pywrap_default", "SE3"),
+}
+
+
+class _Careful(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) in _OTHERS:
+            return super().find_class(module, name)
+        if module.startswith((*_PLACES, _ALGEBRA)) and "." not in name:
+            found = super().find_class(module, name)
+            if module.startswith(_ALGEBRA) and isinstance(found, type) and found.__module__ == module:
+                return found
+            declares = isinstance(found, type) and (dataclasses.is_dataclass(found) or issubclass(found, Declaration))
+            if declares and found.__module__ == module:
+                return found
+        reason = "the pickle asks for code that is not this package's; trust it, or give the stack"
+        raise PicklingError("stack", f"{module}.{name}", reason)
+
+
+def load_stack(data: bytes, *, trust: bool = False) -> Declaration:
+    """The stack in a pickle.
+
+    Args:
+        trust: look up and run whatever the pickle says: needed for items and functions of the user's own, and safe only
+            where the file is.
+
+    Raises:
+        PicklingError: it holds something else, is damaged, or needs ``trust``.
+    """
+    try:
+        stack = pickle.loads(data) if trust else _Careful(io.BytesIO(data)).load()
+    except PicklingError:
+        raise
+    except Exception as error:
+        raise PicklingError(
+            "stack", len(data), f"the pickle cannot be read: {type(error).__name__}: {error}"
+        ) from error
+    if not isinstance(stack, Declaration):
+        raise PicklingError("stack", type(stack).__name__, "the pickle holds no stack")
+    return stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +153,7 @@ def replay(
         recording: the file, or what was read from it.
         stack: the declaration; default: the one in the recording.
         backend: default: that of the recording. Another gives the same commands only up to rounding.
-        trust: see :func:`wbc.replaying.unpickle.load_stack`.
+        trust: see :func:`wbc.replaying.ticks.load_stack`.
         progress: called with the number of finished ticks after each.
 
     Raises:

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from wbc.resolvers.extended import ExtendedJacobian
-from wbc.resolvers.full_space import FullSpace
-from wbc.resolvers.gradient import GradientProjection
-from wbc.resolvers.problem import RateProblem, Resolver
-from wbc.resolvers.pseudo_inverse import PseudoInverse
-from wbc.resolvers.rank_reduction import RankReduction
-from wbc.resolvers.task_priority import TaskPriority
-from wbc.resolvers.virtual_arms import VirtualArms
-
-__all__ = [
-    "ExtendedJacobian",
-    "FullSpace",
-    "GradientProjection",
-    "PseudoInverse",
-    "RankReduction",
-    "RateProblem",
-    "Resolver",
-    "TaskPriority",
-    "VirtualArms",
-]
+from wbc.resolvers.classical import (
+    ExtendedJacobian as ExtendedJacobian,
+    GradientProjection as GradientProjection,
+    PseudoInverse as PseudoInverse,
+    RankReduction as RankReduction,
+    TaskPriority as TaskPriority,
+    VirtualArms as VirtualArms,
+)
+from wbc.resolvers.full_space import FullSpace as FullSpace
+from wbc.resolvers.problem import RateProblem as RateProblem, Resolver as Resolver

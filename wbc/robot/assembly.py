@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import BoundsError, RangeError, ShapeError, UnsupportedJointError
+from wbc.multibody import pin
 from wbc.robot.frames import make_frames_unique
 from wbc.robot.limits import Limits
 from wbc.robot.loops import AnyLoop, JointCurve, LoopError

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import pinocchio as pin
-
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError
+from wbc.multibody import pin
 from wbc.robot.pairs.collision_pairs import find_self_pairs
 from wbc.robot.robot import Robot, checked_robot
 from wbc.shapes import PlacedShape, Solid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-import pinocchio as pin
+from wbc.multibody import pin
 
 
 def make_frames_unique(model: pin.Model) -> dict[str, str]:

@@ -10,10 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.robot.assembly import assemble, override_limits
 from wbc.robot.geometry.link_shapes import description_shapes, fit_shapes
 from wbc.robot.pairs.collision_pairs import find_self_pairs

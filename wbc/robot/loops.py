@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.robot.limits import Limits
+from wbc.robot.shortest_steps import CLOSED, DEPENDENT, ShortestSteps
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -29,16 +30,8 @@ LABELS: Mapping[Kind, tuple[str, ...]] = {
 }
 #: Twice the squared cosine of half the angle between axes is no less, so that none between opposite ones divides by 0
 OPPOSITE = 1e-12
-#: A loop is closed where its residual is below this [m, rad]: rounding of poses metres from the origin
-CLOSED = 1e-11
-#: What a loop may be open by where no joint moves it [m, rad]: lengths and axes of a file are rounded
-ROUNDED = 1e-6
-#: Steps towards a closed configuration at most: they converge quadratically, or not at all
-STEPS = 60
-#: The longest step of a joint [rad, m]: residuals of rotations are straight over a fraction of a turn
-LONGEST = 0.3
-#: Singular values below this share of the largest are none: rows that they stand for are dependent
-DEPENDENT = 1e-7
+#: Entries of Jacobians below this share of the largest are rounding: these joints move both ends of a loop alike
+STILL = 1e-12
 
 
 class LoopError(WbcError):
@@ -135,6 +128,26 @@ class JointCurve:
 AnyLoop = Loop | JointCurve
 
 
+@dataclass(frozen=True)
+class Linkage:
+    """Loops that share joints.
+
+    Attributes:
+        loops: their names.
+        rows: places of their rows among those of all loops.
+        dofs: degrees of freedom that move them. Indices into v.
+    """
+
+    loops: tuple[str, ...]
+    rows: tuple[int, ...]
+    dofs: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Those of the loops."""
+        return ", ".join(self.loops)
+
+
 @dataclass(frozen=True, eq=False)
 class LoopRows:
     """What keeps the loops of a robot closed.
@@ -143,11 +156,13 @@ class LoopRows:
         loops: in the order of their rows.
         bases: of each loop the directions of its residual that no other row has, rows x residual.
         rows: label and unit of each row; one that mixes several is named by the largest of them.
+        moved: of each loop the degrees of freedom that move it. Indices into v.
     """
 
     loops: tuple[AnyLoop, ...] = ()
     bases: tuple[Array, ...] = ()
     rows: tuple[tuple[str, str], ...] = ()
+    moved: tuple[tuple[int, ...], ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.loops)
@@ -156,6 +171,29 @@ class LoopRows:
     def names(self) -> str:
         """Those of the loops, for a sentence."""
         return ", ".join(loop.name for loop in self.loops)
+
+    @cached_property
+    def linkages(self) -> tuple[Linkage, ...]:
+        """Loops with rows, those that share joints together."""
+        ends = np.cumsum([0, *(len(basis) for basis in self.bases)]).tolist()
+        out = list[Linkage]()
+        for loop, (first, end), moved in zip(self.loops, itertools.pairwise(ends), self.moved, strict=True):
+            if first == end:
+                continue
+            parts = [part for part in out if {*part.dofs} & {*moved}]
+            out = [part for part in out if part not in parts]
+            names = itertools.chain.from_iterable(part.loops for part in parts)
+            rows = itertools.chain.from_iterable(part.rows for part in parts)
+            dofs = {*moved}.union(*(part.dofs for part in parts))
+            out.append(Linkage((*names, loop.name), (*rows, *range(first, end)), tuple(sorted(dofs))))
+        return tuple(out)
+
+    def moving(self, matrix: ca.SX) -> ca.SX:
+        """The entries of a Jacobian of the rows that are not 0 in every configuration [rows, nv]."""
+        out = ca.SX(*matrix.shape)
+        for linkage in self.linkages:
+            out[list(linkage.rows), list(linkage.dofs)] = matrix[list(linkage.rows), list(linkage.dofs)]
+        return ca.sparsify(out)
 
     def error(self, kin: Tracer) -> ca.SX:
         """Residuals of all rows [m, rad]."""
@@ -173,8 +211,13 @@ class Closing:
 
     def __init__(self, model: pin.Model, loops: Sequence[AnyLoop], limits: Limits, index: Array) -> None:
         self._model, self._loops = model, loops
-        has = self._has = index >= 0
-        self._at, self._lower, self._upper = index[has], limits.position_lower[has], limits.position_upper[has]
+        self._steps = ShortestSteps(
+            self.look,
+            lambda q, step: np.asarray(pin.normalize(model, pin.integrate(model, q, step))),
+            index,
+            limits.position_lower,
+            limits.position_upper,
+        )
         kin = Tracer(Kinematics(model))
         error = ca.SX(ca.vertcat(*[loop.error(kin) for loop in loops]))
         outputs = [ca.densify(part) for part in kin.expanded(error, ca.densify(kin.slope(error)))]
@@ -186,37 +229,14 @@ class Closing:
         return np.array(error).ravel(), np.array(jacobian)
 
     def close(self, q: Array) -> tuple[Array, float]:
-        """(the best configuration on the way, what its loops are open by there [m, rad]); what no joint moves, up to
-        :data:`ROUNDED`, is not counted.
-        """
-        best = q, np.inf
-        for n in range(STEPS + 1):
-            error, jacobian = self.look(q)
-            left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
-            moved = left.T[sizes > DEPENDENT * sizes.max(initial=0.0)]
-            fixed = error - moved.T @ (moved @ error)
-            rest = error - fixed if np.abs(fixed).max(initial=0.0) <= ROUNDED else error
-            opened = float(np.abs(rest).max(initial=0.0))
-            if opened < best[1]:
-                best = q, opened
-            if opened <= CLOSED or n == STEPS:
-                break
-            step = self._step(q, error, jacobian)
-            step *= min(1.0, LONGEST / max(float(np.abs(step).max(initial=0.0)), 1e-300))
-            q = self._within(np.asarray(pin.integrate(self._model, q, step)))
-        return best
+        """As :meth:`ShortestSteps.root`: (configuration, what its loops are open by there [m, rad])."""
+        return self._steps.root(q)
 
-    def _step(self, q: Array, error: Array, jacobian: Array) -> Array:
-        """The shortest that closes the straight model best, without joints that it pushes against their limits."""
-        free, at = np.ones(self._model.nv, dtype=np.bool_), q[self._at]
-        while True:
-            step = np.zeros(self._model.nv)
-            step[free] = -np.linalg.lstsq(jacobian[:, free], error, rcond=DEPENDENT)[0]
-            along = step[self._has]
-            pushed = ((at <= self._lower) & (along < 0.0)) | ((at >= self._upper) & (along > 0.0))
-            if not pushed.any():
-                return step
-            free[np.flatnonzero(self._has)[pushed]] = False
+    def gaps(self, q: Array) -> dict[str, float]:
+        """What each loop is open by [m, rad], but for what no joint moves, see :meth:`ShortestSteps.unmoved`."""
+        error, jacobian = self.look(q)
+        rest = np.abs(error - self._steps.unmoved(error, jacobian))
+        return {loop.name: float(rest[rows].max()) for loop, rows in zip(self._loops, self.spans, strict=True)}
 
     def first(self, starts: Iterable[Array]) -> Array:
         """The first of the configurations that searches lead to that closes the loops.
@@ -230,8 +250,7 @@ class Closing:
             if found[1] <= CLOSED:
                 return found[0]
             nearest = min(nearest, found, key=lambda one: one[1])
-        error = np.abs(self.look(nearest[0])[0])
-        opened = {loop.name: float(error[rows].max()) for loop, rows in zip(self._loops, self.spans, strict=True)}
+        opened = self.gaps(nearest[0])
         worst = max(opened, key=lambda name: opened[name])
         reason = f"no configuration was found that closes it with the others; open by {opened[worst]:.3g} m or rad"
         reason += f" at the nearest, q = {np.array2string(nearest[0], precision=4)}"
@@ -241,12 +260,9 @@ class Closing:
 
     def _beyond(self, q: Array) -> list[str]:
         """Joints beyond their position limits where the loops are closed without any; none: they are not."""
-        free = copy.copy(self)
-        free._lower, free._upper = np.full_like(self._lower, -np.inf), np.full_like(self._upper, np.inf)
-        found, opened = free.close(q)
-        off = (found[self._at] < self._lower) | (found[self._at] > self._upper)
+        q, opened = replace(self._steps, lower=-self._steps.endless, upper=self._steps.endless).root(q)
         joints = {int(self._model.idx_qs[j]): str(self._model.names[j]) for j in range(1, self._model.njoints)}
-        return [joints[at] for at in self._at[off].tolist()] if opened <= CLOSED else []
+        return [joints[at] for at in self._steps.outside(q)] if opened <= CLOSED else []
 
     @property
     def spans(self) -> list[slice]:
@@ -258,7 +274,12 @@ class Closing:
         """The first ``count`` loops with the directions that are independent at some configurations; ``units``: of the
         joints' coordinates.
         """
-        bases = independent(self.spans[:count], np.array([self.look(q)[1] for q in looks]))
+        jacobians = np.array([self.look(q)[1] for q in looks])
+        bases = independent(self.spans[:count], jacobians)
+        sizes = np.abs(jacobians).max(axis=0)
+        moved = [
+            np.flatnonzero(sizes[span].max(axis=0) > STILL * sizes.max(initial=0.0)) for span in self.spans[:count]
+        ]
         rows = []
         for loop, basis in zip(self._loops, bases, strict=False):
             for row in basis:
@@ -267,12 +288,7 @@ class Closing:
                 turns = label.startswith("r")
                 unit = units[loop.follower] if isinstance(loop, JointCurve) else "rad" if turns else "m"
                 rows.append((f"{loop.name}.{label}", unit))
-        return LoopRows(tuple(self._loops[:count]), bases, tuple(rows))
-
-    def _within(self, q: Array) -> Array:
-        out = np.array(pin.normalize(self._model, q))
-        out[self._at] = np.clip(out[self._at], self._lower, self._upper)
-        return out
+        return LoopRows(tuple(self._loops[:count]), bases, tuple(rows), tuple(tuple(dofs.tolist()) for dofs in moved))
 
 
 def independent(parts: Sequence[slice], jacobians: Array) -> tuple[Array, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from wbc.robot.loops import DEPENDENT
+from wbc.robot.shortest_steps import DEPENDENT
 from wbc.validation import Array
 
 

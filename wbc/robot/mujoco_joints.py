@@ -6,10 +6,10 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
+from wbc.multibody import pin
 from wbc.robot.robot import Robot, checked_robot
 from wbc.robot.sources.mjmodel import is_mjmodel
 from wbc.robot.sources.mjnames import SIZES, MjNames, names_of, pose_of

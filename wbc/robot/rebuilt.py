@@ -1,4 +1,5 @@
-"""A model on another base or without some of its joints, with everything that a ``pin.Model`` says kept.
+"""A model on another base or without some of its joints, with everything that a ``pin.Model`` says kept, frames in
+their order.
 
 Pinocchio 4.1 loses part of it: ``appendModel`` sets armatures to 0 and gravity to 9.81 m/s^2 downwards, and drops
 reference configurations; ``buildReducedModel`` refuses a model whose ``velocityLimit`` was lowered, as
@@ -10,29 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import PINOCCHIO, pin, single_joint
+from wbc.multibody.model import OF_COORDINATES, OF_DOFS
+from wbc.symbolic.joints import follower_of
 from wbc.validation import Array
-
-#: Limits by pairs, which Pinocchio compares with each other
-_PAIRED = ("DryFrictionLimit", "EffortLimit", "PositionLimit", "VelocityLimit")
-#: What labels of joints begin with; no file has such names
-_JOINT = "\x01joint "
-#: What labels of frames begin with; no file has such names
-_FRAME = "\x01frame "
-OF_DOFS = (
-    "armature",
-    "damping",
-    "lowerDryFrictionLimit",
-    "lowerEffortLimit",
-    "lowerVelocityLimit",
-    "rotorGearRatio",
-    "rotorInertia",
-    "upperDryFrictionLimit",
-    "upperEffortLimit",
-    "upperVelocityLimit",
-)
-OF_COORDINATES = ("lowerPositionLimit", "positionLimitMargin", "upperPositionLimit")
 
 
 def on_joint(model: pin.Model, joint: pin.JointModel, name: str) -> pin.Model:
@@ -40,73 +23,68 @@ def on_joint(model: pin.Model, joint: pin.JointModel, name: str) -> pin.Model:
     root = pin.Model()
     while model.existJointName(name):
         name += "_"
-    index = root.addJoint(0, joint, pin.SE3.Identity(), name)
-    root.addJointFrame(index)
-    start = pin.neutral(root)
-    out = pin.appendModel(root, _labelled(model), root.getFrameId(name), pin.SE3.Identity())
-    _fill(out, model)
-    for entry in model.referenceConfigurations:
-        out.referenceConfigurations[entry.key()] = np.concatenate([start, np.array(entry.data())])
-    return out
+    root.addJointFrame(root.addJoint(0, joint, pin.SE3.Identity(), name))
+    return _appended(root, model, pin.neutral(model), ())
 
 
 def without_joints(model: pin.Model, joints: Sequence[int], q: Array) -> pin.Model:
     """The model with some joints locked where a configuration has them."""
-    out = pin.buildReducedModel(_labelled(model), list(joints), q)
-    _fill(out, model)
-    kept = [there for _, there, _, _ in _shared(out, model)]
-    for entry in model.referenceConfigurations:
-        parts = (np.array(entry.data())[there] for there in kept)
-        out.referenceConfigurations[entry.key()] = np.concatenate([np.zeros(0), *parts])
-    return out
+    return _appended(pin.Model(), model, q, joints)
 
 
-def _labelled(model: pin.Model) -> pin.Model:
-    """A copy with limits that Pinocchio does not refuse, and a name of its own for every joint and frame."""
-    out = pin.Model(model)
-    for pair in _PAIRED:
-        count = out.nq if pair == "PositionLimit" else out.nv
-        setattr(out, f"lower{pair}", np.full(count, -np.inf))
-        setattr(out, f"upper{pair}", np.full(count, np.inf))
-    for j in range(1, out.njoints):
-        out.names[j] = f"{_JOINT}{j}"
-    for k, frame in enumerate(out.frames):
-        if k > 0:
-            # Pinocchio looks for the frame of a joint by the joint's name
-            own = frame.type == pin.FrameType.JOINT and model.frames[k].name == model.names[frame.parentJoint]
-            frame.name = f"{_JOINT}{frame.parentJoint}" if own else f"{_FRAME}{k}"
-    return out
-
-
-def _shared(out: pin.Model, model: pin.Model) -> list[tuple[slice, slice, slice, slice]]:
-    """Of each joint of ``out`` that ``model`` has: its coordinates here and there, its degrees of freedom alike."""
-    found = []
-    for j in range(1, out.njoints):
-        if not model.existJointName(str(out.names[j])):
+def _appended(out: pin.Model, model: pin.Model, q: Array, locked: Sequence[int]) -> pin.Model:
+    """``out`` with the joints, bodies and frames of a model after its own, the model's world on its last joint."""
+    data, start, base, first = model.createData(), pin.neutral(out), int(out.njoints) - 1, len(out.frames) - 1
+    pin.forwardKinematics(model, data, q)
+    # Of each joint of the model: the joint that carries its body, and the body's pose there
+    carriers = [(base, pin.SE3.Identity())]
+    leaders = dict(zip(model.mimicking_joints, model.mimicked_joints, strict=True))
+    coupled = list[tuple[int, int, float, float]]()
+    for j in range(1, model.njoints):
+        joint, pose = carriers[model.parents[j]]
+        if j in locked:
+            carriers.append((joint, pose * data.liMi[j]))
             continue
-        k, nq, nv = model.getJointId(str(out.names[j])), int(out.nqs[j]), int(out.nvs[j])
-        starts = int(out.idx_qs[j]), int(model.idx_qs[k]), int(out.idx_vs[j]), int(model.idx_vs[k])
-        q, p, v, w = (slice(start, start + n) for start, n in zip(starts, (nq, nq, nv, nv), strict=True))
-        found.append((q, p, v, w))
-    return found
-
-
-def _fill(out: pin.Model, model: pin.Model) -> None:
-    """Gives the labelled joints and frames of ``out`` their names and fields of the model again."""
-    for j, label in enumerate(list(out.names)):
-        if str(label).startswith(_JOINT):
-            out.names[j] = model.names[int(str(label)[len(_JOINT) :])]
-    for frame in out.frames:
-        label = str(frame.name)
-        if label.startswith(_JOINT):
-            frame.name = str(model.names[int(label[len(_JOINT) :])])
-        elif label.startswith(_FRAME):
-            frame.name = str(model.frames[int(label[len(_FRAME) :])].name)
+        name, placement = str(model.names[j]), pose * model.jointPlacements[j]
+        made = model.joints[j]
+        if j in model.mimicking_joints:
+            turns, axis, ratio, offset = follower_of(made, int(model.nqs[leaders[j]]), name)
+            made = single_joint(axis, slides=not turns)
+            coupled.append((carriers[leaders[j]][0], int(out.njoints), ratio, offset))
+        carriers.append((out.addJoint(joint, made, placement, name), pin.SE3.Identity()))
+    for (joint, pose), inertia in zip(carriers, model.inertias, strict=True):
+        out.appendBodyToJoint(joint, inertia, pose)
+    numbers = {0: first}
+    for k, frame in enumerate(model.frames):
+        if k > 0:
+            joint, pose = carriers[frame.parentJoint]
+            name, kind = str(frame.name), frame.type
+            if kind == pin.FrameType.JOINT and frame.parentJoint in locked:
+                kind = pin.FrameType.FIXED_JOINT
+                while out.existFrame(name, kind):
+                    name += "_"
+            above = numbers[int(frame.parentFrame)]
+            added = pin.Frame(name, joint, above, pose * frame.placement, kind, frame.inertia)
+            numbers[k] = out.addFrame(added, False)
+    for pair in coupled:
+        out = pin.transformJointIntoMimic(out, *pair)
     out.name, out.gravity = str(model.name), pin.Motion(model.gravity)
-    shared = _shared(out, model)
-    for names, here, there in ((OF_COORDINATES, 0, 1), (OF_DOFS, 2, 3)):
-        for name in names:
-            values, source = np.array(getattr(out, name)), np.array(getattr(model, name))
-            for spans in shared:
-                values[spans[here]] = source[spans[there]]
-            setattr(out, name, values)
+    kept = [j for j in range(1, model.njoints) if j not in locked]
+    for names, starts, sizes, own in (
+        (OF_COORDINATES, model.idx_qs, model.nqs, len(start)),
+        (OF_DOFS, model.idx_vs, model.nvs, int(sum(out.nvs[: base + 1]))),
+    ):
+        for key in names:
+            source = np.array(getattr(model, key))
+            parts = (source[starts[j] : starts[j] + sizes[j]] for j in kept)
+            setattr(out, key, np.concatenate([np.array(getattr(out, key))[:own], *parts]))
+    for key, values in _references(model).items():
+        parts = (values[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept)
+        out.referenceConfigurations[key] = np.concatenate([start, *parts])
+    return out
+
+
+def _references(model: pin.Model) -> dict[str, Array]:
+    if PINOCCHIO:
+        return {entry.key(): np.array(entry.data()) for entry in model.referenceConfigurations}
+    return dict(model.referenceConfigurations)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 

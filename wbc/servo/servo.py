@@ -8,12 +8,12 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.controller import Step
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
+from wbc.multibody import pin
 from wbc.servo.laws import Feedback, quickness
 from wbc.servo.response import ENOUGH, PER_JOINT, SHOWN, Identification, Response
 from wbc.simulation import Command, CommandKind

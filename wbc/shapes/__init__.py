@@ -4,26 +4,17 @@ Shapes are plain data. They are bounded bodies on links or obstacles in the worl
 is a list of :class:`Convex` parts. Where a shape sits is said by whoever uses it.
 """
 
-from wbc.shapes.box import Box
-from wbc.shapes.convex import Convex
-from wbc.shapes.cylinder import Cylinder
-from wbc.shapes.ellipsoid import Ellipsoid
-from wbc.shapes.height_map import HeightMap
-from wbc.shapes.round import Capsule, Sphere
-from wbc.shapes.solid import FAR, Geometry, HalfSpace, PlacedShape, Shape, Solid
-
-__all__ = [
-    "FAR",
-    "Box",
-    "Capsule",
-    "Convex",
-    "Cylinder",
-    "Ellipsoid",
-    "Geometry",
-    "HalfSpace",
-    "HeightMap",
-    "PlacedShape",
-    "Shape",
-    "Solid",
-    "Sphere",
-]
+from wbc.shapes.box import Box as Box
+from wbc.shapes.convex import Convex as Convex
+from wbc.shapes.cylinder import Cylinder as Cylinder
+from wbc.shapes.ellipsoid import Ellipsoid as Ellipsoid
+from wbc.shapes.height_map import HeightMap as HeightMap
+from wbc.shapes.round import Capsule as Capsule, Sphere as Sphere
+from wbc.shapes.solid import (
+    FAR as FAR,
+    Geometry as Geometry,
+    HalfSpace as HalfSpace,
+    PlacedShape as PlacedShape,
+    Shape as Shape,
+    Solid as Solid,
+)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.shapes.around import around_ellipsoid
 from wbc.shapes.round import Sphere
 from wbc.shapes.solid import Kind, Solid

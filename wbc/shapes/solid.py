@@ -7,11 +7,11 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""A control loop's end of the seam: a plant that fits the robot, driven by desired velocities."""
+"""A control loop's end of the seam: a plant that fits the robot, driven by commands of one kind."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ class Connection:
             state = connection.drive(controller.step(state.q).v)
 
     Args:
-        plant: None: a :class:`KinematicPlant`. dt: control period [s].
+        plant: None: a :class:`KinematicPlant`. dt: control period [s]. kind: of its commands.
 
     Raises:
         ShapeError: it is no plant, or one of another robot. RangeError: it does not advance by such periods, or takes
-            no velocities.
+            no such commands.
     """
 
-    def __init__(self, plant: Plant | None, robot: Robot, dt: float) -> None:
+    def __init__(self, plant: Plant | None, robot: Robot, dt: float, kind: CommandKind = CommandKind.VELOCITY) -> None:
         self.plant: Plant = KinematicPlant(robot) if plant is None else plant
-        _check(self.plant, robot, dt)
+        _check(self.plant, robot, dt, kind)
         self._q_shape, self._v_shape, self._dt, self._time = (robot.nq,), (robot.nv,), dt, -inf
         # One command for all ticks, written anew in each
-        self._command = Command(CommandKind.VELOCITY, np.zeros(robot.nv))
+        self._command = Command(kind, np.zeros(robot.nv))
         self._values = self._command.values
         self._nq = robot.nq
 
@@ -65,13 +65,13 @@ class Connection:
             self.plant.reset(q, time)
             return self._checked(self.plant.read())
 
-    def drive(self, v: Array) -> PlantState:
-        """One period with a desired velocity ``[nv]``; the state after it.
+    def drive(self, command: Array) -> PlantState:
+        """One period with a command ``[nv]``, as a desired velocity; the state after it.
 
         Raises:
             PlantError: no valid reading, and the plant is commanded to rest; or it raised.
         """
-        self._values[:] = v
+        self._values[:] = command
         plant = self.plant
         try:
             plant.apply(self._command)
@@ -83,7 +83,7 @@ class Connection:
             raise self._failed(error) from error
 
     def rest(self) -> None:
-        """Command zero velocity; time does not go on.
+        """Command zeros: no velocity, or motors without torque; time does not go on.
 
         Raises:
             PlantError: the plant raised.
@@ -132,7 +132,7 @@ class Connection:
         return "expected finite numbers"
 
 
-def _check(plant: Any, robot: Robot, dt: float) -> None:
+def _check(plant: Any, robot: Robot, dt: float, kind: CommandKind) -> None:
     missing = [name for name in MEMBERS if not hasattr(plant, name)]
     if missing or isinstance(plant, type):
         why = "an instance, not the class" if not missing else f"it has no {', '.join(missing)}"
@@ -145,5 +145,6 @@ def _check(plant: Any, robot: Robot, dt: float) -> None:
     if round(periods) < 1 or abs(periods - round(periods)) > MULTIPLE:
         raise RangeError("plant.time_step", step, f"expected a step that divides the control period of {dt:g} s")
     kinds = tuple(str(kind) for kind in validation.items("plant.commands", plant.commands, "kinds of commands"))
-    if CommandKind.VELOCITY not in kinds:
-        raise RangeError("plant.commands", kinds, "the loop commands velocities, which this plant does not take")
+    if kind not in kinds:
+        name = "velocities" if kind is CommandKind.VELOCITY else f"{kind}s"
+        raise RangeError("plant.commands", kinds, f"the loop commands {name}, which this plant does not take")

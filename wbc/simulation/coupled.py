@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation.dynamics import ConstrainedDynamics, Grip
 from wbc.simulation.plant import GripKind

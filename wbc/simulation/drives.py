@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation.plant import Command, CommandKind, Plant, PlantState

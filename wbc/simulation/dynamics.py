@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.simulation.plant import GripKind
 from wbc.validation import Array
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation.dynamics import Grip, Slip
 from wbc.simulation.momentum import Balance

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

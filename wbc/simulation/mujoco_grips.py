@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError, WbcError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation.dynamics import AXIS
 from wbc.simulation.gripping import Gripping, GrippingState
@@ -20,6 +21,9 @@ from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
 from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    import mujoco
 
 #: Points of a frame that its grip holds, as many as the kind needs [m]
 POINTS = AXIS * np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -46,6 +50,8 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         frames: that can be held. time_step: [s].
         time_constant: of the grips [s]; None: two time steps, the least that MuJoCo takes. rate: [1/s].
         motors: default: torques as commanded within the limits of effort. seed: of their noise.
+        spec: of :func:`mujoco_spec` of this robot with motors, and what else stands in the world; its time step counts.
+            None: the robot alone.
 
     Raises:
         UnknownNameError: no such frame. What :func:`mujoco_model` raises.
@@ -63,10 +69,13 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         rate: float = 20.0,
         motors: Motors | None = None,
         seed: int = 0,
+        spec: mujoco.MjSpec | None = None,
     ) -> None:
         import mujoco
 
-        spec = mujoco_spec(robot, time_step=time_step, actuators="torque", drawn=False)
+        if spec is None:
+            spec = mujoco_spec(robot, time_step=time_step, actuators="torque", drawn=False)
+        time_step = float(spec.option.timestep)
         self._drive = PlantMotors(motors or Motors(), robot, time_step)
         for start, armature in enumerate(self._drive.armature):
             if armature:

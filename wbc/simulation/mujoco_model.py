@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from numpy.polynomial import Polynomial
 
 from wbc import extras, validation
 from wbc.errors import RangeError, UnsupportedJointError
+from wbc.multibody import pin
 from wbc.robot import JointCurve, Robot
 from wbc.robot.robot import checked_robot
 from wbc.rotations import TO_MUJOCO, quaternion

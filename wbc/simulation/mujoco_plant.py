@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import extras
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.mujoco_joints import MujocoJoints
 from wbc.robot.robot import checked_robot

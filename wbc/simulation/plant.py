@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
-import pinocchio as pin
-
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 

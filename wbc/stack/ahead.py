@@ -19,6 +19,7 @@ _WBC = Path(__file__).parents[1]
 KERNELS = (
     "analysis/certificates/native/subdivide.c",
     "clearance/native/sweep.c",
+    "climb/native/climb.c",
     "coordinates/control/native/singular.c",
     "geometry/native/geometry.c",
     "proximity/native/sensor.c",

@@ -6,22 +6,19 @@ import pathlib
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import casadi as ca
-
 from wbc import validation
 from wbc.errors import CompileError
 from wbc.native import cache, toolchain
 from wbc.stack import codegen
+from wbc.stack.behind import NativeBehind
+from wbc.stack.compiling import FUNCTION, LIBRARY, functions_in
 from wbc.stack.declaration import Declaration
 from wbc.stack.key import key
 from wbc.stack.layout import Layout
-from wbc.stack.program import TickProgram, build
-from wbc.stack.rows import RowsLibrary
+from wbc.stack.program import TickProgram, build, loaded
 
 BackendName = Literal["auto", "native", "vm"]
 BACKENDS = ("auto", "native", "vm")
-#: C of the functions, beside them
-_SOURCE = "rows.c"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,19 +30,25 @@ class Artifact:
         library: shared library of the tick, or None for the virtual machine.
         program: CasADi functions, or None for a native library.
         cached: it was in the cache, no expression was built.
-        rows: the program as native code in the making, or None.
+        behind: the library in the making, or None.
     """
 
     layout: Layout
     library: pathlib.Path | None
     program: TickProgram | None
     cached: bool
-    rows: RowsLibrary | None = None
+    behind: NativeBehind | None = None
 
     @property
     def backend(self) -> str:
         """Its name."""
         return "vm" if self.library is None else "native"
+
+    def settled(self, wait: bool = False) -> Artifact:
+        """With its library, if that is there now; ``wait``: or will be."""
+        if self.behind is None or (made := self.behind.library(wait)) is None:
+            return self
+        return replace(self, library=made, program=None, behind=None)
 
 
 def compile_stack(stack: Declaration, backend: str, version: str, search: bool = False, wait: bool = True) -> Artifact:
@@ -54,7 +57,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
     Args:
         backend: ``native`` (needs gcc), ``vm``: rows on CasADi's virtual machine, or ``auto``: native where it can be.
         search: a native library with inverse kinematics.
-        wait: False, of ``auto``: the virtual machine at once, and its rows as native code when they are compiled.
+        wait: False, of ``auto``: the virtual machine at once, and native code when that is compiled.
 
     Where ``auto`` finds a compiler that fails, the first lines of its message are in the log and the virtual machine
     does the work.
@@ -82,44 +85,48 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
     """The shared library, compiled or from the cache."""
 
     def fill(folder: pathlib.Path) -> None:
-        program = build(stack, layout, loops=True)
-        toolchain.compile_tick(codegen.sources(stack, layout, program), folder / "tick.so", search)
+        program = build(stack, layout)
+        toolchain.compile_tick(codegen.sources(stack, layout, program, moves=search), folder / LIBRARY, search)
 
-    built_by = toolchain.identity() + ("\nsearch" if search else "")
-    folder, cached = cache.fetch(
-        key(stack, version, built_by), fill, library=True, what=_said(stack), advice="backend='vm' is ready sooner"
-    )
-    return Artifact(layout, folder / "tick.so", None, cached)
+    name, what = _named(stack, version, search), _said(stack)
+    folder, cached = cache.fetch(name, fill, library=True, what=what, advice="wait=False answers meanwhile")
+    return Artifact(layout, folder / LIBRARY, None, cached)
 
 
-def _virtual(stack: Declaration, layout: Layout, version: str, source: bool = False) -> tuple[Artifact, pathlib.Path]:
-    """The functions for the virtual machine, built or from the cache, and their folder; ``source``: with their C."""
-    made: dict[str, ca.Function] = {}
+def _named(stack: Declaration, version: str, search: bool = False) -> str:
+    """Name of a stack's library in the cache."""
+    return key(stack, version, toolchain.identity() + ("\nsearch" if search else ""))
+
+
+def _virtual(stack: Declaration, layout: Layout, version: str) -> tuple[Artifact, pathlib.Path]:
+    """The functions for the virtual machine, built or from the cache, and their folder, which is all that
+    :mod:`wbc.stack.compiling` needs.
+    """
+    made: list[TickProgram] = []
 
     def fill(folder: pathlib.Path) -> None:
-        made.update(build(stack, layout).functions)
-        for name, function in made.items():
-            function.save(str(folder / f"{name}.casadi"))
-        if source:
-            (folder / _SOURCE).write_text(codegen.casadi_source(list(made.values())))
+        made.append(build(stack, layout))
+        for name, function in made[0].functions.items():
+            function.save(str(folder / f"{name}{FUNCTION}"))
+        for name, text in codegen.tables(stack, layout, made[0]).items():
+            (folder / name).write_text(text)
 
-    folder, cached = cache.fetch(key(stack, version, f"vm {source}"), fill, what=_said(stack))
-    saved = made or {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob("*.casadi"))}
-    functions = TickProgram(saved["rows"], saved.get("ahead"), saved.get("curvature"), saved.get("torque"))
-    functions = replace(functions, lost=saved.get("lost"))
-    return Artifact(layout, None, functions, cached), folder
+    folder, cached = cache.fetch(key(stack, version, "vm"), fill, what=_said(stack))
+    program = made[0] if made else loaded(stack, layout, functions_in(folder))
+    return Artifact(layout, None, program, cached), folder
 
 
 def _at_once(stack: Declaration, layout: Layout, version: str) -> Artifact:
-    """The functions for the virtual machine, and behind them the same as native code, where a compiler is.
-
-    Their C is made here and not behind: CasADi keeps the interpreter's lock meanwhile, and a tick would wait.
+    """The library where it is in the cache; else the functions for the virtual machine, and behind them the library,
+    where a compiler is.
     """
     if not toolchain.available():
         return _virtual(stack, layout, version)[0]
-    out, folder = _virtual(stack, layout, version, source=True)
-    rows = RowsLibrary(lambda: key(stack, version, f"{toolchain.identity()}\nrows"), folder / _SOURCE, _said(stack))
-    return replace(out, rows=rows)
+    name = _named(stack, version)
+    if (folder := cache.find(name, library=True)) is not None:
+        return Artifact(layout, folder / LIBRARY, None, cached=True)
+    out, folder = _virtual(stack, layout, version)
+    return replace(out, behind=NativeBehind(folder, name, _said(stack)))
 
 
 def _said(stack: Declaration) -> str:

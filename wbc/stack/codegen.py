@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from importlib import resources
 from typing import Any
 
 import casadi as ca
@@ -13,10 +11,10 @@ import numpy as np
 from wbc.shapes import FAR
 from wbc.stack.commands import COMMANDS
 from wbc.stack.declaration import Declaration
-from wbc.stack.handing_over import hand_over
 from wbc.stack.layout import Layout
 from wbc.stack.memory import LEVEL_NUMBERS, structures
-from wbc.stack.program import ROWS_OUTPUTS, TickProgram, sparsity_rows
+from wbc.stack.program import TickProgram, sparsity_rows
+from wbc.stack.sources import completed
 from wbc.stack.tables import (
     bent_rows,
     brakes,
@@ -31,43 +29,23 @@ from wbc.stack.tables import (
 )
 from wbc.symbolic.kinematics import Kinematics
 
-#: Output of the rows before which stands what they hand to the curvature
-HANDED = len(ROWS_OUTPUTS)
 #: Class of rows that have a price in the order of sacrifice: they give way at it, and before any other
 PRICED = 99
 
 
-def sources(stack: Declaration, layout: Layout, program: TickProgram) -> dict[str, str]:
-    """File name -> text of everything that makes the tick of a stack."""
-    native = resources.files("wbc.stack") / "native"
-    written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
-    compiled = program.functions
-    if program.curvature is not None:
-        compiled["rows"], compiled["curvature"] = hand_over(program.rows, program.curvature, HANDED)
-    functions = [*compiled.values(), motion(stack)]
-    return {
-        "rows.c": casadi_source(functions),
-        "stack.h": header(stack, layout, program, functions),
-        "memory.h": structures(layout),
-        **written,
-    }
+def sources(stack: Declaration, layout: Layout, program: TickProgram, moves: bool = False) -> dict[str, str]:
+    """File name -> text of everything that makes the tick of a stack; ``moves``: and what follows ticks in C."""
+    functions = program.functions | ({"move": motion(stack)} if moves else {})
+    return completed(functions, tables(stack, layout, program))
 
 
-def casadi_source(functions: list[ca.Function]) -> str:
-    """Functions as C, to the same bits as on the virtual machine but for the sign of zeros."""
-    generator = ca.CodeGenerator("rows.c", {"with_header": False})
-    for function in functions:
-        generator.add(function)
-    text = str(generator.dump())
-    # The library's are calls; the same here, of NaN the other argument, but for the sign of zeros
-    for name, sign in (("fmin", "<"), ("fmax", ">")):
-        text = text.replace(f"return {name}(x, y);", f"return x {sign} y || y != y ? x : y;")
-    # Helpers of a line; at the level that the rows are compiled at, others are calls
-    return re.sub(r"^(casadi_real casadi_\w+\()", r"static inline \1", text, flags=re.MULTILINE)
+def tables(stack: Declaration, layout: Layout, program: TickProgram) -> dict[str, str]:
+    """The headers of a stack, without what its functions in C will need."""
+    return {"stack.h": header(stack, layout, program), "memory.h": structures(layout)}
 
 
-def header(stack: Declaration, layout: Layout, program: TickProgram, functions: list[ca.Function]) -> str:
-    """``stack.h``: the sizes and tables of a stack; ``functions`` are those of its rows."""
+def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
+    """``stack.h``: the sizes and tables of a stack."""
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
@@ -100,7 +78,6 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
                 "SENSED": len(program.sensed.blocks),
                 "FAR": FAR,
                 "NNZK": upper.nnz(),
-                "HANDED": next((f.numel_out("handed") for f in functions if "handed" in f.name_out()), 0),
                 "CALM": int(stack.calm),
                 "BENDING": sum(bent_rows(layout, program)),
                 "ELASTIC": int(layout.elastic),
@@ -109,8 +86,6 @@ def header(stack: Declaration, layout: Layout, program: TickProgram, functions: 
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
                 "LONGEST": max(1.0, *dofs, *scales),
                 "ACTIVE_MAX": layout.variables + len(orders) + 1,
-                "WORK_W": max(f.sz_w() for f in functions),
-                "WORK_IW": max(f.sz_iw() for f in functions),
             }.items()
         ),
         _table("int", "j_start", j_start),

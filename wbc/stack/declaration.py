@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import pickling, validation
 from wbc.errors import (
@@ -22,14 +21,17 @@ from wbc.errors import (
     ShapeError,
     UnknownNameError,
 )
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.stack.commands import COMMANDS
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
 from wbc.tasks._contact import FORCE_WEIGHT, Contact, ContactForce, ContactWrench, LoopForces, Unactuated
 from wbc.tasks._direction import DIRECTION_PRICE, Direction
+from wbc.tasks._linkage_speed import LinkageSpeed
 from wbc.tasks.base import Command, Constraint, Form, Item, SacrificeOrder, Task
 from wbc.tasks.damping import Damping
+from wbc.tasks.joint_limits import JointLimits
 from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.moving_frame import MovingFrame
 from wbc.tasks.wrench_sum import WrenchSum
@@ -266,6 +268,7 @@ class Declaration:
         name: str | None = None,
         level: int = 0,
         weight: float = 1.0,
+        *,
         hard: bool = True,
         soft: float | None = None,
         scaled: bool = False,
@@ -323,6 +326,8 @@ class Declaration:
             added.append(Entry(Direction(chosen, item), kept, level, 1.0, True, number * DIRECTION_PRICE))
         item.validate(self._robot)
         _check_values(item, self._robot)
+        if isinstance(item, JointLimits) and (speed := LinkageSpeed(item)).rows(self._robot):
+            added.append(Entry(speed, self._free_name(f"{chosen} linkages"), level, number))
         self._entries |= {entry.name: entry for entry in added}
         self._was_added(chosen)
         return self

@@ -5,7 +5,9 @@ structure, a table is a constant. Here the same text is made to take them when i
 context, a table a pointer of it, and an array a pointer into memory that ``bind_tick`` lays out. So nothing is written
 twice, and a tick gives the same answer both ways.
 
-Rows are evaluated by :class:`casadi.FunctionBuffer`, whose address the context has, until it has that of native code.
+Rows are evaluated by :class:`casadi.FunctionBuffer`, whose address the context has. Where it has that of a tick that
+was compiled for the stack (:mod:`wbc.stack.behind`), every function here calls the one of the same name there, which
+works on the same fields of :class:`wbc.stack.memory.Memory`: so a tick changes over at once and as a whole.
 """
 
 from __future__ import annotations
@@ -33,31 +35,40 @@ from wbc.stack.memory import (
 SIZES = (
     "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "ELASTIC", "UNITS",
     "LAST_ORDER", "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST",
-    "SOFT_MAX", "BLOCKED",
+    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED",
 )  # fmt: skip
-REALS = ("LONGEST", "LEFT_FREE", "DAMPING")
+REALS = ("LONGEST", "LEFT_FREE", "DAMPING", "FAR")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
 INT_TABLES = (
     "j_start", "j_col", "a_start", "a_end", "a_col", "row_order", "bound_sequence", "unit_start", "unit_size",
     "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
-    "slewed_at", "slewed_dof", "level_start", "row_level", "block_row", "block_rows", "block_first", "block_columns",
+    "slewed_at", "slewed_dof", "level_start", "row_level", "ball_pose", "ball_velocity", "ball_margin", "ball_rate",
+    "ball_row", "ball_first", "row_segment", "segment_row", "sensed_row", "sensed_count", "sensed_distance",
+    "sensed_line", "sensed_side", "block_row", "block_rows", "block_first", "block_columns",
 )  # fmt: skip
 REAL_TABLES = (
     "force_scale", "brake_limit", "stop_low", "stop_high", "row_scale", "dof_scale", "damping", "slack_reported",
-    "task_scale",
+    "task_scale", "row_reach", "segment_half",
 )  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
 FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost")
 COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)")], "lost": [(1, "moved", "DOFS")]}
 #: Arrays that only C knows and the functions write
-WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries")
+WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries", "segment", "screw", "segment_ahead")
+#: What the tick compiled for the stack does in place of what is here, once there is one
+FORWARDED = (
+    "wbc_tick_assemble", "wbc_tick_certify", "wbc_tick_check", "wbc_tick_curvature", "wbc_tick_find_lost",
+    "wbc_tick_look_ahead", "wbc_tick_reset", "wbc_tick_resume", "wbc_tick_safe_step", "wbc_tick_solve", "wbc_tick_step",
+    "wbc_tick_suspend", "wbc_tick_take", "wbc_tick_task_rows", "wbc_tick_torques",
+)  # fmt: skip
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")
-_ALWAYS = ("MH", "KEPT", "BENDING", "NNZK")
+_ALWAYS = ("MH", "KEPT", "BENDING", "NNZK", "BALLS", "SENSED")
 
 #: What makes the sources of the files in ``native``
 MAKERS = ("generic.py", "memory.py", "commands.py")
 
+_EXPORTED = re.compile(r"^EXPORT ([\w ]+ )(\w+)\((?:const )?wbc_tick \*t([^)]*)\) \{", re.MULTILINE)
 _MEMBERS = re.compile(r"^    (double|int|long long|wide) (.*?);", re.MULTILINE)
 _ARRAY = re.compile(r"(\w+)\[(.*)\]")
 
@@ -140,7 +151,7 @@ def origins(variant: Variant) -> dict[str, str]:
 def sources(variant: Variant) -> dict[str, str]:
     """File name -> text; ``generic.c`` is what is compiled."""
     native = resources.files("wbc.stack") / "native"
-    left_out = ("balls.h", "sensed.h", "converge.h", "converge.c", "many.h", "library.c")
+    left_out = ("converge.h", "converge.c", "many.h", "library.c")
     found = [f for f in native.iterdir() if f.name.endswith((".c", ".h")) and f.name not in left_out]
     texts = {file.name: file.read_text() for file in found}
     report, rest = variant.fields()
@@ -156,7 +167,7 @@ def sources(variant: Variant) -> dict[str, str]:
     primal = _Structure.of(body[1])
     texts["primal.h"] = texts["primal.h"].replace(body[0], _structure("wbc_primal", primal))
     texts["primal.h"] = texts["primal.h"].replace("memset(&s, 0, sizeof s);", "PRIMAL_ROOM(s)")
-    tick.layout = [*reported.layout, *given.layout, *tick.layout]
+    tick.layout = [*reported.layout, *given.layout, "from = at = rest;", *tick.layout]
     scalars = [each.c_name for each in (*report, *rest) if not each.shape]
     own = {
         "out->": reported.sizes,
@@ -171,12 +182,11 @@ def sources(variant: Variant) -> dict[str, str]:
     texts["tick.c"] = texts["tick.c"].replace(
         "memset(t, 0, sizeof *t);",
         "const wbc_context *given = t->context;\n    memset(t, 0, sizeof *t);\n    t->context = given;\n"
-        "    bind_tick(t, (char *)given->memory);",
+        "    bind_tick(t, (char *)given->memory, (char *)given->rest);",
     )
     names = [each.c_name for each in report], [each.c_name for each in rest]
     texts["memory.h"] = _memory(*names)
     texts["stack.h"] = _context(variant)
-    texts["sensed.h"] = '#include "margins.h"\n'
     texts["generic.c"] = _MAIN
     return texts
 
@@ -208,7 +218,8 @@ def _layouts(tick: _Structure, levels: _Structure, variant: Variant) -> str:
     out = []
     for kind, name, made, last in (*parts, ("wbc_tick", "bind_tick", tick, inner)):
         lines = _conditions("\n    ".join(made.layout))
-        out.append(f"static size_t {name}({kind} *s, char *at) {{\n    char *from = at;\n    {lines}\n{last}")
+        more = ", char *rest" if kind == "wbc_tick" else ""
+        out.append(f"static size_t {name}({kind} *s, char *at{more}) {{\n    char *from = at;\n    {lines}\n{last}")
         out.append("    return at - from;\n}\n")
     return "\n".join(["", *out])
 
@@ -239,9 +250,19 @@ def _at_run_time(text: str, scalars: list[str], sizes: dict[str, dict[str, str]]
             line += "".join(f" memset({name}, 0, sizeof {name});" for name, _ in zeroed)
         lines.append(line)
     text = "\n".join(lines) + "\n"
-    return re.sub(
-        r"^(EXPORT [\w ]+\((?:const )?wbc_tick \*t[^)]*\) \{)", r"\1 use(t->context);", text, flags=re.MULTILINE
-    )
+    return _EXPORTED.sub(_forwarding, text)
+
+
+def _forwarding(found: re.Match[str]) -> str:
+    """The beginning of a function that the tick compiled for the stack does, once there is one."""
+    kind, name, given = found[1].strip(), found[2], [each.strip() for each in found[3].split(",") if each.strip()]
+    if name not in FORWARDED:
+        return found[0] + " use(t->context);"
+    types = ", ".join(["void *", *(re.sub(r"\w+$", "", each) for each in given)])
+    call = f"(({kind} (*)({types}))t->context->{name}_)"
+    call += f"({', '.join(['t->context->own', *(each.split()[-1].lstrip('*') for each in given)])});"
+    done = f"{{ {call} return; }}" if kind == "void" else f"return {call}"
+    return f"{found[0]}\n    if (t->context->own) {done}\n    use(t->context);"
 
 
 def _memory(report: list[str], rest: list[str]) -> str:
@@ -274,10 +295,9 @@ def _context(variant: Variant) -> str:
         "#include <string.h>",
         f"#define COMMAND {COMMANDS.index(variant.command)}",
         f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
-        *(f"#define {name} 0" for name in ("BALLS", "SEGMENTS", "SENSED", "HANDED", "WORK_W", "WORK_IW")),
+        *(f"#define {name} 0" for name in ("HANDED", "WORK_W", "WORK_IW")),
         *(f"#define HAS_{name} {int(there)}" for name, there in chosen.items()),
         *(f"#define HAS_{name} 1" for name in _ALWAYS),
-        "typedef int (*wbc_code)(const double **, double **, long long *, double *, int);",
         "/* Of eight bytes each, in the order that Python writes them in */",
         "typedef struct {",
         "    long long serial;",
@@ -286,11 +306,10 @@ def _context(variant: Variant) -> str:
         *(f"    const {kind} *{name}_;" for name, kind in tables),
         "    void (*evaluate)(void *);",
         *(f"    void *{name}_;" for name in FUNCTIONS),
-        *(f"    wbc_code {name}_code_;" for name in FUNCTIONS),
-        "    long long *iw_;",
-        "    double *w_;",
         *(f"    double *{name}_;" for name in copies),
-        "    double *memory;",
+        "    double *memory, *rest;",
+        "    void *own;",
+        *(f"    void *{name}_;" for name in FORWARDED),
         "} wbc_context;",
         "static wbc_context S;",
         "static inline void use(const wbc_context *c) { if (c->serial != S.serial) S = *c; }",
@@ -322,24 +341,24 @@ _MAIN = (
     """/* A tick of any stack whose rows CasADi computes */
 #include "tick.c"
 #include "builtins.h"
+#include "carried.h"
 
 #define EVALUATED(name) \\
     int name(const double **arg, double **res, long long *iw, double *w, int mem) { \\
         (void)arg, (void)res, (void)iw, (void)w, (void)mem;
 """
     + "".join(
-        f"EVALUATED({name})\n    if (S.{name}_code_) return S.{name}_code_(arg, res, S.iw_, S.w_, mem);\n"
-        f"    if (!S.{name}_) return 0;\n"
+        f"EVALUATED({name})\n    if (!S.{name}_) return 0;\n"
         + "".join(f"    memcpy(S.{to}_, arg[{k}], {n} * 8);\n" for k, to, n in COPIED.get(name, ()))
         + f"    S.evaluate(S.{name}_);\n    return 0;\n}}\n"
         for name in FUNCTIONS
     )
     + """
-/* Bytes of the arrays of a tick in this context */
+/* Bytes of the arrays of a tick in this context that are not in memory.h */
 EXPORT long long wbc_generic_room(const wbc_context *context) {
     wbc_tick t;
     use(context);
-    return (long long)bind_tick(&t, NULL);
+    return (long long)bind_tick(&t, NULL, NULL);
 }
 
 EXPORT void wbc_generic_context(wbc_tick *t, const wbc_context *context) { t->context = context; }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
+import importlib.util
 import json
 import marshal
 import pathlib
@@ -12,8 +12,8 @@ import sys
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.stack.declaration import Declaration, inner_items
 
 #: Everything that runs when a program is built: all parts that this one imports, and what those import. A test compares
@@ -23,6 +23,7 @@ PARTS = (
     "wbc.extras",
     "wbc.geometry",
     "wbc.lazy",
+    "wbc.multibody",
     "wbc.native",
     "wbc.pickling",
     "wbc.proximity",
@@ -61,7 +62,10 @@ def _own_code() -> str:
 
 def files_of(part: str) -> list[tuple[str, pathlib.Path]]:
     """(name, path) of the Python and C files of a part of this package."""
-    file = pathlib.Path(str(importlib.import_module(part).__file__))
+    # Not imported for it
+    spec = importlib.util.find_spec(part)
+    assert spec is not None
+    file = pathlib.Path(str(spec.origin))
     if file.name != "__init__.py":
         return [(part, file)]
     found = (path for path in file.parent.rglob("*") if path.suffix in (".py", ".c", ".h"))

@@ -26,8 +26,8 @@ Of a stack that commands accelerations or torques the variables are a, and the w
 :mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x, enabled)`` are the torques of the joints, and ``ahead`` takes the
 mean velocity until the next tick.
 
-For a compiled tick the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have
-no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
+Of velocities the rows of :meth:`Constraint.ball_rows` are left to the loop in ``native/balls.h``: here they have no
+entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (``native/sensed.h``). Both need:
 
     segment  segments x 6   (middle; axis) of every link core, of ``rows`` and of ``ahead``
     screw    6 x nv         (linear at the origin of the world; angular) of every degree of freedom, of ``rows``
@@ -35,6 +35,7 @@ no entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -96,6 +97,23 @@ class TickProgram:
         return {name: function for name, function in every.items() if function is not None}
 
 
+def loops(stack: Declaration) -> bool:
+    """Whether the C of its tick has loops for distances: they know first derivatives."""
+    return stack.command == "velocity"
+
+
+def left_to_loops(stack: Declaration, layout: Layout) -> tuple[Balls, Sensed]:
+    """Rows of a stack that its functions leave to loops."""
+    return (Balls.of(stack, layout), Sensed.of(stack, layout)) if loops(stack) else (Balls(), Sensed())
+
+
+def loaded(stack: Declaration, layout: Layout, functions: Mapping[str, ca.Function]) -> TickProgram:
+    """The program of a stack whose functions were built before."""
+    balls, sensed = left_to_loops(stack, layout)
+    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost")}
+    return TickProgram(functions["rows"], **others, balls=balls, sensed=sensed)
+
+
 #: Expressions of robots whose stacks were built, for as long as the robots live
 _KNOWN: WeakKeyDictionary[Robot, Kinematics] = WeakKeyDictionary()
 
@@ -109,11 +127,9 @@ def _kinematics_of(robot: Robot) -> Kinematics:
 
 
 class _ProgramBuilder:
-    def __init__(self, stack: Declaration, layout: Layout, loops: bool) -> None:
-        # Loops know first derivatives
-        loops = loops and stack.command == "velocity"
-        self.stack, self.layout, self.loops = stack, layout, loops
-        self.balls = Balls.of(stack, layout) if loops else Balls()
+    def __init__(self, stack: Declaration, layout: Layout) -> None:
+        self.stack, self.layout, self.loops = stack, layout, loops(stack)
+        self.balls, self.sensed = left_to_loops(stack, layout)
         self.kinematics = _kinematics_of(stack.robot)
         self.p = ca.SX.sym("p", layout.parameters)
         self.dt = ca.SX.sym("dt")
@@ -351,14 +367,14 @@ class _ProgramBuilder:
 
 
 @quick_operators()
-def build(stack: Declaration, layout: Layout, loops: bool = False) -> TickProgram:
-    """Build the functions of a stack; ``loops``: without what a compiled tick computes in loops.
+def build(stack: Declaration, layout: Layout) -> TickProgram:
+    """Build the functions of a stack.
 
     Raises:
         ShapeError: an item's expression has another number of rows than it declares, or free symbols.
     """
-    b = _ProgramBuilder(stack, layout, loops)
-    balls, sensed = b.balls, Sensed.of(stack, layout) if b.loops else Sensed()
+    b = _ProgramBuilder(stack, layout)
+    balls, sensed = b.balls, b.sensed
     nv = layout.variables
     tasks = [(block.start, *b.task(block)) for block in layout.of_form("task")]
     tasks = [(start, e, w, f, b.columns(shared_pattern(J.T))) for start, e, w, f, J in tasks]
@@ -439,9 +455,4 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     stray = [s.name() for s in free if s.__hash__() not in known]
     if stray:
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, shared(outputs), ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)
-
-
-def shared(outputs: list[ca.SX]) -> list[ca.SX]:
-    """The same expressions, with what occurs in them twice computed once."""
-    return list(ca.cse(outputs))
+    return ca.Function(name, inputs, outputs, ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)

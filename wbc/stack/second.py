@@ -142,6 +142,8 @@ class SecondOrder:
             return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
         if block.entry.yielding:
             return self._limits(block, item), None, None
+        if item.later:
+            return self._later(block, item, tracer), None, None
         if block.form == "rows":
             return self._rates(block, item, tracer), None, None
         margins = item.margins(robot, tracer, inputs)
@@ -189,6 +191,16 @@ class SecondOrder:
                 most = scale * float(self._robot.limits.effort[i])
                 out[i] = ca.fmax(most - ca.fabs(self._still[i]), LEAST_SHARE * most) / inertia[i]
         return out
+
+    def _later(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
+        """Rows on the velocity at the end of the tick, v + a dt."""
+        b = self._b
+        declared = item.velocity_rows(self._robot, tracer, b.values(block), b.dt)
+        assert declared is not None
+        matrix = tracer.expand(ca.SX(declared.matrix))
+        now = ca.densify(matrix @ self._kinematics.v)
+        ends = (tracer.expand(b.column(block, "side", end)) for end in (declared.lower, declared.upper))
+        return Rows(self._wide(matrix), *((end - now) / b.dt for end in ends))
 
     def _rates(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
         """Rows on velocities: what they are off decays at ``rate``."""
@@ -293,7 +305,8 @@ class SecondOrder:
         if not self._layout.loop_rows:
             return ca.SX(0, self._layout.nv)
         tracer = Tracer(self._kinematics)
-        return tracer.jacobian(self._robot.loops.error(tracer))
+        loops = self._robot.loops
+        return loops.moving(tracer.jacobian(loops.error(tracer)))
 
     def _contacts(self) -> list[ca.SX]:
         """What the transposed of takes each contact's wrench to generalised forces, components x nv, as far as it is

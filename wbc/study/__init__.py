@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 from wbc import extras, lazy
 
 if TYPE_CHECKING:
-    from wbc.study.carrying_out import Progress, carry_out
-    from wbc.study.declaration import Study, StudyError
-    from wbc.study.kept import Kept
+    from wbc.study.carrying_out import Progress as Progress, carry_out as carry_out
+    from wbc.study.declaration import Study as Study, StudyError as StudyError
+    from wbc.study.kept import Kept as Kept
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)
 
-__all__ = ["Kept", "Progress", "Study", "StudyError", "carry_out"]
 
 extras.require("studies", "a study")

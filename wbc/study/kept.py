@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from wbc import extras
+from wbc import extras, validation
 from wbc.errors import BusyError, RangeError, RobotFileError
+from wbc.native.file_lock import lock
 from wbc.study.declaration import Study
 from wbc.study.scenario import Row, StudyTrial
 
@@ -43,7 +43,7 @@ class Kept:
         self.folder, self.study = folder, study
         self._file = (folder / TRIALS).open("a+", encoding="utf-8")
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._file, wait=False)
         except OSError:
             self._file.close()
             raise BusyError("study", str(folder), "another process runs the study in this folder") from None
@@ -115,12 +115,10 @@ class Kept:
 
         path = self.folder / RESULTS
         part = path.with_suffix(".part")
-        try:
+        with validation.writing("study", path, RobotFileError):
             about = {"study": json.dumps(self.study.data())}
             pq.write_table(pa.table(self.table()).replace_schema_metadata(about), part)
             part.replace(path)
-        except OSError as error:
-            raise RobotFileError("study", str(path), f"cannot be written: {error.strerror}") from error
         return path
 
     def __enter__(self) -> Kept:

@@ -6,11 +6,11 @@ import functools
 from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots, validation
 from wbc.api import Stack
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.tasks import EndEffector, JointLimits
 from wbc.validation import Array
 

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
-import pinocchio as pin
 from scipy.linalg import null_space, orth
 from scipy.optimize import linprog
 from scipy.sparse.csgraph import connected_components
@@ -31,6 +30,7 @@ from scipy.sparse.csgraph import connected_components
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import CommandError, RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.support.statics import Statics, TorqueRows, least_lack
 from wbc.validation import Array

@@ -13,16 +13,17 @@ mass moves.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from scipy.optimize import linprog
 
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import CommandError, RangeError
+from wbc.multibody import pin
 from wbc.support.statics import Statics, statics
 from wbc.validation import Array
 
@@ -132,13 +133,13 @@ def region(controller: CompiledStack, q: Any, *, torque: bool = True, tolerance:
     data, configuration = robot.model.createData(), robot.configuration("q", q)
     center = pin.centerOfMass(robot.model, data, configuration).copy()
     pin.forwardKinematics(robot.model, data, configuration)
-    axes, turn = _across(gravity / strength), data.oMi[1].rotation
+    axes, turn = across(gravity / strength), data.oMi[1].rotation
     weight = pin.computeTotalMass(robot.model) * gravity
     # the moment of the weight about the base, in its axes, by how far the centre of mass is elsewhere
     moments = np.zeros((6, 2))
     moments[3:] = np.column_stack([turn.T @ np.cross(axis, weight) for axis in axes])
     program = _RegionProgram(found, moments, validation.flag("torque", torque))
-    corners, outer = program.project(limit)
+    corners, outer = projected(program.farthest, limit)
     here = axes @ center
     return Region(center, axes, corners + here, outer + here, bool(torque))
 
@@ -171,30 +172,36 @@ class _RegionProgram:
         answer = linprog(cost, A_ub=A, b_ub=b, A_eq=E, b_eq=e, bounds=self._bounds, method="highs")
         return None if answer.status != 0 else np.array(answer.x[-2:])
 
-    def project(self, tolerance: float) -> tuple[Array, Array]:
-        """Corners of an inner and of an outer polygon, counterclockwise."""
-        angles = 2.0 * np.pi * np.arange(4) / 4
-        directions = [np.array([np.cos(a), np.sin(a)]) for a in angles]
-        corners: list[Array] = []
-        for direction in directions:
-            if (point := self.farthest(direction)) is None:
-                return np.zeros((0, 2)), np.zeros((0, 2))
-            corners.append(point)
-        while len(corners) < MOST:
-            tips = _tips(directions, corners)
-            after = [*corners[1:], corners[0]]
-            gaps = [0.5 * abs(float(_cross(b - a, t - a))) for a, b, t in zip(corners, after, tips, strict=True)]
-            if sum(gaps) <= tolerance:
-                break
-            k = int(np.argmax(gaps))
-            edge = after[k] - corners[k]
-            direction = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
-            point = self.farthest(direction)
-            if point is None:
-                break
-            directions.insert(k + 1, direction)
-            corners.insert(k + 1, point)
-        return _distinct(np.array(corners)), _distinct(np.array(_tips(directions, corners)))
+
+def projected(farthest: Callable[[Array], Array | None], tolerance: float) -> tuple[Array, Array]:
+    """Corners of an inner and of an outer polygon of a convex region in the plane, counterclockwise.
+
+    Args:
+        farthest: the point of the region that is farthest along a direction, None where the region is empty.
+        tolerance: area by which the two may differ.
+    """
+    angles = 2.0 * np.pi * np.arange(4) / 4
+    directions = [np.array([np.cos(a), np.sin(a)]) for a in angles]
+    corners: list[Array] = []
+    for direction in directions:
+        if (point := farthest(direction)) is None:
+            return np.zeros((0, 2)), np.zeros((0, 2))
+        corners.append(point)
+    while len(corners) < MOST:
+        tips = _tips(directions, corners)
+        after = [*corners[1:], corners[0]]
+        gaps = [0.5 * abs(float(_cross(b - a, t - a))) for a, b, t in zip(corners, after, tips, strict=True)]
+        if sum(gaps) <= tolerance:
+            break
+        k = int(np.argmax(gaps))
+        edge = after[k] - corners[k]
+        direction = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
+        point = farthest(direction)
+        if point is None:
+            break
+        directions.insert(k + 1, direction)
+        corners.insert(k + 1, point)
+    return _distinct(np.array(corners)), _distinct(np.array(_tips(directions, corners)))
 
 
 def _tips(directions: list[Array], corners: list[Array]) -> list[Array]:
@@ -238,7 +245,7 @@ def _area(corners: Array) -> float:
     return 0.5 * abs(float(_cross(corners, np.roll(corners, -1, axis=0)).sum()))
 
 
-def _across(down: Array) -> Array:
+def across(down: Array) -> Array:
     """Two unit vectors across a direction: x and y of the world where it is down."""
     first = np.array([1.0, 0.0, 0.0]) if abs(down[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     first = first - down * (down @ first)

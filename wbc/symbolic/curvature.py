@@ -54,16 +54,25 @@ def curvature(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> ca.SX:
         if force.kind == "own":
             K += force.vector
     for k in turned:
-        for i in kinematics.support(k):
-            angular = kinematics.joint_twist(i)[1]
-            block = ca.sparsify(angular.T @ turned[k])
-            if i == k:
-                block = 0.5 * (block + block.T)
-            rows, columns = kinematics.joint_columns(i), kinematics.joint_columns(k)
+        support, columns = kinematics.support(k), kinematics.joint_columns(k)
+        own = ca.sparsify(kinematics.joint_twist(k)[1].T @ turned[k])
+        K[columns, columns] += 0.5 * (own + own.T)
+        for before in _distinct(kinematics, support[:-1]):
+            rows = [row for i in before for row in _rows(kinematics, i)]
+            block = ca.sparsify(ca.horzcat(*(kinematics.joint_twist(i)[1] for i in before)).T @ turned[k])
             K[rows, columns] += block
-            if i != k:
-                K[columns, rows] += block.T
+            K[columns, rows] += block.T
     return ca.sparsify(K)
+
+
+def _rows(kinematics: Kinematics, joint: int) -> range:
+    return range(*kinematics.joint_columns(joint).indices(kinematics.nv))
+
+
+def _distinct(kinematics: Kinematics, joints: list[int]) -> list[list[int]]:
+    """The joints together; one by one where a mimic joint has the velocities of another."""
+    rows = [row for j in joints for row in _rows(kinematics, j)]
+    return [joints][: len(joints)] if len(rows) == len(set(rows)) else [[j] for j in joints]
 
 
 def _loads(kinematics: Kinematics, forces: Iterable[AppliedForce]) -> dict[int, _JointLoad]:

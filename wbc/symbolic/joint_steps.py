@@ -7,9 +7,9 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import UnsupportedJointError
+from wbc.multibody import pin
 from wbc.symbolic.joint_maps import AXES, Vector
 from wbc.symbolic.joints import SUPPORTED, follower_of, motion_at
 

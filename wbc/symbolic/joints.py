@@ -9,8 +9,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import UnsupportedJointError
-from wbc.symbolic import joint_maps as maps
-from wbc.symbolic import rotations as rot
+from wbc.symbolic import joint_maps as maps, rotations as rot
 from wbc.symbolic.joint_maps import AXES, SymbolicJoint
 
 __all__ = ["SUPPORTED", "SymbolicJoint", "follower_of", "mimic_joint", "motion_at", "symbolic_joint"]

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
-import pinocchio as pin
 
 from wbc.errors import UnknownNameError
-from wbc.symbolic import kernels
-from wbc.symbolic import rotations as rot
+from wbc.multibody import pin
+from wbc.symbolic import kernels, rotations as rot
 from wbc.symbolic.joints import SymbolicJoint, mimic_joint, symbolic_joint
 
 WORLD = "world"

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.symbolic.kinematics import Kinematics
 
 Vector = NDArray[np.float64]

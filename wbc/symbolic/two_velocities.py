@@ -17,8 +17,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from wbc.symbolic import kernels
-from wbc.symbolic import rotations as rot
+from wbc.symbolic import kernels, rotations as rot
 from wbc.symbolic.dynamics import sum_to_root
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.velocity import Velocities

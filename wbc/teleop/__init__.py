@@ -2,20 +2,8 @@
 
 from __future__ import annotations
 
-from wbc.teleop.keyboard import Keyboard
-from wbc.teleop.loop import SessionLog, run_session
-from wbc.teleop.order import Order, Source
-from wbc.teleop.rate_file import RateFile, RateFileError
-from wbc.teleop.session import Seen, Teleoperation
-
-__all__ = [
-    "Keyboard",
-    "Order",
-    "RateFile",
-    "RateFileError",
-    "Seen",
-    "SessionLog",
-    "Source",
-    "Teleoperation",
-    "run_session",
-]
+from wbc.teleop.keyboard import Keyboard as Keyboard
+from wbc.teleop.loop import SessionLog as SessionLog, run_session as run_session
+from wbc.teleop.order import Order as Order, Source as Source
+from wbc.teleop.rate_file import RateFile as RateFile, RateFileError as RateFileError
+from wbc.teleop.session import Seen as Seen, Teleoperation as Teleoperation

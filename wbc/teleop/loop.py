@@ -94,7 +94,7 @@ class SessionLog:
         rows = range(1, AT_ONCE + 1)
         head = ["time", "pair", "status", "sigma", "kept", "advised", "lost", "why"]
         head += [*(f"asked {k}" for k in rows), *(f"met {k}" for k in rows)]
-        try:
+        with validation.writing("path", file, RobotFileError):
             file.parent.mkdir(parents=True, exist_ok=True)
             with file.open("w", newline="", encoding="utf-8") as out:
                 table = csv.writer(out)
@@ -107,8 +107,6 @@ class SessionLog:
                     numbers = map(repr, [*q.tolist(), *seen.step.v.tolist()])
                     what = [f"{time:.6g}", seen.active, str(seen.step.status), *own, "; ".join(seen.why)]
                     table.writerow([*what, *rates[0], *rates[1], *numbers])
-        except OSError as error:
-            raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
         return file
 
     def columns(self, robot: Robot) -> Log:
@@ -157,12 +155,10 @@ class SessionLog:
             said = [seen.active, *map(repr, seen.asked.tolist())]
             if not lines or said != lines[-1][1:]:
                 lines.append([repr(at), *said])
-        try:
+        with validation.writing("path", file, RobotFileError):
             file.parent.mkdir(parents=True, exist_ok=True)
             with file.open("w", newline="", encoding="utf-8") as out:
                 csv.writer(out).writerows([COLUMNS, *lines, [repr(self.time[-1] + 1.0 / RATE)]])
-        except OSError as error:
-            raise RobotFileError("path", str(file), f"cannot be written: {error.strerror}") from error
         return file
 
 
@@ -209,7 +205,7 @@ def run_session(
     q = connection.reset(q).q
     try:
         with connection:
-            _run(session, source, q, connection, float(limit), realtime, progress, log)
+            _run(session, source, q, connection, limit=float(limit), realtime=realtime, progress=progress, log=log)
     except KeyboardInterrupt:
         log.interrupted = True
     finally:
@@ -222,6 +218,7 @@ def _run(
     source: Source,
     q: Array,
     connection: Connection,
+    *,
     limit: float,
     realtime: bool,
     progress: Callable[[float, Seen], None] | None,

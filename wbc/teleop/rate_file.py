@@ -33,11 +33,11 @@ class RateFile:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.orders: list[tuple[float, Order]] = []
+        text = validation.text_of("path", path, RateFileError)
         try:
-            lines = list(csv.reader(validation.file_path("path", path).read_text(encoding="utf-8").splitlines()))
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            reason = validation.no_such(path, f"cannot be read: {error}")
-            raise RateFileError("path", str(path), reason) from error
+            lines = list(csv.reader(text.splitlines()))
+        except csv.Error as error:
+            raise RateFileError("path", str(path), f"cannot be read: {error}") from error
         if not lines or tuple(cell.strip() for cell in lines[0]) != COLUMNS:
             raise RateFileError("line 1", lines[0] if lines else "", f"expected the columns {','.join(COLUMNS)}")
         for number, cells in enumerate(lines[1:], start=2):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import itertools
+import os
 import pathlib
 import re
 from typing import Any
@@ -16,15 +17,17 @@ from wbc.errors import CompileError
 from wbc.native import toolchain
 from wbc.native.library import load_library
 from wbc.stack import generic
+from wbc.stack.behind import NativeBehind
 from wbc.stack.codegen import blocks, header
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
-from wbc.stack.program import ROWS_OUTPUTS, TickProgram
-from wbc.stack.rows import RowsLibrary
-from wbc.tick.native import CompiledTick
+from wbc.stack.program import TickProgram
+from wbc.tick.native import CompiledTick, aligned
 from wbc.validation import Array
 
+#: What the structure of the stack's own code may have besides, as it has no pointers and other gaps [numbers]
+_SPARE = 512
 #: No two contexts of a process have the same
 _serials = itertools.count(1)
 _capsule = ctypes.pythonapi.PyCapsule_GetPointer
@@ -40,9 +43,10 @@ def _evaluate() -> int:
     Raises:
         CompileError: its library does not have it.
     """
+    # The one that is loaded: the wheel has the same library by several names, and another would be a second copy of it
     for path in sorted(pathlib.Path(ca.__file__).parent.glob("libcasadi.*")):
         try:
-            found: Any = ctypes.PyDLL(str(path))._ZN6casadi21_function_buffer_evalEPv
+            found: Any = ctypes.PyDLL(str(path), mode=os.RTLD_NOLOAD)._ZN6casadi21_function_buffer_evalEPv
         except (OSError, AttributeError):
             continue
         return ctypes.cast(found, ctypes.c_void_p).value or 0
@@ -57,6 +61,12 @@ def _library(variant: generic.Variant) -> ctypes.PyDLL:
     return library
 
 
+def _address(library: ctypes.PyDLL, name: str) -> int:
+    """Of a function; 0 where there is none."""
+    function: Any = getattr(library, name, None)
+    return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
 class GenericTick(CompiledTick):
     """Memory of one controller, and functions of the library that all stacks of its kind share.
 
@@ -65,36 +75,58 @@ class GenericTick(CompiledTick):
     """
 
     def __init__(
-        self, program: TickProgram, stack: Declaration, layout: Layout, native_rows: RowsLibrary | None = None
+        self, program: TickProgram, stack: Declaration, layout: Layout, behind: NativeBehind | None = None
     ) -> None:
-        self._given = (program, stack, layout, native_rows)
+        self._given = (program, stack, layout, behind)
         soft = not layout.cascade and any(at >= 0 for at in layout.price_at)
         variant = generic.Variant(layout.command, layout.cascade, soft)
-        library, self._native = _library(variant), False
+        library = _library(variant)
         self._context = _ContextStruct(stack, layout, program)
-        room = int(library.wbc_generic_room(self._context.pointer)) // 8
-        memory, self._tick = np.zeros(room), np.zeros(int(library.wbc_tick_size()) // 8 + 1)
-        self._context.set("memory", memory.ctypes.data)
+        self._rest = np.zeros(int(library.wbc_generic_room(self._context.pointer)) // 8)
+        self._tick = np.zeros(int(library.wbc_tick_size()) // 8 + 1)
+        self._places = Memory(layout)
+        # What only C knows is the same in the stack's own code, but for numbers that its functions work with
+        worked = 3 * sum(function.n_instructions() for function in program.functions.values())
+        more = len(self._rest) + len(self._tick) + worked + _SPARE
+        self._room = self._places.size + (0 if behind is None else more)
+        memory = aligned(self._room)
+        self._context.set_together({"memory": memory.ctypes.data, "rest": self._rest.ctypes.data})
         pointer = ctypes.c_void_p(self._tick.ctypes.data)
         library.wbc_generic_context(pointer, self._context.pointer)
         super().__init__(library, layout, memory, pointer)
         self._bind(program, layout)
-        if native_rows is not None:
-            native_rows.give(self)
+        self._offered: ctypes.PyDLL | None = None
+        if behind is not None:
+            behind.give(self)
 
     @property
     def tier(self) -> str:
-        return "rows" if self._native else "vm"
+        return "native" if self._context["own"] else "vm"
 
-    def change_over(self, library: ctypes.PyDLL) -> None:
-        """The same functions in native code, to the same bits, from the next call on."""
-        functions = self._given[0].functions
-        w = np.zeros(1 + max(f.sz_w() for f in functions.values()))
-        iw = np.zeros(1 + max(f.sz_iw() for f in functions.values()), np.int64)
-        codes = {f"{name}_code": ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0 for name in functions}
-        self._kept += [w, iw]
-        self._context.set_together(codes | {"w": w.ctypes.data, "iw": iw.ctypes.data})
-        self._native = True
+    def offer(self, library: ctypes.PyDLL) -> None:
+        library.wbc_tick_size.restype = library.wbc_tick_offset.restype = ctypes.c_longlong
+        self._places.require(library.wbc_tick_offset, library._name)
+        if library.wbc_tick_size() > 8 * self._room:
+            raise CompileError("library", library._name, "needs more memory than there is")
+        self._offered = library
+        self.wake()
+
+    def change_over(self) -> None:
+        # May be interrupted anywhere: the tick is here until its context says that it is there, and done twice this
+        # leaves what done once does
+        if (library := self._offered) is None:
+            return
+        carried = np.zeros(int(self._library.wbc_tick_carried()), np.intc)
+        place, given = ctypes.c_void_p(self._memory.ctypes.data), ctypes.c_void_p(carried.ctypes.data)
+        self._library.wbc_tick_suspend(self.pointer, given)
+        library.wbc_tick_take_over(place, given)
+        there = {name: _address(library, name) for name in generic.FORWARDED}
+        self._context.set_together(there | {"own": self._memory.ctypes.data})
+        self._offered = None
+
+    @property
+    def offered(self) -> bool:
+        return self._offered is not None
 
     def twin(self) -> GenericTick:
         return GenericTick(*self._given)
@@ -102,12 +134,12 @@ class GenericTick(CompiledTick):
     def _written(self, name: str, count: int) -> Array:
         """An array that only C has the name of."""
         address = int(self._library.wbc_generic_written(self.pointer, generic.WRITTEN.index(name)))
-        start = (address - self._memory.ctypes.data) // 8
-        return self._memory[start : start + max(1, count)]
+        start = (address - self._rest.ctypes.data) // 8
+        return self._rest[start : start + max(1, count)]
 
     def _bind(self, program: TickProgram, layout: Layout) -> None:
         """Have the functions of the rows read and write the tick's memory."""
-        places = Memory(layout)
+        places = self._places
 
         def field(name: str, least: int = 0) -> Array:
             place = places[name]
@@ -124,14 +156,14 @@ class GenericTick(CompiledTick):
             self._context.set(name, array.ctypes.data)
         state = [q, v[: layout.nv], p, dt]
         named = {"low": "free_low", "high": "free_high"}
-        sizes = dict(zip(ROWS_OUTPUTS, (program.rows.nnz_out(i) for i in range(len(ROWS_OUTPUTS))), strict=True))
         written = [
-            self._written(name, sizes[name]) if name in generic.WRITTEN else field(named.get(name, name))
-            for name in ROWS_OUTPUTS
+            self._written(name, program.rows.nnz_out(k)) if name in generic.WRITTEN else field(named.get(name, name))
+            for k, name in enumerate(program.rows.name_out())
         ]
+        ahead = [self._written("segment_ahead", program.ahead.nnz_out(1))] if program.balls and program.ahead else []
         calls: dict[str, tuple[Any, list[Array], list[Array]]] = {
             "rows": (program.rows, state, written),
-            "ahead": (program.ahead, [q, copies["mean"], p, dt], [field("ahead")]),
+            "ahead": (program.ahead, [q, copies["mean"], p, dt], [field("ahead"), *ahead]),
             "lost": (program.lost, [q, copies["moved"], p, dt], [field("lost")]),
         }
         if program.curvature is not None:
@@ -157,7 +189,7 @@ class _ContextStruct:
     """The sizes and tables of a stack as ``wbc_context`` has them: numbers and addresses of eight bytes each."""
 
     def __init__(self, stack: Declaration, layout: Layout, program: TickProgram) -> None:
-        text = header(stack, layout, program, [program.rows])
+        text = header(stack, layout, program)
         numbers = dict(re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE))
         tables = dict(re.findall(r"^static const \w+ (\w+)\[\] = \{(.*)\};$", text, re.MULTILINE))
         jt = program.rows.sparsity_out("jt")
@@ -166,8 +198,8 @@ class _ContextStruct:
         numbers["BLOCKED"] = str(len(found))
         self.names = [
             "serial", *generic.SIZES, *generic.REALS, *generic.INT_TABLES, *generic.REAL_TABLES, "evaluate",
-            *generic.FUNCTIONS, *(f"{name}_code" for name in generic.FUNCTIONS), "iw", "w",
-            *(name for given in generic.COPIED.values() for _, name, _ in given), "memory",
+            *generic.FUNCTIONS, *(name for given in generic.COPIED.values() for _, name, _ in given), "memory", "rest",
+            "own", *generic.FORWARDED,
         ]  # fmt: skip
         self._entries = np.zeros(len(self.names), np.int64)
         self._kept: list[np.ndarray] = []
@@ -184,6 +216,9 @@ class _ContextStruct:
             self._table(name, np.array([float.fromhex(x) for x in tables.get(name, "0").split(", ")]))
         self.set("evaluate", _evaluate())
         self.pointer = ctypes.c_void_p(self._entries.ctypes.data)
+
+    def __getitem__(self, name: str) -> int:
+        return int(self._entries[self.names.index(name)])
 
     def set(self, name: str, value: int) -> None:
         """A whole number, or an address; with a new serial, by which C sees that something has changed."""

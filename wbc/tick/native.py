@@ -12,13 +12,23 @@ from typing import Any
 import numpy as np
 
 from wbc.errors import SolverError
-from wbc.native.builtin import builtin
+from wbc.native.builtin import builtin, builtin_of_some
 from wbc.native.library import load_library
 from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tick.buffers import INFINITE, OWN, REST_RATE, Buffers, TaskRows
 from wbc.validation import Array
+
+#: What a tick with its values in one call returns where an argument is refused, as in ``native/builtins.h``
+REFUSED = -100
+
+
+def aligned(count: int) -> Array:
+    """Zeros that begin where a line of the processor's cache does."""
+    raw = np.zeros(count + 8)
+    shift = (-raw.ctypes.data % 64) // 8
+    return raw[shift : shift + count]
 
 
 class CompiledTick(Buffers, ABC):
@@ -79,6 +89,25 @@ class CompiledTick(Buffers, ABC):
         request = np.array([self.pointer.value, staged.ctypes.data, table.ctypes.data, len(table)], np.int64)
         self._kept += [staged, table, request]
         return builtin(self._library.wbc_python_take, request.ctypes.data)
+
+    def cycler(self, staged: Array, plan: np.ndarray) -> Callable[..., bytes | int]:
+        """What ticks at a configuration with these values in one call: of (q, values in the order of the plan), arrays
+        of doubles. Returns a copy of :attr:`state` where the tick is solved, else its flag; a negative one, and nothing
+        is changed, where an argument is refused.
+
+        Args:
+            staged, plan: as of :meth:`taker`.
+        """
+        table = np.ascontiguousarray(plan, np.intc).reshape(-1, 3)
+        request = np.array(
+            [
+                self.pointer.value, self.q.ctypes.data, staged.ctypes.data, table.ctypes.data, len(table),
+                self._layout.nq, self.state.nbytes, self.state.ctypes.data,
+            ],
+            np.int64,
+        )  # fmt: skip
+        self._kept += [staged, table, request]
+        return builtin_of_some(self._library.wbc_python_cycle, request.ctypes.data)
 
     def reset(self) -> None:
         self._library.wbc_tick_reset(self.pointer)
@@ -160,7 +189,20 @@ class CompiledTick(Buffers, ABC):
     @property
     @abstractmethod
     def tier(self) -> str:
-        """``native``: code of this stack alone; ``rows``: its rows are, the rest is shared; ``vm``: neither is."""
+        """``native``: code of this stack alone; ``vm``: code that all stacks share, with rows on CasADi's virtual
+        machine.
+        """
+
+    #: called by the thread that offers native code
+    wake: Callable[[], None] = staticmethod(lambda: None)
+
+    @property
+    def offered(self) -> bool:
+        """Native code waits for :meth:`change_over`."""
+        return False
+
+    def change_over(self) -> None:
+        """To the native code that was offered, to the same bits, with the next tick; nothing without."""
 
     @abstractmethod
     def twin(self) -> CompiledTick:
@@ -247,10 +289,7 @@ class NativeTick(CompiledTick):
         # Not CDLL: releasing the interpreter lock costs more than it can give a call of a few microseconds
         loaded = library if isinstance(library, ctypes.PyDLL) else load_library(library)
         loaded.wbc_tick_size.restype = loaded.wbc_tick_offset.restype = ctypes.c_longlong
-        size = int(loaded.wbc_tick_size())
-        raw = np.zeros(size // 8 + 8)
-        shift = (-raw.ctypes.data % 64) // 8
-        memory = raw[shift : shift + size // 8]
+        memory = aligned(int(loaded.wbc_tick_size()) // 8)
         Memory(layout).require(loaded.wbc_tick_offset, loaded._name)
         super().__init__(loaded, layout, memory, ctypes.c_void_p(memory.ctypes.data))
 

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import MissingShapeError, ShapeError
 from wbc.geometry import ShapeTable, distances
+from wbc.multibody import PINOCCHIO, pin
 from wbc.robot import Robot
 from wbc.robot.geometry.bodies import raw_of
 from wbc.robot.geometry.meshes import Mesh
@@ -108,6 +108,9 @@ def least_mesh_clearance(
 def bodies_of(robot: Robot, kind: pin.GeometryType) -> list[tuple[str, pin.SE3, Any]]:
     """(link, placement in the link's frame, coal geometry) of the URDF's bodies; [] where there are none to read."""
     if not robot.source.endswith(".urdf"):
+        return []
+    if not PINOCCHIO:
+        log.warning("bodies of %s: Pinocchio reads them, which is not installed", robot.source)
         return []
     folders = [str(folder) for folder in pathlib.Path(robot.source).parents]
     try:

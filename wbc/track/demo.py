@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots, shapes
+from wbc.multibody import pin
 from wbc.track.presets import preset
 from wbc.track.setup import ElbowSwing, MovingObstacle, PathRun
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc import validation
 from wbc.errors import WbcError
 from wbc.track.summary import Figure
 from wbc.validation import Array
@@ -162,10 +163,8 @@ class RunPage:
         page = f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{_text(self._title)}</title>'
         page += f"<style>{STYLE}</style></head><body>{''.join(self._parts)}</body></html>\n"
         file = folder / FILE
-        try:
+        with validation.writing("report", file, WbcError):
             file.write_text(page, encoding="utf-8")
-        except OSError as error:
-            raise WbcError("report", str(file), f"cannot be written: {error.strerror}") from error
         return file
 
 

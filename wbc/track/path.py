@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.rotations import quaternion
 from wbc.validation import Array
 

@@ -43,12 +43,7 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
     path = validation.file_path("path", file)
     if path.suffix.lower() not in SUFFIXES:
         raise PathFileError("path", str(path), "unknown kind of file", SUFFIXES)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        missing = isinstance(error, FileNotFoundError)
-        reason = validation.no_such(path) if missing else f"cannot be read: {error}"
-        raise PathFileError("path", str(path), reason) from error
+    text = validation.text_of("path", path, PathFileError)
     table = csv_rows(path, text, COLUMNS) if path.suffix.lower() == ".csv" else _from_tables(path, text)
     if not text.strip():
         raise PathFileError("path", str(path), "the file is empty")

@@ -6,10 +6,10 @@ import math
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import UnknownNameError, WbcError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.track.path import ApproachedPath, TimedPath
 from wbc.track.path_file import SUFFIXES, read_path

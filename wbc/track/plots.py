@@ -8,11 +8,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import style
 from wbc.log import Log
 from wbc.log.plots import LogPanel, over_time, save_each, tick_histogram
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 from wbc.track.page import stretches

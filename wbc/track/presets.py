@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import shapes, validation
+from wbc.multibody import pin
 from wbc.track.path import Sample, SplinePath, TimedPath, smooth_step
 from wbc.validation import Array
 

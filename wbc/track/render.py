@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.shapes import PlacedShape
 from wbc.validation import Array
 

@@ -10,19 +10,18 @@ t_k + dt/2, which is what v is held for.
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.api import Controller
 from wbc.controller import Status, Step, core_of
 from wbc.log import Log, TickRecorder
+from wbc.multibody import pin
 from wbc.shapes import Sphere
 from wbc.simulation import Connection, Plant
 from wbc.track.clearance import clearances, least_mesh_clearance
@@ -170,7 +169,7 @@ def _meta(plan: PathRun, controller: Controller, recorder: RunRecorder, compile_
         "dof_units": list(robot.dof_units),
         "position_index": [int(i) for i in robot.position_index],
         "limits": {name: [None if math.isinf(x) else float(x) for x in array] for name, array in arrays.items()},
-        "versions": {name: importlib.metadata.version(name) for name in VERSIONS},
+        "versions": extras.versions(VERSIONS),
     }
 
 

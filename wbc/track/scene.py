@@ -10,13 +10,12 @@ from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
-import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import style, validation
 from wbc.errors import RangeError, RobotFileError, ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.shapes import Convex, PlacedShape, Solid, Sphere
@@ -198,11 +197,9 @@ class Scene:
         fine = (SUPERSAMPLING * sides[0], SUPERSAMPLING * sides[1])
         camera = render.framed(self.points(), fine, azimuth, elevation)
         image = _render(camera, self._solid, self._pale, self._floor)
-        try:
+        with validation.writing("Scene.file", path, RobotFileError, ValueError):
             path.parent.mkdir(parents=True, exist_ok=True)
             _write(image, self._key, path)
-        except (OSError, ValueError) as error:
-            raise RobotFileError("Scene.file", str(path), f"cannot be written: {error}") from error
         return path
 
     def points(self) -> Array:
@@ -262,7 +259,7 @@ def link_meshes(robot: Robot) -> list[tuple[str, Array]]:
 def _link_meshes(robot: Robot) -> list[tuple[str, Array]]:
     out = []
     for link, placement, geometry in bodies_of(robot, pin.GeometryType.VISUAL):
-        if isinstance(geometry, coal.BVHModelBase):
+        if hasattr(geometry, "tri_indices"):  # a mesh of Coal
             vertices = np.array(geometry.vertices()) @ placement.rotation.T + placement.translation
             faces = [(t[0], t[1], t[2]) for t in (geometry.tri_indices(k) for k in range(geometry.num_tris))]
             out.append((link, vertices[np.array(faces, dtype=np.int64)]))

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import shapes, tasks, validation
 from wbc.api import Stack
 from wbc.errors import ShapeError, WbcError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.track.path import TimedPath, smooth_step

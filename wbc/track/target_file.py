@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RotationError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.track.path_file import PathFileError, csv_rows
 
 POSITION = ("x", "y", "z")

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.api import Stack
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.continuation import Tracker
 from wbc.ik.engine import SearchEngine
+from wbc.multibody import pin
 from wbc.stack.declaration import Declaration
 from wbc.tasks import EndEffector
 from wbc.trajectory.paths.path import Path, PolynomialPath

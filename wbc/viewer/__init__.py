@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.viewer.beside import Viewer, show
-    from wbc.viewer.errors import ViewerError
-    from wbc.viewer.messages import MessageError
-    from wbc.viewer.operation import Operation
-    from wbc.viewer.paced import run
+    from wbc.viewer.beside import Viewer as Viewer, show as show
+    from wbc.viewer.errors import ViewerError as ViewerError
+    from wbc.viewer.messages import MessageError as MessageError
+    from wbc.viewer.operation import Operation as Operation
+    from wbc.viewer.paced import run as run
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = ["MessageError", "Operation", "Viewer", "ViewerError", "run", "show"]
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

@@ -18,9 +18,8 @@ from wbc.controller import Step, core_of
 from wbc.controller.step import state_of
 from wbc.errors import WbcError
 from wbc.viewer import messages
-from wbc.viewer.errors import ViewerError
+from wbc.viewer.errors import LOOPBACK, ViewerError, require_local
 from wbc.viewer.link import STOPPED, UNHEARD, UNHEARD_TEXT, WAITS, LoopEnd
-from wbc.viewer.local import LOOPBACK, require_local
 from wbc.viewer.operation import Operation
 from wbc.viewer.pairing import Pairing
 from wbc.viewer.scenery import Scenery
@@ -43,6 +42,7 @@ class Viewer:
     def __init__(
         self,
         controller: Controller,
+        *,
         host: str,
         port: int,
         token: str | None,
@@ -211,7 +211,10 @@ def show(
     number = validation.integer("port", port, 0, 65535)
     if zeromq:
         require_local(zeromq)
-    viewer = Viewer(controller, name, number, token or token_for(name), longest, zeromq, operation, scenery, pairing)
+    viewer = Viewer(
+        controller, host=name, port=number, token=token or token_for(name), silence=longest, zeromq=zeromq,
+        operation=operation, scenery=scenery, pairing=pairing,
+    )  # fmt: skip
     if open_browser:
         webbrowser.open(viewer.url)
     return viewer

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape, Shape
 from wbc.track import render

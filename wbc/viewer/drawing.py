@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.geometry import ShapeTable, distances
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import PlacedShape

@@ -109,7 +109,7 @@ def value_of(kind: str, sent: Any) -> Any:
 
 def sent_pose(numbers: Array) -> list[float]:
     """A pose's 12 numbers of a buffer (rotation by columns, position) as it is sent."""
-    import pinocchio as pin
+    from wbc.multibody import pin
 
     pose = pin.SE3(numbers[:9].reshape(3, 3, order="F"), numbers[9:])
     return [float(x) for x in pin.SE3ToXYZQUAT(pose)]

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.controller.handle import Handle
+from wbc.multibody import pin
 from wbc.stack.layout import Slot
 from wbc.tasks.base import Constraint
 from wbc.validation import Array

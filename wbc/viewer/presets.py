@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots, tasks, validation
 from wbc.api import Stack
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
@@ -115,12 +115,13 @@ def ssrms() -> Playground:
 
 
 def of_robot(robot: Robot) -> Playground:
-    """Any robot: every joint on a slider, and its tip, or hands, to be dragged where it has any."""
+    """Any robot: every joint that a motor drives on a slider, and its tip, or hands, to be dragged where it has any."""
     stack = Stack(robot, dt=0.02)
     for name, frame in robot.frames.items():
         if name == "tip" or name.endswith("_hand"):
             stack.add(tasks.EndEffector(frame, gain=GAIN), name=name)
-    stack.add(tasks.Posture(), name="posture", weight=1e-4)
+    driven = [name for name in robot.joint_names if robot.dofs(name).start not in robot.passive]
+    stack.add(tasks.Posture(joints=tuple(driven) if robot.passive else None), name="posture", weight=1e-4)
     if robot.base_nv:
         stack.add(tasks.Hold(robot.frames.get("base", robot.frame_names[1])), name="base")
     stack.add(tasks.JointLimits(), name="limits")

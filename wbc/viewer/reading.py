@@ -21,6 +21,9 @@ def declared(controller: Controller) -> dict[str, Any]:
     joints = []
     for k, (name, unit, place) in enumerate(zip(robot.dof_names, robot.dof_units, robot.position_index, strict=True)):
         low, high = float(robot.limits.position_lower[k]), float(robot.limits.position_upper[k])
+        if k in robot.passive:
+            # What no motor drives has no slider
+            low = high = -np.inf
         # Unbounded joints have two numbers in q, a base up to seven
         joints.append({"name": name, "unit": unit, "place": int(place), "low": low, "high": high})
     items = []

@@ -181,8 +181,6 @@ def save_page(
             text = re.sub("<title>.*?</title>", lambda _: f"<title>{name}</title>", text, count=1)
         finally:
             server.stop()
-    try:
+    with validation.writing("file", file, ViewerError):
         file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ViewerError("file", str(file), f"cannot be written: {error.strerror}") from error
     return file

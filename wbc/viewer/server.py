@@ -18,9 +18,8 @@ from urllib.parse import urlsplit
 
 from wbc.errors import WbcError
 from wbc.viewer import messages
-from wbc.viewer.errors import ViewerError
+from wbc.viewer.errors import LOOPBACK, ViewerError
 from wbc.viewer.gate import Gate, answer
-from wbc.viewer.local import LOOPBACK
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

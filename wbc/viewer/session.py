@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.tasks.base import Constraint
 from wbc.validation import Array
 from wbc.viewer import messages

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.api import Controller
 from wbc.controller import Step, core_of
+from wbc.multibody import pin
 from wbc.stack.layout import Block
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks.base import Item

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pathlib
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.shapes import PlacedShape
 from wbc.track import render

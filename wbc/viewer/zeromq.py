@@ -13,8 +13,7 @@ import time
 from typing import Any
 
 from wbc import extras
-from wbc.viewer.errors import ViewerError
-from wbc.viewer.local import require_local
+from wbc.viewer.errors import ViewerError, require_local
 
 #: Between two looks for peers that are gone [s]
 LOOK = 0.1

@@ -7,43 +7,26 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.errors import StructureFileError
-    from wbc.walking.arms.puma import ArmKinematics
-    from wbc.walking.arms.two_ended import TwoEndedKinematics
+    from wbc.errors import StructureFileError as StructureFileError
+    from wbc.walking.arms.puma import ArmKinematics as ArmKinematics
+    from wbc.walking.arms.two_ended import TwoEndedKinematics as TwoEndedKinematics
     from wbc.walking.holds.built_in import (
-        cylinder,
-        module,
-        plane,
-        remove_columns,
-        remove_fraction,
-        remove_rows,
-        truss,
+        cylinder as cylinder,
+        module as module,
+        plane as plane,
+        remove_columns as remove_columns,
+        remove_fraction as remove_fraction,
+        remove_rows as remove_rows,
+        truss as truss,
     )
-    from wbc.walking.holds.files import parse_structure, read_structure, save_structure
-    from wbc.walking.holds.hold import Hold
-    from wbc.walking.holds.obstacle import Obstacle
-    from wbc.walking.holds.structure import Structure
-    from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
+    from wbc.walking.holds.files import (
+        parse_structure as parse_structure,
+        read_structure as read_structure,
+        save_structure as save_structure,
+    )
+    from wbc.walking.holds.hold import Hold as Hold
+    from wbc.walking.holds.obstacle import Obstacle as Obstacle
+    from wbc.walking.holds.structure import Structure as Structure
+    from wbc.walking.holds.surface import CylinderSurface as CylinderSurface, PlaneSurface as PlaneSurface
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = [
-    "ArmKinematics",
-    "CylinderSurface",
-    "Hold",
-    "Obstacle",
-    "PlaneSurface",
-    "Structure",
-    "StructureFileError",
-    "TwoEndedKinematics",
-    "cylinder",
-    "module",
-    "parse_structure",
-    "plane",
-    "read_structure",
-    "remove_columns",
-    "remove_fraction",
-    "remove_rows",
-    "save_structure",
-    "truss",
-]
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle, grid_pose
 

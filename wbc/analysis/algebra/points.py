@@ -35,9 +35,14 @@ def _scale(relation: Relation) -> int:
 
 
 def _terms(
-    half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Any, sine: Any, cosine: Any
+    half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Any, functions: tuple[Any, Any]
 ) -> Iterator[Any]:
-    """Terms of a form in sin(q/2), cos(q/2) of given degrees, over a scale, at numbers or at arrays of one shape."""
+    """Terms of a form in sin(q/2), cos(q/2) of given degrees, over a scale, at numbers or at arrays of one shape.
+
+    Args:
+        functions: sine and cosine of such.
+    """
+    sine, cosine = functions
     symbols = [float(v) for v in half.ring.symbols.values()]
     for powers, number in form.terms():
         term = int(number) / scale
@@ -55,7 +60,7 @@ def _terms(
 def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Array) -> tuple[float, float]:
     """(value, largest term) of a form in sin(q/2), cos(q/2) of given degrees."""
     total = largest = 0.0
-    for term in _terms(half, form, degrees, scale, q, sin, cos):
+    for term in _terms(half, form, degrees, scale, q, (sin, cos)):
         total += term
         largest = max(largest, abs(term))
     return total, largest
@@ -63,7 +68,7 @@ def _sum(half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int,
 
 def form_grid(half: HalfAngles, relation: Relation, q: Sequence[Array]) -> Array:
     """A relation at many configurations, one array a joint, all of one shape; 0 on the branch."""
-    return np.asarray(sum(_terms(half, relation.poly, relation.degrees, _scale(relation), q, np.sin, np.cos)))
+    return np.asarray(sum(_terms(half, relation.poly, relation.degrees, _scale(relation), q, (np.sin, np.cos))))
 
 
 def changes_sign(half: HalfAngles, relation: Relation) -> bool:

@@ -8,10 +8,10 @@ from math import degrees
 from typing import TypeAlias
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
 from wbc.errors import RotationError
+from wbc.multibody import pin
 from wbc.rotations import quaternion
 from wbc.validation import Array
 

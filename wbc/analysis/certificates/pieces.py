@@ -14,6 +14,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from wbc import validation
 from wbc.analysis.algebra.trig_form import TrigForm
 from wbc.analysis.certificates.boxes import BoxSearch, Counts
 from wbc.errors import RobotFileError
@@ -129,15 +130,13 @@ class BoxPieces:
             return
         boxes = np.concatenate([*self._waiting, *running, np.empty((0, self.kept.shape[1]))])
         fresh = self._path.with_name(self._path.name + ".part")
-        try:
+        with validation.writing("state", self._path, RobotFileError):
             with fresh.open("wb") as file:
                 counts = np.array(astuple(self.counts))
                 np.savez_compressed(
                     file, name=self._name, boxes=boxes, kept=self.kept, counts=counts, seconds=self.seconds
                 )
             os.replace(fresh, self._path)
-        except OSError as error:
-            raise RobotFileError("state", str(self._path), f"cannot be written: {error.strerror}") from error
 
     def _load(self, path: Path) -> None:
         try:

@@ -125,6 +125,7 @@ def numeric_witness(
     augmented: TrigForm,
     starts: Array,
     eps: float,
+    *,
     until: float = inf,
 ) -> NumericWitness | None:
     """The first configuration, found from starts, where J_R v = 0 for some |v| = 1 and sigma_min(J_T) >= eps.

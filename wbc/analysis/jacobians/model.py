@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.analysis.algebra.ring import Coordinate, Matrix, TrigRing
 from wbc.analysis.algebra.transforms import SNAP, Transform, Vector, apply, exact_placement, exact_rotation, identity
 from wbc.errors import UnsupportedJointError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows, JointRows, Rows
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array

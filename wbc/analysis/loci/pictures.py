@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from wbc import style
+from wbc import style, validation
 from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.locus import Located
 from wbc.analysis.algebra.notation import Notation
 from wbc.analysis.algebra.points import angle, form_grid, real_point
 from wbc.analysis.jacobians.model import ExactModel
-from wbc.analysis.loci.level_surface import zero_surface
-from wbc.errors import RobotFileError
+from wbc.errors import RobotFileError, ShapeError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Random points that are drawn of a curve
@@ -29,6 +29,55 @@ _GRID = 33
 _FINE = 241
 #: Lines of a locus that are drawn, at most
 _MOST = 6
+#: Corners of a cell that six tetrahedra about its diagonal have, each a walk along the axes in another order
+_WALKS = np.array([[np.zeros(3), *np.cumsum(np.eye(3)[list(order)], axis=0)] for order in permutations(range(3))], int)
+#: Corners of a tetrahedron, in the order of their values, between which the triangles have their vertices, by how many
+#: values are negative
+_TRIANGLES = {
+    1: (((0, 1), (0, 2), (0, 3)),),
+    2: (((0, 2), (0, 3), (1, 3)), ((0, 2), (1, 3), (1, 2))),
+    3: (((3, 0), (3, 1), (3, 2)),),
+}
+
+
+def zero_surface(values: Array, ticks: Array) -> Array:
+    """Triangles of the set f = 0, f linear in each of six tetrahedra a cell.
+
+    Args:
+        values: of f on the grid ticks x ticks x ticks ``[n, n, n]``. ticks: rising ``[n]``.
+
+    Returns:
+        ``[m, 3 vertices, 3 coordinates]``, counterclockwise seen from where f is positive.
+
+    Raises:
+        ShapeError: values that are not on that grid.
+    """
+    count = len(ticks)
+    if values.shape != (count,) * 3 or count < 2:
+        raise ShapeError("values", values, f"expected shape {(count,) * 3}, and two ticks or more")
+    cells = np.stack(np.meshgrid(*[np.arange(count - 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 1, 3)
+    corners = (cells + _WALKS).reshape(-1, 4, 3)
+    # A corner at zero counts as above, so that every crossing has a length
+    heights = values[corners[..., 0], corners[..., 1], corners[..., 2]]
+    order = np.argsort(heights, axis=1)
+    heights = np.take_along_axis(heights, order, axis=1)
+    corners = np.take_along_axis(corners, order[..., None], axis=1)
+    below = (heights < 0.0).sum(axis=1)
+    pieces, upward = [], []
+    for number, triangles in _TRIANGLES.items():
+        h, at = heights[below == number], np.asarray(ticks)[corners[below == number]]
+        for triangle in triangles:
+            upward.append(at[:, 3] - at[:, 0])
+            part = [h[:, a] / (h[:, a] - h[:, b]) for a, b in triangle]
+            pieces.append(
+                np.stack(
+                    [at[:, a] + t[:, None] * (at[:, b] - at[:, a]) for (a, b), t in zip(triangle, part, strict=True)], 1
+                )
+            )
+    out, normal = np.concatenate(pieces), np.concatenate(upward)
+    turned = np.einsum("ij,ij->i", np.cross(out[:, 1] - out[:, 0], out[:, 2] - out[:, 0]), normal) < 0.0
+    out[turned] = out[turned][:, [0, 2, 1]]
+    return np.asarray(out)
 
 
 def save_pictures(model: ExactModel, found: Located, folder: Path, name: str) -> list[Path]:
@@ -42,7 +91,7 @@ def save_pictures(model: ExactModel, found: Located, folder: Path, name: str) ->
         RobotFileError: the folder cannot be written.
     """
     groups = _groups(found)
-    try:
+    with validation.writing("plot", folder, RobotFileError):
         folder.mkdir(parents=True, exist_ok=True)
         files = []
         for suffix, latex in ((".txt", False), (".tex", True)):
@@ -57,8 +106,6 @@ def save_pictures(model: ExactModel, found: Located, folder: Path, name: str) ->
                     files.append(folder / f"{name}-{kind}.png")
                     figure.savefig(files[-1], bbox_inches="tight")
                     plt.close(figure)
-    except OSError as error:
-        raise RobotFileError("plot", str(folder), f"cannot be written: {error.strerror}") from error
     return files
 
 

@@ -42,13 +42,7 @@ def state_file(folder: Path | None, robot: str, name: str) -> Path | None:
 
 
 def certified(
-    model: ExactModel,
-    robot: str,
-    name: str,
-    task: Sequence[Rows],
-    rows: Sequence[Rows],
-    folder: Path | None,
-    minutes: float,
+    model: ExactModel, name: str, task: Sequence[Rows], rows: Sequence[Rows], state: Path | None, minutes: float
 ) -> RankCertificate:
     """The certificate of one set, with a progress bar."""
     with progress_bar() as bar:
@@ -58,14 +52,12 @@ def certified(
             task,
             rows,
             minutes=minutes,
-            state=state_file(folder, robot, name),
+            state=state,
             progress=lambda part: bar.update(shown, completed=part),
         )
 
 
-def certified_tree(
-    model: ExactModel, robot: str, name: str, one: TreeSet, folder: Path | None, minutes: float
-) -> TreeCertificate:
+def certified_tree(model: ExactModel, name: str, one: TreeSet, state: Path | None, minutes: float) -> TreeCertificate:
     """The certificate of one set of a tree, each block with its own progress bar."""
     with progress_bar() as bar:
         shown: dict[str, TaskID] = {}
@@ -75,7 +67,6 @@ def certified_tree(
                 shown[str(block)] = bar.add_task(f"{name}, {block}, decided", total=1.0)
             bar.update(shown[str(block)], completed=part)
 
-        state = state_file(folder, robot, name)
         return certify_blocks(model, one.task, one.constraints, minutes=minutes, state=state, progress=within)
 
 

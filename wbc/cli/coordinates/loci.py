@@ -37,7 +37,7 @@ from wbc.analysis.told import (
 )
 from wbc.cli import console
 from wbc.cli.coordinates.asked import AnalysisAsked
-from wbc.cli.coordinates.certificates import certified, certified_tree, winner
+from wbc.cli.coordinates.certificates import certified, certified_tree, state_file, winner
 from wbc.cli.scene import tip_frame
 from wbc.coordinates import TREES, tree_sets
 from wbc.errors import RangeError, RobotFileError
@@ -63,10 +63,8 @@ def analysed(asked: AnalysisAsked) -> None:
     found = {"robot": robot, "algorithm": asked.algorithm, "sets": records}
     console.data(found)
     if asked.data is not None:
-        try:
+        with validation.writing("data", asked.data, RobotFileError):
             console.write_json(asked.data, found)
-        except OSError as error:
-            raise RobotFileError("data", str(asked.data), f"cannot be written: {error.strerror}") from error
 
 
 def _analyse_arm(asked: AnalysisAsked, robot: str, own: list[Rows]) -> list[dict[str, Any]]:
@@ -116,7 +114,7 @@ def _analyse_tree(asked: AnalysisAsked, robot: str) -> list[dict[str, Any]]:
         records.append(tree_record(name, found))
         if asked.certify:
             left = max(budget.seconds / 60.0, _LEAST)
-            proof = certified_tree(model, robot, name, one, asked.resume, left)
+            proof = certified_tree(model, name, one, state_file(asked.resume, robot, name), left)
             _say(f"  {line}" for line in tree_certificate_lines(proof))
             records[-1]["certificate"] = tree_certificate_record(proof)
     return records
@@ -131,7 +129,7 @@ def _one_set(
     screened = asked.screen is not None
     if screened or asked.certify or asked.full:
         minutes = search.seconds / 60.0 * (1.0 if screened else _PROOF)
-        proof = certified(model, robot, name, task, rows, asked.resume, minutes)
+        proof = certified(model, name, task, rows, state_file(asked.resume, robot, name), minutes)
     if screened and proof is not None:
         _say([name, *(f"  {line}" for line in certificate_lines(proof))])
         return {"set": name, "certificate": certificate_record(proof)}

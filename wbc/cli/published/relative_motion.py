@@ -47,8 +47,8 @@ class RelativeMotion:
         from wbc.cli import console
         from wbc.cli.folders import filled, run_folder
         from wbc.published.relative_motion import MasterSlave, studies
-        from wbc.published.relative_motion.pictures import plot_lines
         from wbc.published.relative_motion.printed import tables
+        from wbc.published.relative_motion.studies import plot_lines
 
         if self.study == "tables":
             rows, said, summary = self._lines()

@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import combinations, islice
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows, PitchPlaneRows
 from wbc.coordinates.arms.arm_parts import Arm, Held, Parts, components
@@ -15,6 +14,7 @@ from wbc.coordinates.arms.tree import Chain, chains_of, single
 from wbc.coordinates.rows import AxisRows, Coordinate, PlaneAngleRows
 from wbc.coordinates.samples import ROUNDING, rank, states_of
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.coordinates import expressions
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

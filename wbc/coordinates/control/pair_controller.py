@@ -74,7 +74,7 @@ class PairController:
             robot, pairs, dt, items=items, limits=limits, gain=gain, length=length, scaled=scaled
         )
         self.robot, self.dt = robot, self.declared.stack.dt
-        self.controller = self.declared.stack.compile(backend=backend)
+        self.controller = self.declared.stack.compile(backend=backend, wait=True)
         native = self.controller.backend == "native"
         self._rates = RateMatrices(robot, self.declared.coordinates, native=native)
         self._integrals = RateIntegrals(robot, self._rates)

@@ -7,7 +7,6 @@ from enum import StrEnum
 from typing import Any, TypeAlias
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.coordinates.chains import Braked, braked
@@ -15,6 +14,7 @@ from wbc.coordinates.control.conditioning import Conditioning
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.samples import ROUNDING
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc import validation
@@ -20,6 +19,7 @@ from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.scales import scales
 from wbc.coordinates.system.system_motion import system_coordinates
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD

@@ -9,7 +9,6 @@ from math import comb
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.analysis.rows import BodyRows
 from wbc.coordinates import expressions
@@ -18,6 +17,7 @@ from wbc.coordinates.rows import Coordinate, coordinates
 from wbc.coordinates.samples import ROUNDING, ranks
 from wbc.coordinates.scales import scales
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.symbolic.kinematics import WORLD, frame_index

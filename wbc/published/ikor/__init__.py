@@ -6,36 +6,23 @@ Source: IKOR, inverse kinematics on redundant systems; ORNL/TM-13096. What its l
 
 from __future__ import annotations
 
-from wbc.published.ikor.cases import case, differences, printed
-from wbc.published.ikor.driver import Code, CourseRun, Driver, Stop
-from wbc.published.ikor.files import IkorFileError
-from wbc.published.ikor.legacy import legacy_hermies
-from wbc.published.ikor.lines import Trajectory, arc_from, line_to, posed, straight
-from wbc.published.ikor.machines import ArmMachine, airarm, hermies, machine_of, planar, without_platform
-from wbc.published.ikor.settings import Method, Settings, Switch
-
-__all__ = [
-    "ArmMachine",
-    "Code",
-    "CourseRun",
-    "Driver",
-    "IkorFileError",
-    "Method",
-    "Settings",
-    "Stop",
-    "Switch",
-    "Trajectory",
-    "airarm",
-    "arc_from",
-    "case",
-    "differences",
-    "hermies",
-    "legacy_hermies",
-    "line_to",
-    "machine_of",
-    "planar",
-    "posed",
-    "printed",
-    "straight",
-    "without_platform",
-]
+from wbc.published.ikor.cases import case as case, differences as differences, printed as printed
+from wbc.published.ikor.driver import Code as Code, CourseRun as CourseRun, Driver as Driver, Stop as Stop
+from wbc.published.ikor.files import IkorFileError as IkorFileError
+from wbc.published.ikor.legacy import legacy_hermies as legacy_hermies
+from wbc.published.ikor.lines import (
+    Trajectory as Trajectory,
+    arc_from as arc_from,
+    line_to as line_to,
+    posed as posed,
+    straight as straight,
+)
+from wbc.published.ikor.machines import (
+    ArmMachine as ArmMachine,
+    airarm as airarm,
+    hermies as hermies,
+    machine_of as machine_of,
+    planar as planar,
+    without_platform as without_platform,
+)
+from wbc.published.ikor.settings import Method as Method, Settings as Settings, Switch as Switch

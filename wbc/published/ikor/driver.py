@@ -11,16 +11,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, WbcError
+from wbc.multibody import pin
 from wbc.published.ikor.avoidance import broken, gaps
-from wbc.published.ikor.criteria import step_criterion
 from wbc.published.ikor.lines import GIMBAL, Trajectory, euler_angles, rotation_of, turned
 from wbc.published.ikor.machines import STEERING, WHEEL_BASE, ArmMachine
 from wbc.published.ikor.polygons import convex_parts
-from wbc.published.ikor.settings import AXES, Settings
+from wbc.published.ikor.settings import AXES, Settings, step_criterion
 from wbc.published.ikor.stack_steps import StackSteps
 from wbc.resolvers import PseudoInverse, RateProblem
 from wbc.resolvers.fsp import Criterion, EqualityRow, Optimum, SolutionSpace, best, blocked, orthogonal

@@ -37,10 +37,7 @@ class _FileLines:
 
     def __init__(self, file: Any) -> None:
         self.path = validation.file_path("file", file)
-        try:
-            text = self.path.read_text()
-        except (OSError, UnicodeDecodeError) as error:
-            raise IkorFileError(str(self.path), str(file), f"cannot be read: {error}") from error
+        text = validation.text_of(str(self.path), self.path, IkorFileError)
         self.left = [(k, line.split("#")[0].split()) for k, line in enumerate(text.splitlines(), 1)]
         self.left = [(k, words) for k, words in self.left if words]
         self.last = self.left[-1][0] if self.left else 0

@@ -7,23 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.published.ikor.machines import ArmMachine
+from wbc.robot.shortest_steps import CLOSED, ShortestSteps
 from wbc.validation import Array
 
 #: Of a line that is created: [m], [rad], as the published program shows them
 INCREMENTS = 0.01, math.radians(1.0)
 #: Configurations that a pose is searched from, beside home
 SEARCHES = 40
-#: Steps of the search from each
-STEPS = 100
-#: Longest step [rad or m]
-LONGEST = 0.3
-#: Miss at the end [m, rad]
-REACHED = 1e-10
 #: Smallest cosine of the pitch at which yaw and roll are told apart
 GIMBAL = 1e-6
 
@@ -97,24 +92,25 @@ def arc_from(machine: ArmMachine, centre: Any, angle: float, turn: float = 0.0, 
 
 def posed(machine: ArmMachine, point: Any, euler: Any = None) -> Array:
     """Columns within their limits with the tool at a point [m] and, if they are given, at yaw, pitch, roll [rad]: by
-    damped steps from home, else from random configurations of a fixed seed.
+    shortest steps from home, else from random configurations of a fixed seed.
 
     Raises:
         ShapeError, NotFiniteError: no point or angles. RangeError: none is found.
     """
     goal, rows = validation.ordinary_array("from", point, (3,)), slice(3 if euler is None else 6)
     turned_to = np.eye(3) if euler is None else rotation_of(validation.ordinary_array("from", euler, (3,)))
-    rng = np.random.default_rng(0)
+
+    def look(q: Array) -> tuple[Array, Array]:
+        place, rotation = machine.place(q)
+        return np.concatenate((place - goal, pin.log3(rotation @ turned_to.T)))[rows], machine.jacobian(q)[rows]
+
+    rng, columns = np.random.default_rng(0), np.arange(len(machine.home))
+    search = ShortestSteps(look, np.add, columns, machine.lower, machine.upper)
     reach = np.clip(machine.lower, -math.pi, None), np.clip(machine.upper, None, math.pi)
-    for q in [machine.home.copy(), *(rng.uniform(*reach) for _ in range(SEARCHES))]:
-        for _ in range(STEPS):
-            place, rotation = machine.place(q)
-            x = np.concatenate((goal - place, pin.log3(turned_to @ rotation.T)))[rows]
-            if np.abs(x).max() < REACHED and (q >= machine.lower).all() and (q <= machine.upper).all():
-                return q
-            J = machine.jacobian(q)[rows]
-            v = J.T @ np.linalg.solve(J @ J.T + max(1e-12, 0.1 * float(x @ x)) * np.eye(len(x)), x)
-            q = np.clip(q + v * min(1.0, LONGEST / max(float(np.abs(v).max()), 1e-300)), machine.lower, machine.upper)
+    for start in [machine.home, *(rng.uniform(*reach) for _ in range(SEARCHES))]:
+        q, missed = search.root(np.clip(start, machine.lower, machine.upper))
+        if missed <= CLOSED:
+            return q
     raise RangeError("from", goal.tolist(), "no configuration within the limits is found with the tool there")
 
 

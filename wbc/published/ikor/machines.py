@@ -10,10 +10,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots, validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -45,7 +45,7 @@ class ArmMachine:
 
     Attributes:
         robot: with real joints, those of the platform first; all of one degree of freedom. tip: its tool frame.
-        spread, shift: configuration of the robot = spread q + shift [nv, M], [nv].
+        spread: configuration of the robot = spread q [nv, M].
         ends: link ends from the arm's base to the tool, each (joint number in the model, place in its frame).
         home: [rad or m]. lower, upper: limits, buffers included. weights: b of each column, 1 for normal.
         prismatic: which columns are lengths. base: one of :data:`BASES`. plate: radius of its disc [m].
@@ -56,7 +56,6 @@ class ArmMachine:
     robot: Robot
     tip: str
     spread: Array
-    shift: Array
     ends: tuple[tuple[int, tuple[float, float, float]], ...]
     home: Array
     lower: Array
@@ -97,11 +96,7 @@ class ArmMachine:
 
     def of_robot(self, q: Array) -> Array:
         """The robot's configuration."""
-        return np.asarray(self.spread @ q + self.shift)
-
-    def of_columns(self, configuration: Array) -> Array:
-        """q of the robot's configuration."""
-        return np.asarray(np.linalg.lstsq(self.spread, configuration - self.shift, rcond=None)[0])
+        return np.asarray(self.spread @ q)
 
     def place(self, q: Array) -> tuple[Array, Array]:
         """Position [3] and rotation [3, 3] of the tool in the world."""
@@ -164,12 +159,13 @@ def hermies(
         ("RX", (-h, -math.pi, 0.0), (0.0, hand, 0.0)),
     ]
     ends = [(0, (0, 0, 0)), (1, (0, shoulder, 0)), (2, (0, upper, 0)), (4, (0, forearm, 0)), (7, (tool, 0, 0))]
-    model, shift = _assembled(base, offset, chain)
+    model = _assembled(base, offset, chain)
     _tool(model, (tool, 0.0, 0.0), h)
     home = np.zeros(7)
     home[1], home[5] = math.pi, h
     note = "first link 0.356 m by the norms; platform limits and plate"
-    return _machine("hermies", model, base, shift, np.eye(7), ends, home, np.full(7, 2.0 * math.pi), (note,))
+    most = np.full(7, 2.0 * math.pi)
+    return _machine("hermies", model, base, np.eye(7), ends, home=home, most=most, assumed=(note,))
 
 
 def airarm(
@@ -190,7 +186,7 @@ def airarm(
         ("RZ", (0.0, 0.0, 0.0), (wrist, 0.0, 0.0)),
     ]
     ends = [(0, (0, 0, 0)), (1, (0, 0, lower)), (3, (0, 0, 0)), (4, (wrist, 0, 0)), (5, (tool, 0, 0))]
-    model, shift = _assembled(base, offset, chain)
+    model = _assembled(base, offset, chain)
     _tool(model, (tool, 0.0, 0.0), 0.0)
     # The wrist's joint is slaved to the first two: -(q1 + q2), and the tool's turns backwards
     spread = np.diag([1.0, 1.0, 1.0, 0.0, -1.0])
@@ -199,7 +195,7 @@ def airarm(
     limits = np.array([[-math.pi, math.radians(10.0), 0.0, -2.0 * math.pi, -math.pi / 2]])
     most = np.array([math.pi, math.radians(160.0), 24 * 0.0254, 2.0 * math.pi, math.pi / 2])
     notes = "third to fifth link", "limits of joint 1 and of the platform", "home"
-    made = _machine("airarm", model, base, shift, spread, ends, home, most, notes, prismatic=(2,))
+    made = _machine("airarm", model, base, spread, ends, home=home, most=most, assumed=notes, prismatic=(2,))
     made.lower[:5] = limits
     return made
 
@@ -212,12 +208,12 @@ def planar(links: Sequence[float] = PLANAR_LINKS) -> ArmMachine:
     """
     lengths = _lengths(links, len(tuple(links)))
     places = [(0.0, 0.0, 0.0), *((one, 0.0, 0.0) for one in lengths[:-1])]
-    model, shift = _assembled("none", (0, 0, 0), [("RZ", (0.0, 0.0, 0.0), place) for place in places])
+    model = _assembled("none", (0, 0, 0), [("RZ", (0.0, 0.0, 0.0), place) for place in places])
     _tool(model, (lengths[-1], 0.0, 0.0), 0.0)
     ends: list[Any] = [(0, (0, 0, 0)), *((k + 1, (one, 0.0, 0.0)) for k, one in enumerate(lengths))]
     home = np.full(len(lengths), 0.5)
     most = np.full(len(lengths), math.pi)
-    return _machine("planar", model, "none", shift, np.eye(len(lengths)), ends, home, most, ("all links",))
+    return _machine("planar", model, "none", np.eye(len(lengths)), ends, home=home, most=most, assumed=("all links",))
 
 
 def machine_of(robot: Robot, tip: str) -> ArmMachine:
@@ -236,13 +232,12 @@ def machine_of(robot: Robot, tip: str) -> ArmMachine:
     bounds = robot.limits.position_lower, robot.limits.position_upper
     low, high = (np.where(np.isfinite(x), x, np.sign(x) * 1e3) for x in bounds)
     still = tuple(unit == "m" for unit in robot.dof_units)
-    one, none = np.ones(robot.nv), np.zeros(robot.nv)
+    one = np.ones(robot.nv)
     return ArmMachine(
         robot.name,
         robot,
         tip,
         np.eye(robot.nv),
-        none,
         ends,
         robot.neutral.copy(),
         low,
@@ -270,7 +265,7 @@ def _lengths(links: Sequence[float], count: int) -> list[float]:
     return [float(x) for x in validation.ordinary_array("links", links, (count,))]
 
 
-def _assembled(base: str, offset: Sequence[float], chain: Sequence[Any]) -> tuple[pin.Model, Array]:
+def _assembled(base: str, offset: Sequence[float], chain: Sequence[Any]) -> pin.Model:
     """A model with the platform's joints, if any, and the chain: (joint, z-y-x angles, place) each."""
     validation.one_of("base", base, BASES)
     model, parent, at = pin.Model(), 0, pin.SE3.Identity()
@@ -285,7 +280,7 @@ def _assembled(base: str, offset: Sequence[float], chain: Sequence[Any]) -> tupl
         parent = model.addJoint(parent, joint, at * pin.SE3(turn, np.array(place)), f"joint{number}")
         model.addFrame(pin.Frame(f"link{parent}", parent, 0, pin.SE3.Identity(), pin.FrameType.BODY))
         at = pin.SE3.Identity()
-    return model, np.zeros(model.nv)
+    return model
 
 
 def _tool(model: pin.Model, place: tuple[float, float, float], turn: float) -> None:
@@ -294,7 +289,7 @@ def _tool(model: pin.Model, place: tuple[float, float, float], turn: float) -> N
 
 
 def _machine(
-    name: str, model: pin.Model, base: str, shift: Array, spread: Array, ends: Any, home: Array, most: Array,
+    name: str, model: pin.Model, base: str, spread: Array, ends: Any, *, home: Array, most: Array,
     assumed: tuple[str, ...], prismatic: tuple[int, ...] = (),
 ) -> ArmMachine:  # fmt: skip
     arm, first = len(home), model.nv - len(home)
@@ -313,5 +308,16 @@ def _machine(
     robot = robots.load(model, name=name, **bounds)
     start = np.concatenate((home, np.zeros(first)))
     return ArmMachine(
-        name, robot, "tip", whole, shift, ends, start, -upper, upper, np.ones(model.nv), sliding, base, assumed=assumed
+        name,
+        robot,
+        "tip",
+        whole,
+        ends,
+        start,
+        -upper,
+        upper,
+        np.ones(model.nv),
+        sliding,
+        base,
+        assumed=assumed,
     )

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import tasks
 from wbc.api import Stack
 from wbc.errors import InfeasibleError, RangeError
+from wbc.multibody import pin
 from wbc.published.ikor.legacy import LegacyHermies
 from wbc.published.ikor.machines import ArmMachine
 from wbc.published.ikor.settings import DT, Settings
@@ -68,9 +68,7 @@ class StackSteps:
         robot = machine.robot
         if np.isfinite(settings.step_limit):
             robot = robot.with_limits(velocity=settings.step_limit / DT)
-        bounds = (
-            np.sort(machine.spread @ np.stack((machine.lower, machine.upper), axis=1), axis=1) + machine.shift[:, None]
-        )
+        bounds = np.sort(machine.spread @ np.stack((machine.lower, machine.upper), axis=1), axis=1)
         robot = robot.with_limits(position_lower=bounds[:, 0], position_upper=bounds[:, 1])
         if settings.obstacles and len(spheres):
             robot = robot.with_shapes(_shapes(machine))

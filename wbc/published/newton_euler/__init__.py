@@ -6,36 +6,27 @@ its print has wrong is put right here and shown in tests/published/test_newton_e
 
 from __future__ import annotations
 
-from wbc.published.newton_euler.actuators import DriveTrain, Motor, discretised
-from wbc.published.newton_euler.control import Adaptive, Estimator, Linearised, Nominal, OneStep, gain
-from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo, Decoupling
-from wbc.published.newton_euler.dynamics import ArmDynamics, Rigid
-from wbc.published.newton_euler.links import Link, SerialChain
-from wbc.published.newton_euler.recursion import Equations, External, LinearModel, equations, linear_model
-from wbc.published.newton_euler.simulation import SimulatedRun, simulate
-
-__all__ = [
-    "Adaptive",
-    "ArmDynamics",
-    "DecoupledArm",
-    "DecoupledTwo",
-    "Decoupling",
-    "DriveTrain",
-    "Equations",
-    "Estimator",
-    "External",
-    "LinearModel",
-    "Linearised",
-    "Link",
-    "Motor",
-    "Nominal",
-    "OneStep",
-    "Rigid",
-    "SerialChain",
-    "SimulatedRun",
-    "discretised",
-    "equations",
-    "gain",
-    "linear_model",
-    "simulate",
-]
+from wbc.published.newton_euler.actuators import DriveTrain as DriveTrain, Motor as Motor, discretised as discretised
+from wbc.published.newton_euler.control import (
+    Adaptive as Adaptive,
+    Estimator as Estimator,
+    Linearised as Linearised,
+    Nominal as Nominal,
+    OneStep as OneStep,
+    gain as gain,
+)
+from wbc.published.newton_euler.decoupling import (
+    DecoupledArm as DecoupledArm,
+    DecoupledTwo as DecoupledTwo,
+    Decoupling as Decoupling,
+)
+from wbc.published.newton_euler.dynamics import ArmDynamics as ArmDynamics, Rigid as Rigid
+from wbc.published.newton_euler.links import Link as Link, SerialChain as SerialChain
+from wbc.published.newton_euler.recursion import (
+    Equations as Equations,
+    External as External,
+    LinearModel as LinearModel,
+    equations as equations,
+    linear_model as linear_model,
+)
+from wbc.published.newton_euler.simulation import SimulatedRun as SimulatedRun, simulate as simulate

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import UnsupportedJointError
 from wbc.motion_control.comparison import CONTROLLERS, ControlScenario, Maker, scenario_of
 from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion
+from wbc.multibody import pin
 from wbc.published.newton_euler.control import ERROR_WEIGHT, Adaptive, Linearised, Nominal, OneStep
 from wbc.published.newton_euler.decoupling import DecoupledArm, DecoupledTwo
 from wbc.published.newton_euler.dynamics import Rigid

@@ -10,16 +10,14 @@ Source: chapters 4 (5.10 to 5.15) and 6 (7.58, 7.59).
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, SolverError
+from wbc.motion_control.motion import Motion
 from wbc.published.newton_euler.actuators import discretised
 from wbc.published.newton_euler.dynamics import ArmDynamics, dynamics_of, measured
 from wbc.published.newton_euler.links import SerialChain
-from wbc.published.newton_euler.three_link import Motion
 from wbc.qp import QP, make_solver
 from wbc.validation import Array
 
@@ -29,13 +27,6 @@ TORQUE_WEIGHT = 0.01
 ERROR_WEIGHT = 1e5
 #: Without excitation P would grow by 1/rho a step until it is no number
 LARGEST_P = 1e30
-
-
-class ControlLaw(Protocol):
-    """A law that is asked once a step, in order."""
-
-    def command(self, time: float, q: Array, v: Array) -> Array:
-        """Torques [n] at a time [s] and the measured positions and velocities, [n] each."""
 
 
 def gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
@@ -162,6 +153,7 @@ class Adaptive:
         motion: Motion,
         dt: float,
         optimum: OneStep | None = None,
+        *,
         theta: Array | None = None,
         rho: float = 0.85,
         start: float = 1e6,

@@ -17,9 +17,10 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.motion_control.motion import Motion
 from wbc.published.newton_euler.dynamics import ArmDynamics, dynamics_of, measured
 from wbc.published.newton_euler.links import SerialChain
-from wbc.published.newton_euler.three_link import Motion, closed_form
+from wbc.published.newton_euler.three_link import closed_form
 from wbc.validation import Array
 
 #: Poles of the thesis: a rise time of 0.01 s, critically damped [1/s]
@@ -38,7 +39,7 @@ class Decoupling:
     """
 
     def __init__(
-        self, x: ca.SX, t: ca.SX, A: ca.SX, B: ca.SX, C: ca.SX, D: ca.SX, poles: Sequence[Sequence[complex]]
+        self, x: ca.SX, t: ca.SX, A: ca.SX, B: ca.SX, C: ca.SX, D: ca.SX, *, poles: Sequence[Sequence[complex]]
     ) -> None:
         if not C.numel() == B.shape[1] == D.shape[1] == len(poles):
             raise ShapeError("C", C.shape, f"expected as many outputs as inputs and sets of poles, {B.shape[1]}")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.motion_control.motion import mass_matrix
+from wbc.multibody import pin
 from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.recursion import Equations, LinearModel, equations, linear_model
 from wbc.validation import Array

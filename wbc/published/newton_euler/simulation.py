@@ -11,14 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.motion_control.motion import Motion, TorqueController
+from wbc.multibody import pin
 from wbc.published.newton_euler.actuators import DriveTrain, discretised
-from wbc.published.newton_euler.control import ControlLaw
 from wbc.published.newton_euler.dynamics import Rigid
-from wbc.published.newton_euler.three_link import Motion
 from wbc.validation import Array
 
 #: Plants of :func:`simulate`
@@ -61,7 +60,7 @@ class SimulatedRun:
 
 def simulate(
     model: pin.Model,
-    controller: ControlLaw,
+    controller: TorqueController,
     motion: Motion,
     *,
     dt: float = 0.01,

@@ -5,7 +5,6 @@ What is hardly legible is chosen so that the drawing, A.69 and the listing agree
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +33,6 @@ ELECTRIC = Motor.third_order(CONSTANT, RESISTANCE, 0.002 * RESISTANCE, 1.0 / 29.
 #: A hydraulic one, none is printed: 31 cm^3 a turn, 0.1 l of oil of 1.4 GPa, at most 0.1 l/s through the valve
 HYDRAULIC = Motor.third_order(5e-6, 1e-12, 1e-4 / (4 * 1.4e9), 1.0 / 29.0, inflow=1e-4)
 State = tuple[Array, Array, Array]
-#: A motion: q, q' and q'', [n] each, at a time [s]
-Motion = Callable[[float], State]
 
 
 def arm(payload: float = 0.0) -> SerialChain:

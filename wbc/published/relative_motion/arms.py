@@ -6,10 +6,10 @@ import functools
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import robots, validation
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.transmission import Transmission
 from wbc.robots.link_tree import TreeLink, build_model

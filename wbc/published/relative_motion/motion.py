@@ -8,10 +8,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError
+from wbc.multibody import pin
 from wbc.published.relative_motion.arms import ARM, SHOULDER, hand, levelled, manipulator
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.taylor import TaylorJacobian

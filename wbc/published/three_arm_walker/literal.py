@@ -13,14 +13,60 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.published.three_arm_walker.gait.tracking import pose_error
-from wbc.published.three_arm_walker.machine.arm import START, forward, joint_beyond
+from wbc.published.three_arm_walker.machine.arm import ES, HW, SN, START, forward, joint_beyond
 from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.motion import CYCLE
 from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault
-from wbc.published.three_arm_walker.machine.rates import joint_rates, saturated
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
 from wbc.published.three_arm_walker.machine.rigid import cross, inverse
 from wbc.validation import Array
+
+#: Below this |sin theta5|, axes 4 and 6 count as aligned
+WRIST_SINGULAR = 1e-2
+
+
+def joint_rates(theta: Array, twist: Array, singular: Variant = "listing") -> Array:
+    """Rates of the six joints, unbounded [rad/s].
+
+    Where axes 4 and 6 are aligned, the part of the rotation across axis 5 is left out (4-18), and the part about both
+    is made by joint 6 (listing) or by joint 4 (text, 4-16 and 4-17). Elsewhere singular postures, theta3 = 0 and
+    S = 0, are kept away from by the artificial limits; at them the rates are not finite.
+
+    Args:
+        theta: 6 [rad]. twist: of the hand, in the axes of the arm base: linear, angular [in/s, rad/s].
+    """
+    s1, c1 = np.sin(theta[0]), np.cos(theta[0])
+    s2, c2, s3 = np.sin(theta[1]), np.cos(theta[1]), np.sin(theta[2])
+    s23, c23 = np.sin(theta[1] + theta[2]), np.cos(theta[1] + theta[2])
+    s4, c4, s5, c5 = np.sin(theta[3]), np.cos(theta[3]), np.sin(theta[4]), np.cos(theta[4])
+    total = s2 + s23
+    wrist = twist[:3] + HW * cross(forward(theta)[:3, 2], twist[3:])
+    inverse = np.array(
+        [
+            [-s1 * s3 * ES, c1 * s3 * ES, 0.0],
+            [s23 * (c1 * total * ES - s1 * SN), s23 * (s1 * total * ES + c1 * SN), c23 * total * ES],
+            [total * (s1 * SN - c1 * total * ES), -total * (c1 * SN + s1 * total * ES), -total * (c2 + c23) * ES],
+        ]
+    )
+    out = np.zeros(6)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out[:3] = inverse @ wrist / (total * s3 * ES**2)
+    bend = out[1] + out[2]
+    left = twist[3:] + np.array([bend * s1, -bend * c1, -out[0]])
+    x, y, z = np.array([[c1 * c23, s1 * c23, -s23], [-s1, c1, 0.0], [c1 * s23, s1 * s23, c23]]) @ left
+    out[4] = -s4 * x + c4 * y
+    if abs(s5) < WRIST_SINGULAR:
+        out[5 if singular == "listing" else 3] = z
+    else:
+        out[5] = (c4 * x + s4 * y) / s5
+        out[3] = z - c5 * out[5]
+    return out
+
+
+def saturated(rates: Array, limits: Array) -> Array:
+    """All rates times min(1, min_i limit_i / |rate_i|): slower along the same motion."""
+    used = float(np.max(np.abs(rates) / limits))
+    return rates / used if used > 1.0 else rates
 
 
 class LiteralPlant:

@@ -28,6 +28,17 @@ def _has_conic(name: str) -> bool:
     return bool(ca.has_conic(name))
 
 
+def require_solver(name: str) -> None:
+    """There is a solver of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    # To look for those of CasADi loads all of them
+    if not (isinstance(name, str) and name in _SUPPORTED):
+        validation.one_of("solver", name, available_solvers(experimental=True))
+
+
 def make_solver(name: str, n: int, m: int, prepared: bool = True) -> Backend:
     """A kept solver for ``n`` variables and ``m`` general rows.
 
@@ -39,7 +50,7 @@ def make_solver(name: str, n: int, m: int, prepared: bool = True) -> Backend:
         UnknownNameError: no solver of that name here. MissingPackageError: its package is not installed.
         SolverError: the solver cannot take problems of this form.
     """
-    validation.one_of("solver", name, available_solvers(experimental=True))
+    require_solver(name)
     if name in _SUPPORTED:
         if name in extras.EXTRAS:
             extras.require(name, "this solver")

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from wbc.resolvers.fsp.blocking import blocked, pattern_counts
+from wbc.resolvers.fsp.blocking import blocked as blocked, pattern_counts as pattern_counts
 from wbc.resolvers.fsp.closed_form import (
-    EqualityRow,
-    Optimum,
-    best,
-    joint_row,
-    lost_rows,
-    one_shot,
-    parametric,
-    point_row,
+    EqualityRow as EqualityRow,
+    Optimum as Optimum,
+    best as best,
+    joint_row as joint_row,
+    lost_rows as lost_rows,
+    one_shot as one_shot,
+    parametric as parametric,
+    point_row as point_row,
 )
-from wbc.resolvers.fsp.criteria import Criterion, least_acceleration, least_power, least_torque
-from wbc.resolvers.fsp.space import Consistency, SolutionSpace, orthogonal
-
-__all__ = [
-    "Consistency",
-    "Criterion",
-    "EqualityRow",
-    "Optimum",
-    "SolutionSpace",
-    "best",
-    "blocked",
-    "joint_row",
-    "least_acceleration",
-    "least_power",
-    "least_torque",
-    "lost_rows",
-    "one_shot",
-    "orthogonal",
-    "parametric",
-    "pattern_counts",
-    "point_row",
-]
+from wbc.resolvers.fsp.criteria import (
+    Criterion as Criterion,
+    least_acceleration as least_acceleration,
+    least_power as least_power,
+    least_torque as least_torque,
+)
+from wbc.resolvers.fsp.space import Consistency as Consistency, SolutionSpace as SolutionSpace, orthogonal as orthogonal

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import coal
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
+from wbc.multibody import pin
 from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
@@ -153,6 +152,8 @@ def resolve_mesh(name: str, source: pathlib.Path, folders: Sequence[pathlib.Path
 
 def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[CollisionBody]:
     """Bodies of a Pinocchio collision model, placed in the frames of their links."""
+    import coal
+
     bodies = []
     for item in geometry.geometryObjects:
         frame = model.frames[item.parentFrame]
@@ -217,6 +218,8 @@ def raw_of(geometry: Any) -> Raw:
     Raises:
         RobotFileError: an unbounded body, or a kind that is not known here.
     """
+    import coal
+
     if isinstance(geometry, coal.Sphere):
         return Sphere(geometry.radius)
     if isinstance(geometry, coal.Capsule):

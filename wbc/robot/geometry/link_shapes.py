@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
+from wbc.multibody import pin
 from wbc.robot.geometry.bodies import CollisionBody, bodies_of
 from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
 from wbc.robot.geometry.meshes import Mesh, read_mesh

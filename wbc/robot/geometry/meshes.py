@@ -6,13 +6,14 @@ import itertools
 import pathlib
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
-import coal
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc import extras
 from wbc.errors import RobotFileError
+from wbc.multibody import pin
 from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
 from wbc.validation import Array
 
@@ -81,10 +82,14 @@ def read_mesh(path: pathlib.Path, scale: Array) -> Mesh:
     """The mesh in a file that Coal's loader reads (STL, OBJ, DAE, ...).
 
     Raises:
-        RobotFileError: missing, unreadable or empty.
+        RobotFileError: missing, unreadable or empty. MissingPackageError: Coal is not installed.
     """
     if not path.is_file():
         raise RobotFileError("mesh", str(path), "there is no such file")
+    try:
+        import coal
+    except ModuleNotFoundError as error:
+        raise extras.missing("coal", "coal", "reading meshes") from error
     try:
         with captured_stderr() as noise:
             loaded = coal.MeshLoader().load(str(path), scale)
@@ -96,7 +101,7 @@ def read_mesh(path: pathlib.Path, scale: Array) -> Mesh:
     return mesh
 
 
-def mesh_of(geometry: coal.BVHModelBase) -> Mesh:
+def mesh_of(geometry: Any) -> Mesh:
     """The mesh of a Coal geometry."""
     corners = [geometry.tri_indices(k) for k in range(geometry.num_tris)]
     triangles = np.array([(c[0], c[1], c[2]) for c in corners], dtype=np.intp).reshape(-1, 3)

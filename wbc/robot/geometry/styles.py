@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
 from wbc.robot.geometry.convex_parts import parts_of
 from wbc.robot.geometry.covering import cover

@@ -140,7 +140,7 @@ def find_self_pairs(
     if samples:
         moving = [pair for pair in pairs if near.get(pair) != "same body"]
         done = {pair for pair in moving if settled[pair] is not None or neutral[pair] <= clearance}
-        found = search(robot, links, moving, samples, seed, clearance, progress or _silent, done)
+        found = search(robot, links, moving, samples, seed, clearance, progress=progress or _silent, settled=done)
     chosen = tuple(_judged(pair, settled[pair], neutral.get(pair), found.get(pair), clearance) for pair in pairs)
     unknown = tuple(sorted(rules.links - set(robot.frame_names)))
     return SelfPairs(robot.name, chosen, samples, seed, clearance, unknown)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot.pairs.distances import Links
 from wbc.robot.sampling import configuration, joint_range
 from wbc.validation import Array

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import NotFiniteError
 from wbc.geometry import ShapeTable, distances, segment_distances
+from wbc.multibody import pin
 from wbc.robot.pairs.link_pairs import joint_of
 from wbc.robot.sampling import joint_poses
 from wbc.shapes import PlacedShape, Solid

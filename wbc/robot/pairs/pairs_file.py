@@ -46,10 +46,8 @@ def save_self_pairs(found: SelfPairs, path: Any) -> None:
         *(f"  {{ {_fields(pair)} }}," for pair in found.pairs),
         "]",
     ]
-    try:
+    with validation.writing("pairs", file, RobotFileError):
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RobotFileError("pairs", str(file), f"cannot be written: {error}") from error
 
 
 def read_self_pairs(path: Any, robot: Robot) -> SelfPairs:

@@ -51,6 +51,7 @@ def search(
     samples: int,
     seed: int,
     clearance: float,
+    *,
     progress: Progress,
     settled: Container[tuple[str, str]] = (),
 ) -> dict[tuple[str, str], PairFinding]:

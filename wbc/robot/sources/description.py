@@ -7,18 +7,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RobotFileError
+from wbc.multibody import pin
 from wbc.robot.loops import AnyLoop
 from wbc.robot.rebuilt import on_joint, without_joints
 from wbc.robot.robot import BASES
 from wbc.validation import Array
 
 ROOT = "root_joint"
-#: Components of an axis this much apart are the same
-_ALIGNED = 1e-15
 
 
 @dataclass(frozen=True)
@@ -70,14 +68,6 @@ def root_joint(base: str) -> pin.JointModel | None:
     if base == "fixed":
         return None
     return pin.JointModelFreeFlyer() if base == "floating" else pin.JointModelPlanar()
-
-
-def single_joint(axis: Array, *, slides: bool) -> pin.JointModel:
-    """The Pinocchio joint that turns about, or slides along, a unit vector; one that knows its axis where it can."""
-    turning = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ, pin.JointModelRevoluteUnaligned)
-    sliding = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ, pin.JointModelPrismaticUnaligned)
-    kinds, along = sliding if slides else turning, np.flatnonzero(np.abs(axis - np.eye(3)).max(axis=1) < _ALIGNED)
-    return kinds[along[0]]() if along.size else kinds[3](axis)
 
 
 def own_base(model: pin.Model) -> str:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robot.sources.description import Description, with_base
 
 CONVENTIONS = ("standard", "modified")

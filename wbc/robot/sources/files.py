@@ -7,12 +7,11 @@ import functools
 import os
 import pathlib
 import sys
+import sysconfig
 import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-
-import pinocchio as pin
 
 from wbc.errors import RobotFileError
 from wbc.extras import MissingPackageError
@@ -27,13 +26,13 @@ _stderr_lock = threading.Lock()
 
 @functools.cache
 def example_data_folder() -> pathlib.Path:
-    """The folder ``robots`` of the example-robot-data wheel: beside Pinocchio, where both wheels put what is no Python,
-    else found through the wheel's own list of files.
+    """The folder ``robots`` of the example-robot-data wheel: where wheels of its kind put what is no Python, else found
+    through the wheel's own list of files.
 
     Raises:
         MissingPackageError: the wheel is not installed. RobotFileError: it has no robots.
     """
-    folder = pathlib.Path(pin.__file__).resolve().parents[4] / "share" / _DATA_WHEEL / "robots"
+    folder = pathlib.Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", _DATA_WHEEL, "robots").resolve()
     return folder if folder.is_dir() else listed_data_folder()
 
 

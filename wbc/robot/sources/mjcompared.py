@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot.sources.mjnames import FREE, HINGE, SIZES, MjNames, coordinates
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array

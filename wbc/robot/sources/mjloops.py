@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robot.loops import AnyLoop, JointCurve, Loop
 from wbc.robot.sources.mjnames import MjNames, pose_of
 from wbc.validation import Array

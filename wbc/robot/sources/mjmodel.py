@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import extras
 from wbc.errors import RobotFileError
-from wbc.robot.sources.description import Description, Mimic, own_base, single_joint, with_base
+from wbc.multibody import pin, single_joint
+from wbc.robot.sources.description import Description, Mimic, own_base, with_base
 from wbc.robot.sources.files import captured_stderr
 from wbc.robot.sources.mjactuators import driven_joints, elsewhere, force_range, of_actuators
 from wbc.robot.sources.mjcompared import MjCompared, sentence

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
 

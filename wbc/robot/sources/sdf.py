@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RobotFileError
+from wbc.multibody import pin, single_joint
 from wbc.robot.loops import Kind, Loop
-from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, single_joint, with_base
+from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, with_base
 from wbc.robot.sources.urdf_checks import SHORTEST_AXIS, Remarks
 from wbc.validation import Array
 

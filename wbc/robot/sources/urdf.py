@@ -1,4 +1,4 @@
-"""Reading URDF files: Pinocchio's parser for the model, the XML for what the parser drops or takes wrongly."""
+"""Reading URDF files: what they say besides the model, and what of it is taken otherwise than written."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError, RobotFileError
+from wbc.multibody import pin
 from wbc.robot.sources.description import Description, Mimic, moving_freely, root_joint, with_base
-from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
 from wbc.robot.sources.urdf_checks import SINGLE, Remarks, axis_of, check_links, check_tree, number
+from wbc.robot.sources.urdf_model import NotUrdf, UrdfElements, build_model
 from wbc.validation import Array
 
 Joints = Mapping[str, ElementTree.Element]
@@ -35,7 +35,7 @@ def read_urdf(
         mimic_leaders: follower -> leader, for files that misspell the leader of a mimic joint.
 
     Raises:
-        RobotFileError: what is no URDF, with the parser's reason; no tree, a joint without an axis, a negative mass,
+        RobotFileError: what is no URDF; no tree, a joint without an axis, a negative mass,
             by names and numbers; a ``base`` that contradicts the file's own.
         RangeError: a mimic of a joint with several numbers.
     """
@@ -44,13 +44,12 @@ def read_urdf(
     coupled = {name for pair in leaders.items() if pair[1] in joints for name in pair}
     unlimited = _read_limits(joints, coupled, remarks)
     check_tree(path, tree)
-    text = _motion(tree)
-    plain, noise = _parsed(path, text)
-    if noise:
-        dropped = ": these links weigh nothing" if "inertial element for Link" in noise else ""
-        remarks.add("parser", noise + dropped)
     loose = any(joint.get("type") in ("floating", "planar") for joint in joints.values())
-    model = plain if loose or base in (None, "fixed") else _rooted(path, text, plain, root_joint(str(base)))
+    try:
+        elements = UrdfElements(tree, remarks)
+        model = build_model(elements, None if loose or base is None else root_joint(base))
+    except NotUrdf as error:
+        raise RobotFileError("robot", str(path), f"it is no URDF: {error.reason}") from error
     check_links(path, tree, remarks)
     mimics = _mimics(joints, leaders, model, remarks)
     for name in unlimited:
@@ -71,43 +70,6 @@ def read_urdf(
     return Description(
         whole, kind, mimics, notes=remarks.said(), source=str(path), undriven=undriven, transmissions=moved
     )
-
-
-def _motion(tree: ElementTree.Element) -> str:
-    """What a file says of motion and weight, without shapes and looks."""
-    out = ElementTree.Element("robot", tree.attrib)
-    for link in tree.findall("link"):
-        _copy(link.findall("inertial"), ElementTree.SubElement(out, "link", link.attrib))
-    _copy(tree.findall("joint"), out)
-    return ElementTree.tostring(out, encoding="unicode")
-
-
-def _copy(elements: list[ElementTree.Element], under: ElementTree.Element) -> None:
-    """Copies of elements with their children, but not with what is in those."""
-    for element in elements:
-        copied = ElementTree.SubElement(under, element.tag, element.attrib)
-        for child in element:
-            ElementTree.SubElement(copied, child.tag, child.attrib)
-
-
-def _parsed(path: pathlib.Path, text: str, *root: pin.JointModel) -> tuple[pin.Model, str]:
-    """(the parser's model, what it said)."""
-    try:
-        with captured_stderr() as noise:
-            model = pin.buildModelFromXML(text, *root)
-    except PARSER_ERRORS as error:
-        reason = noise.reason or " ".join(str(error).split())
-        raise RobotFileError("robot", str(path), f"the URDF parser refused it: {reason}") from error
-    return model, noise.reason
-
-
-def _rooted(path: pathlib.Path, text: str, plain: pin.Model, root: pin.JointModel) -> pin.Model:
-    """The model on a root joint, with frames in the parser's order; it leaves the root link's frame without inertia."""
-    model, _ = _parsed(path, text, root)
-    for frame in plain.frames:
-        if model.existFrame(frame.name, frame.type):
-            model.frames[model.getFrameId(frame.name, frame.type)].inertia = frame.inertia
-    return model
 
 
 def _leaders(joints: Joints, corrections: dict[str, str]) -> dict[str, str]:

@@ -73,6 +73,37 @@ static int activate(DAQPWorkspace *work, int i, int lower) {
     return 0;
 }
 
+/* The same for a general equality after others of its kind, as DAQP would: M M' = L D L' with one row more */
+static int activate_equality(wbc_tick *t, int i) {
+    DAQPWorkspace *work = &t->daqp;
+    const int count = work->n_active;
+    const double *row = t->M + (i - NV) * NV;
+    double *next = t->L + count * (count + 1) / 2, rest = 0.0;
+    for (int j = 0; j < NV; j++) rest += row[j] * row[j];
+    for (int a = 0; a < count; a++) {
+        const double *other = t->M + (work->WS[a] - NV) * NV;
+        four sum = {0};
+        int j = 0;
+        for (; j + 4 <= NV; j += 4) sum += GIVEN_FOUR(row + j) * GIVEN_FOUR(other + j);
+        next[a] = SUM_OF_FOUR(sum);
+        for (; j < NV; j++) next[a] += row[j] * other[j];
+    }
+    for (int a = 0, at = 0; a < count; a++, at++)
+        for (int b = 0; b < a; b++) next[a] -= t->L[at++] * next[b];
+    for (int a = 0; a < count; a++) {
+        const double part = next[a] / t->D[a];
+        rest -= part * next[a];
+        next[a] = part;
+    }
+    if (rest < DEPENDENT) return 0;
+    t->D[count] = next[count] = rest;
+    work->sense[i] |= ACTIVE;
+    work->WS[count] = i;
+    work->lam[count] = 1.0;
+    work->n_active = count + 1;
+    return 1;
+}
+
 /* What DAQP is given as its limit, one more than the iterations it may make; 0 where the cap leaves none */
 static int granted(wbc_tick *t) {
     const int limit = t->brief ? t->brief : 100 + 10 * M_ALL;
@@ -179,8 +210,12 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
         if (stays(t, i) && !row_is_dead(t, i)) t->sense[i] |= IMMUTABLE;
     }
     /* Equalities first: the later, dependent ones are left out and checked afterwards */
+    int alike = 1;
     for (int i = 0; i < M_ALL; i++)
-        if ((t->sense[i] & (IMMUTABLE | SOFT)) == IMMUTABLE && !row_is_dead(t, i) && !activate(work, i, 0)) dependent = 1;
+        if ((t->sense[i] & (IMMUTABLE | SOFT)) == IMMUTABLE && !row_is_dead(t, i)) {
+            alike &= i >= NV;
+            if (!(alike ? activate_equality(t, i) : activate(work, i, 0))) dependent = 1;
+        }
     for (int i = NV; i < M_ALL; i++)
         if ((t->sense[i] & (IMMUTABLE | SOFT)) == (IMMUTABLE | SOFT) && !row_is_dead(t, i)) activate(work, i, below(t, i));
     if (warm)

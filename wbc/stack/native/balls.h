@@ -24,8 +24,6 @@ static void leave_out(wbc_tick *t, int k) {
 
 #if BALLS > 0
 
-typedef double segment_numbers[SEGMENTS];
-
 /* |d| of every segment, and where the nearest point is on it; coordinates stand together, so that the loop runs on
  * several segments at a time */
 static void to_segments(const double *segment, const double *center, double *length, double *along) {
@@ -84,7 +82,7 @@ static void ball_row_entries(wbc_tick *t, int k, const double *center, const dou
 /* Margins and rows; `screen`: without those that are far away. Needs the bounds. */
 static void ball_rows(wbc_tick *t, int screen) {
     const double stop = slowest_stop(t);
-    segment_numbers speed, length, along;
+    double speed[SEGMENTS + 1], length[SEGMENTS + 1], along[SEGMENTS + 1];
     for (int c = 0; screen && c < SEGMENTS; c++) speed[c] = fastest(t, c);
     for (int b = 0; b < BALLS; b++) {
         const double *center = t->p + ball_pose[b] + 9, *velocity = t->p + ball_velocity[b];
@@ -114,7 +112,7 @@ static void ball_rows(wbc_tick *t, int screen) {
 
 /* The same margins one step later, with the segments as they will be */
 static void balls_ahead(wbc_tick *t) {
-    segment_numbers length, along;
+    double length[SEGMENTS + 1], along[SEGMENTS + 1];
     for (int b = 0; b < BALLS; b++) {
         const double *velocity = t->p + ball_velocity[b];
         double center[3];

@@ -22,11 +22,18 @@
 #define TURNING 1.0
 
 #if BENDING > 0
-/* What each row loses of what it keeps until q (+) v dt: its residual changes by another amount than its rate says */
+/* What each row loses of what it keeps until q (+) v dt: its residual changes by another amount than its rate says. That of one v
+ * is asked for again and again, and evaluated once. */
 static void lose(wbc_tick *t, const double *v) {
-    const double *arg[4] = {t->q, v, t->p, &t->dt};
-    double *res[1] = {t->report.lost};
-    lost(arg, res, t->work_iw, t->work_w, 0);
+    if (!t->lost_known || memcmp(v, t->lost_of, sizeof t->lost_of)) {
+        const double *arg[4] = {t->q, v, t->p, &t->dt};
+        double *res[1] = {t->report.lost};
+        lost(arg, res, t->work_iw, t->work_w, 0);
+        memcpy(t->lost_there, t->report.lost, MC * sizeof(double));
+        memcpy(t->lost_of, v, sizeof t->lost_of);
+        t->lost_known = 1;
+    }
+    memcpy(t->report.lost, t->lost_there, MC * sizeof(double));
     for (int k = 0; k < MC; k++) {
         const double loss = bent[k] ? t->report.lost[k] - row_at(t, k, v) * t->dt : 0.0;
         t->report.lost[k] = isfinite(loss) && t->free_low[k] == t->free_high[k] ? loss : 0.0;
@@ -64,6 +71,7 @@ static double bent_by(const wbc_tick *t, double worst) {
 
 /* The rows as they are at q */
 static void unbend(wbc_tick *t) {
+    t->lost_known = 0;
     memset(t->bend, 0, sizeof t->bend);
     memset(t->stopped, 0, sizeof t->stopped);
     t->curving = t->shortened = 0.0;

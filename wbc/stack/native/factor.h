@@ -62,10 +62,10 @@ static void strengthen(wbc_tick *t) {
             t->loose[k] = 1.0 / (1.0 / t->give[k] - t->strength[k]);
         }
 #endif
-        for (int e = a_start[k]; e < a_end[k]; e++) {
-            const double f = t->strength[k] * t->at[e];
-            for (int c = e; c < a_end[k]; c++) t->R[a_col[e] * WIDE + a_col[c]] += f * t->at[c];
-        }
+        /* What this adds left of the diagonal in its group of 8 is not read */
+        double row[WIDE] = {0};
+        for (int e = a_start[k]; e < a_end[k]; e++) row[a_col[e]] = t->at[e];
+        for (int e = a_start[k]; e < a_end[k]; e++) axpy(t->R + a_col[e] * WIDE, row, t->strength[k] * t->at[e], a_col[e]);
     }
 }
 

@@ -3,6 +3,7 @@
 #ifndef WBC_MANY_H
 #define WBC_MANY_H
 
+#include "carried.h"
 #include "values.h"
 
 #include <sched.h>
@@ -11,47 +12,6 @@
 /* Of what the caller writes, which stands between the report and H */
 #define INPUT_SIZE (offsetof(wbc_tick, H) - offsetof(wbc_tick, q))
 #define PROBLEM_SIZE (offsetof(wbc_tick, unusable) - offsetof(wbc_tick, H))
-
-/* What one tick leaves to the next beside its inputs: the active sets of its searches */
-typedef struct {
-    int warm, keep[M_ALL];
-#if SOFT_ROWS > 0
-    int held[MC + 1], later[MC + 1];
-#endif
-#if LEVELS > 0
-    int level_keep[(LEVELS + 1) * M_ALL], level_warm[LEVELS + 1];
-#endif
-} wbc_carried;
-
-EXPORT long long wbc_tick_carried_size(void) { return (long long)sizeof(wbc_carried); }
-
-/* Take over what a robot carries */
-EXPORT void wbc_tick_resume(wbc_tick *t, const wbc_carried *from) {
-    t->warm = from->warm;
-    memcpy(t->keep, from->keep, sizeof t->keep);
-#if SOFT_ROWS > 0
-    memcpy(t->held, from->held, sizeof t->held);
-    memcpy(t->later, from->later, sizeof t->later);
-#endif
-#if LEVELS > 0
-    memcpy(t->levels.keep, from->level_keep, sizeof t->levels.keep);
-    memcpy(t->levels.warm, from->level_warm, sizeof t->levels.warm);
-#endif
-}
-
-/* What the robot carries from here on */
-EXPORT void wbc_tick_suspend(const wbc_tick *t, wbc_carried *to) {
-    to->warm = t->warm;
-    memcpy(to->keep, t->keep, sizeof t->keep);
-#if SOFT_ROWS > 0
-    memcpy(to->held, t->held, sizeof t->held);
-    memcpy(to->later, t->later, sizeof t->later);
-#endif
-#if LEVELS > 0
-    memcpy(to->level_keep, t->levels.keep, sizeof t->levels.keep);
-    memcpy(to->level_warm, t->levels.warm, sizeof t->levels.warm);
-#endif
-}
 
 /* A value of each robot: where it is of the first, and how many bytes further of the next (0: one for all); what it is, see
  * values.h; where it goes in a robot's inputs, and how many numbers it has */
@@ -122,7 +82,8 @@ EXPORT int wbc_many_take(wbc_shared *s, const wbc_given *given, int values, long
  * robot whose tick ends with a flag in `left`, bits of 1 << flag, nothing but its values is changed: it is the caller's. Flags
  * with WBC_UNSOUND are bits above, refusals are not expected. */
 EXPORT int wbc_tick_many(wbc_tick *t, wbc_shared *s, const wbc_given *given, int values, long long count, double *inputs,
-                         double *reports, wbc_carried *carried, int *flags, int left) {
+                         double *reports, int *carried, int *flags, int left) {
+    const int carry = wbc_tick_carried();
     if (!all_fit(s, given, values, count)) return 0;
     for (int done = 0; done < CALL; done += PIECE) {
         const long long first = __atomic_fetch_add(&s->next, PIECE, __ATOMIC_RELAXED);
@@ -132,12 +93,12 @@ EXPORT int wbc_tick_many(wbc_tick *t, wbc_shared *s, const wbc_given *given, int
             char *input = (char *)inputs + k * (long long)INPUT_SIZE;
             put_values(inputs, given, values, k);
             memcpy(t->q, input, INPUT_SIZE);
-            wbc_tick_resume(t, carried + k);
+            wbc_tick_resume(t, carried + k * carry);
             flags[k] = wbc_tick_step(t);
             if (flags[k] < 0 || (left >> flags[k] & 1)) continue;
             memcpy((char *)reports + k * (long long)REPORT_SIZE, &t->report, REPORT_SIZE);
             memcpy(input, t->q, INPUT_SIZE);
-            wbc_tick_suspend(t, carried + k);
+            wbc_tick_suspend(t, carried + k * carry);
         }
     }
     return 2;

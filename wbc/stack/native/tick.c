@@ -264,8 +264,8 @@ EXPORT int wbc_tick_safe_step(wbc_tick *t) {
     return (int)(t->report.flag = WBC_UNCERTIFIED);
 }
 
-EXPORT void wbc_tick_init(wbc_tick *t) {
-    memset(t, 0, sizeof *t);
+/* The solvers' memory is that of the tick, all of it zero */
+static void begin(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
     t->problem.n = work->n = NV;
     t->problem.m = work->m = M_ALL;
@@ -297,6 +297,11 @@ EXPORT void wbc_tick_init(wbc_tick *t) {
 #if LEVELS > 0
     begin_level_solver(t);
 #endif
+}
+
+EXPORT void wbc_tick_init(wbc_tick *t) {
+    memset(t, 0, sizeof *t);
+    begin(t);
     for (int i = 0; i < MT; i++) t->weight[i] = 1.0;
     for (int k = 0; k < MC; k++) t->enabled[k] = 1.0;
     for (int i = 0; i < NB * NV; i++) t->bound_enabled[i] = 1.0;

@@ -101,6 +101,8 @@ typedef struct {
 
 typedef struct {
     WBC_BUFFERS                  /* what the caller knows: see memory.h, which is generated */
+    int lost_known;              /* `lost_there` is what rows lose at the velocity `lost_of` */
+    double lost_of[NV], lost_there[MC + 1];
     int prepared;                /* R is the factor of H, and y its right-hand side */
     int curved;                  /* H contains curvature */
     int firm;                    /* rows that keep directions, or bend, are firm in R */

@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from wbc.teleop.bilateral.run import BilateralRecord, Operator, Packet, Port, Wall, run_bilateral
-from wbc.teleop.bilateral.scheme import (
-    Bilateral,
-    Channel,
-    Channels,
-    Device,
-    Scheme,
-    four_channel,
-    position_force,
-    position_position,
+from wbc.teleop.bilateral.run import (
+    BilateralRecord as BilateralRecord,
+    Operator as Operator,
+    Packet as Packet,
+    Port as Port,
+    Wall as Wall,
+    run_bilateral as run_bilateral,
 )
-
-__all__ = [
-    "Bilateral",
-    "BilateralRecord",
-    "Channel",
-    "Channels",
-    "Device",
-    "Operator",
-    "Packet",
-    "Port",
-    "Scheme",
-    "Wall",
-    "four_channel",
-    "position_force",
-    "position_position",
-    "run_bilateral",
-]
+from wbc.teleop.bilateral.scheme import (
+    Bilateral as Bilateral,
+    Channel as Channel,
+    Channels as Channels,
+    Device as Device,
+    Scheme as Scheme,
+    four_channel as four_channel,
+    position_force as position_force,
+    position_position as position_position,
+)

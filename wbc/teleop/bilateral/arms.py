@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import tasks, validation
 from wbc.api import Stack
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.simulation import Connection, Plant

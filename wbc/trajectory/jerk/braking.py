@@ -48,14 +48,18 @@ def after(course: Course, time: float) -> Point:
 
 
 def guarded(
-    now: Point, wanted: Point, low: float, high: float, acceleration: float, jerk: float, dt: float, tolerance: float
+    now: Point, wanted: Point, walls: tuple[float, float], sizes: tuple[float, float], dt: float, tolerance: float
 ) -> Point | None:
     """What a joint does instead of going to ``wanted`` in the next tick, None where it may.
 
-    It may go where its shortest stop stays within [low, high], or goes no farther outside than the one from ``now``.
-    Otherwise it takes a tick of that stop, or of the one over the least distance once the former leaves the limits.
-    Stops from states on a stop are its rest: who starts with a stop within the limits keeps having one.
+    It may go where its shortest stop stays within its walls, (low, high), or goes no farther outside than the one from
+    ``now``. Otherwise it takes a tick of that stop, or of the one over the least distance once the former leaves the
+    limits. Stops from states on a stop are its rest: who starts with a stop within the limits keeps having one.
+
+    Args:
+        sizes: largest acceleration and jerk.
     """
+    (low, high), (acceleration, jerk) = walls, sizes
     below, above = reach(wanted[1], wanted[2], acceleration, jerk)
     below, above = wanted[0] + below, wanted[0] + above
     if below >= low - tolerance and above <= high + tolerance:

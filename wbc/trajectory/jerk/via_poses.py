@@ -124,7 +124,7 @@ def _path(points: Array, quaternions: Array, bounds: SpeedBounds, turning: float
             blend = 2.0 * reaches[i] / speeds[i]
             push = speeds[i] / blend * (directions[i] - directions[i - 1])
             start = points[i] - reaches[i] * directions[i - 1]
-            build.add(blend, start, speeds[i] * directions[i - 1], push, rotations[i])
+            build.add(blend, (push, speeds[i] * directions[i - 1], start), rotations[i])
         if turns[i] <= times[i]:
             along = _quick(corners, i, float(times[i]), float(tops[i]))
         else:
@@ -134,9 +134,8 @@ def _path(points: Array, quaternions: Array, bounds: SpeedBounds, turning: float
         rate = turning * slower**2
         ramp = ramps[i] / slower if turns[i] > 0.0 else 0.0
         about = [(ramp, rate), (span - 2.0 * ramp, 0.0), (ramp, -rate)]
-        build.segment(
-            points[i] + reaches[i] * directions[i], directions[i], float(speeds[i]), along, rotations[i], axes[i], about
-        )
+        line = points[i] + reaches[i] * directions[i], directions[i]
+        build.segment(line, float(speeds[i]), along, (rotations[i], axes[i]), about)
     return build.path()
 
 
@@ -199,33 +198,40 @@ class _Build:
     def add(
         self,
         span: float,
-        origin: Array,
-        velocity: Array,
-        acceleration: Array,
+        motion: tuple[Array, Array, Array],
         rotation: Array,
         axis: Array | None = None,
         angle: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """One piece, unless the clock would not show it; ``angle``: angular acceleration / 2, angular speed, angle."""
+        """One piece, unless the clock would not show it.
+
+        Args:
+            motion: acceleration, velocity and position at its beginning.
+            angle: angular acceleration / 2, angular speed, angle.
+        """
         if span <= self.least:
             return
         self.spans.append(span)
-        self.origins.append(np.array([0.5 * acceleration, velocity, origin]))
+        self.origins.append(np.array([0.5 * motion[0], *motion[1:]]))
         self.rotations.append(rotation)
         self.axes.append(np.zeros(3) if axis is None else axis)
         self.angles.append(list(angle))
 
     def segment(
         self,
-        origin: Array,
-        direction: Array,
+        line: tuple[Array, Array],
         speed: float,
         along: list[Piece],
-        rotation: Array,
-        axis: Array,
+        turn: tuple[Array, Array],
         about: list[Piece],
     ) -> None:
-        """A straight part with its rotation: a new piece wherever one of both changes its acceleration."""
+        """A straight part with its rotation: a new piece wherever one of both changes its acceleration.
+
+        Args:
+            line: its beginning and its direction.
+            turn: the rotation at its beginning, and the axis that it turns about.
+        """
+        (origin, direction), (rotation, axis) = line, turn
         moving, turning = _table(along, speed), _table(about, 0.0)
         breaks = np.sort(np.concatenate([moving[:, 0], turning[:, 0], [sum(span for span, _ in along)]]))
         kept = [0.0]
@@ -236,15 +242,8 @@ class _Build:
             middle = 0.5 * (begin + end)
             push, v, travelled = _moved(moving, middle, begin)
             twist, w, angle = _moved(turning, middle, begin)
-            self.add(
-                end - begin,
-                origin + travelled * direction,
-                v * direction,
-                push * direction,
-                rotation,
-                axis,
-                (0.5 * twist, w, angle),
-            )
+            motion = push * direction, v * direction, origin + travelled * direction
+            self.add(end - begin, motion, rotation, axis, (0.5 * twist, w, angle))
 
     def path(self) -> PosePath:
         knots = np.concatenate([[0.0], np.cumsum(self.spans)])

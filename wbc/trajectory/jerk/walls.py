@@ -136,6 +136,5 @@ class Walls:
 
     def held_back(self, i: int, now: Point, wanted: Point) -> Point | None:
         """See :func:`guarded`, for one joint."""
-        return guarded(
-            now, wanted, self._low[i], self._high[i], self._acceleration[i], self._jerk[i], self._dt, WALL_TOLERANCE
-        )
+        walls, sizes = (self._low[i], self._high[i]), (self._acceleration[i], self._jerk[i])
+        return guarded(now, wanted, walls, sizes, self._dt, WALL_TOLERANCE)

@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robot.robot import Robot
 from wbc.stack.evaluation import ManyStates
 from wbc.symbolic.dynamics import Dynamics

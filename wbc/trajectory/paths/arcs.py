@@ -55,7 +55,7 @@ def arc_path(
     rotation = matrices(quaternion(pose.rotation)[None])
     arm = point - middle
     x = arm - axis * float(axis @ arm)
-    return _arc(point - x, x, axis, angle, whole if orientation == "carried" else np.zeros(3), rotation, radius)
+    return _arc(point - x, x, axis, angle, whole if orientation == "carried" else np.zeros(3), rotation, radius=radius)
 
 
 def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PosePath:
@@ -82,7 +82,7 @@ def arc_through(start: Any, via: Any, end: Any, radius: float = RADIUS) -> PoseP
     turn = turn_between(*quaternions)
     if np.linalg.norm(turn) > LARGEST_TURN:
         raise RangeError("path.end", end, "half a turn from the first orientation: both directions are as long")
-    return _arc(middle, x, normal, angle, turn, matrices(quaternions[0][None]), radius)
+    return _arc(middle, x, normal, angle, turn, matrices(quaternions[0][None]), radius=radius)
 
 
 def _circle(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
@@ -108,7 +108,9 @@ def _angle(x: Array, y: Array, normal: Array) -> float:
     return angle if angle > 0.0 else angle + 2.0 * np.pi
 
 
-def _arc(center: Array, x: Array, normal: Array, angle: float, turn: Array, rotation: Array, radius: float) -> PosePath:
+def _arc(
+    center: Array, x: Array, normal: Array, angle: float, turn: Array, rotation: Array, *, radius: float
+) -> PosePath:
     """By ``angle`` round ``normal`` from center + x, while turning by ``turn``."""
     arm = distance(np.zeros(3), x)
     with np.errstate(over="ignore"):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import weakref
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robots import Walker, WalkerData
 from wbc.walking.arms.puma import ArmKinematics
 

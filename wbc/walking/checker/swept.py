@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.clearance import EndlessCylinder, Exemption, Motion, Pair, Sweeper, SweptBody, SweptScene, Tree
+from wbc.multibody import pin
 from wbc.shapes import Capsule, HalfSpace
 from wbc.validation import Array
 from wbc.walking.checker.report import Tally

@@ -7,10 +7,10 @@ from math import cos, pi, radians, sin
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.shapes import Box, Capsule
 from wbc.walking.holds.hold import FIXED, FREE, Hold, frame_of
 from wbc.walking.holds.obstacle import Obstacle

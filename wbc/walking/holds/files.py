@@ -33,11 +33,11 @@ from math import isfinite
 from typing import Any, TextIO
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import StructureFileError, WbcError
+from wbc.multibody import pin
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.hold import SURFACE, Hold, checked_id, checked_roll, frame_of

@@ -7,10 +7,10 @@ from math import pi
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 FREE = "free"

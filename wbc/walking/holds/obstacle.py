@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import ShapeError
 from wbc.geometry import segment_distances
+from wbc.multibody import pin
 from wbc.shapes import Box, Capsule, Cylinder, Sphere
 from wbc.validation import Array
 from wbc.walking.holds.hold import checked_id

@@ -9,11 +9,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.clearance import TriangleMesh
 from wbc.errors import DuplicateNameError, ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.holds.hold import FREE, SURFACE, Hold
 from wbc.walking.holds.obstacle import Obstacle

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.walking.body_path import BodyPath
 from wbc.walking.log.log import WalkLogError
 

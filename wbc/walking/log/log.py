@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc import log as logs
-from wbc import validation
+from wbc import log as logs, validation
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
 from wbc.log import Log, LogFileError
 from wbc.validation import Array

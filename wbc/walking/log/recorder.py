@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from math import inf
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbc import __version__, validation
+from wbc import __version__, extras, validation
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.log import TickRecorder
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.holds.hold import FIXED, FREE
 from wbc.walking.holds.structure import Structure
@@ -213,10 +212,4 @@ class LogRecorder:
 @functools.cache
 def versions() -> Mapping[str, str]:
     """Versions of this package and of :data:`PACKAGES`."""
-    out = {"wbc": __version__}
-    for name in PACKAGES:
-        try:
-            out[name] = version(name)
-        except PackageNotFoundError:
-            out[name] = "unknown"
-    return out
+    return {"wbc": __version__} | extras.versions(PACKAGES)

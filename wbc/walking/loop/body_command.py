@@ -7,8 +7,8 @@ from math import inf, sqrt
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.stack.evaluation import SingleState
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, log3, to_quaternion

@@ -9,9 +9,9 @@ from math import ceil, sqrt
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robots import Walker
 from wbc.stack.evaluation import SingleState

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 

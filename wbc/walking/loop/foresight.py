@@ -8,7 +8,6 @@ from itertools import product
 from math import inf
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.clearance import (
@@ -23,6 +22,7 @@ from wbc.clearance import (
     bodies_of,
     self_pairs,
 )
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of

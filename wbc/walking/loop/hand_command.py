@@ -7,8 +7,8 @@ from math import cos, inf, sin, sqrt
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robots import WalkerData
 from wbc.stack.evaluation import SingleState

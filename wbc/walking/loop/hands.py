@@ -7,9 +7,9 @@ from math import dist
 from typing import Any, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.rotations import quaternion
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from math import dist
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.simulation import Connection, GripKind, GrippingPlant, LoadedPlant, MovingPlant, Plant, WatchedPlant
 from wbc.validation import Array

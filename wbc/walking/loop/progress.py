@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.loop.state import Swinging

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import tasks
 from wbc.api import Controller, Stack
 from wbc.controller import core_of
 from wbc.controller.handle import InputGroup
 from wbc.errors import RangeError
+from wbc.multibody import pin
 from wbc.robots import Walker, WalkerArm
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure

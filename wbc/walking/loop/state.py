@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.planner.swings.law import Aim, SwingLaw
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.loop.foresight import Foresight
 from wbc.walking.loop.state import Hand, Manual, Tick

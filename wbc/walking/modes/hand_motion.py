@@ -8,9 +8,9 @@ from functools import partial
 from math import ceil
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import WbcError
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import LIMIT_NAMES, ArmKinematics

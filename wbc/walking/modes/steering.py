@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.walking.planner.planner import plan_slices, plan_walk
+    from wbc.walking.planner.planner import plan_slices as plan_slices, plan_walk as plan_walk
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = ["plan_slices", "plan_walk"]
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

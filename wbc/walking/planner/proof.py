@@ -11,11 +11,11 @@ import functools
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.clearance import EndlessCylinder, Exemption, Motion, Pair, Sweeper, SweptBody, SweptScene, Tree
 from wbc.clearance.scene import bodies_of, self_pairs
 from wbc.clearance.sweep import Nearest
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.shapes import HalfSpace
 from wbc.validation import Array

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.shapes import Capsule, Solid
 from wbc.validation import Array

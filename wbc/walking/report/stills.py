@@ -6,9 +6,9 @@ import pathlib
 from collections.abc import Callable
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.track.scene import Scene
 from wbc.walking.log.log import CLOSED, OPENING, WalkLog
 from wbc.walking.report import surroundings

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wbc.clearance import TriangleMesh
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL

@@ -7,20 +7,15 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.walking.run.places import GridPlace
-    from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, ResumeRequest, Site, TwoEndedRequest
-    from wbc.walking.run.session import WalkRun, perform_walk
+    from wbc.walking.run.places import GridPlace as GridPlace
+    from wbc.walking.run.request import (
+        ArmRequest as ArmRequest,
+        DriveRequest as DriveRequest,
+        PathRequest as PathRequest,
+        ResumeRequest as ResumeRequest,
+        Site as Site,
+        TwoEndedRequest as TwoEndedRequest,
+    )
+    from wbc.walking.run.session import WalkRun as WalkRun, perform_walk as perform_walk
 else:
-    __getattr__ = lazy.attach(__name__, __file__)
-
-__all__ = [
-    "ArmRequest",
-    "DriveRequest",
-    "GridPlace",
-    "PathRequest",
-    "ResumeRequest",
-    "Site",
-    "TwoEndedRequest",
-    "WalkRun",
-    "perform_walk",
-]
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

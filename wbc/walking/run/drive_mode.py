@@ -6,8 +6,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.track.summary import Figure
 from wbc.validation import Array

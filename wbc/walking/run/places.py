@@ -7,10 +7,10 @@ from math import radians
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.validation import Array
 
 if TYPE_CHECKING:

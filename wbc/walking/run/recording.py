@@ -10,9 +10,9 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.log import FileWriter
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.body_path import SPACING, BodyPath

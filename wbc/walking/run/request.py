@@ -14,8 +14,7 @@ from wbc.walking.planner.objective import OBJECTIVES, Objective
 from wbc.walking.run.places import GridPlace, Place, grid_place, over_holds
 
 if TYPE_CHECKING:
-    import pinocchio as pin
-
+    from wbc.multibody import pin
     from wbc.robots import WalkerData
     from wbc.walking.body_path import BodyPath
     from wbc.walking.holds.structure import Structure
@@ -160,7 +159,7 @@ class Route:
         Raises:
             as :meth:`path`.
         """
-        import pinocchio as pin
+        from wbc.multibody import pin
 
         route = self if self.points else replace(self, points=(self.start,))
         return pin.SE3(route.path(data).poses[0])
@@ -253,8 +252,7 @@ def arm_task(text: str) -> ArmTask:
     if kind == "hold" and rest:
         return ArmTask("hold", text, hold=rest)
     if kind == "poses" and rest:
-        import pinocchio as pin
-
+        from wbc.multibody import pin
         from wbc.walking.holds.hold import frame_of
         from wbc.walking.modes.commands import read_numbers
 

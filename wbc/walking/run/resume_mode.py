@@ -8,11 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError, WbcError
-from wbc.robots import Walker
-from wbc.robots import walker as made_walker
+from wbc.multibody import pin
+from wbc.robots import Walker, walker as made_walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
 from wbc.validation import Array

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure

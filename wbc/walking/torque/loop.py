@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
+from wbc.multibody import pin
 from wbc.simulation import Command, CommandKind, Encoders, GripKind, Plant, PlantState
 from wbc.validation import Array
 from wbc.walking.torque.bearing import Bearing

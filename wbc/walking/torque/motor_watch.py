@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from wbc.estimation import MomentumObserver
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Of the observer [1/s], and what noise of the rates may make of it, the lesser counts: as its residual is commanded

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import HoldRating
 from wbc.track.summary import Figure
 from wbc.validation import Array

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.rotations import quaternion
 from wbc.simulation import Plant

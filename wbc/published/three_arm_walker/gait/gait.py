@@ -19,10 +19,9 @@ import numpy as np
 
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
-from wbc.published.three_arm_walker.gait.swing import swing_poses
 from wbc.published.three_arm_walker.gait.tracking import has_arrived, tracking_command
 from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
-from wbc.published.three_arm_walker.machine.grid import Place, Terrain
+from wbc.published.three_arm_walker.machine.grid import RADIUS, Place, Terrain, frame
 from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion
 from wbc.published.three_arm_walker.machine.plant import CycleCommand, WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders, View
@@ -34,6 +33,14 @@ LATE = 1.0
 #: Decimals to which margins [grid units] are compared: ties, common on a symmetric body, go to the first and not to
 #: rounding
 TIE = 9
+#: Radius of the via points [in]
+APPROACH = RADIUS + 3.0
+
+
+def swing_poses(hand: Array, old: Place | None, new: Place) -> list[Array]:
+    """The hand's pose, and those that it is to pass; ``old`` is None where it is in the air already."""
+    lifted = [] if old is None else [frame(*old, APPROACH)]
+    return [hand, *lifted, frame(*new, APPROACH), frame(*new)]
 
 
 @dataclass(frozen=True)

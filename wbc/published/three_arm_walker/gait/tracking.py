@@ -9,8 +9,8 @@ Source: M. R. Patterson's thesis, 5.3.2 and the listing VELCOM; ROERRC, not list
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.published.three_arm_walker.machine.calibration import WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.published.three_arm_walker.machine.motion import CYCLE, RATE, BodyMotion

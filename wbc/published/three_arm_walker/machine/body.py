@@ -12,8 +12,8 @@ taken back within one cycle.
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.published.three_arm_walker.machine.grid import PITCH, RADIUS, STEP, coordinates, euler_angles
 from wbc.published.three_arm_walker.machine.motion import CYCLE
 from wbc.published.three_arm_walker.machine.rigid import cross

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import atan2, pi
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.robots import Margins, Walker
 from wbc.validation import Array
 from wbc.walking.holds.structure import Structure

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from math import ceil, pi, radians
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from wbc.multibody import pin
 from wbc.robots import BodyLimb
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath

@@ -10,8 +10,8 @@ from functools import partial
 from math import ceil, pi
 
 import numpy as np
-import pinocchio as pin
 
+from wbc.multibody import pin
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking.arms.puma import limb_of

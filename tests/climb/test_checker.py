@@ -1,0 +1,199 @@
+"""The checker of climbing notices each fault that is planted in a clean log, and names where it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.climb.by_hand import TRIPODS, gait
+from wbc.climb import ClimbScene, ContactPlan
+from wbc.climb.checker import CheckRules, check
+from wbc.climb.loop import ClimbLoop, ClimbRun
+from wbc.errors import RangeError, ShapeError
+from wbc.log import Log
+from wbc.shapes import Box, PlacedShape, Sphere
+
+Columns = dict[str, np.ndarray]
+#: A tick in the first swing
+ALOFT = 50
+
+
+@functools.cache
+def walked() -> tuple[ContactPlan, ClimbRun]:
+    plan = gait(TRIPODS)
+    return plan, ClimbLoop(plan).run()
+
+
+def _changed(change: Callable[[Columns], None]) -> Log:
+    log = walked()[1].log
+    columns = {name: values.copy() for name, values in log.columns.items()}
+    change(columns)
+    return dataclasses.replace(log, columns=columns)
+
+
+def _q(dof: int) -> str:
+    return f"q.{dof + 1}"
+
+
+def _clock(c: Columns) -> None:
+    c["t"][ALOFT:] += 0.003
+
+
+def _beyond(c: Columns) -> None:
+    c[_q(7)][:] = 2.5
+
+
+def _fast(c: Columns) -> None:
+    c[_q(6)][ALOFT:] += 0.1
+
+
+def _jerky(c: Columns) -> None:
+    c[_q(6)][ALOFT:] += 0.02
+
+
+def _slipping(c: Columns) -> None:
+    c["q.0"] += np.minimum(np.linspace(0.0, 0.006, len(c["t"])), 0.0015)
+
+
+def _off(c: Columns) -> None:
+    c["q.1"] += 0.0025
+
+
+def _let_go(c: Columns) -> None:
+    for limb in (2, 4, 6):
+        c[f"contact.limb{limb}"][ALOFT] = -1
+
+
+def _shared(c: Columns) -> None:
+    c["contact.limb1"][ALOFT] = c["contact.limb2"][ALOFT]
+
+
+def _digging(c: Columns) -> None:
+    c[_q(7)][ALOFT - 3 : ALOFT + 3] += 0.4
+
+
+def _closed_in_the_air(c: Columns) -> None:
+    c["contact.limb1"][ALOFT] = 6
+
+
+PLANTED = {
+    "step of time": _clock,
+    "joint beyond its limit": _beyond,
+    "joint's rate": _fast,
+    "joint's acceleration": _jerky,
+    "closed contact slips": _slipping,
+    "closed contact off its foothold": _off,
+    "contacts bear the robot at rest": _let_go,
+    "foothold that is another's": _shared,
+    "clearance of bodies": _digging,
+    "contact's point in a body": _digging,
+}
+
+
+def test_a_clean_climb_is_clean() -> None:
+    plan, run = walked()
+    report = check(run.log, plan.climber, plan.scene)
+    assert report.clean, str(report)
+    assert {finding.rule for finding in report.findings} >= set(PLANTED)
+    looked = {finding.rule: finding.count for finding in report.findings}
+    assert min(count for rule, count in looked.items() if rule != "closed contact turned") > 0
+
+
+@pytest.mark.parametrize("rule", PLANTED)
+def test_a_fault_is_noticed_by_its_rule(rule: str) -> None:
+    plan, _ = walked()
+    report = check(_changed(PLANTED[rule]), plan.climber, plan.scene)
+    assert rule in {finding.rule for finding in report.violations}, str(report)
+
+
+def test_a_contact_that_closes_in_the_air_is_off_its_foothold() -> None:
+    plan, _ = walked()
+    report = check(_changed(_closed_in_the_air), plan.climber, plan.scene)
+    worst = {finding.rule: finding for finding in report.violations}["closed contact off its foothold"]
+    assert worst.where == "limb1 on p6"
+    assert worst.worst > 0.03
+
+
+def _with(scene: ClimbScene, name: str, body: PlacedShape) -> ClimbScene:
+    return dataclasses.replace(scene, bodies={**scene.bodies, name: body})
+
+
+def test_what_is_passed_between_two_ticks_is_found() -> None:
+    plan, run = walked()
+    # Every fifth tick of the swing: between two of them a foot goes on by some millimetres, past a grain of dust
+    log = dataclasses.replace(
+        run.log,
+        columns={k: v[::5] for k, v in run.log.columns.items()},
+        meta={**run.log.meta, "period": 0.05},
+    )
+    machine, q, t = plan.climber, log.array("q"), len(log) // 4
+    ends = [machine.contact_pose(q[k], 0).translation for k in (t, t + 1)]
+    middle = pin.integrate(machine.robot.model, q[t], 0.5 * pin.difference(machine.robot.model, q[t], q[t + 1]))
+    between = machine.contact_pose(middle, 0).translation
+    assert np.linalg.norm(ends[1] - ends[0]) > 0.005
+    grain = PlacedShape(Sphere(2e-4), pin.SE3(np.eye(3), between))
+    report = check(log, machine, _with(plan.scene, "grain", grain))
+    violated = {finding.rule: finding for finding in report.violations}
+    assert violated["clearance of bodies"].where == "limb1_link3 and grain"
+
+
+def test_a_body_beside_the_way_is_as_near_as_coal_says() -> None:
+    plan, run = walked()
+    beside = PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.26 + 0.05])))
+    report = check(run.log, plan.climber, _with(plan.scene, "lid", beside))
+    assert report.clean, str(report)
+    nearest = {finding.rule: finding for finding in report.findings}["clearance of bodies"]
+    for wanted in (0.02, 0.06):
+        strict = check(run.log, plan.climber, _with(plan.scene, "lid", beside), CheckRules(clearance=wanted))
+        lid = [f for f in strict.violations if f.rule == "clearance of bodies"]
+        # Top of the body's box: its height over the feet and half of its thickness
+        gap = 0.26 - (float(run.log["q.2"].max()) + 0.04)
+        assert bool(lid) is (wanted > gap) or nearest.worst < wanted
+
+
+def test_limbs_that_may_not_hold_a_foothold_do_not() -> None:
+    plan, run = walked()
+    footholds = list(plan.scene.footholds)
+    footholds[7] = dataclasses.replace(footholds[7], limbs=("limb1",))
+    report = check(run.log, plan.climber, dataclasses.replace(plan.scene, footholds=footholds))
+    assert [finding.rule for finding in report.violations] == ["foothold that is another's"]
+
+
+def test_on_a_slope_the_lower_friction_counts() -> None:
+    plan, run = walked()
+    for angle, friction, holds in ((0.2, 0.8, True), (0.45, 0.8, True), (0.2, 0.1, False), (0.7, 0.8, False)):
+        # The ground stays level, gravity leans: friction 0.6 of the feet bears up to 0.54 rad
+        gravity = 9.81 * np.array([0.0, np.sin(angle), -np.cos(angle)])
+        footholds = [dataclasses.replace(one, friction=friction) for one in plan.scene.footholds]
+        scene = dataclasses.replace(plan.scene, gravity=gravity, footholds=footholds)
+        ends = [0, len(run.log) - 1]
+        standing = dataclasses.replace(run.log, columns={k: v[ends] for k, v in run.log.columns.items()})
+        violated = {f.rule for f in check(standing, plan.climber, scene).violations}
+        assert ("contacts bear the robot at rest" not in violated) is holds, (angle, friction)
+
+
+def test_without_weight_contacts_must_fix_the_body() -> None:
+    plan, run = walked()
+    scene = dataclasses.replace(plan.scene, gravity=np.zeros(3))
+    assert check(run.log, plan.climber, scene).clean
+
+    def opened(c: Columns) -> None:
+        for limb in (1, 3, 4, 5):
+            c[f"contact.limb{limb}"][:] = -1
+
+    log = _changed(opened)
+    assert "contacts fix the body" in {f.rule for f in check(log, plan.climber, scene).violations}
+
+
+def test_logs_of_others_are_refused() -> None:
+    plan, run = walked()
+    with pytest.raises(RangeError, match="another robot"):
+        check(dataclasses.replace(run.log, meta={**run.log.meta, "robot_digest": "x"}), plan.climber, plan.scene)
+    few = dataclasses.replace(plan.scene, footholds=plan.scene.footholds[:3])
+    with pytest.raises(ShapeError, match="3 footholds"):
+        check(run.log, plan.climber, few)

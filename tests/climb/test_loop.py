@@ -1,0 +1,203 @@
+"""The loop of climbing: plans arrive, late limbs are waited for, and what goes wrong is said."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.climb.by_hand import TRIPODS, climber, gait, level, posture
+from wbc.climb import FREE_LIMB, ClimbScene, ContactMove, ContactPlan, Foothold, Stance
+from wbc.climb.checker import check
+from wbc.climb.loop import TRANSITIONS, Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState, PlanReference
+from wbc.climb.loop.limb_state import after
+from wbc.errors import RangeError
+from wbc.shapes import Box, PlacedShape
+from wbc.simulation import KinematicPlant
+
+
+class Lagging(KinematicPlant):
+    """Joints and body come to a commanded rate with a time constant [s]."""
+
+    def __init__(self, robot, lag: float) -> None:  # type: ignore[no-untyped-def]
+        self.lag = lag
+        super().__init__(robot)
+
+    def apply(self, command) -> None:  # type: ignore[no-untyped-def]
+        self._v = self._v + 0.01 / (self.lag + 0.01) * (command.values - self._v)
+
+
+@pytest.mark.parametrize("steps", [TRIPODS * 2, [(k,) for k in (0, 3, 4, 1)], [(0, 5), (2, 3), (1, 4)]])
+def test_a_plan_is_carried_out_and_checked(steps: list[tuple[int, ...]]) -> None:
+    plan = gait(steps)
+    run = ClimbLoop(plan).run()
+    assert run.outcome is ClimbOutcome.ARRIVED
+    assert not run.reason
+    assert run.log["kept"].all()
+    assert abs(len(run.log) * 0.01 - plan.times[-1]) < 0.03
+    away = pin.difference(plan.climber.robot.model, plan.q[-1], run.log.array("q")[-1])
+    assert np.abs(away).max() < 1e-4
+    last = list(plan.start)
+    for move in plan.moves:
+        last[move.limb] = move.lands
+    assert run.log.array("contact")[-1].tolist() == last
+    report = check(run.log, plan.climber, plan.scene)
+    assert report.clean, str(report)
+
+
+def test_changes_are_those_of_the_table_and_in_the_log() -> None:
+    run = ClimbLoop(gait(TRIPODS)).run()
+    states = dict.fromkeys(run.log.group("state"), LimbState.HELD)
+    for _, limb, state, cause in run.changes:
+        assert TRANSITIONS[states[limb], cause] is state
+        states[limb] = state
+    seen = {LimbState(k) for column in run.log.group("state").values() for k in np.unique(column)}
+    assert seen == {LimbState.HELD, LimbState.SWINGING, LimbState.REACHING}
+    for state, cause in itertools.product(LimbState, Cause):
+        if (state, cause) not in TRANSITIONS:
+            with pytest.raises(RangeError, match="changes by"):
+                after(state, cause)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.1])
+def test_a_plan_waits_for_limbs_that_are_late(lag: float) -> None:
+    plan = gait(TRIPODS)
+    run = ClimbLoop(plan, Lagging(plan.climber.robot, lag)).run(most=20.0)
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    assert len(run.log) * 0.01 > plan.times[-1] + 0.05
+    assert (np.diff(run.log["path_time"]) >= 0.0).all()
+
+
+def test_a_limb_that_never_comes_is_named_with_its_distance() -> None:
+    plan = gait(TRIPODS)
+    row = plan.moves[0].lands
+    away = list(plan.scene.footholds)
+    moved = pin.SE3(np.eye(3), away[row].pose.translation + [0.004, 0.0, 0.0])
+    away[row] = dataclasses.replace(away[row], pose=moved)
+    run = ClimbLoop(dataclasses.replace(plan, scene=dataclasses.replace(plan.scene, footholds=away))).run()
+    assert run.outcome is ClimbOutcome.STOPPED
+    assert f"limb1 did not come to p{row}: 4.0" in run.reason
+
+
+def _stands(run: ClimbRun) -> None:
+    assert np.abs(run.log.array("u")[-1]).max() < 5e-3
+
+
+def test_a_foothold_that_is_gone_before_it_is_held_stops_the_robot_and_says_so() -> None:
+    plan = gait(TRIPODS)
+    loop = ClimbLoop(plan)
+    for _ in range(50):
+        loop.tick()
+    loop.see(dataclasses.replace(plan.scene, footholds=plan.scene.footholds[:6] + plan.scene.footholds[7:]))
+    run = loop.run()
+    assert run.outcome is ClimbOutcome.STOPPED
+    assert "the foothold p6 that limb1 was to land on is gone, and no planner was given" in run.reason
+    assert len(run.log) < 80
+    _stands(run)
+    assert run.log["contact.limb1"][-1] == FREE_LIMB
+
+
+def _back_down(scene: ClimbScene, stance: Stance) -> ContactPlan:
+    """Free limbs go straight to the nearest foothold that is free; the body stands."""
+    machine, now = climber(), stance.q.copy()
+    taken, moves = set(stance.contacts), []
+    places = np.array([machine.contact_pose(now, k).translation for k in range(6)])
+    for limb, row in enumerate(stance.contacts):
+        if row == FREE_LIMB:
+            near = min((k for k in range(len(scene.footholds)) if k not in taken),
+                       key=lambda k: np.linalg.norm(scene.footholds[k].pose.translation - places[limb]))  # fmt: skip
+            taken.add(near)
+            moves.append(ContactMove(limb, FREE_LIMB, near, 0.1, 0.9))
+            places[limb] = scene.footholds[near].pose.translation
+    end = posture(machine, now[:3], places, now)
+    times = np.array([0.0, 0.1, 0.9, 1.0])
+    return ContactPlan(machine, scene, stance.contacts, moves, times, np.array([now, now, end, end]),
+                       np.zeros((4, 24)))  # fmt: skip
+
+
+def test_a_planner_is_asked_from_the_stance_that_the_robot_is_in() -> None:
+    plan = gait(TRIPODS)
+    asked: list[Stance] = []
+
+    def planner(scene: ClimbScene, stance: Stance) -> ContactPlan:
+        asked.append(stance)
+        return _back_down(scene, stance)
+
+    loop = ClimbLoop(plan, replan=planner)
+    for _ in range(60):
+        loop.tick()
+    left = dataclasses.replace(plan.scene, footholds=plan.scene.footholds[:6] + plan.scene.footholds[7:])
+    loop.see(left)
+    run = loop.run(most=10.0)
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    assert [stance.contacts for stance in asked] == [(FREE_LIMB, 1, FREE_LIMB, 3, FREE_LIMB, 5)]
+    assert len(run.plans) == 2
+    assert run.log["kept"].all()
+    assert min(run.log.array("contact")[-1]) >= 0
+    assert {cause for *_, cause in run.changes} >= {Cause.NEW_PLAN, Cause.AT_FOOTHOLD}
+
+
+def test_a_planner_that_finds_nothing_ends_the_run_with_its_reason() -> None:
+    def planner(scene: ClimbScene, stance: Stance) -> ContactPlan:
+        raise RangeError("goal", "x", "nothing within 0.3 m")
+
+    plan = gait(TRIPODS)
+    loop = ClimbLoop(plan, replan=planner)
+    for _ in range(30):
+        loop.tick()
+    stone = PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3(np.eye(3), np.array([2.0, 0.0, 0.0])))
+    loop.see(dataclasses.replace(plan.scene, bodies={**plan.scene.bodies, "stone": stone}))
+    run = loop.run()
+    assert run.outcome is ClimbOutcome.STOPPED
+    assert "nothing within 0.3 m" in run.reason
+    assert "the bodies of the scene are others" in run.reason
+    _stands(run)
+
+
+def test_a_foothold_that_breaks_off_frees_its_limb() -> None:
+    plan = gait(TRIPODS)
+    loop = ClimbLoop(plan, replan=_back_down)
+    for _ in range(5):
+        loop.tick()
+    spare = Foothold("spare", pin.SE3(np.eye(3), plan.scene.footholds[1].pose.translation + [0.0, 0.02, 0.0]), "floor")
+    loop.see(dataclasses.replace(plan.scene, footholds=[spare, *plan.scene.footholds[2:], plan.scene.footholds[0]]))
+    run = loop.run(most=5.0)
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    time, *change = run.changes[0]
+    assert abs(time - 0.05) < 1e-6
+    assert change == ["limb2", LimbState.FREE, Cause.HOLD_LOST]
+    assert run.plans[1].start[0] == len(plan.scene.footholds) - 1
+
+
+def test_the_reference_is_the_plan_at_its_knots_and_smooth_between() -> None:
+    plan = gait(TRIPODS)
+    model = plan.climber.robot.model
+    rng = np.random.default_rng(3)
+    turned = np.array([pin.integrate(model, q, np.r_[np.zeros(3), 0.3 * np.sin(t + np.arange(3)), np.zeros(18)])
+                       for q, t in zip(plan.q, plan.times, strict=True)])  # fmt: skip
+    v = rng.normal(0.0, 0.5, plan.v.shape)
+    reference = PlanReference(dataclasses.replace(plan, q=turned, v=v), plan.climber.robot)
+    for k, t in enumerate(plan.times[1:-1], start=1):
+        assert np.abs(pin.difference(model, turned[k], reference.q(t))).max() < 1e-12
+        before = pin.difference(model, reference.q(t - 1e-6), turned[k]) / 1e-6
+        later = pin.difference(model, turned[k], reference.q(t + 1e-6)) / 1e-6
+        assert np.abs(before - v[k]).max() < 1e-3
+        assert np.abs(later - v[k]).max() < 1e-3
+
+
+def test_plans_that_are_none_are_refused_by_name() -> None:
+    plan = gait(TRIPODS)
+    for change, what in (
+        ({"start": (0, 1)}, "plan.start"),
+        ({"moves": [ContactMove(9, 0, 1, 0.1, 0.2)]}, r"plan.moves\[0\]"),
+        ({"moves": [ContactMove(0, 0, 1, 0.2, 0.1)]}, "lift < land"),
+        ({"start": (1, 0, 2, 3, 4, 5)}, "m and 0 rad off p1"),
+    ):
+        with pytest.raises(RangeError, match=what):
+            ClimbLoop(dataclasses.replace(plan, **change))
+    other = dataclasses.replace(level([np.zeros(3)]), gravity=np.zeros(3))
+    with pytest.raises(RangeError, match="gravity"):
+        ClimbLoop(plan).see(other)

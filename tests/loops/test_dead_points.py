@@ -1,0 +1,147 @@
+"""Dead points: they are named from afar, and linkages slow down before them, so that no tick gives way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.loops.mechanisms import NAMED, random_linkage
+from tests.repeats import covering, repeats
+from wbc.errors import RangeError
+from wbc.robot import Robot
+from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.tracer import Tracer
+from wbc.tasks._linkage_speed import LinkageSpeed, bend_of
+from wbc.validation import Array
+
+DT = 0.005
+
+
+def limited(text: str, acceleration: float, room: float = np.inf) -> Robot:
+    """Of at most 3 rad/s, with limits of acceleration, and within a room about neutral."""
+    robot = wbc.robots.load(text, shapes="none").with_limits(velocity=3.0, acceleration=acceleration)
+    index = robot.position_index
+    has, low, high = index >= 0, np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
+    low[has], high[has] = robot.neutral[index[has]] - room, robot.neutral[index[has]] + room
+    return robot.with_limits(position_lower=low, position_upper=high)
+
+
+def ticks(robot: Robot, command: str, count: int, seed: int) -> Iterator[tuple[wbc.Step, Array, Array]]:
+    """(step, the configuration that it leads to, the change of velocity) of ticks towards postures drawn every 60."""
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, rng = stack.compile(command=command), np.random.default_rng(seed)
+    q, v = robot.neutral, np.zeros(robot.nv)
+    controller.reset(q)
+    for k in range(count):
+        if k % 60 == 0:
+            controller["posture"].target = pin.integrate(robot.model, q, 2.0 * rng.normal(size=robot.nv))
+        step = controller.step(q) if command == "velocity" else controller.step(q, v)
+        if command == "velocity":
+            q = pin.integrate(robot.model, q, step.v * DT)
+        else:
+            q = robot.closed(pin.integrate(robot.model, q, (v + 0.5 * DT * step.a) * DT))
+        yield step, q, np.array(step.v) - v
+        v = np.array(step.v)
+
+
+@pytest.mark.parametrize("seed", range(repeats(4)))
+@pytest.mark.parametrize(
+    ("command", "acceleration", "room"), covering(["velocity", "acceleration"], [5.0, 20.0], [np.inf, 0.5])
+)
+def test_no_tick_gives_way(command: str, acceleration: float, room: float, seed: int) -> None:
+    """Linkages of which some stood open by centimetres when their joints could not follow them."""
+    robot = limited(random_linkage(seed + 2), acceleration, room)
+    speeds = []
+    for step, q, change in ticks(robot, command, 200, seed):
+        assert step.status == "solved", step
+        assert max(robot.loop_gaps(q).values()) < 1e-9
+        assert np.abs(change).max() <= acceleration * DT * (1.0 + 1e-9)
+        speeds.append(np.abs(step.v).max())
+    assert max(speeds) > 0.1, "nothing moved"
+
+
+def test_a_dead_point_is_named_from_afar() -> None:
+    """The distance falls as the crank turns, and from the threshold on steps and explanations say so."""
+    robot = wbc.robots.load(NAMED["four_bar"], actuated=["heel"], velocity=3.0, acceleration=20.0)
+    q, told = robot.neutral, []
+    for _ in range(13):
+        told += robot.dead_points(q, within=1.0)
+        rates = robot.motor_jacobian(q)[:, 0]
+        q = robot.integrate(q, 0.1 * rates / np.abs(rates).max())
+    falls = -np.diff([point.distance for point in told])
+    assert ((falls > 0.05) & (falls < 0.25)).all()
+    assert {(point.linkage, point.branches) for point in told} == {("pin", False)}
+    assert told[-1].distance < 0.2
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture()).add(wbc.tasks.JointLimits())
+    step = stack.compile().step(q)
+    assert [point.linkage for point in step.dead_points] == ["pin"]
+    explanation = step.explain()
+    assert explanation.dead_points == step.dead_points
+    assert f"{step.dead_points[0]}." in str(explanation)
+    assert "rad from its dead point, where its motors do not move knee" in str(explanation)
+
+
+def test_a_linkage_that_branches_is_named() -> None:
+    """A parallelogram whose bars are in line may go on as one or as its crossed twin."""
+    robot = wbc.robots.load(NAMED["parallelogram"], shapes="none")
+    flat = robot.closed(robot.neutral + np.pi / 2.0 * np.array([1.0, -1.0, 1.0, 1.0]))
+    assert robot.dead_points(robot.neutral) == ()
+    (point,) = robot.dead_points(flat)
+    assert point.branches
+    assert point.distance < 1e-6
+    assert "its loops leave" in str(point)
+
+
+def test_a_tree_has_none_and_bad_input_is_refused() -> None:
+    robot = wbc.robots.load(NAMED["four_bar"])
+    assert robot.with_loops().dead_points([0.0, 0.0, 0.0]) == ()
+    assert robot.with_loops().loop_gaps([0.0, 0.0, 0.0]) == {}
+    with pytest.raises(RangeError, match="within"):
+        robot.dead_points(robot.neutral, within=-1.0)
+
+
+def test_gaps_are_told_by_loop() -> None:
+    robot = wbc.robots.load(NAMED["ankle"])
+    q = robot.neutral.copy()
+    q[robot.position_index[robot.dofs("left_motor").start]] += 0.1
+    gaps = robot.loop_gaps(q)
+    assert gaps["left"] > 1e-3
+    assert gaps["right"] < 1e-9
+
+
+@pytest.mark.parametrize("name", ["four_bar", "delta"])
+def test_slopes_of_what_a_linkage_asks_for(name: str) -> None:
+    """Those of |c / A|^2 / 2 are differences of it."""
+    robot, rng, h = limited(NAMED[name], 20.0), np.random.default_rng(0), 1e-6
+    kin = Tracer(Kinematics(robot.model))
+    (linkage,) = robot.loops.linkages
+    bend = bend_of(robot, kin, linkage, np.full(len(linkage.dofs), 20.0))
+    asked = ca.SX.zeros(robot.nv)
+    asked[list(linkage.dofs)] = bend.asked
+    size = ca.sumsqr(bend.asked / 20.0) / 2.0
+    look = ca.Function("bend", [kin.q, kin.v], [size, bend.slope, bend.growth, asked])
+    q, v = robot.integrate(robot.neutral, 0.2 * rng.normal(size=robot.nv)), rng.normal(size=robot.nv)
+    _, slope, growth, c = (np.array(part).ravel() for part in look(q, v))
+
+    def at(q: Array, v: Array) -> float:
+        return float(look(q, v)[0])
+
+    found = [(at(q, v + h * unit) - at(q, v - h * unit)) / (2.0 * h) for unit in np.eye(robot.nv)]
+    assert slope == pytest.approx(found, abs=1e-5 * np.abs(found).max())
+    ends = [at(pin.integrate(robot.model, q, sign * h * v), v + sign * h * c) for sign in (1.0, -1.0)]
+    assert growth[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-4)
+
+
+def test_only_linkages_with_limits_of_acceleration_are_slowed() -> None:
+    robot = limited(NAMED["four_bar"], 20.0)
+    limits = wbc.tasks.JointLimits()
+    names = [entry.name for entry in wbc.Stack(robot, DT).add(limits).entries]
+    assert names == ["mechanism", "joint_limits", "joint_limits linkages"]
+    for one, other in ((robot, wbc.tasks.JointLimits(acceleration=False)), (robot.with_loops(), limits)):
+        items = [type(entry.item) for entry in wbc.Stack(one, DT).add(other).entries]
+        assert LinkageSpeed not in items

@@ -1,0 +1,181 @@
+"""Whether contacts bear a robot at rest, and with how much to spare: an exact linear program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from wbc import validation
+from wbc.climb.climber import Climber
+from wbc.climb.scene import ClimbScene
+from wbc.climb.stance import FREE_LIMB
+from wbc.climb.world import ClimbWorld, held_pose
+from wbc.errors import RangeError, ShapeError
+from wbc.multibody import pin
+from wbc.support.region import Region, across, projected
+from wbc.symbolic.joint_steps import place
+from wbc.symbolic.kinematics import frame_index
+from wbc.validation import Array
+
+#: Greatest force by which contacts are thought to squeeze what is between them, in weights; as in ``native/balance.h``
+ROOM = 1e3
+#: Area by which the two polygons of a region may differ [m^2]
+AREA = 1e-5
+
+
+class Equilibrium:
+    """Contacts of a climber in a scene.
+
+        max t <= 1   over wrenches w  with  sum of w = -m g at the centre of mass,   A w + s t m |g| <= b of all
+
+    with s = 1 for rows of forces of unit length: t is the share of the weight by which each contact's forces may be
+    wrong along any row of its cone. Friction is the lower one of limb and foothold. A row that bears nothing at all
+    (moments of a point) takes no part. Rows of moments alone count by the lever of the kind, the ratio of its largest
+    moments and forces.
+
+    Args:
+        climber, scene: the robot and what it climbs.
+
+    Cannot do: see dynamics; it holds for a robot at rest or slow.
+    """
+
+    def __init__(self, climber: Climber, scene: ClimbScene) -> None:
+        self.climber = validation.instance("climber", climber, Climber, "a Climber")
+        self.scene = validation.instance("scene", scene, ClimbScene, "a ClimbScene")
+        self.world = ClimbWorld(climber, scene)
+        self._regions: dict[tuple[int, ...], Region] = {}
+
+    def margin(self, contacts: Sequence[int], q: Array, *, motors: bool = False) -> float:
+        """Slack t [1] of contacts at a configuration; below 0 they do not bear the robot, and by -t of its weight each
+        contact lacks. -inf: their wrenches span no six directions; +inf: nothing weighs, and they hold the body.
+
+        Args:
+            contacts: for each limb the row of its foothold, or ``FREE_LIMB``.
+            motors: whether torques at rest stay within the efforts of the joints as well; -inf where they cannot.
+
+        Raises:
+            ShapeError, RangeError: contacts that are none; a q of another shape.
+        """
+        held = self._checked(contacts)
+        at = validation.real_array("q", q, (self.climber.robot.nq,))
+        poses = self._poses(held, at)
+        if motors:
+            return self._with_motors(held, at, poses)
+        places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
+        return self.world.slack(places, self.climber.center_of_mass(at), poses)[0]
+
+    def region(self, contacts: Sequence[int]) -> Region:
+        """Where the centre of mass may be, across gravity, for t >= 0; kept for each set of contacts.
+
+        Hands and feet that fix their turn about the normal are taken as their footholds are turned.
+
+        Raises:
+            ShapeError: contacts that are none. RangeError: nothing weighs.
+        """
+        held = self._checked(contacts)
+        gravity = np.asarray(self.scene.gravity)
+        strength = float(np.linalg.norm(gravity))
+        if strength == 0.0:
+            raise RangeError("scene.gravity", gravity, "without gravity the centre of mass may be anywhere")
+        if held not in self._regions:
+            axes = across(gravity / strength)
+            rows = [row for row in held if row >= 0]
+            middle = self.scene.positions[rows].mean(axis=0) if rows else np.zeros(3)
+            poses = np.array([place(self.scene.footholds[max(row, 0)].pose) for row in held])
+            G, r, A, _, b = self._program(held, poses, middle)
+            shifts = np.array([np.concatenate([np.zeros(3), -np.cross(axis, gravity / strength)]) for axis in axes])
+
+            def farthest(direction: Array) -> Array | None:
+                cost = np.concatenate([np.zeros(G.shape[1]), -direction])
+                wide = np.hstack([A, np.zeros((len(A), 2))])
+                free = [(None, None)] * G.shape[1] + [(-ROOM, ROOM)] * 2
+                answer = linprog(cost, wide, b, np.hstack([G, -shifts.T]), r, free, method="highs")
+                return None if answer.status != 0 else np.array(answer.x[-2:])
+
+            corners, outer = projected(farthest, AREA)
+            here = axes @ middle
+            self._regions[held] = Region(middle, axes, corners + here, outer + here, torque=False)
+        return self._regions[held]
+
+    def _checked(self, contacts: Sequence[int]) -> tuple[int, ...]:
+        held = tuple(int(row) for row in contacts)
+        if len(held) != len(self.climber.limbs):
+            raise ShapeError("contacts", contacts, f"expected {len(self.climber.limbs)}, one for each limb")
+        for limb, row in enumerate(held):
+            if not FREE_LIMB <= row < len(self.scene.footholds):
+                raise RangeError("contacts", row, f"expected rows from 0 to {len(self.scene.footholds) - 1}, or -1")
+            if row >= 0 and self.world.cone_of[limb, self._first[row]] < 0:
+                name, hold = self.climber.limbs[limb].name, self.scene.footholds[row]
+                raise RangeError("contacts", row, f"foothold {hold.id} is for {', '.join(hold.limbs)}, not for {name}")
+        return held
+
+    @property
+    def _first(self) -> NDArray[np.intp]:
+        """The first place of each foothold."""
+        return np.searchsorted(self.world.hold, np.arange(len(self.scene.footholds)))
+
+    def _poses(self, held: tuple[int, ...], q: Array) -> Array:
+        """Poses of the contacts ``(limbs, 12)``: those of the footholds, turned about the normal as the limbs are."""
+        poses = [place(held_pose(self.climber, self.scene, limb, row, q)) for limb, row in enumerate(held)]
+        return np.ascontiguousarray(poses)
+
+    def _program(self, held: tuple[int, ...], poses: Array, center: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """G, r, A, s and b of G x = r and A x + s t <= b, in weights; moments about the centre."""
+        weight, gravity = self.world.weight, np.asarray(self.scene.gravity)
+        maps, blocks, slacks, sides = [], [], [], []
+        for limb, row in enumerate(held):
+            if row < 0:
+                continue
+            cone = self.world.cone(limb, int(self._first[row]))
+            turn, arm = poses[limb, :9].reshape(3, 3), poses[limb, 9:] - center
+            force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
+            maps.append(np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
+            blocks.append(cone.A)
+            slacks.append(cone.s)
+            sides.append(cone.b / weight)
+        G = np.hstack(maps) if maps else np.zeros((6, 0))
+        A = np.zeros((sum(map(len, blocks)), G.shape[1]))
+        row, column = 0, 0
+        for block in blocks:
+            A[row : row + block.shape[0], column : column + block.shape[1]] = block
+            row, column = row + block.shape[0], column + block.shape[1]
+        r = np.concatenate([-gravity * self.climber.mass / weight, np.zeros(3)])
+        return G, r, A, np.concatenate([*slacks, []]), np.concatenate([*sides, []])
+
+    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array) -> float:
+        """The slack with torques of motors within their efforts, which take no part in it."""
+        robot, weight = self.climber.robot, self.world.weight
+        model, data = robot.model, robot.model.createData()
+        center = self.climber.center_of_mass(q)
+        G, r, A, s, b = self._program(held, poses, center)
+        if np.linalg.matrix_rank(G) < 6:
+            return -np.inf
+        pin.computeJointJacobians(model, data, q)
+        own = (
+            -(self.climber.mass * pin.jacobianCenterOfMass(model, data, q)).T @ np.asarray(self.scene.gravity) / weight
+        )
+        pulled = []
+        for limb, row in enumerate(held):
+            if row >= 0:
+                cone, turn = self.world.cone(limb, int(self._first[row])), poses[limb, :9].reshape(3, 3)
+                frame = frame_index(model, self.climber.limbs[limb].frame)
+                pin.updateFramePlacement(model, data, frame)
+                J = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+                arm = poses[limb, 9:] - data.oMf[frame].translation
+                force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
+                pulled.append(J.T @ np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
+        motors = [dof for dof in robot.motors if np.isfinite(robot.limits.effort[dof])]
+        torque, most = -np.hstack(pulled)[motors], robot.limits.effort[motors] / weight
+        sides = np.vstack([np.hstack([A, s[:, None]]), np.hstack([torque, np.zeros((len(motors), 1))])])
+        sides = np.vstack([sides, np.hstack([-torque, np.zeros((len(motors), 1))])])
+        ends = np.concatenate([b, most - own[motors], most + own[motors]])
+        free = [(None, None)] * G.shape[1] + [(None, 1.0)]
+        cost = np.concatenate([np.zeros(G.shape[1]), [-1.0]])
+        answer = linprog(cost, sides, ends, np.hstack([G, np.zeros((6, 1))]), r, free, method="highs")
+        if answer.status != 0:
+            return -np.inf
+        slack = float(answer.x[-1])
+        return slack if not self.world.numbers.weightless else (np.inf if slack > 0.0 else -np.inf)

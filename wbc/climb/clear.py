@@ -1,0 +1,263 @@
+"""Clearances of a climber: its links from each other and from what it climbs, proven between instants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import pickling, validation
+from wbc.clearance import Exemption, Motion, Nearest, Pair, Sweeper, SweptBody, SweptScene, Tree, bodies_of, self_pairs
+from wbc.climb.climber import Climber
+from wbc.climb.joint_values import joint_values
+from wbc.climb.scene import ClimbScene
+from wbc.climb.stance import FREE_LIMB
+from wbc.errors import ShapeError
+from wbc.multibody import pin
+from wbc.shapes import PlacedShape
+from wbc.shapes.around import distance_to_segment
+from wbc.shapes.solid import why_apart
+from wbc.symbolic.kinematics import frame_index
+from wbc.validation import Array
+
+#: Distances that a tip keeps on its way to a foothold, one after the other, as shares of the clearance
+STAIRS = (1.0, 0.5, 0.25, 0.0)
+#: The last of these steps: at a foothold
+AT_FOOTHOLD = len(STAIRS) - 1
+#: Share of its distance from the foothold that a tip keeps from the body that the foothold is on: it comes down between
+#: parts of that body that are up to 60 degrees steep
+APPROACH = 0.5
+#: How much deeper than its form says a tip may be in what it holds [m]: rounding of descriptions and meshes
+SINK = 2e-3
+#: What is proven may be less by this [m]: a move may begin in a stance that has nothing to spare
+TOLERANCE = 1e-4
+#: Cosine of how far a round tip may be tilted on what it holds, 75 degrees
+TILTED = 0.26
+#: A depth that stands for no requirement [m]
+ANY_DEPTH = 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Clearances:
+    """Links of a climber against each other and against the bodies of a scene.
+
+    Links that move with the last joint of a limb, its tips, touch the body that the limb's foothold is on. While the
+    contact is d away from the foothold, a tip keeps from that body, in steps,
+
+        min(clearance, d / 2 - sink)
+
+    with sink how far the tip's form goes beyond the contact's frame, as a round foot that tilts does.
+
+    All within 0.1 mm, which proofs may miss.
+
+    Attributes:
+        climber, scene: as given.
+        clearance: distance that links keep from bodies [m].
+        apart: distance that links keep from each other [m].
+
+    Raises:
+        ShapeError: the robot has no shapes, or pairs of its links are not chosen yet. RangeError, NotFiniteError: a
+            distance that is none.
+    """
+
+    climber: Climber
+    scene: ClimbScene
+    clearance: float = 0.01
+    apart: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.climber.robot.shapes:
+            raise ShapeError("robot.shapes", None, "the robot has no shapes, so nothing can be proven to be clear")
+        for name in ("clearance", "apart"):
+            value = validation.scalar(f"Clearances.{name}", getattr(self, name), low=0.0, unit="m")
+            object.__setattr__(self, name, value)
+
+    def __getstate__(self) -> dict[str, object]:
+        return pickling.declared(self)
+
+    def standing(self, contacts: Sequence[int], q: Array) -> Nearest | None:
+        """Two bodies that are nearer than they may be in a stance; None: there are none."""
+        return self.moving([(row,) for row in contacts], np.array([0.0, 1.0]), np.stack([q, q]), None)
+
+    def moving(self, contacts: Sequence[Sequence[int]], times: Array, q: Array, v: Array | None) -> Nearest | None:
+        """Two bodies that come nearer to each other than they may, and when; None: it is proven that there are none.
+
+        Args:
+            contacts: of each limb the rows of the footholds that it leaves, holds or lands on; ``FREE_LIMB`` for none.
+            times: knots ``(n)``. q: configurations there ``(n, nq)``.
+            v: velocities there ``(n, nv)``, with cubics between; None: even between knots.
+        """
+        motion = self._motion(times, q, v)
+        exempt = [
+            entry
+            for limb, rows in enumerate(contacts)
+            for row in set(rows)
+            for entry in self._exempt(limb, row, AT_FOOTHOLD if len(set(rows)) == 1 else 0)
+        ]
+        swept = self._sweeper.sweep(motion, self._chosen(contacts, motion), exempt, aim="any", tolerance=TOLERANCE)
+        if swept.clear:
+            return None
+        near = swept.nearest
+        return near and replace(near, first=_plain_name(near.first), second=_plain_name(near.second))
+
+    def _motion(self, times: Array, q: Array, v: Array | None) -> Motion:
+        values, tree = joint_values(self.climber.robot, q), self._sweeper.scene.tree
+        if v is None:
+            return Motion.linear(tree, times, values, q[:, :7])
+        motion = Motion.cubic(tree, times, values, v[:, 6:], q[:, :7])
+        # Between knots the base goes evenly here: it is on its cubic within 4 h / 27 of the changes of its rates
+        span = np.diff(times)[:, None]
+        turned = motion.poses[0, :, :9].reshape(-1, 3, 3)
+        slack = []
+        for rates, mean in (
+            (np.einsum("nij,nj->ni", turned, v[:, :3]), np.diff(q[:, :3], axis=0) / span),
+            (v[:, 3:6], motion.turns[0] / span),
+        ):
+            change = np.linalg.norm(rates[:-1] - mean, axis=1) + np.linalg.norm(rates[1:] - mean, axis=1)
+            slack.append(float((4.0 / 27.0 * span[:, 0] * change).max()))
+        return Motion.cubic(tree, times, values, v[:, 6:], q[:, :7], free_slack=np.array([slack]))
+
+    def _chosen(self, contacts: Sequence[Sequence[int]], motion: Motion) -> NDArray[np.intp]:
+        """Pairs of links, and links with bodies that are as near as the robot is large."""
+        base = motion.poses[0, :, 9:]
+        middle = (base.min(axis=0) + base.max(axis=0)) / 2
+        reach = self._size + float(np.linalg.norm(base - middle, axis=1).max()) + self.clearance
+        near = np.append(np.linalg.norm(self._centers - middle, axis=1) - self._radii <= reach, True)
+        # Tips that hold are at their footholds all the time: the steps on the way there say nothing of them
+        begin = np.full((len(contacts) + 1, len(near)), len(STAIRS))
+        names = list(self.scene.bodies)
+        for limb, rows in enumerate(contacts):
+            for on in {self.scene.footholds[row].on for row in rows if row != FREE_LIMB} - {""}:
+                begin[limb, names.index(on)] = AT_FOOTHOLD if len(set(rows)) == 1 else 0
+        body_of, limb_of, stair = self._pairs[1]
+        step = begin[limb_of, body_of]
+        return np.flatnonzero(near[body_of] & ((stair >= step) | ((stair <= 0) & (step == len(STAIRS)))))
+
+    def _exempt(self, limb: int, row: int, since: int) -> list[Exemption]:
+        if row == FREE_LIMB or not self.scene.footholds[row].on:
+            return []
+        foothold, out = self.scene.footholds[row], list[Exemption]()
+        mount, point = _scene_name(foothold.on), foothold.pose.translation
+        for body, sink in self._tips[limb]:
+            if why_apart(body.shape, self.scene.bodies[foothold.on].shape):
+                continue
+            for stair, share in list(enumerate(STAIRS))[since:]:
+                radius = (share * self.clearance + sink) / APPROACH
+                depth = ANY_DEPTH if share else sink + SINK
+                out.append(
+                    Exemption(_stair_name(body.name, stair), mount, point, radius if share else radius + SINK, depth)
+                )
+        return out
+
+    @cached_property
+    def _tips(self) -> tuple[list[tuple[SweptBody, float]], ...]:
+        """Of each limb the bodies that its last joint moves, and how far they go beyond the contact's frame [m]."""
+        model, out = self.climber.robot.model, []
+        for limb, chain in zip(self.climber.limbs, self.climber.chains, strict=True):
+            tips = []
+            frame = model.frames[frame_index(model, limb.frame)]
+            contact = frame.placement * limb.placement
+            for body in bodies_of(self.climber.robot):
+                on = model.frames[frame_index(model, body.link)]
+                if on.parentJoint == chain[-1]:
+                    placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
+                    tips.append((body, _beyond(placed, contact, limb.contact.fixed == "position")))
+            out.append(tips)
+        return tuple(out)
+
+    @cached_property
+    def _pairs(self) -> tuple[list[Pair], tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
+        """All pairs; of each the body of the scene (the last: none), the limb (the last: none) and the stair."""
+        pairs = self_pairs(self.climber.robot, self.apart - TOLERANCE)
+        none = len(self.scene.bodies), len(self.climber.limbs)
+        told = [(none[0], none[1], -1)] * len(pairs)
+        limb_of = {body.name: limb for limb, tips in enumerate(self._tips) for body, _ in tips}
+        mounts = {foothold.on for foothold in self.scene.footholds}
+        for k, (name, placed) in enumerate(self.scene.bodies.items()):
+            for body in bodies_of(self.climber.robot):
+                if why_apart(body.shape, placed.shape):
+                    continue
+                limb = limb_of.get(body.name, none[1])
+                steps = STAIRS if name in mounts and limb < none[1] else STAIRS[:1]
+                for stair, share in enumerate(steps):
+                    pairs.append(
+                        Pair(_stair_name(body.name, stair), _scene_name(name), share * self.clearance - TOLERANCE)
+                    )
+                    told.append((k, limb, stair))
+        columns = np.array(told, dtype=np.intp).reshape(-1, 3).T
+        return pairs, (columns[0], columns[1], columns[2])
+
+    @cached_property
+    def _sweeper(self) -> Sweeper:
+        robot = self.climber.robot
+        model, bodies = robot.model, {body.name: body for body in bodies_of(robot)}
+        for limb, tips in zip(self.climber.limbs, self._tips, strict=True):
+            contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement.translation
+            for body, _ in tips:
+                grasp = model.frames[frame_index(model, body.link)].placement.actInv(contact)
+                for stair in range(len(STAIRS)):
+                    name = _stair_name(body.name, stair)
+                    bodies[name] = SweptBody(name, body.shape, body.link, body.placement, grasp)
+        world = [SweptBody(_scene_name(name), b.shape, placement=b.placement) for name, b in self.scene.bodies.items()]
+        return Sweeper(SweptScene(Tree.of_model(model), [*bodies.values(), *world], self._pairs[0]))
+
+    @cached_property
+    def _size(self) -> float:
+        """No point of the robot is further from its base [m]; sliding joints count at their limits."""
+        robot = self.climber.robot
+        model, most = robot.model, 0.0
+        slides = {
+            j: max(
+                abs(float(model.lowerPositionLimit[model.idx_qs[j]])),
+                abs(float(model.upperPositionLimit[model.idx_qs[j]])),
+            )
+            for j in range(2, model.njoints)
+            if model.joints[j].shortname().startswith("JointModelP")
+        }
+        for body in bodies_of(robot):
+            frame = model.frames[frame_index(model, body.link)]
+            way = [
+                float(np.linalg.norm(model.jointPlacements[j].translation)) + slides.get(j, 0.0)
+                for j in model.supports[frame.parentJoint]
+                if j > 1
+            ]
+            place = frame.placement * (body.placement or pin.SE3.Identity())
+            most = max(most, sum(way) + float(np.linalg.norm(place * body.shape.center)) + body.shape.reach)
+        return most
+
+    @cached_property
+    def _centers(self) -> Array:
+        return np.array([b.placement * b.shape.center for b in self.scene.bodies.values()]).reshape(-1, 3)
+
+    @cached_property
+    def _radii(self) -> Array:
+        return np.array([b.shape.reach for b in self.scene.bodies.values()])
+
+
+def _scene_name(body: str) -> str:
+    """Of a body of the scene among links, whose names may be the same."""
+    return f"\0{body}"
+
+
+def _stair_name(body: str, stair: int) -> str:
+    return body + "\1" * stair
+
+
+def _plain_name(name: str) -> str:
+    return name.strip("\0\1")
+
+
+def _beyond(placed: PlacedShape, contact: pin.SE3, tilts: bool) -> float:
+    """How far a shape goes beyond a contact's frame, against its z axis [m]; tilted most where it tilts."""
+    a, b, radius = placed.capsule()
+    if tilts:
+        off = float(distance_to_segment(contact.translation[None], a, b)[0])
+        return max(0.0, radius - TILTED * off)
+    if placed.shape.is_round:
+        return float(max(0.0, radius - min(contact.actInv(a)[2], contact.actInv(b)[2])))
+    corners = placed.shape.triangles().reshape(-1, 3)
+    at = contact.inverse() * placed.placement
+    return max(0.0, -float((corners @ at.rotation[2] + at.translation[2]).min()))

@@ -1,0 +1,65 @@
+"""A first stance near a configuration."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from wbc.climb.climber import Climber
+from wbc.climb.scene import ClimbScene
+from wbc.climb.search import StanceOptions, no_stances
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.world import ClimbWorld, PostureOutcome
+
+#: Footholds that are tried of each limb, nearest first
+NEAREST = 6
+#: Stances that are tried at most
+STANCES = 400
+
+
+def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOptions | None = None) -> Stance:
+    """The stance on the footholds nearest to the limbs in a configuration in which the robot can stand with the margin
+    of the options; limbs without a foothold near stay in the air.
+
+    Args:
+        q: configuration ``(nq)`` about which it is sought, contacts near their footholds.
+
+    Raises:
+        NoStancesError: none of the nearest combinations can be stood on; the best of them, in numbers. What
+            ``robot.configuration`` raises.
+    """
+    given = StanceOptions() if options is None else options
+    at = climber.robot.configuration("q", q)
+    world = ClimbWorld(climber, scene, None, given.limits, given.clearance, given.apart)
+    choices: list[list[tuple[float, int]]] = []
+    for limb in range(len(climber.limbs)):
+        pose = climber.contact_pose(at, limb)
+        away = np.linalg.norm(world.places[:, 9:] - pose.translation, axis=1) / world.limbs.numbers[limb].length
+        # Of turns about the normal the nearest first
+        turned = 1.0 - world.places[:, [0, 3, 6]] @ pose.rotation[:, 0] if climber.fixed(limb) == "pose" else 0.0
+        cost = np.where(world.cone_of[limb] >= 0, away + 0.2 * turned, np.inf)
+        order = np.argsort(cost, kind="stable")[:NEAREST]
+        near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0]
+        choices.append(near or [(1.0, FREE_LIMB)])
+    combinations = sorted(itertools.product(*choices), key=lambda chosen: sum(cost for cost, _ in chosen))
+    state, best, tried = world.state_of(at), -np.inf, 0
+    for chosen in combinations:
+        places = [place for _, place in chosen]
+        held = [int(world.hold[place]) for place in places if place >= 0]
+        if len(set(held)) < len(held):
+            continue
+        tried += 1
+        if tried > STANCES:
+            break
+        contacts = world.contacts(places)
+        how, found, slack, _ = world.stand(contacts, contacts, given.margin, state, followed=False)
+        if how == PostureOutcome.STANDS:
+            rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)
+            return Stance(rows, world.q_of(found))
+        best = max(best, slack if how == PostureOutcome.NOT_BORNE else -np.inf)
+    reason = f"none of {min(tried, STANCES)} stances on the footholds nearest to it can be stood on"
+    if np.isfinite(best):
+        reason += f"; the best lacks {given.margin - best:.3g} of the weight"
+    raise no_stances("q", at[:3].round(3).tolist(), reason, "start")

@@ -1,0 +1,289 @@
+"""One limb in the loop: its state, its moves, and its items of the stack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from wbc.climb.climber import ClimbLimb
+from wbc.climb.loop.limb_state import CLOSED, Cause, LimbState, after
+from wbc.climb.loop.options import LoopOptions
+from wbc.climb.loop.reference import PlanReference
+from wbc.climb.loop.stack import FootholdContact, contact_frame
+from wbc.climb.plan import ContactMove, ContactPlan
+from wbc.climb.scene import Foothold
+from wbc.climb.stance import FREE_LIMB
+from wbc.controller import core_of
+from wbc.controller.handle import InputGroup
+from wbc.multibody import pin
+from wbc.robot import Robot
+from wbc.simulation import GripKind, GrippingPlant
+from wbc.validation import Array
+
+#: How long before it lands a limb counts as reaching [s]
+NEAR_LANDING = 0.1
+#: How far from its foothold a limb closes by velocities [m]
+NEAR_BY_RATES = 1e-3
+#: The same by torques, which are not exact [m]
+NEAR_BY_TORQUES = 3e-3
+#: Weight of a contact's force that hands its load over
+UNLOADED = 1e8
+#: Rounding of times [s]
+INSTANT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LoopParts:
+    """What all limbs of a loop share.
+
+    Attributes:
+        robot: with contact frames. stack, controller: of :func:`climb_stack`. options: of the loop.
+        plant: that grips; None: it does not. torques: whether torques are commanded. dt: period [s].
+    """
+
+    robot: Robot
+    stack: Any
+    controller: Any
+    options: LoopOptions
+    plant: GrippingPlant | None
+    torques: bool
+    dt: float
+
+
+class LimbMachine:
+    """A limb's state as of :class:`LimbState`, and what a change of it means for stack and plant.
+
+    Args:
+        limb: which. parts: of the loop.
+
+    Attributes:
+        state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
+    """
+
+    def __init__(self, limb: ClimbLimb, parts: LoopParts) -> None:
+        self.name, self._kind, self._parts = limb.name, limb.contact, parts
+        self._frame = contact_frame(limb)
+        self._number = parts.robot.model.getFrameId(self._frame)
+        items = parts.controller
+        self._contact, self._swing = items[f"{self.name} contact"], items[f"{self.name} swing"]
+        self._force = items[f"{self.name} contact force"] if parts.torques else None
+        self._bearing = 0.0 if self._force is None else self._force.weight
+        self._item: FootholdContact = parts.stack[f"{self.name} contact"].item
+        fields = ("target", "feedforward")
+        self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
+        self._loading, near = (parts.options.unload if parts.torques else 0.0), parts.options.latch_distance
+        self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
+        self._seen, self._planned = parts.robot.model.createData(), parts.robot.model.createData()
+        self.state, self.held, self._since = LimbState.FREE, FREE_LIMB, 0.0
+        self._late, self._moves, self._target = 0.0, list[ContactMove](), pin.SE3.Identity()
+        self._footholds: tuple[Foothold, ...] = ()
+        self._contact.enabled = False
+
+    # ------------------------------------------------------------------ plans
+
+    def begin(self, moves: list[ContactMove], plan: ContactPlan, reference: PlanReference, held: int) -> None:
+        """A plan begins, in which this limb has these moves and is closed on a foothold, or not."""
+        self._moves, self._footholds, self._reference = moves, tuple(plan.scene.footholds), reference
+        self._gone, self._late, self.held = set[int](), 0.0, held
+        self._pose = self._planned_pose(0.0)
+
+    def stand(self, foothold: int, q: Array, now: float) -> str:
+        """Closed from the beginning; what keeps it from there, "" for nothing."""
+        self._target = self._at(foothold, 0.0)
+        off, turned = self.off(q)
+        options = self._parts.options
+        if off > 10.0 * self._near or turned > 10.0 * options.latch_angle:
+            return f"{self.name} is {off:.3g} m and {turned:.3g} rad off {self._footholds[foothold].id}"
+        self.state, self._since = LimbState.HELD, now
+        self._close(foothold, q)
+        return ""
+
+    @property
+    def coming(self) -> ContactMove | None:
+        """The move that is under way or comes next; None: no more."""
+        return self._moves[0] if self._moves else None
+
+    @property
+    def moves(self) -> list[ContactMove]:
+        """Those that are not over."""
+        return self._moves
+
+    def missing(self, rows: set[int]) -> str:
+        """Footholds are gone: what of this limb's plan cannot be done, in words; "" for nothing."""
+        said = ""
+        if self.state in CLOSED and self.held in rows:
+            said = f"the foothold {self._footholds[self.held].id} of {self.name} is gone"
+        for move in self._moves:
+            if move.lands in rows:
+                self._gone.add(move.lands)
+                said = said or f"the foothold {self._footholds[move.lands].id} that {self.name} was to land on is gone"
+        return said
+
+    # ------------------------------------------------------------------ states
+
+    @property
+    def due(self) -> float:
+        """Time of the plan before which its state does not change [s]."""
+        move, state = self.coming, self.state
+        if state in (LimbState.UNLOADING, LimbState.LATCHING):
+            return -inf
+        if move is None:
+            return inf
+        if state in (LimbState.HELD, LimbState.FREE):
+            return move.lift - self._loading
+        return move.land - NEAR_LANDING if state is LimbState.SWINGING else -inf
+
+    def loaded(self, now: float) -> bool:
+        """Whether the time in which a load is handed over has passed since it last changed."""
+        return now - self._since + INSTANT >= self._loading
+
+    def unloaded(self, now: float) -> bool:
+        """Whether it has handed its load over, or bears none that counts."""
+        return self._loading == 0.0 or (self.state is LimbState.UNLOADING and self.loaded(now))
+
+    def landed(self, time: float) -> bool:
+        """Whether it has done what the plan has it do until a time of the plan."""
+        move = self.coming
+        return move is None or move.land > time + INSTANT
+
+    def cause(self, ahead: float, path_time: float, q: Array, now: float, borne: bool) -> Cause | None:
+        """What changes its state by now; None: nothing.
+
+        Args:
+            ahead: time of the plan at the end of the tick. path_time: now. q: where the robot is. now: clock [s].
+            borne: whether the limbs that are to bear the robot when this one lifts do.
+        """
+        state, move = self.state, self.coming
+        if state is LimbState.LATCHING:
+            return Cause.SETTLED if self.loaded(now) else None
+        if move is None:
+            return None
+        if state is LimbState.HELD:
+            return Cause.LIFT_NEARS if borne and ahead > move.lift - self._loading else None
+        if state is LimbState.UNLOADING:
+            return Cause.UNLOADED if ahead > move.lift and self.loaded(now) else None
+        if state is LimbState.FREE:
+            return Cause.LIFT_NEARS if borne and ahead > move.lift else None
+        if state is LimbState.SWINGING:
+            if move.lands == FREE_LIMB:
+                return Cause.NO_FOOTHOLD if ahead >= move.land else None
+            return Cause.LANDING_NEARS if ahead >= move.land - NEAR_LANDING else None
+        if path_time < move.land - INSTANT or move.lands in self._gone:
+            return None
+        off, turned = self.off(q)
+        there = off <= self._near and turned <= self._parts.options.latch_angle
+        return Cause.AT_FOOTHOLD if there else None
+
+    def wait(self, path_time: float) -> bool:
+        """Whether the plan has to wait for it, a tick more."""
+        move = self.coming
+        if self.state is not LimbState.REACHING or move is None or path_time < move.land - INSTANT:
+            return False
+        self._late += self._parts.dt
+        return True
+
+    def too_late(self, q: Array) -> str:
+        """What keeps it from its foothold for longer than is waited, in words; "" for nothing."""
+        options, move = self._parts.options, self.coming
+        if self._late <= options.patience or move is None:
+            return ""
+        off, turned = self.off(q)
+        return (
+            f"{self.name} did not come to {self._footholds[move.lands].id}: {1e3 * off:.2f} mm and {turned:.3f} rad "
+            f"off after {options.patience:g} s; {1e3 * self._near:g} mm and {options.latch_angle:g} rad are allowed"
+        )
+
+    def change(self, cause: Cause, q: Array, q_planned: Array, now: float) -> LimbState:
+        """Its next state, as of the table; stack and plant are told."""
+        before = self.state
+        state = self.state = after(before, cause)
+        self._since, move = now, self.coming
+        if state is LimbState.UNLOADING and self._force is not None:
+            self._force.ramp(UNLOADED, self._loading)
+        elif before in CLOSED and state not in CLOSED:
+            self._open(q_planned)
+        elif state is LimbState.LATCHING and move is not None:
+            self._close(move.lands, q)
+        elif cause is Cause.NEW_PLAN and state is LimbState.HELD and self._force is not None:
+            self._force.ramp(self._bearing, self._loading)
+        elif cause in (Cause.SETTLED, Cause.NO_FOOTHOLD):
+            self._moves = self._moves[1:]
+        if state is LimbState.SWINGING and move is not None and move.lands != FREE_LIMB:
+            self._target = self._at(move.lands, move.land)
+        return state
+
+    # ------------------------------------------------------------------ stack and plant
+
+    def follow(self, planned: pin.Data) -> None:
+        """In the air: the contact frame follows the plan, whose kinematics at the next tick are known."""
+        parts = self._parts
+        now, then = self._pose, pin.updateFramePlacement(parts.robot.model, planned, self._number).copy()
+        self._pose = then
+        place, speed = now.translation, (then.translation - now.translation) / parts.dt
+        if self._late > 0.0 and parts.torques and not self._kind.pulls:
+            normal, press = self._target.rotation[:, 2], parts.options.press
+            place, speed = place - press * self._late * normal, speed - press * normal
+        if self._kind.fixed == "position":
+            self._aim.write(np.concatenate([place, speed]))
+            return
+        turn = now.rotation @ pin.log3(now.rotation.T @ then.rotation) / parts.dt
+        self._aim.write(np.concatenate([now.rotation.T.ravel(), place, speed, turn]))
+
+    def off(self, q: Array) -> tuple[float, float]:
+        """How far it is from its foothold [m], and how far turned as far as its contact fixes that [rad]."""
+        pose, target = self._seen_pose(q), self._target
+        off = float(np.linalg.norm(pose.translation - target.translation))
+        if self._kind.fixed == "position":
+            return off, 0.0
+        if self._kind.fixed == "axis":
+            return off, float(np.arccos(np.clip(pose.rotation[:, 2] @ target.rotation[:, 2], -1.0, 1.0)))
+        return off, float(np.linalg.norm(pin.log3(pose.rotation.T @ target.rotation)))
+
+    def _close(self, foothold: int, q: Array) -> None:
+        """Its rows are hard."""
+        target, inputs = self._target, dict[str, Any]()
+        if self._force is not None:
+            if not self._kind.pulls:
+                # Where the foot is on the ground, which may be a little off the plan's foothold
+                pose = self._seen_pose(q)
+                target = pin.SE3(target.rotation if self._kind.fixed == "position" else pose.rotation, pose.translation)
+            slopes, bounds = self._item.numbers(self._footholds[foothold].friction)
+            inputs = {"slopes": slopes, "bounds": bounds}
+            self._force.ramp(self._bearing, self._loading)
+        self._contact.set(target=target, **inputs)
+        self._contact.enabled, self._swing.enabled = True, False
+        if self._parts.plant is not None and self._kind.pulls:
+            self._parts.plant.grasp(self._frame, target, GripKind(self._kind.fixed))
+        self.held, self._late = foothold, 0.0
+
+    def _open(self, q_planned: Array) -> None:
+        """It follows the plan through the air."""
+        self._contact.enabled, self._swing.enabled = False, True
+        if self._parts.plant is not None and self._kind.pulls:
+            self._parts.plant.release(self._frame)
+        pin.forwardKinematics(self._parts.robot.model, self._planned, q_planned)
+        self._pose = pin.updateFramePlacement(self._parts.robot.model, self._planned, self._number).copy()
+        self.held, self._late = FREE_LIMB, 0.0
+
+    def _at(self, foothold: int, time: float) -> pin.SE3:
+        """The contact pose at a foothold: its place and normal, and the turn about it that the plan has."""
+        pose = self._footholds[foothold].pose
+        if self._kind.fixed == "position":
+            return pin.SE3(pose)
+        z, x = pose.rotation[:, 2], self._planned_pose(time).rotation[:, 0]
+        x = x - (x @ z) * z
+        x /= np.linalg.norm(x)
+        return pin.SE3(np.column_stack([x, np.cross(z, x), z]), pose.translation)
+
+    def _planned_pose(self, time: float) -> pin.SE3:
+        model = self._parts.robot.model
+        pin.forwardKinematics(model, self._planned, self._reference.q(time))
+        return pin.updateFramePlacement(model, self._planned, self._number).copy()
+
+    def _seen_pose(self, q: Array) -> pin.SE3:
+        model = self._parts.robot.model
+        pin.forwardKinematics(model, self._seen, q)
+        return pin.updateFramePlacement(model, self._seen, self._number).copy()

@@ -1,0 +1,125 @@
+"""Climbers by name: a robot, the tips by which it holds, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import pi
+
+import numpy as np
+
+from wbc import validation
+from wbc.climb.climber import Climber, ClimbLimb
+from wbc.climb.contacts import ContactKind, FlatFoot, GripHand, PointFoot
+from wbc.multibody import pin
+from wbc.robot import Robot
+from wbc.robots.catalogue import load
+from wbc.robots.limbed import arms_on_body, limbed
+from wbc.robots.pairs import find_self_pairs
+from wbc.robots.walker_masses import with_masses
+from wbc.robots.walker_robot import walker
+
+#: From a hand's approach to the outward normal of what it holds
+FLIP = pin.SE3(pin.utils.rotate("x", pi), np.zeros(3))
+#: Acceleration of the joints of robots whose description has none [rad/s^2]: full torque on a leg without load
+QUICK = 60.0
+#: The same for a humanoid, whose limbs are heavier [rad/s^2]
+HEAVY = 20.0
+#: Friction that feet count on [1]: rubber on concrete has some 0.8
+FRICTION = 0.6
+#: Half lengths of the soles of TALOS [m]
+SOLE = (0.1, 0.06)
+
+
+def climber(name: str) -> Climber:
+    """A climber of the table.
+
+        climber("anymal_c").limbs[0].name       # "LF_FOOT"
+
+    Raises:
+        UnknownNameError: no such climber.
+    """
+    return _MADE[validation.one_of("climber", name, names())](name)
+
+
+def names() -> tuple[str, ...]:
+    """Names that :func:`climber` knows."""
+    return tuple(_MADE)
+
+
+def _limbed(contact: ContactKind) -> Callable[[str], Climber]:
+    def make(name: str) -> Climber:
+        robot = limbed(name)
+        tips = [frame for frame in robot.frame_names if frame.endswith("_tip")]
+        place = FLIP if contact.fixed != "position" else pin.SE3.Identity()
+        return Climber(robot, [ClimbLimb(tip, contact, place, tip.removesuffix("_tip")) for tip in tips], name=name)
+
+    return make
+
+
+def _table(frames: Sequence[str], shapes: str, acceleration: float, contact: ContactKind) -> Callable[[str], Climber]:
+    def make(name: str) -> Climber:
+        robot = _ready(load(name, shapes=shapes, acceleration=acceleration))
+        limbs = [ClimbLimb(robot.frames[frame], contact) for frame in frames]
+        return Climber(robot, limbs, name=name)
+
+    return make
+
+
+def _walker(name: str) -> Climber:
+    machine = with_masses(walker())
+    hand = GripHand(rolls=True)
+    return Climber(machine.robot, [ClimbLimb(arm.hand, hand, FLIP, arm.name) for arm in machine.arms], name=name)
+
+
+def _two_ended(name: str) -> Climber:
+    machine = walker(two_ended=True)
+    return Climber(machine.robot, [ClimbLimb(arm.hand, GripHand(), FLIP, arm.name) for arm in machine.arms], name=name)
+
+
+def _three_pandas(name: str) -> Climber:
+    arm = _ready(load("panda", shapes="fit", neutral={"panda_joint6": pi}))
+    # The base stands on the body's side, its x axis downwards: the hands of arms at rest are below the body
+    side = pin.SE3(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.25, 0.0, 0.0]))
+    places = [pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * side for k in range(3)]
+    robot = arms_on_body(arm, places, 0.3, 20.0)
+    hands = [ClimbLimb(f"arm{k}_panda_hand_tcp", GripHand(), FLIP, f"arm{k}") for k in (1, 2, 3)]
+    return Climber(robot, hands, name=name)
+
+
+def _talos(hands: bool) -> Callable[[str], Climber]:
+    def make(name: str) -> Climber:
+        robot = _ready(load("talos", shapes="fit", acceleration=HEAVY))
+        sole = FlatFoot(SOLE, FRICTION)
+        limbs = [ClimbLimb(robot.frames[f"{side}_foot"], sole, name=f"{side}_foot") for side in ("left", "right")]
+        if hands:
+            grip = GripHand(200.0, 10.0)
+            limbs += [ClimbLimb(robot.frames[f"{side}_hand"], grip, FLIP, f"{side}_hand") for side in ("left", "right")]
+        return Climber(robot, limbs, name=name)
+
+    return make
+
+
+def _ready(robot: Robot) -> Robot:
+    """The robot with pairs of links that must not touch."""
+    if robot.self_pairs is not None:
+        return robot
+    return robot.with_self_pairs(find_self_pairs(robot, samples=300).kept)
+
+
+_FEET = ("front_left_foot", "front_right_foot", "hind_left_foot", "hind_right_foot")
+_MADE: dict[str, Callable[[str], Climber]] = {
+    "walker": _walker,
+    "two_ended": _two_ended,
+    "three_pandas": _three_pandas,
+    "truss_climber": _limbed(GripHand(rolls=True)),
+    "hexapod": _limbed(PointFoot(FRICTION)),
+    "hexapod_grips": _limbed(GripHand(300.0, 20.0)),
+    "anymal_c": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
+    "solo12": _table(_FEET, "fit", QUICK, PointFoot(FRICTION)),
+    "a1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
+    "go1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
+    "talos": _talos(False),
+    "talos_hands": _talos(True),
+    "wall_climber": _limbed(GripHand(300.0, 20.0, swivels=True)),
+    "octopod": _limbed(PointFoot(FRICTION)),
+}

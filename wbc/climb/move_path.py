@@ -1,0 +1,331 @@
+"""Paths of a climber from one stance to the next: contacts that are held stay where they are, the others go over."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from wbc.climb.closure import CLOSED, HEAVY_BODY, LIGHT_BODY, Closure
+from wbc.climb.joint_values import beyond_limits, joint_values, with_joint_values
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.errors import InfeasibleError
+from wbc.multibody import pin
+from wbc.rotations import exponential, matrices
+from wbc.validation import Array
+
+#: Share of a path in which a limb lifts, and in which it lands
+LIFTING = 0.2
+#: Intervals of a path at first: they are doubled until contacts hold between them
+FEWEST = 20
+#: Intervals of a path at most
+MOST = 80
+#: Largest error of a held contact between samples [m, rad]
+HELD = 2e-5
+#: How far limbs that lift or land may be from their curves between samples [m]: less than tips may sink in
+STRAYED = 1e-3
+#: Largest change of a joint from sample to sample, as a share of 1 rad in the coarsest path: more is a jump
+JUMP = 0.6
+
+
+class HeldError(InfeasibleError):
+    """Contacts that hold cannot stay where they are on the way of the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class SwingShape:
+    """How limbs in the air go from lift to land.
+
+    Attributes:
+        height: how far the contact is lifted along the normal that it leaves, and along the one that it lands on [m].
+        lean: how much of that goes towards where the limb's contact is at rest, at most this share of the height [1].
+        joints: the limb goes from lifted to lifted posture evenly in its joints; else its contact goes on a curve.
+        tucked: share of the way to its resting angles that it bends in the middle; of paths in the joints.
+        window: from where to where on the path the body moves [1].
+        via: limb -> angles through which it goes in the middle; of paths in the joints.
+        yields: the body yields to the limbs that hold, which go as evenly in their joints as they can.
+        rise: how far the body goes off the straight line in the middle, along the mean normal of what is held [m].
+    """
+
+    height: float
+    lean: float = 0.0
+    joints: bool = False
+    tucked: float = 0.0
+    window: tuple[float, float] = (0.0, 1.0)
+    via: Mapping[int, Array] = field(default_factory=dict)
+    yields: bool = False
+    rise: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MovePath:
+    """A path q(s), 0 <= s <= 1, twice continuously differentiable, through samples in which contacts are closed.
+
+    The base goes by its position and by the turn vector against where it begins, joints by their angles: cubic splines.
+
+    Attributes:
+        closure: of the climber.
+        held: limb -> pose of the contact frame in the world, of limbs that hold all the way.
+        s: of the samples. q: there.
+    """
+
+    closure: Closure
+    held: Mapping[int, pin.SE3]
+    s: Array
+    q: Array
+
+    @cached_property
+    def coordinates(self) -> Array:
+        """Of the samples: position of the base [m], turn vector [rad], angles, ``(samples, nv)``."""
+        away = _product(self._first * [-1.0, -1.0, -1.0, 1.0], self.q[:, 3:7])
+        sine = np.linalg.norm(away[:, :3], axis=1)
+        angle = 2.0 * np.arctan2(sine, away[:, 3])
+        angle = np.where(angle > np.pi, angle - 2.0 * np.pi, angle)
+        turns = away[:, :3] * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)[:, None]
+        return np.hstack([self.q[:, :3], turns, joint_values(self.closure.climber.robot, self.q)])
+
+    @property
+    def _first(self) -> Array:
+        """Quaternion of the base at the beginning."""
+        return np.asarray(self.q[0, 3:7])
+
+    @cached_property
+    def _spline(self):  # type: ignore[no-untyped-def]  # scipy has no types
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(self.s, self.coordinates, axis=0)
+
+    def at(self, s: Array, order: int = 0) -> Array:
+        """Coordinates or a derivative of them ``(n, nv)``."""
+        return np.asarray(self._spline(s, order))
+
+    def configurations(self, coordinates: Array) -> Array:
+        """Configurations ``(n, nq)`` at some coordinates."""
+        out = with_joint_values(
+            self.closure.climber.robot, np.tile(self.q[0], (len(coordinates), 1)), coordinates[:, 6:]
+        )
+        half = 0.5 * np.linalg.norm(coordinates[:, 3:6], axis=1)[:, None]
+        turn = np.hstack([0.5 * np.sinc(half / np.pi) * coordinates[:, 3:6], np.cos(half)])
+        out[:, :3] = coordinates[:, :3]
+        out[:, 3:7] = _product(self._first, turn)
+        return out
+
+    def velocities(self, coordinates: Array, rates: Array) -> Array:
+        """Velocities ``(n, nv)`` in Pinocchio's order of coordinates that change at some rates."""
+        out, turns = np.array(rates), coordinates[:, 3:6]
+        rotation = matrices(self._first) @ exponential(turns)
+        out[:, :3] = np.einsum("nji,nj->ni", rotation, rates[:, :3])
+        # With w = dt/ds and a = |t| the body turns at w - (1 - cos a) / a^2 t x w + (a - sin a) / a^3 t x (t x w)
+        angle = np.maximum(np.linalg.norm(turns, axis=1), 1e-6)[:, None]
+        once = np.cross(turns, rates[:, 3:6])
+        lag = (1.0 - np.cos(angle)) / angle**2
+        out[:, 3:6] += (angle - np.sin(angle)) / angle**3 * np.cross(turns, once) - lag * once
+        return out
+
+    @cached_property
+    def error(self) -> float:
+        """Largest error of the held contacts half-way between samples [m, rad]."""
+        middle = self.configurations(self.at((self.s[1:] + self.s[:-1]) / 2))
+        return max((self.closure.error(q, self.held) for q in middle), default=0.0)
+
+
+def move_path(
+    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
+) -> MovePath:
+    """The path from a stance to the next one: contacts that both have stay closed.
+
+    Args:
+        normals: row of a foothold -> outward normal in the world ``(3)``, of footholds that are left or landed on.
+
+    Raises:
+        InfeasibleError: held contacts cannot stay closed on the way, a joint has to jump, or it leaves its limits.
+    """
+    count = FEWEST
+    while True:
+        moving = _Moving(closure, one, other, shape, normals)
+        path = moving.path(count)
+        if path.error < HELD and moving.strayed(path) < STRAYED:
+            return path
+        count *= 2
+        if count > MOST:
+            if path.error < HELD:
+                raise InfeasibleError("limbs in the air", path.error, f"stray from their curves between {MOST} samples")
+            reason = f"leave their places by {path.error:.2g} m or rad between {MOST} samples"
+            raise HeldError("held contacts", path.error, reason)
+
+
+class _Moving:
+    """What goes where on the way from one stance to the next."""
+
+    def __init__(
+        self, closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
+    ) -> None:
+        self.closure, self.one, self.other, self.shape = closure, one, other, shape
+        self.climber = closure.climber
+        self.poses = closure.poses(one.q), closure.poses(other.q)
+        pairs = list(zip(one.contacts, other.contacts, strict=True))
+        self.held = {k: self.poses[0][k] for k, (a, b) in enumerate(pairs) if a == b != FREE_LIMB}
+        self.swings = [k for k, (a, b) in enumerate(pairs) if a != b]
+        zero = np.zeros(3)
+        held = [normals[a] for a, b in pairs if a == b != FREE_LIMB]
+        up = np.sum(held, axis=0) if held else zero
+        self.rise = shape.rise * up / max(float(np.linalg.norm(up)), 1e-9)
+        self.lifts = {
+            k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k])) for k in self.swings
+        }
+
+    def _lift(self, limb: int, end: int, row: int, normals: Mapping[int, Array]) -> Array:
+        """From a contact of the first or second stance to where it is lifted [m]."""
+        if row == FREE_LIMB:
+            return np.zeros(3)
+        normal, height = normals[row], self.shape.height
+        if self.shape.lean == 0.0:
+            return np.asarray(height * normal)
+        stance = (self.one, self.other)[end]
+        rest = self.climber.contact_pose(self.climber.rest, limb)
+        there = self.climber.body_pose(stance.q) * self.climber.body_pose(self.climber.rest).actInv(rest)
+        away = there.translation - self.poses[end][limb].translation
+        away -= (away @ normal) * normal
+        far = max(float(np.linalg.norm(away)), 1e-9)
+        return np.asarray(height * normal + self.shape.lean * min(height, far) * away / far)
+
+    def path(self, count: int) -> MovePath:
+        s = np.linspace(0.0, 1.0, count + 1)
+        q = self._between(s)
+        held = {limb: np.tile(_row(pose), (len(s), 1)) for limb, pose in self.held.items()}
+        curves = {limb: np.array([_row(self._curve(limb, x)) for x in s]) for limb in self.swings}
+        if self.closure.short.intersection([*held, *curves]):
+            # The body goes where limbs that hold with more rows than they have joints take it
+            self._close(s, q, held if self.shape.joints else held | curves, HEAVY_BODY)
+        else:
+            self._close(s, q, held, LIGHT_BODY if self.shape.yields else HEAVY_BODY)
+            if self.shape.joints:
+                self._by_joints(s, q, curves)
+            else:
+                self._close(s, q, curves, 0.0)
+        q[0], q[-1] = self.one.q, self.other.q
+        self._check(q, count)
+        return MovePath(self.closure, self.held, s, q)
+
+    def strayed(self, path: MovePath) -> float:
+        """How far limbs that lift or land are from their curves half-way between samples [m]."""
+        middle = (path.s[1:] + path.s[:-1]) / 2
+        chosen = middle[(middle < LIFTING) | (middle > 1.0 - LIFTING)] if self.swings else middle[:0]
+        if self.closure.short and self.shape.joints:
+            return 0.0
+        away = [0.0]
+        for s, q in zip(chosen, path.configurations(path.at(chosen)), strict=True):
+            poses = self.closure.poses(q)
+            away += [float(np.linalg.norm(self._curve(k, s).translation - poses[k].translation)) for k in self.swings]
+        return max(away)
+
+    def _body(self, s: Array) -> Array:
+        """How far the body is."""
+        low, high = self.shape.window
+        if (low, high) == (0.0, 1.0):
+            return s
+        x = np.clip((s - low) / (high - low), 0.0, 1.0)
+        return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
+
+    def _between(self, s: Array) -> Array:
+        """Body on the straight line, joints evenly."""
+        model = self.climber.robot.model
+        first, last = (self.climber.body_pose(stance.q) for stance in (self.one, self.other))
+        turn = pin.log3(first.rotation.T @ last.rotation)
+        out = np.empty((len(s), model.nq))
+        for k, (x, b) in enumerate(zip(s, self._body(s), strict=True)):
+            joints = pin.interpolate(model, self.one.q, self.other.q, float(x))
+            bow = 16.0 * (b * (1.0 - b)) ** 2 * self.rise
+            position = (1.0 - b) * first.translation + b * last.translation + bow
+            out[k] = self.climber.with_body(joints, pin.SE3(first.rotation @ pin.exp3(b * turn), position))
+        return out
+
+    def _curve(self, limb: int, s: float) -> pin.SE3:
+        """Contact pose of a limb in the air: straight up, over on a cubic that continues both, straight down."""
+        (start, end), (up, down) = (self.poses[0][limb], self.poses[1][limb]), self.lifts[limb]
+        at, to = start.translation + up, end.translation + down
+        turn = pin.log3(start.rotation.T @ end.rotation)
+        if s <= LIFTING:
+            x, position = 0.0, start.translation + up * (s / LIFTING)
+        elif s >= 1.0 - LIFTING:
+            x, position = 1.0, end.translation + down * ((1.0 - s) / LIFTING)
+        else:
+            span = 1.0 - 2.0 * LIFTING
+            x = (s - LIFTING) / span
+            position = _cubic(x, at, to, up * span / LIFTING, -down * span / LIFTING)
+        turned = start.rotation @ pin.exp3(x * x * (3.0 - 2.0 * x) * turn)
+        return pin.SE3(turned, position)
+
+    def _by_joints(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
+        """Limbs in the air lift and land on their curves, and in between go evenly in their joints."""
+        up, down = (int(k) for k in np.flatnonzero((s > LIFTING - 1e-9) & (s < 1.0 - LIFTING + 1e-9))[[0, -1]])
+        for part in (slice(up + 1), slice(down, None)):
+            self._close(s[part], q[part], {limb: curve[part] for limb, curve in curves.items()}, 0.0)
+        for limb in self.swings:
+            angles = np.array([self.climber.angles(row, limb) for row in q])
+            slopes = (angles[up] - angles[up - 1]) * (down - up), (angles[down + 1] - angles[down]) * (down - up)
+            middle = (angles[up] + angles[down]) / 2
+            rest = self.climber.angles(self.climber.rest, limb)
+            via = self.shape.via.get(limb, middle + self.shape.tucked * (rest - middle))
+            for k in range(up, down + 1):
+                x = (k - up) / (down - up)
+                between = _cubic(x, angles[up], angles[down], *slopes)
+                at_middle = _cubic(0.5, angles[up], angles[down], *slopes)
+                if limb in self.shape.via or self.shape.tucked:
+                    between = between + 16.0 * (x * (1.0 - x)) ** 2 * (via - at_middle)
+                q[k] = self.climber.with_limb(q[k], limb, between)
+
+    def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float) -> None:
+        """Brings contacts to poses in the world, ``(samples, 12)``; the body as well, where limbs cannot follow."""
+        if body < LIGHT_BODY and all(self.closure.followed(limb, q, poses) for limb, poses in wanted.items()):
+            return
+        for k in range(len(s)):
+            contacts = {limb: pin.SE3(p[k, :9].reshape(3, 3), p[k, 9:]) for limb, p in wanted.items()}
+            q[k], left = self.closure.closed(q[k], contacts, body)
+            if left > 1e3 * CLOSED:
+                worst = max(contacts, key=lambda limb: self.closure.error(q[k], {limb: contacts[limb]}))
+                kind, name = InfeasibleError if body == 0.0 else HeldError, self.climber.limbs[worst].name
+                reason = f"is off by {left:.3g} m or rad at {100.0 * s[k]:.0f} % of the way to the next stance"
+                raise kind(f"contact of {name}", left, reason)
+
+    def _kind(self, dof: str) -> type[InfeasibleError]:
+        """Of an error of a joint: whether it is one of a limb that holds."""
+        number = self.climber.robot.dof_names.index(dof)
+        return HeldError if any(number in self.climber.joints(limb) for limb in self.held) else InfeasibleError
+
+    def _check(self, q: Array, count: int) -> None:
+        robot = self.climber.robot
+        steps = np.array([pin.difference(robot.model, a, b)[6:] for a, b in itertools.pairwise(q)])
+        most = JUMP * FEWEST / count
+        if steps.size and np.abs(steps).max() > most:
+            k, joint = np.unravel_index(int(np.abs(steps).argmax()), steps.shape)
+            name, size = robot.dof_names[6 + int(joint)], float(abs(steps[k, joint]))
+            raise self._kind(name)(name, size, f"jumps by {size:.3g} rad or m on the way to the next stance")
+        if worst := beyond_limits(robot, q):
+            raise self._kind(worst[0])(
+                worst[0], worst[1], f"is {worst[1]:.3g} rad or m beyond its limit on the way to the next"
+            )
+
+
+def _cubic(x: float, a: Array, b: Array, slope: Array, last: Array) -> Array:
+    """The cubic from a to b over 0 .. 1 with these slopes at its ends."""
+    return np.asarray(
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a
+        + x**2 * (3.0 - 2.0 * x) * b
+        + x * (1.0 - x) ** 2 * slope
+        - x**2 * (1.0 - x) * last
+    )
+
+
+def _row(pose: pin.SE3) -> Array:
+    """Rotation row by row, then position."""
+    return np.concatenate([pose.rotation.ravel(), pose.translation])
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Quaternions a b, of x, y, z, w: one and several."""
+    vector = a[3] * b[:, :3] + b[:, 3:] * a[:3] + np.cross(a[:3], b[:, :3])
+    return np.column_stack([vector, a[3] * b[:, 3] - b[:, :3] @ a[:3]])

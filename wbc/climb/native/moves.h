@@ -1,0 +1,194 @@
+/* From one stance to the next, and which next ones there may be. */
+#ifndef WBC_MOVES_H
+#define WBC_MOVES_H
+
+#include "posture.h"
+
+/* Poses between two postures at which limbs that hold are followed */
+#define BETWEEN 4
+/* Farther from its even way no angle may have to go [rad, m] */
+#define JUMP 1.0
+/* How much lower and higher the body begins in other attempts [lengths of the robot] */
+#define LOWER 0.15
+/* Pull of angles to rest, and of a guess's turn to the present one, beside weights of 1 */
+#define REST 1e-2
+#define UPRIGHT 2e-2
+/* Lengths of a limb that a contact turned by 1 rad from rest counts for */
+#define TURNED 0.15
+/* Distance from rest from which on stretch grows with its fourth power [lengths of a limb] */
+#define COMFORT 0.4
+
+/* The body's pose for which contacts are nearest to where they are at rest: two steps of least squares from `base` on, in place.
+ * `touch`: contact poses at rest in the body's frame. The stretch: sum of squared distances from there in
+ * lengths of the limbs, and more beyond COMFORT */
+static double guess_body(const climb_t *c, const int *contact, const double (*touch)[12], double *base) {
+    double from[12], stretch = 0.0;
+    memcpy(from, base, sizeof from);
+    for (int round = 0; round < 2; round++) {
+        double H[36] = {0}, g[6], by[3], arm[3], moved[12];
+        turn_between(from, base, by);
+        const double unit = c->length * c->length;
+        for (int i = 0; i < 3; i++) H[7 * i] = 1e-6, H[7 * (3 + i)] = UPRIGHT * unit, g[i] = 0.0, g[3 + i] = -UPRIGHT * unit * by[i];
+        for (int l = 0; l < c->limbs; l++) {
+            if (contact[l] < 0) continue;
+            const double *goal = c->foothold + 12 * contact[l];
+            compose(base, touch[l], moved);
+            minus3(moved + 9, base + 9, arm);
+            double r[3], lever[3];
+            minus3(moved + 9, goal + 9, r);
+            cross3(arm, r, lever);
+            /* e = r + v + w x arm */
+            for (int i = 0; i < 3; i++) {
+                H[7 * i] += 1.0, g[i] -= r[i], g[3 + i] -= lever[i];
+                for (int k = 0; k < 3; k++) H[6 * (3 + i) + 3 + k] += (i == k ? dot3(arm, arm) : 0.0) - arm[i] * arm[k];
+            }
+            H[19] -= arm[2], H[20] += arm[1], H[24] += arm[2], H[26] -= arm[0], H[30] -= arm[1], H[31] += arm[0];
+            for (int axis = 2; axis >= 0 && c->limb[l].rows > (axis ? 3 : 5); axis -= 2) { /* z, then x where it counts */
+                const double w = 0.1 * c->limb[l].length * c->limb[l].length;
+                const double u[3] = {moved[axis], moved[3 + axis], moved[6 + axis]};
+                const double wanted[3] = {goal[axis], goal[3 + axis], goal[6 + axis]};
+                cross3(u, wanted, by);
+                for (int i = 0; i < 3; i++) {
+                    g[3 + i] += w * by[i];
+                    for (int k = 0; k < 3; k++) H[6 * (3 + i) + 3 + k] += w * ((i == k) - u[i] * u[k]);
+                }
+            }
+        }
+        if (!solve_positive(6, H, g)) break;
+        move_body(base, g);
+    }
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        double moved[12], by[3];
+        compose(base, touch[l], moved);
+        minus3(moved + 9, c->foothold + 12 * contact[l] + 9, by);
+        double far = sqrt(dot3(by, by)) / c->limb[l].length;
+        if (c->limb[l].rows == 6) {
+            turn_between(c->foothold + 12 * contact[l], moved, by);
+            far += TURNED * sqrt(dot3(by, by));
+        }
+        stretch += far * far * (1.0 + far * far / (COMFORT * COMFORT));
+    }
+    return stretch;
+}
+
+static void pose_between(const double *a, const double *b, double part, double *out) {
+    double twist[6];
+    minus3(b + 9, a + 9, twist);
+    turn_between(a, b, twist + 3);
+    for (int i = 0; i < 6; i++) twist[i] *= part;
+    memcpy(out, a, 12 * sizeof *out);
+    move_body(out, twist);
+}
+
+static void own_pose(const double *base, const double *world, double *out) {
+    double by[3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) out[3 * i + k] = base[i] * world[k] + base[3 + i] * world[3 + k] + base[6 + i] * world[6 + k];
+    minus3(world + 9, base + 9, by);
+    turn_back(base, by, out + 9);
+}
+
+/* The same for limbs on which the body has to give way: all go evenly, and are brought back to their contacts */
+static int follow_whole(const climb_t *c, const int *contact, const double *base, const double *angle, const double *to,
+                        const double *reached) {
+    double pose[12], now[MOST_LIMBS * MOST_ANGLES];
+    const int angles = c->offset[c->limbs];
+    for (int k = 1; k < BETWEEN; k++) {
+        const double part = (double)k / BETWEEN;
+        pose_between(base, to, part, pose);
+        for (int i = 0; i < angles; i++) now[i] = angle[i] + part * (reached[i] - angle[i]);
+        if (!tighten(c, contact, pose, now)) return BREAKS;
+        for (int i = 0; i < angles; i++)
+            if (fabs(now[i] - angle[i] - part * (reached[i] - angle[i])) > JUMP) return BREAKS;
+    }
+    return STANDS;
+}
+
+/* Follows limbs that hold while the body goes from one posture to another, whose angles become what is come to; the slack and
+ * clearance there are looked at again where these differ */
+static int follow(climb_t *c, const int *contact, const wish_t *wish, const double *base, const double *angle, const double *to,
+                  double *reached, double *slack, int *which) {
+    double pose[12], now[MOST_ANGLES], center[3];
+    placed_t placed[MOST_LIMBS];
+    int other = 0;
+    if (yields(c, contact)) return follow_whole(c, contact, base, angle, to, reached);
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        const limb_t *limb = c->limb + l;
+        double *end = reached + c->offset[l];
+        memcpy(now, angle + c->offset[l], (size_t)limb->angles * sizeof *now);
+        for (int k = 1; k <= BETWEEN; k++) {
+            const double part = (double)k / BETWEEN;
+            pose_between(base, to, part, pose);
+            /* Limbs with angles to spare are led to where they end */
+            if (limb->angles > limb->rows)
+                for (int i = 0; i < limb->angles; i++) now[i] += (end[i] - now[i]) / (BETWEEN - k + 1);
+            if (!reach_from(limb, k < BETWEEN ? pose : to, c->foothold + 12 * contact[l], now)) return BREAKS;
+        }
+        for (int i = 0; i < limb->angles; i++) other |= fabs(end[i] - now[i]) > 1e-3;
+        memcpy(end, now, (size_t)limb->angles * sizeof *now);
+    }
+    if (!other) return STANDS;
+    place_all(c, to, reached, placed, center);
+    *slack = INFINITY;
+    for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
+    if (*slack < wish->slack) return NOT_BORNE;
+    return link_clearance(c, contact, to, placed, which) >= 0.0 ? STANDS : TOUCHES;
+}
+
+/* Another beginning than the present state: the body as guessed and lower or higher, all limbs as from rest; in place */
+static void begin_anew(const climb_t *c, const int *contact, const double (*touch)[12], int attempt, double *state) {
+    double own[12];
+    guess_body(c, contact, touch, state);
+    for (int i = 0; i < 3; i++) state[9 + i] += (attempt == 1 ? 0.0 : attempt == 2 ? LOWER : -LOWER) * c->length * c->down[i];
+    for (int l = 0; l < c->limbs; l++) {
+        double *now = state + 12 + c->offset[l];
+        if (contact[l] < 0) continue;
+        own_pose(state, c->foothold + 12 * contact[l], own);
+        if (!postures(c->limb + l, own, c->limb[l].rest, 1, now))
+            memcpy(now, c->limb[l].rest, (size_t)c->limb[l].angles * sizeof *now);
+    }
+}
+
+/* The posture from which limbs of which others are kept let go, which is the present one where those bear it; in place. `slack`:
+ * the least; `moves`: whether it is another one */
+static int lift_off(climb_t *c, const int *contact, const int *kept, double wanted, const double (*touch)[12], int attempt,
+                    double *state, double *slack, int *which, int *moves) {
+    wish_t wish = {1, {support_of(c, kept)}, wanted, 0.0, 0.0, REST, {0}, 0, {{0}}};
+    if (!wish.support[0]) return NOT_BORNE;
+    placed_t placed[MOST_LIMBS];
+    double center[3], from[12 + MOST_LIMBS * MOST_ANGLES];
+    place_all(c, state, state + 12, placed, center);
+    *moves = 0;
+    *slack = slack_of(c, wish.support[0], center, wanted);
+    if (*slack >= wanted) return STANDS;
+    if (*slack == -INFINITY) return NOT_BORNE;
+    *moves = 1;
+    memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
+    if (attempt) begin_anew(c, contact, touch, attempt, state);
+    int how = posture(c, contact, &wish, state, state + 12, slack, which);
+    return how == STANDS ? follow(c, contact, &wish, from, from + 12, state, state + 12, slack, which) : how;
+}
+
+/* From there, the posture at which limbs hold again or are at rest in the air; in place */
+static int land_on(climb_t *c, const int *next, const int *kept, double wanted, const double (*touch)[12], int attempt,
+                   double *state, double *slack, int *which) {
+    wish_t wish = {1, {support_of(c, kept)}, wanted, 0.0, 0.0, REST, {0}, 0, {{0}}};
+    if (!wish.support[0]) return NOT_BORNE;
+    double own[12], from[12 + MOST_LIMBS * MOST_ANGLES];
+    memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
+    guess_body(c, next, touch, state);
+    for (int l = 0; l < c->limbs; l++) {
+        double *now = state + 12 + c->offset[l];
+        if (next[l] >= 0 && next[l] == kept[l]) continue;
+        if (next[l] >= 0) own_pose(state, c->foothold + 12 * next[l], own);
+        if (next[l] < 0 || !postures(c->limb + l, own, c->limb[l].rest, 1, now))
+            memcpy(now, c->limb[l].rest, (size_t)c->limb[l].angles * sizeof *now);
+    }
+    if (attempt) begin_anew(c, next, touch, attempt, state);
+    int how = posture(c, next, &wish, state, state + 12, slack, which);
+    return how == STANDS ? follow(c, kept, &wish, from, from + 12, state, state + 12, slack, which) : how;
+}
+
+#endif

@@ -1,0 +1,264 @@
+/* A posture of the whole robot on its contacts: least squares over the body's pose and the angles of the limbs that hold. */
+#ifndef WBC_POSTURE_H
+#define WBC_POSTURE_H
+
+#include "stand.h"
+
+#define MOST_VARIABLES (6 + MOST_LIMBS * 8)
+/* Iterations of Gauss and Newton between two looks at the equilibrium, and looks */
+#define SWEEPS 25
+#define LOOKS 10
+/* Moves below this end the sweeps: what contacts lack then is made up by their limbs [rad, m of the length] */
+#define NEAR_ENOUGH 2e-2
+/* Weights of contacts and of the equilibrium's bounds over those of angles from rest [1/m^2 of the robot's length] */
+#define HOLDS 1e4
+#define BEARS 1e3
+/* What a centre of mass is led beyond a bound, in weights */
+#define BEYOND 2e-3
+
+/* Pairs that are kept apart in one posture, and what they are led beyond [lengths of the robot] */
+#define AVOIDED 6
+#define ASIDE 2e-3
+
+/* What is wanted: the slack of each of some supports, and the body at a pose by weights of place and turn */
+typedef struct {
+    int supports;
+    support_t *support[2];
+    double slack, place, turn, rest, pose[12];
+    int avoided, avoid[AVOIDED][2]; /* pairs, as of link_clearance, that are kept apart */
+} wish_t;
+
+enum { STANDS, NOT_REACHED, NOT_BORNE, TOUCHES, BREAKS };
+
+/* All limbs at a configuration, and the centre of mass */
+static void place_all(const climb_t *c, const double *base, const double *angle, placed_t *placed, double *center) {
+    double at[3];
+    turn(base, c->trunk + 1, at);
+    for (int i = 0; i < 3; i++) center[i] = c->trunk[0] * (at[i] + base[9 + i]);
+    for (int l = 0; l < c->limbs; l++) {
+        place_limb(c->limb + l, base, angle + c->offset[l], placed + l);
+        for (int i = 0; i < 3; i++) center[i] += placed[l].moment[0][i];
+    }
+    for (int i = 0; i < 3; i++) center[i] /= c->mass;
+}
+
+/* H += w row row', g += w r row over the chosen columns */
+static void add_row(int n, double *H, double *g, const int *column, const double *value, int count, double r, double w) {
+    for (int i = 0; i < count; i++) {
+        const double by = w * value[i];
+        g[column[i]] -= by * r;
+        for (int k = 0; k < count; k++)
+            if (column[k] <= column[i]) H[column[i] * n + column[k]] += by * value[k];
+    }
+}
+
+/* Moves the body by a twist (linear, angular) */
+static void move_body(double *base, const double *twist) {
+    const double angle = sqrt(dot3(twist + 3, twist + 3));
+    for (int i = 0; i < 3; i++) base[9 + i] += twist[i];
+    if (angle < 1e-15) return;
+    double R[9], next[9];
+    const double u[3] = {twist[3] / angle, twist[4] / angle, twist[5] / angle};
+    axis_angle(u, cos(angle), sin(angle), R);
+    turns(R, base, next);
+    memcpy(base, next, sizeof next);
+}
+
+/* How a point of a piece moves along n with the angles of its limb, times a sign, added to a row */
+static void along_limb(const climb_t *c, const int *contact, int piece, const placed_t *placed, const double *point, const double *n,
+                       double sign, const int *start, double *value, int *column, int *count) {
+    const piece_t *p = c->piece + piece;
+    if (p->limb < 0 || contact[p->limb] < 0) return;
+    for (int s = 0; s <= p->step; s++, ++*count) {
+        const step_t *step = c->limb[p->limb].step + s;
+        double arm[3], by[3];
+        minus3(point, placed[p->limb].at[s], arm);
+        cross3(placed[p->limb].axis[s], arm, by);
+        value[*count] = sign * step->scale * dot3(n, step->shifts ? placed[p->limb].axis[s] : by);
+        column[*count] = start[p->limb] + step->angle;
+    }
+}
+
+/* The distance of a pair less what it keeps, and its row */
+static double avoiding(const climb_t *c, const int *contact, const int *pair, const double *base, const placed_t *placed,
+                       const int *start, double *value, int *column, int *count) {
+    const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
+    const int own = pair[1] < 0, other = own ? -1 - pair[1] : pair[1];
+    double a[12], b[12], arm[3], lever[3], far_point[3];
+    answer_t found;
+    place_piece(c, pair[0], base, placed, a);
+    if (own) place_piece(c, other, base, placed, b);
+    measure_shapes(&how, c->shape + pair[0], a, c->shape + (own ? other : c->pieces + other), own ? b : c->body + 12 * other, &found);
+    minus3(found.point, base + 9, arm);
+    cross3(arm, found.normal, lever);
+    for (int k = 0; k < 3; k++) {
+        value[k] = own ? 0.0 : -found.normal[k], value[3 + k] = own ? 0.0 : -lever[k];
+        column[k] = k, column[3 + k] = 3 + k;
+    }
+    along_limb(c, contact, pair[0], placed, found.point, found.normal, -1.0, start, value, column, count);
+    along3(found.point, found.gap, found.normal, far_point);
+    if (own) along_limb(c, contact, other, placed, far_point, found.normal, 1.0, start, value, column, count);
+    return found.gap - (own ? c->apart : c->clear);
+}
+
+/* One sweep of least squares; the largest move [m, rad] */
+static double sweep(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle, placed_t *placed) {
+    double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3], J[MOST_ANGLES][6], M[MOST_ANGLES][3];
+    double E[6][6], r[6], value[MOST_VARIABLES];
+    int start[MOST_LIMBS], column[MOST_VARIABLES], n = 6;
+    char out[MOST_VARIABLES] = {0};
+    place_all(c, base, angle, placed, center);
+    for (int l = 0; l < c->limbs; l++) {
+        start[l] = n;
+        if (contact[l] >= 0) n += c->limb[l].angles;
+    }
+    memset(H, 0, (size_t)(n * n) * sizeof *H), memset(g, 0, (size_t)n * sizeof *g);
+    for (int k = 0; k < n; k++) H[k * n + k] = 1e-6;
+    const double unit = 1.0 / (c->length * c->length);
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        const limb_t *limb = c->limb + l;
+        const int k0 = limb->angles;
+        contact_error(limb, placed[l].tip, c->foothold + 12 * contact[l], r, E);
+        limb_jacobian(limb, placed + l, J);
+        double arm[3];
+        minus3(placed[l].tip + 9, base + 9, arm);
+        for (int i = 0; i < limb->rows; i++) {
+            double lever[3];
+            cross3(arm, E[i], lever); /* E (w x arm) = w (arm x E) */
+            for (int k = 0; k < 3; k++) {
+                value[k] = E[i][k], value[3 + k] = lever[k] + E[i][3 + k];
+                column[k] = k, column[3 + k] = 3 + k;
+            }
+            for (int k = 0; k < k0; k++) {
+                double sum = 0.0;
+                for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
+                value[6 + k] = sum, column[6 + k] = start[l] + k;
+            }
+            add_row(n, H, g, column, value, 6 + k0, r[i], HOLDS * unit);
+        }
+        for (int k = 0; k < k0; k++) {
+            const double off = angle[c->offset[l] + k] - limb->rest[k];
+            H[(start[l] + k) * (n + 1)] += wish->rest, g[start[l] + k] -= wish->rest * off;
+        }
+    }
+    if (wish->place > 0.0)
+        for (int i = 0; i < 3; i++)
+            H[i * (n + 1)] += wish->place * unit, g[i] -= wish->place * unit * (base[9 + i] - wish->pose[9 + i]);
+    if (wish->turn > 0.0) {
+        double by[3];
+        turn_between(wish->pose, base, by);
+        for (int i = 0; i < 3; i++) H[(3 + i) * (n + 1)] += wish->turn, g[3 + i] -= wish->turn * by[i];
+    }
+    for (int s = 0; s < wish->supports; s++) {
+        const support_t *known = wish->support[s];
+        for (int b = 0; b < known->bounds; b++) {
+            const double *bound = known->bound[b], size = sqrt(dot3(bound + 1, bound + 1));
+            const double short_of = wish->slack + BEYOND - bound[0] - dot3(bound + 1, center);
+            if (!(short_of > -BEYOND) || !(size * c->length > 1e-6)) continue;
+            const double u[3] = {bound[1] / size, bound[2] / size, bound[3] / size};
+            double arm[3], lever[3];
+            minus3(center, base + 9, arm);
+            cross3(arm, u, lever);
+            int count = 6;
+            for (int k = 0; k < 3; k++) value[k] = u[k], value[3 + k] = lever[k], column[k] = k, column[3 + k] = 3 + k;
+            for (int l = 0; l < c->limbs; l++) {
+                if (contact[l] < 0) continue;
+                moment_jacobian(c->limb + l, placed + l, M);
+                for (int k = 0; k < c->limb[l].angles; k++, count++) value[count] = dot3(u, M[k]) / c->mass, column[count] = start[l] + k;
+            }
+            add_row(n, H, g, column, value, count, -short_of / size, BEARS * unit);
+        }
+    }
+    for (int k = 0; k < wish->avoided; k++) {
+        int count = 6;
+        const double far = avoiding(c, contact, wish->avoid[k], base, placed, start, value, column, &count);
+        if (far < ASIDE * c->length) add_row(n, H, g, column, value, count, far - ASIDE * c->length, BEARS * unit);
+    }
+    /* Angles at a limit against which they are pulled stay there */
+    for (int l = 0; l < c->limbs; l++)
+        for (int k = 0; contact[l] >= 0 && k < c->limb[l].angles; k++) {
+            const double now = angle[c->offset[l] + k], pull = g[start[l] + k];
+            if ((now <= c->limb[l].lower[k] && pull < 0.0) || (now >= c->limb[l].upper[k] && pull > 0.0)) out[start[l] + k] = 1;
+        }
+    for (int i = 0; i < n; i++)
+        if (out[i]) {
+            for (int k = 0; k < n; k++) H[(i > k ? i * n + k : k * n + i)] = 0.0;
+            H[i * (n + 1)] = 1.0, g[i] = 0.0;
+        }
+    if (!solve_positive(n, H, g)) return 0.0;
+    double longest = 0.0, moved = 0.0;
+    for (int k = 0; k < n; k++) longest = fmax(longest, k < 3 ? fabs(g[k]) / c->length : fabs(g[k]));
+    const double by = longest > 0.6 ? 0.6 / longest : 1.0;
+    for (int k = 0; k < n; k++) g[k] *= by;
+    for (int k = 0; k < 6; k++) moved = fmax(moved, k < 3 ? fabs(g[k]) / c->length : fabs(g[k]));
+    move_body(base, g);
+    for (int l = 0; l < c->limbs; l++)
+        for (int k = 0; contact[l] >= 0 && k < c->limb[l].angles; k++) {
+            double *now = angle + c->offset[l] + k, next = fmin(fmax(*now + g[start[l] + k], c->limb[l].lower[k]), c->limb[l].upper[k]);
+            moved = fmax(moved, fabs(next - *now)), *now = next;
+        }
+    return moved;
+}
+
+/* Whether a limb that holds fixes more rows than it has angles, so that the body has to give way */
+static int yields(const climb_t *c, const int *contact) {
+    for (int l = 0; l < c->limbs; l++)
+        if (contact[l] >= 0 && c->limb[l].angles < c->limb[l].rows) return 1;
+    return 0;
+}
+
+/* Brings all contacts to where they are wanted, by their limbs alone or by all at once; whether they are */
+static int tighten(const climb_t *c, const int *contact, double *base, double *angle) {
+    placed_t placed[MOST_LIMBS];
+    double r[6], E[6][6];
+    if (!yields(c, contact)) {
+        for (int l = 0; l < c->limbs; l++)
+            if (contact[l] >= 0 && !reach_from(c->limb + l, base, c->foothold + 12 * contact[l], angle + c->offset[l])) return 0;
+        return 1;
+    }
+    const wish_t none = {0};
+    for (int k = 0; k < ITERATIONS; k++) {
+        double most = 0.0;
+        sweep(c, contact, &none, base, angle, placed);
+        for (int l = 0; l < c->limbs; l++) {
+            if (contact[l] < 0) continue;
+            place_limb(c->limb + l, base, angle + c->offset[l], placed + l);
+            contact_error(c->limb + l, placed[l].tip, c->foothold + 12 * contact[l], r, E);
+            for (int i = 0; i < c->limb[l].rows; i++) most = fmax(most, fabs(r[i]));
+        }
+        if (most < 0.5 * EXACT * c->length) return 1;
+    }
+    return 0;
+}
+
+/* Finds a posture from the given one on, in place. `slack`: the least over the supports [1]; `which`: as of clearance */
+static int posture(climb_t *c, const int *contact, const wish_t *given, double *base, double *angle, double *slack, int *which) {
+    placed_t placed[MOST_LIMBS];
+    wish_t more = *given, *wish = &more;
+    double center[3];
+    int how = NOT_BORNE;
+    c->searches++;
+    *slack = INFINITY;
+    for (int look = 0; look < LOOKS; look++) {
+        for (int k = 0; k < SWEEPS; k++, c->sweeps++)
+            if (sweep(c, contact, wish, base, angle, placed) < NEAR_ENOUGH) break;
+        if (!tighten(c, contact, base, angle)) return NOT_REACHED;
+        place_all(c, base, angle, placed, center);
+        *slack = INFINITY;
+        for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
+        how = NOT_BORNE;
+        if (*slack == -INFINITY) return how;
+        if (*slack < wish->slack) continue;
+        if (link_clearance(c, contact, base, placed, which) >= 0.0) return STANDS;
+        how = TOUCHES;
+        int known = wish->avoided == AVOIDED;
+        for (int k = 0; k < wish->avoided && !known; k++) known = !memcmp(wish->avoid[k], which, sizeof wish->avoid[k]);
+        /* A pair that touches in spite of its row gets one more look */
+        if (known && look >= LOOKS / 2) return how;
+        if (!known) memcpy(wish->avoid[wish->avoided++], which, sizeof wish->avoid[0]);
+    }
+    return how;
+}
+
+#endif

@@ -1,0 +1,203 @@
+/* The robot, the footholds and the bodies in the world; which centres of mass contacts bear, as bounds that are kept; and
+ * whether links are clear. */
+#ifndef WBC_STAND_H
+#define WBC_STAND_H
+
+#include "balance.h"
+#include "measure.h"
+#include "reach.h"
+
+/* Bounds on the slack that are kept of a set of contacts */
+#define BOUNDS 12
+
+/* Wrenches of a contact: w = N x with A x + s t <= b, in weights */
+typedef struct {
+    int forces, rows;
+    const double *N, *A, *b, *s;
+} cone_t;
+
+/* Contacts that bear: slack <= bound[0] + bound[1..3] center, and -INFINITY where they never do */
+typedef struct {
+    int contact[MOST_LIMBS], bounds, never;
+    double bound[BOUNDS][4];
+} support_t;
+
+/* A shape of the robot on a step of a limb (-1, -1: on the body); `tip`: whether it is on the limb's last link */
+typedef struct {
+    int limb, step, shape, tip;
+    double place[12];
+} piece_t;
+
+/* wbc/climb/world.py has the same */
+typedef struct {
+    int limbs, footholds, pieces, bodies, pairs, weightless;
+    double mass, length, clear, apart, down[3], trunk[4];
+    const limb_t *limb;
+    const int *offset;        /* of a limb's angles among all */
+    const double *foothold;   /* poses, 12 each */
+    const int *cone_of;       /* limb by limb the cone at each foothold, -1: it may not hold there */
+    const cone_t *cone;
+    const int *on;            /* the body that each foothold is on, -1: none */
+    const int *hold;          /* footholds of one number here are one place, held at different turns */
+    const piece_t *piece;
+    const shape_t *shape;     /* of the pieces, then of the bodies */
+    const double *body;       /* poses of their centres, 12 each */
+    const int *pair;          /* of pieces, 2 each */
+    support_t **support;      /* hashed by contacts */
+    int places, supports, largest;
+    double *work;
+    long programs, searches, sweeps, measured; /* linear programs, postures, their sweeps and distances so far */
+} climb_t;
+
+static unsigned hashed(const int *contact, int limbs) {
+    unsigned h = 2166136261u;
+    for (int k = 0; k < limbs; k++) h = (h ^ (unsigned)(contact[k] + 1)) * 16777619u;
+    return h ^ (h >> 15);
+}
+
+static int place_of(support_t **table, int places, const int *contact, int limbs) {
+    unsigned at = hashed(contact, limbs) & (unsigned)(places - 1);
+    while (table[at] && memcmp(table[at]->contact, contact, (size_t)limbs * sizeof *contact)) at = (at + 1) & (unsigned)(places - 1);
+    return (int)at;
+}
+
+/* What is known of some contacts; 0: there is no memory */
+static support_t *support_of(climb_t *c, const int *contact) {
+    if (2 * c->supports >= c->places) {
+        const int places = c->places ? 2 * c->places : 256;
+        support_t **table = calloc((size_t)places, sizeof *table);
+        if (!table) return 0;
+        for (int k = 0; k < c->places; k++)
+            if (c->support[k]) table[place_of(table, places, c->support[k]->contact, c->limbs)] = c->support[k];
+        free(c->support);
+        c->support = table, c->places = places;
+    }
+    const int at = place_of(c->support, c->places, contact, c->limbs);
+    if (c->support[at]) return c->support[at];
+    support_t *made = calloc(1, sizeof *made);
+    if (!made) return 0;
+    memcpy(made->contact, contact, (size_t)c->limbs * sizeof *contact);
+    c->supports++;
+    return c->support[at] = made;
+}
+
+/* The slack [1] of wrenches of contacts at a centre of mass, by the program; fills `bound`, over the centre of mass. `poses`: of
+ * the contacts, limb by limb; 0: those of their places */
+static double slack_by_program(climb_t *c, const int *contact, const double *poses, const double *center, double *bound) {
+    int n = 0, m = 0, count = 0;
+    double middle[3] = {0};
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        const cone_t *cone = c->cone + c->cone_of[l * c->footholds + contact[l]];
+        n += cone->forces, m += cone->rows, count++;
+        const double *pose = poses ? poses + 12 * l : c->foothold + 12 * contact[l];
+        for (int i = 0; i < 3; i++) middle[i] += pose[9 + i];
+    }
+    memset(bound, 0, 4 * sizeof *bound);
+    if (n < 6) return bound[0] = -INFINITY;
+    const size_t needed = 6 * (size_t)n + (size_t)m * n + 2 * (size_t)m + balance_work(n, m);
+    if ((size_t)c->largest < needed) {
+        double *work = realloc(c->work, needed * sizeof *work);
+        if (!work) return bound[0] = -INFINITY;
+        c->work = work, c->largest = (int)needed;
+    }
+    double *G = c->work, *A = G + 6 * n, *b = A + (size_t)m * n, *s = b + m, r[6], all[7];
+    memset(G, 0, sizeof *G * (6 * (size_t)n + (size_t)m * n));
+    for (int i = 0; i < 3; i++) middle[i] /= count;
+    int column = 0, row = 0;
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        const cone_t *cone = c->cone + c->cone_of[l * c->footholds + contact[l]];
+        const double *pose = poses ? poses + 12 * l : c->foothold + 12 * contact[l];
+        double arm[3], force[3], moment[3], by[3];
+        minus3(pose + 9, middle, arm);
+        for (int k = 0; k < cone->forces; k++) {
+            const double own[6] = {cone->N[k], cone->N[cone->forces + k], cone->N[2 * cone->forces + k],
+                                   cone->N[3 * cone->forces + k], cone->N[4 * cone->forces + k], cone->N[5 * cone->forces + k]};
+            turn(pose, own, force), turn(pose, own + 3, moment);
+            cross3(arm, force, by);
+            for (int i = 0; i < 3; i++) {
+                G[i * n + column + k] = force[i];
+                G[(3 + i) * n + column + k] = (moment[i] + by[i]) / c->length;
+            }
+        }
+        for (int j = 0; j < cone->rows; j++, row++) {
+            memcpy(A + row * n + column, cone->A + j * cone->forces, (size_t)cone->forces * sizeof *A);
+            b[row] = cone->b[j], s[row] = cone->s[j];
+        }
+        column += cone->forces;
+    }
+    double arm[3], moment[3], by[3];
+    minus3(center, middle, arm);
+    cross3(arm, c->down, moment);
+    for (int i = 0; i < 3; i++) r[i] = -c->down[i], r[3 + i] = -moment[i] / c->length;
+    c->programs++;
+    const double slack = largest_slack(n, m, G, r, A, b, s, all, s + m);
+    cross3(c->down, all + 4, by);
+    bound[0] = all[0];
+    for (int i = 0; i < 3; i++) {
+        bound[1 + i] = -by[i] / c->length;
+        bound[0] += -all[1 + i] * c->down[i] - bound[1 + i] * middle[i];
+    }
+    if (slack == -INFINITY) bound[0] = slack;
+    return slack;
+}
+
+/* The slack where bounds leave at least `wanted`, else the least of them; INFINITY where nothing weighs and contacts hold */
+static double slack_of(climb_t *c, support_t *known, const double *center, double wanted) {
+    double least = INFINITY, bound[4];
+    if (known->never) return -INFINITY;
+    for (int k = 0; k < known->bounds; k++) least = fmin(least, known->bound[k][0] + dot3(known->bound[k] + 1, center));
+    if (least < wanted) return least;
+    if (c->weightless && known->bounds) return INFINITY;
+    const double slack = slack_by_program(c, known->contact, 0, center, bound);
+    if (slack == -INFINITY || (c->weightless && slack < 1e-9)) {
+        known->never = 1;
+        return -INFINITY;
+    }
+    const int at = known->bounds < BOUNDS ? known->bounds++ : (int)(c->programs % BOUNDS);
+    memcpy(known->bound[at], bound, sizeof bound);
+    if (!c->weightless) return slack;
+    known->bound[at][0] = INFINITY;
+    return INFINITY;
+}
+
+static void place_piece(const climb_t *c, int k, const double *base, const placed_t *placed, double *out) {
+    const piece_t *p = c->piece + k;
+    compose(p->limb < 0 ? base : placed[p->limb].pose[p->step], p->place, out);
+}
+
+/* Shortest distance less what is kept [m] of links from bodies and each other, up to a positive one; the last link of a limb that holds
+ * is near to what it holds. `which`: piece, and body or -1 - piece */
+static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
+    const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
+    double pose[c->pieces ? c->pieces : 1][12], least = INFINITY;
+    for (int k = 0; k < c->pieces; k++) place_piece(c, k, base, placed, pose[k]);
+    for (int k = 0; k < c->pieces + c->pairs; k++) {
+        const int own = k >= c->pieces;
+        const double keep = own ? c->apart : c->clear;
+        const int i = own ? c->pair[2 * (k - c->pieces)] : k;
+        const shape_t *a = c->shape + c->piece[i].shape;
+        for (int j = 0; j < (own ? 1 : c->bodies); j++) {
+            const int other = own ? c->pair[2 * (k - c->pieces) + 1] : j;
+            const shape_t *b = c->shape + (own ? c->piece[other].shape : c->pieces + j);
+            const double *at = own ? pose[other] : c->body + 12 * j;
+            if (b->size[5] < 1e6) {
+                double apart[3];
+                minus3(pose[i] + 9, at + 9, apart);
+                const double sum = a->size[5] + b->size[5] + keep;
+                if (dot3(apart, apart) > sum * sum) continue;
+            }
+            const int limb = c->piece[i].limb;
+            if (!own && c->piece[i].tip && contact[limb] >= 0 && c->on[contact[limb]] == j) continue;
+            answer_t found;
+            measure_shapes(&how, a, pose[i], b, at, &found);
+            c->measured++;
+            if (found.gap - keep < least) least = found.gap - keep, which[0] = i, which[1] = own ? -1 - other : j;
+            if (least < 0.0) return least;
+        }
+    }
+    return least;
+}
+
+#endif

@@ -1,0 +1,85 @@
+"""From where a robot stands to where it is to go: stances, then the motion through them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.climb.balance import Equilibrium
+from wbc.climb.climber import Climber
+from wbc.climb.goal import Goal
+from wbc.climb.motion import MotionOptions, MoveError, carry_out
+from wbc.climb.plan import ContactPlan
+from wbc.climb.scene import ClimbScene
+from wbc.climb.search import AT_START, StanceOptions, find_stances
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.errors import RangeError
+from wbc.validation import Array
+
+
+@dataclass(frozen=True)
+class ClimbOptions:
+    """How a plan is made.
+
+    Attributes:
+        stances, motion: of the search and of the motion.
+        again: how often stances are sought again without a move that has no motion, at most.
+    """
+
+    stances: StanceOptions = field(default_factory=StanceOptions)
+    motion: MotionOptions = field(default_factory=MotionOptions)
+    again: int = 30
+
+
+def plan_climb(
+    climber: Climber, scene: ClimbScene, start: Stance | Array, goal: Goal, options: ClimbOptions | None = None
+) -> ContactPlan:
+    """The motion of a climber to a goal. A move for which no motion is found is left out, and stances are sought again.
+
+    Args:
+        start: a stance, or a configuration ``(nq)``: then each limb at a foothold holds it.
+
+    Raises:
+        NoStancesError: no stances lead there. MoveError: motions were found for none of so many ways. ShapeError,
+            RangeError: start, goal or options that do not fit.
+    """
+    given = ClimbOptions() if options is None else validation.instance("options", options, ClimbOptions, "ClimbOptions")
+    first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
+    forbidden, balance = set(given.stances.forbidden), Equilibrium(climber, scene)
+    for tries in range(given.again + 1):
+        stances = find_stances(climber, scene, first, goal, replace(given.stances, forbidden=frozenset(forbidden)))
+        try:
+            return carry_out(climber, scene, stances, given.motion, balance)
+        except MoveError as error:
+            contacts = [tuple(stance.contacts) for stance in stances.stances]
+            # A body that cannot shift is kept from the move that it shifts for
+            ahead = next(
+                (row for row in range(error.move, len(contacts) - 1) if contacts[row] != contacts[row + 1]), None
+            )
+            if ahead is None or tries == given.again:
+                raise
+            forbidden.add((contacts[ahead], contacts[ahead + 1]))
+    raise AssertionError
+
+
+def stance_at(climber: Climber, scene: ClimbScene, q: Any) -> Stance:
+    """The stance of a configuration: every limb whose contact is at a foothold holds it.
+
+    Raises:
+        RangeError: no limb is at a foothold; how far the nearest is. What ``robot.configuration`` raises.
+    """
+    at = climber.robot.configuration("start", q)
+    contacts, least = [], np.inf
+    for limb, one in enumerate(climber.limbs):
+        away = np.linalg.norm(scene.positions - climber.contact_pose(at, limb).translation, axis=1)
+        away[[bool(hold.limbs) and one.name not in hold.limbs for hold in scene.footholds]] = np.inf
+        contacts.append(int(np.argmin(away)) if away.min() <= AT_START else FREE_LIMB)
+        least = min(least, float(away.min()))
+    if max(contacts) < 0:
+        raise RangeError(
+            "start", least, f"no limb is within {AT_START:g} m of a foothold; the nearest is {least:.3g} m away"
+        )
+    return Stance(tuple(contacts), at)

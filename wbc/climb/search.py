@@ -1,0 +1,483 @@
+"""Free gait by search: which limb goes to which foothold next, with the body's pose found for every stance.
+
+A node is a stance: contacts, and a posture in which they hold. From it every limb may go to every foothold that the
+robot could have at once with its other contacts; a move is looked at when it is the most promising one left, by
+
+    steps so far + WEIGHT (sum over limbs of D(foothold) / stride) + DEAR stretch
+
+with D the length of the shortest way over footholds from there to the goal, and the stretch the sum of squared
+distances of contacts from where they are at rest relative to the body. Nothing is left out for good: where no plan is
+found and no limit was hit, every stance that moves of the kinds here come to was seen.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import time
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.climb.climber import Climber
+from wbc.climb.foothold_graph import ways_over_footholds
+from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
+from wbc.climb.reach import LIMIT_MARGIN
+from wbc.climb.scene import ClimbScene
+from wbc.climb.stance import FREE_LIMB, Stance, StancePath
+from wbc.climb.world import ClimbWorld, PostureOutcome
+from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.multibody import pin
+from wbc.symbolic.joint_steps import place
+from wbc.validation import Array
+
+#: Of a limb's length: how far a step goes, as the search guesses
+STRIDE = 0.5
+#: How much dearer the way that is left is than the steps so far
+WEIGHT = 2.5
+#: Squared distance of a foothold from where a limb is at rest from which on it is tried last [squared lengths of limb]
+NEAR = 1.0
+#: What a stretch of 1 costs [steps]
+DEAR = 6.0
+#: Other beginnings from which postures of refused moves are sought, once nothing else is left
+ATTEMPTS = 3
+#: What a limb in the air costs [steps]
+IN_THE_AIR = 2.0
+#: How far a limb may be from its foothold at the start [m]
+AT_START = 1e-4
+#: Weight by which the body is drawn to the goal: beside those of contacts a hundredth, of rest ten thousand times
+DRAWN = 1e2
+
+
+class NoStancesError(WbcError):
+    """No way over stances was found; ``value`` and the text say why in numbers.
+
+    Attributes:
+        cause: ``"start"``: the first stance is none; ``"goal"``: no stance can be at the goal; ``"reach"``: every
+            stance that can be reached was seen; ``"limit"``: a limit of moves or time ended the search.
+        nearest: distance from the goal of the nearest stance [m].
+    """
+
+    cause: str = ""
+    nearest: float = np.inf
+
+
+def no_stances(field: str, value: Any, reason: str, cause: str, nearest: float = np.inf) -> NoStancesError:
+    """The error with its attributes."""
+    error = NoStancesError(field, value, reason)
+    error.cause, error.nearest = cause, nearest
+    return error
+
+
+@dataclass(frozen=True)
+class StanceOptions:
+    """How stances are sought.
+
+    Attributes:
+        margin: least slack of equilibrium of the limbs that stay, in shares of the weight, at both ends of a move.
+        limits: distance from limits of joints [m, rad].
+        clearance: distance of links from bodies [m]. apart: of links from each other [m].
+        moves: how many moves are looked at, at most.
+        seconds: time of the search, at most [s]; a search that it ends is not the same on another machine.
+        gait: sets of limbs, by name, that go at once where that can be.
+        forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
+    """
+
+    margin: float = 0.02
+    limits: float = LIMIT_MARGIN
+    clearance: float = 0.01
+    apart: float = 0.0
+    moves: int = 20000
+    seconds: float = np.inf
+    gait: tuple[tuple[str, ...], ...] = ()
+    forbidden: frozenset[tuple[tuple[int, ...], tuple[int, ...]]] = frozenset()
+
+    def __post_init__(self) -> None:
+        for name in ("margin", "limits", "clearance", "apart"):
+            validation.scalar(f"StanceOptions.{name}", getattr(self, name), low=0.0)
+        validation.integer("StanceOptions.moves", self.moves, 1)
+        if not self.seconds > 0.0:
+            raise RangeError("StanceOptions.seconds", self.seconds, "expected a time above 0 s")
+
+
+#: What :meth:`ClimbWorld.lift` says
+_Lift = tuple[PostureOutcome, Array, float, NDArray[np.int32], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class _Node:
+    """A stance that was found, and the move that led to it; lifts that were looked at, by the contacts that stay, with
+    the attempt; and limbs that cannot be lifted, as far as was looked.
+    """
+
+    contacts: NDArray[np.int32]
+    state: Array
+    steps: int
+    slack: float
+    before: _Node | None = None
+    lift: Array | None = None
+    lifts: dict[bytes, tuple[tuple[PostureOutcome, Array, float, NDArray[np.int32], bool], int]] = field(
+        default_factory=dict
+    )
+    stuck: set[int] = field(default_factory=set)
+
+
+def find_stances(
+    climber: Climber, scene: ClimbScene, start: Stance, goal: Goal, options: StanceOptions | None = None
+) -> StancePath:
+    """Stances from the start to the goal, each of which differs from the one before by the place of the body, or by
+    the contacts of some limbs too. In both stances of a move the limbs that keep their foothold bear the robot with the
+    margin asked for; every stance keeps joint limits and clearances, and limbs that hold reach along the body's
+    straight way from one to the next.
+
+    Raises:
+        NoStancesError: there is no such way, or none was found within the limits; why, in numbers. ShapeError,
+            RangeError, UnknownNameError: start, goal or options that do not fit climber and scene.
+    """
+    given = StanceOptions() if options is None else validation.instance("options", options, StanceOptions, "options")
+    places: Sequence[Any] = goal.places if isinstance(goal, Route) else [goal]
+    stances, margins = [start], [np.inf]
+    for target in places:
+        search = StanceSearch(climber, scene, stances[-1], target, given)
+        found = search.run()
+        stances += list(found.stances[1:])
+        margins[0] = min(margins[0], float(found.margins[0]))
+        margins += list(found.margins[1:])
+    if len(stances) == 1:
+        stances, margins = stances * 2, margins * 2
+    return StancePath(tuple(stances), np.array(margins))
+
+
+class StanceSearch:
+    """One search.
+
+    Attributes:
+        seen: how many stances there are so far. tried: how many moves were looked at, by outcome.
+    """
+
+    def __init__(
+        self, climber: Climber, scene: ClimbScene, start: Stance, goal: BodyPlace | LimbAt, options: StanceOptions
+    ) -> None:
+        if len(start.contacts) != len(climber.limbs):
+            raise ShapeError("start.contacts", start.contacts, f"expected {len(climber.limbs)}, one for each limb")
+        for row in start.contacts:
+            if not FREE_LIMB <= row < len(scene.footholds):
+                raise RangeError("start.contacts", row, f"expected rows from 0 to {len(scene.footholds) - 1}, or -1")
+        self.climber, self.scene, self.options, self.goal = climber, scene, options, goal
+        self.world = ClimbWorld(climber, scene, start, options.limits, options.clearance, options.apart)
+        q = climber.robot.configuration("start.q", start.q)
+        self.given = start
+        self.first = _Node(self.world.contacts(self.world.start), self.world.state_of(q), 0, np.inf)
+        self.tried: Counter[PostureOutcome] = Counter()
+        self.seen = 0
+        self._names = [limb.name for limb in climber.limbs]
+        #: Contacts are this far from the body's origin at rest [m]
+        self._spread = float(np.linalg.norm(self.world.touch[:, 9:], axis=1).max())
+        self._far, self._goal_body, self._limb = self._distances()
+        self._sets = [tuple(climber.row(name) for name in names) for names in options.gait]
+
+    def run(self) -> StancePath:
+        """The way found, see :func:`find_stances`."""
+        first = self.first = self._checked_start()
+        known: dict[bytes, _Node] = {first.contacts.tobytes(): first}
+        count, until = itertools.count(), time.monotonic() + self.options.seconds
+        queue: list[tuple[float, int, _Node, Iterator[tuple[float, NDArray[np.int32]]], NDArray[np.int32]]] = []
+        again: deque[tuple[_Node, NDArray[np.int32], int]] = deque()
+        nearest, best = self._distance(first), first
+
+        def push(node: _Node, moves: Iterator[tuple[float, NDArray[np.int32]]]) -> None:
+            for cost, after in moves:
+                heapq.heappush(queue, (cost, next(count), node, moves, after))
+                return
+
+        if path := self._at_goal(first):
+            return path
+        self.seen = len(known)
+        if self._cannot_be():
+            raise self._refusal("goal", nearest, best)
+        push(first, self._moves(first))
+        while queue or again:
+            if queue:
+                _, _, node, moves, after = heapq.heappop(queue)
+                attempt = 0
+                push(node, moves)
+            else:
+                # What was refused is looked at from other beginnings, once all else was
+                node, after, attempt = again.popleft()
+            if sum(self.tried.values()) >= self.options.moves or time.monotonic() > until:
+                self.seen = len(known)
+                raise self._refusal("limit", nearest, best)
+            if after.tobytes() in known or self._forbidden(node.contacts, after):
+                continue
+            stuck = len(node.stuck)
+            found = self._moved(node, after, attempt)
+            if len(node.stuck) < stuck:
+                push(node, self._moves(node))
+            if found is None:
+                if attempt < ATTEMPTS:
+                    again.append((node, after, attempt + 1))
+                continue
+            known[after.tobytes()] = found
+            if (away := self._distance(found)) < nearest:
+                nearest, best = away, found
+            if path := self._at_goal(found):
+                return path
+            push(found, self._moves(found))
+        self.seen = len(known)
+        raise self._refusal("reach", nearest, best)
+
+    def _moved(self, node: _Node, after: NDArray[np.int32], attempt: int) -> _Node | None:
+        """The stance after a move, if there is one."""
+        kept = np.where(node.contacts == after, after, FREE_LIMB).astype(np.int32)
+        key, margin = kept.tobytes(), self.options.margin
+        known = node.lifts.get(key)
+        if known is None or (known[1] < attempt and known[0][0] != PostureOutcome.STANDS):
+            lifted = self.world.lift(node.contacts, kept, margin, node.state, attempt)
+            node.lifts[key] = lifted, attempt
+            self.tried[lifted[0]] += lifted[0] != PostureOutcome.STANDS
+        how, lift, before, _, moves = node.lifts[key][0]
+        if how != PostureOutcome.STANDS:
+            moved = np.flatnonzero(node.contacts != after)
+            node.stuck.update(moved.tolist() if len(moved) == 1 else [])
+            return None
+        node.stuck.difference_update(np.flatnonzero(node.contacts != after).tolist())
+        how, land, slack, _ = self.world.land(after, kept, margin, lift, attempt)
+        self.tried[how] += 1
+        if how != PostureOutcome.STANDS:
+            return None
+        return _Node(after, land, node.steps + 1, min(before, slack), node, lift if moves else None)
+
+    def _moves(self, node: _Node) -> Iterator[tuple[float, NDArray[np.int32]]]:
+        """Moves from a stance, with what they promise to cost, the least first; far ones come last."""
+        held = np.array([self._far[limb, at] if at >= 0 else np.nan for limb, at in enumerate(node.contacts)])
+        aloft = float(np.nanmean(held)) + IN_THE_AIR if np.isfinite(held).any() else IN_THE_AIR
+        each = np.where(np.isnan(held), aloft, held)
+        done, total = node.steps + 1.0, float(each.sum())
+        out, stretch = self.world.candidates(node.contacts, node.state, 0.0, NEAR)
+        left = total - each[out[:, 0]] + self._far[out[:, 0], out[:, 1]]
+        cost = done + WEIGHT * (left + self._body_left(stretch[:, 1:])) + DEAR * stretch[:, 0]
+
+        def ordered(out: NDArray[np.int32], cost: Array) -> Iterator[tuple[float, NDArray[np.int32]]]:
+            for k in np.argsort(cost, kind="stable").tolist():
+                limb = int(out[k, 0])
+                if limb not in node.stuck:
+                    after = node.contacts.copy()
+                    after[limb] = out[k, 1]
+                    yield float(cost[k]), after
+
+        def singles() -> Iterator[tuple[float, NDArray[np.int32]]]:
+            yield from ordered(out, cost)
+            later, far = self.world.candidates(node.contacts, node.state, NEAR, np.inf, guesses=False)
+            left = total - each[later[:, 0]] + self._far[later[:, 0], later[:, 1]] + self._body_left(far[:, 1:])
+            worth = done + WEIGHT * left + DEAR * far[:, 0]
+            yield from ordered(later, np.maximum(worth, cost.max(initial=done)))
+
+        free = np.flatnonzero(node.contacts >= 0)
+        letting_go = np.column_stack([free, np.full(len(free), FREE_LIMB)]).astype(np.int32)
+        here = self._body_left(node.state[None, 9:12])
+        worth = done + WEIGHT * (total - each[free] + aloft + here)
+        worth = worth + DEAR * self.world.stretch(node.contacts, node.state)
+        sets = self._set_moves(node, out, cost, left, total)
+        return heapq.merge(singles(), ordered(letting_go, worth), iter(sets), key=lambda entry: entry[0])
+
+    def _set_moves(
+        self, node: _Node, out: NDArray[np.int32], cost: Array, left: Array, total: float
+    ) -> list[tuple[float, NDArray[np.int32]]]:
+        """Moves of the gait's sets: each limb of a set to its most promising foothold."""
+        found = []
+        for limbs in self._sets:
+            after, worth = node.contacts.copy(), node.steps + 1.0 + WEIGHT * total
+            for limb in limbs:
+                rows = np.flatnonzero(out[:, 0] == limb)
+                taken = {self._hold(at) for at in after if at >= 0}
+                for row in rows[np.argsort(cost[rows], kind="stable")]:
+                    if self._hold(out[row, 1]) not in taken:
+                        after[limb] = out[row, 1]
+                        worth += WEIGHT * (left[row] - total)
+                        break
+            if (after != node.contacts).sum() > 1:
+                found.append((worth, after))
+        return sorted(found, key=lambda entry: entry[0])
+
+    def _body_left(self, places: Array) -> Array:
+        """Steps that bodies are away from the goal, where that is nearer than contacts are from the body ``(n)``."""
+        if self._goal_body is None:
+            return np.zeros(len(places))
+        away = np.minimum(np.linalg.norm(places - self._goal_body[9:], axis=1), self._spread)
+        return np.asarray(len(self._names) * away / (STRIDE * self.world.length))
+
+    def _hold(self, at: int) -> int:
+        return int(self.world.hold[at])
+
+    def _rows(self, contacts: NDArray[np.int32]) -> tuple[int, ...]:
+        """Rows of footholds of contacts."""
+        return tuple(self._hold(at) if at >= 0 else FREE_LIMB for at in contacts)
+
+    def _forbidden(self, contacts: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
+        forbidden = self.options.forbidden
+        return bool(forbidden) and (self._rows(contacts), self._rows(after)) in forbidden
+
+    def _distances(self) -> tuple[Array, Array | None, int]:
+        """Steps that each limb is away from the goal at each place ``(limbs, places)``; the body's pose at the goal,
+        and the limb that is to hold.
+        """
+        world, goal, scene = self.world, self.goal, self.scene
+        body, limb = None, -1
+        if isinstance(goal, BodyPlace):
+            ahead = np.linalg.norm(scene.positions - goal.position, axis=1)
+            reach = self._spread + world.length
+            seeds = np.where(ahead <= max(reach, float(ahead.min())), np.maximum(ahead - self._spread, 0.0), np.inf)
+            rotation = np.eye(3) if goal.rotation is None else goal.rotation
+            body, aside = place(pin.SE3(rotation, goal.position)), 0.0
+        else:
+            validation.instance("goal", goal, LimbAt, "a BodyPlace, LimbAt or Route")
+            limb = self.climber.row(goal.limb)
+            row = scene.row(goal.foothold)
+            allowed = scene.footholds[row].limbs
+            if allowed and goal.limb not in allowed:
+                raise RangeError(
+                    "goal.limb", goal.limb, f"foothold {goal.foothold} is held by {', '.join(allowed)} only"
+                )
+            seeds, aside = np.full(len(scene.footholds), np.inf), 2.0 * self._spread
+            seeds[row] = 0.0
+        ways = ways_over_footholds(scene.positions, seeds, world.length)[world.hold]
+        far = np.tile(ways / (STRIDE * world.length), (len(self._names), 1))
+        if limb >= 0:
+            others = np.arange(len(far)) != limb
+            far[others] = np.maximum(far[others] - aside / (STRIDE * world.length), 0.0)
+        return far, body, limb
+
+    def _distance(self, node: _Node) -> float:
+        """From the goal, of the body or the limb [m]."""
+        if self._goal_body is not None:
+            return float(np.linalg.norm(node.state[9:12] - self._goal_body[9:]))
+        at = node.contacts[self._limb]
+        return float(self._far[self._limb, at] * STRIDE * self.world.length) if at >= 0 else np.inf
+
+    def _checked_start(self) -> _Node:
+        """The first stance, if it is one."""
+        world, first = self.world, self.first
+        numbers, nearest = world.look(first.contacts, first.state)
+        for limb, off in enumerate(numbers[2:]):
+            if off > AT_START:
+                at = self.scene.footholds[self._hold(first.contacts[limb])].id
+                reason = f"{self._names[limb]} is {off:.3g} m away from foothold {at}, that it holds"
+                raise no_stances("start.q", off, reason, "start")
+        for limb, (low, high) in enumerate(self.climber.limits):
+            angles = first.state[12 + world.offsets[limb] : 12 + world.offsets[limb + 1]]
+            beyond = np.maximum(low - angles, angles - high)
+            if (beyond > AT_START).any():
+                k = int(np.argmax(beyond))
+                reason = f"angle {k + 1} of {self._names[limb]} is {beyond[k]:.3g} beyond its limit"
+                raise no_stances("start.q", float(angles[k]), reason, "start")
+        if not numbers[0] >= 0.0:
+            raise no_stances("start", float(numbers[0]), self._why_not_borne(first, numbers[0]), "start")
+        if numbers[1] < 0.0:
+            reason = f"{nearest} are {-numbers[1]:.3g} m nearer to each other than they may be"
+            raise no_stances("start.q", float(numbers[1]), reason, "start")
+        return _Node(first.contacts, first.state, 0, float(numbers[0]))
+
+    def _why_not_borne(self, node: _Node, slack: float) -> str:
+        held = [name for name, at in zip(self._names, node.contacts, strict=True) if at >= 0]
+        on = " and ".join(held) or "no limb"
+        if slack == -np.inf:
+            return f"it cannot stand on {on}: their contacts bear no wrench of every direction"
+        short = -slack * self.world.weight
+        return f"it cannot stand on {on}: the contacts lack {-slack:.3g} of the weight, {short:.3g} N each"
+
+    def _at_goal(self, node: _Node) -> StancePath | None:
+        """The whole way, if a posture of this stance is at the goal."""
+        if self._goal_body is None:
+            return self._path(node, None) if self._hold_of(node) else None
+        goal = self.goal
+        assert isinstance(goal, BodyPlace)
+        near = self._distance(node)
+        if near > 0.5 * self.world.length + goal.within:
+            return None
+        turned = goal.rotation is not None
+        if near <= goal.within and not turned:
+            return self._path(node, None)
+        body = self._goal_body if turned else np.concatenate([node.state[:9], self._goal_body[9:]])
+        how, state, _, _ = self.world.stand(
+            node.contacts, node.contacts, self.options.margin, node.state, body=body,
+            weights=(DRAWN, DRAWN if turned else 0.0),
+        )  # fmt: skip
+        off = np.linalg.norm(state[9:12] - body[9:])
+        turn = np.linalg.norm(pin.log3(body[:9].reshape(3, 3).T @ state[:9].reshape(3, 3))) if turned else 0.0
+        if how != PostureOutcome.STANDS or off > goal.within or turn > goal.within:
+            return None
+        return self._path(node, state)
+
+    def _hold_of(self, node: _Node) -> bool:
+        at = node.contacts[self._limb]
+        assert isinstance(self.goal, LimbAt)
+        return bool(at >= 0 and self._hold(at) == self.scene.row(self.goal.foothold))
+
+    def _path(self, node: _Node, last: Array | None) -> StancePath:
+        """From the first stance to this one; body shifts are stances of the same contacts."""
+        chain = [node]
+        while chain[-1].before is not None:
+            chain.append(chain[-1].before)
+        rows: list[tuple[NDArray[np.int32], Array]] = []
+        for one in reversed(chain):
+            if one.lift is not None and one.before is not None:
+                rows.append((one.before.contacts, one.lift))
+            rows.append((one.contacts, one.state))
+        if last is not None:
+            rows.append((node.contacts, last))
+        margins = [self.first.slack]
+        for (contacts, state), (after, later) in itertools.pairwise(rows):
+            kept = np.where(contacts == after, after, FREE_LIMB).tolist()
+            margins.append(min(self.world.slack(kept, self.world.center(at))[0] for at in (state, later)))
+        stances = [Stance(self._rows(contacts), self.world.q_of(state)) for contacts, state in rows]
+        return StancePath((self.given, *stances[1:]), np.array(margins))
+
+    def _refusal(self, cause: str, nearest: float, best: _Node) -> NoStancesError:
+        tried = sum(self.tried.values())
+        words = {
+            PostureOutcome.NOT_REACHED: "out of reach",
+            PostureOutcome.NOT_BORNE: "not borne",
+            PostureOutcome.TOUCHES: "links touch",
+            PostureOutcome.BREAKS: "a limb that holds comes to its limits on the way",
+        }
+        parts = ", ".join(f"{self.tried[how]} {text}" for how, text in words.items() if self.tried[how])
+        saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
+        which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"
+        goal = self.goal.position.round(3).tolist() if isinstance(self.goal, BodyPlace) else self.goal
+        if cause == "limit":
+            reason = f"a limit of moves or time ended the search, which proves nothing: {saw}; {which}"
+            return no_stances("goal", goal, reason, cause, nearest)
+        if lacking := "; ".join(self._lacking().values()):
+            reason = f"no stance there is within reach: {lacking}; {saw}; {which}"
+            return no_stances("goal", goal, reason, "goal", nearest)
+        return no_stances("goal", goal, f"every stance that can be come to was seen: {saw}; {which}", cause, nearest)
+
+    def _told(self, node: _Node) -> str:
+        held = zip(self._names, self._rows(node.contacts), strict=True)
+        return ", ".join(f"{name} at {self.scene.footholds[row].id if row >= 0 else 'none'}" for name, row in held)
+
+    def _lacking(self) -> dict[int, str]:
+        """Limbs that have no foothold within their length of a body at the goal, and how far it is."""
+        out: dict[int, str] = {}
+        if not isinstance(self.goal, BodyPlace):
+            return out
+        for limb, name in enumerate(self._names):
+            row = self.world.limbs.numbers[limb]
+            reach = float(row.length + np.linalg.norm(self.world.limbs.root(limb)))
+            allowed = self.world.cone_of[limb] >= 0
+            near = np.linalg.norm(self.world.places[allowed, 9:] - self.goal.position, axis=1)
+            least = float(near.min()) if len(near) else np.inf
+            if least > reach + self.goal.within:
+                out[limb] = f"{name} reaches {reach:.3g} m and its nearest foothold is {least:.3g} m away"
+        return out
+
+    def _cannot_be(self) -> bool:
+        """Whether the limbs that have a foothold near the goal bear no wrench of every direction."""
+        able = [limb for limb in range(len(self._names)) if limb not in self._lacking()]
+        forces = [max(self.world.forces(limb), default=0) for limb in able]
+        return sum(forces) < 6

@@ -1,0 +1,219 @@
+"""When a path is where: least time under limits of joints and of the body's speed and turn rate, from rest to rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbc import validation
+from wbc.climb.climber import Climber
+from wbc.climb.move_path import MovePath
+from wbc.errors import InfeasibleError, RangeError
+from wbc.validation import Array
+
+#: Longest time between knots of a motion [s]
+KNOTS = 0.02
+#: Intervals of the path on which least time is sought, finer towards its ends, where it is slow
+INTERVALS = 64
+#: How often a law is slowed by what its cubics need beyond the limits at most: each time is exact for the one before
+SLOWED = 3
+
+
+@dataclass(frozen=True)
+class MotionSpeeds:
+    """How fast a climber goes.
+
+    Attributes:
+        speed: largest speed of the body's origin [m/s].
+        turn_rate: largest turn rate of the body [rad/s].
+        share: of the joints' velocity limits that is used, the rest is left to feedback [1].
+        acceleration_share: of their acceleration limits [1].
+        dwell: how long it rests in every stance [s].
+
+    Raises:
+        RangeError, NotFiniteError: a number that is none of these.
+    """
+
+    speed: float = np.inf
+    turn_rate: float = np.inf
+    share: float = 0.9
+    acceleration_share: float = 0.7
+    dwell: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "turn_rate"):
+            if getattr(self, name) != np.inf:
+                value = validation.scalar(f"MotionSpeeds.{name}", getattr(self, name), low=0.0, open_low=True)
+                object.__setattr__(self, name, value)
+        for name in ("share", "acceleration_share"):
+            field = f"MotionSpeeds.{name}"
+            object.__setattr__(
+                self, name, validation.scalar(field, getattr(self, name), low=0.0, high=1.0, open_low=True)
+            )
+        object.__setattr__(self, "dwell", validation.scalar("MotionSpeeds.dwell", self.dwell, low=0.0, unit="s"))
+
+
+@dataclass(frozen=True, eq=False)
+class TimedMove:
+    """Knots of a motion from rest to rest.
+
+    Attributes:
+        times: from 0 on ``(n)`` [s], at most 20 ms apart. q: ``(n, nq)``. v: ``(n, nv)``.
+    """
+
+    times: Array
+    q: Array
+    v: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PathTiming:
+    """The least-time law of the paths of one climber.
+
+    Attributes:
+        climber: whose joints' limits count. speeds: as given.
+
+    Raises:
+        RangeError: a joint of a limb has no limit of velocity or acceleration.
+    """
+
+    climber: Climber
+    speeds: MotionSpeeds
+
+    def __post_init__(self) -> None:
+        limits = self.climber.robot.limits
+        for limb in range(len(self.climber.limbs)):
+            for dof in self.climber.joints(limb):
+                for what, value in (("acceleration", limits.acceleration[dof]), ("velocity", limits.velocity[dof])):
+                    if not np.isfinite(value):
+                        name = f"limit of {what} of {self.climber.robot.dof_names[dof]}"
+                        raise RangeError(name, float(value), "expected a finite one, or least time has no bound")
+
+    def timed(self, path: MovePath) -> TimedMove:
+        """Knots of the fastest motion along a path.
+
+        Raises:
+            InfeasibleError: nothing moves.
+        """
+        s = (1.0 - np.cos(np.linspace(0.0, np.pi, INTERVALS + 1))) / 2.0
+        speed = self._speeds(path, s)
+        span = 2.0 * np.diff(s) / np.maximum(speed[1:] + speed[:-1], 1e-12)
+        # Between points of the grid the path acceleration is constant; long intervals get knots inside
+        parts = [max(1, int(np.ceil(x / KNOTS))) for x in span]
+        times, where, rate = [np.zeros(1)], [np.zeros(1)], [np.zeros(1)]
+        at = 0.0
+        for k, count in enumerate(parts):
+            t = span[k] * np.arange(1, count + 1) / count
+            gain = (speed[k + 1] - speed[k]) / span[k]
+            times.append(at + t)
+            where.append(s[k] + t * (speed[k] + 0.5 * gain * t))
+            rate.append(speed[k] + gain * t)
+            at += span[k]
+        t, x, sd = np.concatenate(times), np.clip(np.concatenate(where), 0.0, 1.0), np.concatenate(rate)
+        x[-1], sd[-1] = 1.0, 0.0
+        coordinates, slopes = path.at(x), path.at(x, 1)
+        rates = slopes * sd[:, None]
+        for _ in range(SLOWED):
+            used = self._used(t, coordinates, rates)
+            if used <= 1.0 + 1e-9:
+                break
+            t, rates = t * used, rates / used
+        gaps = np.ceil(np.diff(t) / KNOTS - 1e-6)
+        if gaps.max() > 1.0:
+            t, coordinates, rates = _denser(t, coordinates, rates, gaps.astype(int))
+        q = path.configurations(coordinates)
+        q[0], q[-1] = path.q[0], path.q[-1]
+        return TimedMove(t, q, path.velocities(coordinates, rates))
+
+    def _speeds(self, path: MovePath, s: Array) -> Array:
+        """ds/dt at the points of a grid."""
+        first, second = path.at(s, 1), path.at(s, 2)
+        velocity, acceleration = self._limits
+        moves = np.isfinite(acceleration) & (np.abs(first).max(axis=0) > 0.0)
+        if not moves.any():
+            raise InfeasibleError("path", 0.0, "no joint moves from this stance to the next one")
+        a, b = first[:, moves] / acceleration[moves], second[:, moves] / acceleration[moves]
+        return fastest(s, a, b, self._squared(first, velocity))
+
+    def _squared(self, slopes: Array, velocity: Array) -> Array:
+        """Bounds of (ds/dt)^2 of joints' velocities and of the body's speed and turn rate."""
+        body = np.stack([np.linalg.norm(slopes[:, part], axis=1) for part in (slice(3), slice(3, 6))], axis=1)
+        used = np.abs(np.hstack([slopes[:, 6:], body])) / [*velocity[6:], self.speeds.speed, self.speeds.turn_rate]
+        return np.asarray(1.0 / np.maximum(used.max(axis=1), 1e-9) ** 2)
+
+    @property
+    def _limits(self) -> tuple[Array, Array]:
+        limits = self.climber.robot.limits
+        return self.speeds.share * limits.velocity, self.speeds.acceleration_share * limits.acceleration
+
+    def _used(self, times: Array, coordinates: Array, rates: Array) -> float:
+        """By which factor the cubics between knots have to be slowed to keep all limits."""
+        velocity, acceleration = self._limits
+        h, step = np.diff(times)[:, None], np.diff(coordinates, axis=0)
+        a, b = rates[:-1], rates[1:]
+        speeds = np.concatenate([rates, 3.0 * step / h - a - b])
+        pulls = np.concatenate([(6.0 * step / h - 4.0 * a - 2.0 * b) / h, (-6.0 * step / h + 2.0 * a + 4.0 * b) / h])
+        body = [np.linalg.norm(speeds[:, part], axis=1).max() for part in (slice(3), slice(3, 6))]
+        ratio = max(
+            float((np.abs(speeds[:, 6:]) / velocity[6:]).max()),
+            float(np.sqrt((np.abs(pulls[:, 6:]) / acceleration[6:]).max())),
+            float(body[0] / self.speeds.speed),
+            float(body[1] / self.speeds.turn_rate),
+        )
+        return ratio * (1.0 + 1e-6) if ratio > 1.0 else 1.0
+
+
+def fastest(s: Array, a: Array, b: Array, squared: Array) -> Array:
+    """Path speeds ds/dt of the fastest motion from rest to rest, at the points of a grid ``(n)``.
+
+        |a u + b x| <= 1,   x <= squared,   x' = x + 2 u (s' - s)       u = d2s/dt2, x = (ds/dt)^2
+
+    with rows at both ends of each interval (TOPP-RA: Pham and Pham, IEEE T-RO 34, 2018). No row has a constant, so that
+    rest is always possible, and the largest x from which the end can be reached has a closed form: a row is a strip
+    |u + r x| <= p, and two strips meet while (r - r') x <= p + p'.
+
+    Args:
+        a, b: ``(n, rows)``. squared: bounds ``(n)``.
+    """
+    span = np.diff(s)
+    # At the end of an interval the square of the speed is x + 2 u span
+    inertia = np.concatenate([a[:-1], a[1:] + 2.0 * span[:, None] * b[1:]], axis=1)
+    bend = np.concatenate([b[:-1], b[1:]], axis=1)
+    size = np.abs(inertia)
+    none = size <= 1e-9 * size.max()
+    safe = np.where(none, 1.0, inertia)
+    width = np.where(none, np.inf, 1.0 / np.abs(safe))
+    lean = np.where(none, 0.0, bend / safe)
+    most = np.minimum(squared[:-1], (1.0 / np.maximum(np.where(none, np.abs(bend), 0.0), 1e-300)).min(axis=1))
+    for k in range(lean.shape[1]):
+        over = lean - lean[:, k : k + 1]
+        limit = np.where(over > 0.0, (width + width[:, k : k + 1]) / np.where(over > 0.0, over, 1.0), np.inf)
+        most = np.minimum(most, limit.min(axis=1))
+    high = np.zeros(len(s))
+    for k in range(len(span) - 1, -1, -1):
+        next_ = 1.0 / (2.0 * span[k])
+        stop, go = lean[k] - next_, next_ - lean[k]
+        limits = np.concatenate(
+            [
+                np.where(stop > 0.0, width[k] / np.where(stop > 0.0, stop, 1.0), np.inf),
+                np.where(go > 0.0, (high[k + 1] * next_ + width[k]) / np.where(go > 0.0, go, 1.0), np.inf),
+            ]
+        )
+        high[k] = min(float(most[k]), float(limits.min()))
+    x = np.zeros(len(s))
+    for k in range(len(span)):
+        up = float((width[k] - lean[k] * x[k]).min())
+        x[k + 1] = min(max(x[k] + 2.0 * span[k] * up, 0.0), high[k + 1])
+    x[-1] = 0.0
+    return np.sqrt(x)
+
+
+def _denser(times: Array, q: Array, v: Array, parts: Array) -> tuple[Array, Array, Array]:
+    """Knots of the same cubics, with some intervals divided evenly."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(times[:-1], times[1:], parts, strict=True)]
+    more = np.concatenate([*inner, times[-1:]])
+    curve = CubicHermiteSpline(times, q, v, axis=0)
+    return more, np.asarray(curve(more)), np.asarray(curve(more, 1))

@@ -1,0 +1,431 @@
+"""A climber and a scene as the compiled planner reads them, and what it answers."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc.climb.chain import library, limb_table
+from wbc.climb.climber import Climber
+from wbc.climb.contacts import ContactKind
+from wbc.climb.reach import LIMIT_MARGIN
+from wbc.climb.scene import ClimbScene, SceneBody
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.geometry.kernel import ShapeTable, checked
+from wbc.multibody import pin
+from wbc.shapes import PlacedShape
+from wbc.symbolic.joint_steps import place
+from wbc.symbolic.kinematics import frame_index
+from wbc.validation import Array
+
+#: Turns about its normal at which a foothold is tried that says nothing of them, by limbs that fix their turn
+TURNS = 12
+#: Rows of a cone and singular values below this are none
+TINY = 1e-12
+
+
+class PostureOutcome(IntEnum):
+    """What became of a posture that was sought; the same numbers stand in ``native/posture.h``."""
+
+    STANDS = 0
+    NOT_REACHED = 1
+    NOT_BORNE = 2
+    TOUCHES = 3
+    BREAKS = 4
+
+
+class _ConeNumbers(ctypes.Structure):
+    """``cone_t`` of ``native/stand.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("forces", "rows")),
+        *((name, ctypes.c_void_p) for name in ("N", "A", "b", "s")),
+    ]
+
+
+class _PieceNumbers(ctypes.Structure):
+    """``piece_t`` of ``native/stand.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("limb", "step", "shape", "tip")),
+        ("place", ctypes.c_double * 12),
+    ]
+
+
+class _ClimbNumbers(ctypes.Structure):
+    """``climb_t`` of ``native/stand.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int) for name in ("limbs", "footholds", "pieces", "bodies", "pairs", "weightless")),
+        *((name, ctypes.c_double) for name in ("mass", "length", "clear", "apart")),
+        ("down", ctypes.c_double * 3),
+        ("trunk", ctypes.c_double * 4),
+        *((name, ctypes.c_void_p) for name in ("limb", "offset", "foothold", "cone_of", "cone", "on", "hold", "piece")),
+        *((name, ctypes.c_void_p) for name in ("shape", "body", "pair", "support")),
+        *((name, ctypes.c_int) for name in ("places", "supports", "largest")),
+        ("work", ctypes.c_void_p),
+        *((name, ctypes.c_long) for name in ("programs", "searches", "sweeps", "measured")),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class SlackCone:
+    """Wrenches w = N x of a contact, with A x + s t <= b where t is their slack.
+
+    Attributes:
+        N: ``(6, k)``: directions of the wrenches that the contact bears at all.
+        A, b, s: ``(rows, k)``, ``(rows)``, ``(rows)``; b in newtons and newton metres, s of a slack of 1 N.
+    """
+
+    N: Array
+    A: Array
+    b: Array
+    s: Array
+
+    @classmethod
+    def of(cls, kind: ContactKind) -> SlackCone:
+        """That of a way to hold. The slack of a row is a force of that size along it; of a row of moments alone, that
+        force at the lever by which the kind's largest moments are larger than its largest forces.
+        """
+        A, b = (np.asarray(part, dtype=np.float64) for part in kind.cone())
+        A, b = A[np.isfinite(b)], b[np.isfinite(b)]
+        opposite = [
+            any(np.abs(row + other).max() < TINY and abs(b[i] + b[j]) < TINY for j, other in enumerate(A))
+            for i, row in enumerate(A)
+        ]
+        tied = np.array(opposite, dtype=bool)
+        _, sizes, basis = np.linalg.svd(np.vstack([A[tied], np.zeros((1, 6))]))
+        rank = int((sizes > TINY).sum())
+        N, A, b = _tidy(basis[rank:].T), A[~tied], b[~tied]
+        forces, moments = np.linalg.norm(A[:, :3], axis=1), np.linalg.norm(A[:, 3:], axis=1)
+        pure = forces < TINY
+        lever = 0.0
+        if pure.any() and (~pure & (b > 0.0)).any():
+            lever = float((b[pure] / moments[pure]).min() / (b[~pure] / forces[~pure]).max())
+        return cls(N, A @ N, b, np.where(pure, lever * moments, forces))
+
+
+def _tidy(basis: Array) -> Array:
+    """A basis of the same space whose columns are unit vectors where they can be."""
+    chosen = [np.eye(6)[k] for k in range(6) if np.linalg.norm(basis @ basis[k]) > 1.0 - 1e-9]
+    if len(chosen) == basis.shape[1] and all(np.abs(basis @ (basis.T @ c) - c).max() < 1e-9 for c in chosen):
+        return np.array(chosen).T.reshape(6, -1)
+    return basis
+
+
+class ClimbWorld:
+    """A climber and a scene in memory. Contacts are rows of int32, one a limb: numbers of places, each a foothold with
+    the turn about its normal at which it is held, or ``FREE_LIMB``.
+
+    Args:
+        start: a stance whose contacts count as places where they are.
+        margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies, each other [m].
+
+    Attributes:
+        places: poses ``(places, 12)``. hold: the foothold of each. start: places of the start's contacts.
+        weight: size of a unit of force [N]: the robot's weight, or 1 N where nothing weighs.
+    """
+
+    def __init__(
+        self, climber: Climber, scene: ClimbScene, start: Stance | None = None, margin: float = LIMIT_MARGIN,
+        clear: float = 0.0, apart: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.climber, self.scene, self.margin = climber, scene, margin
+        self.limbs = limb_table(climber, margin)
+        self._code = checked(
+            library(), wbc_piece_size=_PieceNumbers, wbc_cone_size=_ConeNumbers, wbc_climb_size=_ClimbNumbers
+        )
+        self._code.wbc_slack.restype = ctypes.c_double
+        self._code.wbc_candidates.restype = ctypes.c_long
+        counts = [len(rest) for rest in self.limbs.rest]
+        self.offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        gravity = np.asarray(scene.gravity, dtype=np.float64)
+        strength = float(np.linalg.norm(gravity))
+        self.weight = climber.mass * strength if strength > 0.0 else 1.0
+        self.length = float(max(row.length for row in self.limbs.numbers))
+        self.places, self.hold, turns, self.start = self._all_places(start)
+        names = list(scene.bodies)
+        on_body = [names.index(h.on) if h.on in names else -1 for h in scene.footholds]
+        on = np.array(on_body, dtype=np.int32)[self.hold]
+        self._cones, self.cone_of = self._shapes_of_cones(turns)
+        pieces, links, shapes, poses, pairs = self._bodies()
+        self.links, self.bodies = links, names
+        self._shape_table = ShapeTable(shapes)
+        self._held: list[Any] = [on, pieces, poses, pairs]
+        self.touch = self._at_rest()
+        down = gravity / strength if strength > 0.0 else np.zeros(3)
+        self.numbers = _ClimbNumbers(
+            limbs=len(climber.limbs), footholds=len(self.places), pieces=len(links), bodies=len(names),
+            pairs=len(pairs) // 2, weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
+            clear=clear, apart=apart, down=tuple(down), trunk=tuple(self.limbs.trunk),
+            limb=ctypes.addressof(self.limbs.numbers),
+            offset=self.offsets.ctypes.data, foothold=self.places.ctypes.data,
+            cone_of=self.cone_of.ctypes.data, cone=ctypes.addressof(self._cones), on=on.ctypes.data,
+            hold=self.hold.ctypes.data,
+            piece=ctypes.addressof(pieces), shape=self._shape_table.address, body=poses.ctypes.data,
+            pair=pairs.ctypes.data,
+        )  # fmt: skip
+        self._world = ctypes.byref(self.numbers)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_world"):
+            self._code.wbc_climb_forget(self._world)
+
+    def cone(self, limb: int, foothold: int) -> SlackCone:
+        """Of a limb at a foothold, with the lower of their frictions."""
+        return self._slack_cones[int(self.cone_of[limb, foothold])]
+
+    def forces(self, limb: int) -> set[int]:
+        """Numbers of independent wrenches that a limb bears at the places that it may hold."""
+        return {self._slack_cones[k].N.shape[1] for k in np.unique(self.cone_of[limb]) if k >= 0}
+
+    def state_of(self, q: Array) -> Array:
+        """Pose of the body and angles of all limbs, as one row."""
+        climber = self.climber
+        angles = [climber.angles(q, limb) for limb in range(len(climber.limbs))]
+        return np.concatenate([place(climber.body_pose(q)), *angles])
+
+    def q_of(self, state: Array) -> Array:
+        """The configuration of such a row; joints of no limb are at rest."""
+        climber = self.climber
+        q = climber.with_body(climber.rest, pin.SE3(state[:9].reshape(3, 3), state[9:12]))
+        for limb in range(len(climber.limbs)):
+            q = climber.with_limb(q, limb, state[12 + self.offsets[limb] : 12 + self.offsets[limb + 1]])
+        return q
+
+    def center(self, state: Array) -> Array:
+        """The robot's centre of mass ``(3)`` [m]."""
+        out = np.zeros(3)
+        self._code.wbc_center(self._world, _at(state), _at(out))
+        return out
+
+    def slack(self, contacts: Sequence[int], center: Array, poses: Array | None = None) -> tuple[float, Array]:
+        """Slack in shares of weight, and its bound (offset, gradient over the centre of mass) ``(4)``; infinite where
+        nothing weighs and contacts hold.
+
+        Args:
+            poses: of the contacts ``(limbs, 12)``; None: those of their places.
+        """
+        bound, at = np.zeros(4), np.ascontiguousarray(center, dtype=np.float64)
+        given = None if poses is None else _at(poses)
+        slack = float(self._code.wbc_slack(self._world, _at(self.contacts(contacts)), given, _at(at), _at(bound)))
+        if self.numbers.weightless:
+            slack = np.inf if slack > 1e-9 else -np.inf
+        return slack, bound
+
+    def look(self, contacts: NDArray[np.int32], state: Array) -> tuple[Array, str]:
+        """Slack, clearance [m] and each limb's distance from its foothold [m] of a state; what is nearest."""
+        numbers, which = np.zeros(2 + len(self.climber.limbs)), np.zeros(4, dtype=np.int32)
+        self._code.wbc_look(self._world, _at(contacts), _at(state), _at(numbers), _at(which))
+        if self.numbers.weightless:
+            numbers[0] = np.inf if numbers[0] > 1e-9 else -np.inf
+        return numbers, self.touching(which) if np.isfinite(numbers[1]) else ""
+
+    def stand(
+        self,
+        contacts: NDArray[np.int32],
+        bears: NDArray[np.int32],
+        wanted: float,
+        state: Array,
+        *,
+        body: Array | None = None,
+        weights: tuple[float, float] = (0.0, 0.0),
+        followed: bool = True,
+    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32]]:
+        """A posture on contacts that ``bears`` of them bear with a slack: outcome, state, slack, what touches.
+
+        Args:
+            body: pose to which the body is drawn, 12 numbers, by ``weights`` of its place and turn.
+            followed: whether limbs are followed from ``state`` on.
+        """  # fmt: skip
+        wish = np.zeros(14)
+        wish[:2] = weights
+        wish[2:] = state[:12] if body is None else body
+        out, slack, which = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32)
+        how = self._code.wbc_stand(
+            self._world, _at(contacts), _at(bears), ctypes.c_double(wanted), _at(wish), int(followed), _at(out),
+            _at(slack), _at(which),
+        )  # fmt: skip
+        return PostureOutcome(how), out, float(slack[0]), which
+
+    def lift(
+        self, contacts: NDArray[np.int32], kept: NDArray[np.int32], wanted: float, state: Array, attempt: int = 0
+    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32], bool]:
+        """The state from which all limbs but those kept let go: outcome, state, slack, what touches, and whether it is
+        another state than the one given. Each ``attempt`` from 1 to 3 begins elsewhere.
+        """
+        out, slack, which, moves = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32), ctypes.c_int()
+        how = self._code.wbc_lift(
+            self._world, _at(contacts), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt, _at(out),
+            _at(slack), _at(which), ctypes.byref(moves),
+        )  # fmt: skip
+        return PostureOutcome(how), out, float(slack[0]), which, bool(moves.value)
+
+    def land(
+        self, after: NDArray[np.int32], kept: NDArray[np.int32], wanted: float, state: Array, attempt: int = 0
+    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32]]:
+        """The state from there on in which limbs hold again: outcome, state, slack, what touches."""
+        out, slack, which = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32)
+        how = self._code.wbc_land(
+            self._world, _at(after), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt, _at(out),
+            _at(slack), _at(which),
+        )  # fmt: skip
+        return PostureOutcome(how), out, float(slack[0]), which
+
+    def candidates(
+        self, contacts: NDArray[np.int32], state: Array, least: float, most: float, guesses: bool = True
+    ) -> tuple[NDArray[np.int32], Array]:
+        """Places that limbs may hold next, as far from where they are at rest as squared lengths of the limb within
+        [least, most): limb and place ``(n, 2)``; the stretch then and the body's place ``(n, 4)``, or that far and
+        where it is, where they are not guessed.
+        """
+        room = len(self.climber.limbs) * len(self.places)
+        out, stretch = np.empty((room, 2), dtype=np.int32), np.empty((room, 4))
+        count = self._code.wbc_candidates(
+            self._world, _at(contacts), _at(self.touch), _at(state), ctypes.c_double(least), ctypes.c_double(most),
+            int(guesses), _at(out), _at(stretch),
+        )  # fmt: skip
+        return out[:count], stretch[:count]
+
+    def stretch(self, contacts: NDArray[np.int32], state: Array) -> float:
+        """The stretch of contacts, as of :meth:`candidates`."""
+        self._code.wbc_stretch.restype = ctypes.c_double
+        return float(self._code.wbc_stretch(self._world, _at(contacts), _at(self.touch), _at(state)))
+
+    def contacts(self, contacts: Sequence[int]) -> NDArray[np.int32]:
+        """A row for the other calls."""
+        return np.array(contacts, dtype=np.int32)
+
+    def touching(self, which: NDArray[np.int32]) -> str:
+        """The names of two bodies that touch."""
+        other = int(which[1])
+        return f"{self.links[which[0]]} and {self.bodies[other] if other >= 0 else self.links[-1 - other]}"
+
+    def _all_places(self, start: Stance | None) -> tuple[Array, NDArray[np.int32], Array, tuple[int, ...]]:
+        """Poses of all places, their footholds, which of them limbs of fixed turn alone hold, and those of the start.
+
+        Footholds that say nothing of turns are held at ``TURNS`` of them where a limb fixes its turn.
+        """
+        climber, poses, hold, turned = self.climber, [], [], []
+        fixes = [climber.fixed(limb) == "pose" for limb in range(len(climber.limbs))]
+        for k, foothold in enumerate(self.scene.footholds):
+            count = (foothold.rolls or TURNS) if any(fixes) else 1
+            for turn in range(count):
+                spin = pin.SE3(pin.utils.rotate("z", 2.0 * np.pi * turn / count), np.zeros(3))
+                poses.append(place(foothold.pose * spin))
+                hold.append(k)
+                turned.append(turn > 0)
+        contacts = []
+        for limb, k in enumerate(() if start is None else start.contacts):
+            at = hold.index(k) if k >= 0 else FREE_LIMB
+            if start is not None and k >= 0 and fixes[limb]:
+                at = len(poses)
+                poses.append(place(held_pose(climber, self.scene, limb, k, start.q)))
+                hold.append(k)
+                turned.append(True)
+            contacts.append(at)
+        return np.array(poses), np.array(hold, dtype=np.int32), np.array(turned), tuple(contacts)
+
+    def _shapes_of_cones(self, turned: Array) -> tuple[Any, NDArray[np.int32]]:
+        """Each cone once, and which of them each limb has at each place, -1 where it may not hold."""
+        limbs, holds = self.climber.limbs, self.scene.footholds
+        table = np.full((len(limbs), len(holds)), FREE_LIMB, dtype=np.int32)
+        known: dict[tuple[int, float], int] = {}
+        self._slack_cones: list[SlackCone] = []
+        for limb, one in enumerate(limbs):
+            own = float(getattr(one.contact, "friction", np.inf))
+            for k, hold in enumerate(holds):
+                if hold.limbs and one.name not in hold.limbs:
+                    continue
+                key = (limb, min(own, float(hold.friction)))
+                if key not in known:
+                    known[key] = len(self._slack_cones)
+                    self._slack_cones.append(SlackCone.of(_slipping(one.contact, key[1])))
+                table[limb, k] = known[key]
+        numbers = (_ConeNumbers * max(1, len(self._slack_cones)))()
+        self._cone_arrays = []
+        for row, cone in zip(numbers, self._slack_cones, strict=False):
+            arrays = [np.ascontiguousarray(a) for a in (cone.N, cone.A, cone.b / self.weight, cone.s)]
+            self._cone_arrays.append(arrays)
+            row.forces, row.rows = cone.N.shape[1], len(cone.b)
+            row.N, row.A, row.b, row.s = (a.ctypes.data for a in arrays)
+        table = table[:, self.hold]
+        for limb in range(len(limbs)):
+            if self.climber.fixed(limb) != "pose":
+                table[limb, turned] = FREE_LIMB
+        return numbers, np.ascontiguousarray(table)
+
+    def _bodies(self) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
+        """Pieces of the robot with their links' names, all shapes, poses of the bodies, and pairs of pieces."""
+        climber, model = self.climber, self.climber.robot.model
+        data = model.createData()
+        pin.framesForwardKinematics(model, data, climber.rest)
+        last_step = {
+            joint: (limb, steps - 1)
+            for limb, chain in enumerate(climber.chains)
+            for joint, steps in zip(chain, self.limbs.steps_to[limb], strict=True)
+        }
+        found: list[tuple[int, int, int, pin.SE3]] = []
+        links: list[str] = []
+        shapes: list[Any] = []
+        for link, group in climber.robot.shapes.items():
+            frame = frame_index(model, link)
+            parent = int(model.frames[frame].parentJoint)
+            on = next((int(j) for j in reversed(list(model.supports[parent])) if int(j) in last_step), 1)
+            limb, step = last_step.get(on, (-1, -1))
+            for placed in group:
+                at = data.oMi[on].actInv(data.oMf[frame]) * _centre(placed)
+                found.append((limb, step, int(limb >= 0 and on == climber.chains[limb][-1]), at))
+                links.append(link)
+                shapes.append(placed.shape)
+        pieces = (_PieceNumbers * max(1, len(found)))()
+        for k, (limb, step, tip, at) in enumerate(found):
+            pieces[k] = _PieceNumbers(limb, step, k, tip, tuple(place(at)))
+        bodies = list(self.scene.bodies.values())
+        shapes += [body.shape for body in bodies]
+        poses = np.array([place(_centre(body)) for body in bodies]).reshape(-1, 12)
+        rows: dict[str, list[int]] = {}
+        for k, link in enumerate(links):
+            rows.setdefault(link, []).append(k)
+        chosen = climber.robot.self_pairs or ()
+        pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
+        return pieces, links, shapes, poses, np.array(pairs, dtype=np.int32).ravel()
+
+    def _at_rest(self) -> Array:
+        """Contact poses at rest in the body's frame ``(limbs, 12)``."""
+        climber = self.climber
+        body = climber.body_pose(climber.rest)
+        poses = [body.actInv(climber.contact_pose(climber.rest, limb)) for limb in range(len(climber.limbs))]
+        return np.ascontiguousarray([place(pose) for pose in poses])
+
+
+def _slipping(kind: ContactKind, friction: float) -> ContactKind:
+    """The kind with a lower friction, if it has any."""
+    if not friction < getattr(kind, "friction", friction):
+        return kind
+    return dataclasses.replace(kind, friction=friction)  # type: ignore[call-arg]  # kinds that have it
+
+
+def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: Array) -> pin.SE3:
+    """A foothold's pose, turned about its normal as a limb that fixes its turn is in a configuration."""
+    given = scene.footholds[max(foothold, 0)].pose
+    if foothold < 0 or climber.fixed(limb) != "pose":
+        return given
+    about = pin.log3(given.rotation.T @ climber.contact_pose(q, limb).rotation)[2]
+    return given * pin.SE3(pin.utils.rotate("z", float(about)), np.zeros(3))
+
+
+def _centre(placed: PlacedShape | SceneBody) -> pin.SE3:
+    pose = placed.placement
+    return pose * pin.SE3(np.eye(3), np.asarray(placed.shape.center, dtype=np.float64))
+
+
+def _at(array: NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
