@@ -45,7 +45,7 @@ def climber_of(request: ClimbRequest) -> Climber:
     frames = [name.strip() for text in request.limbs for name in text.split(",") if name.strip()]
     if len(frames) < 2:
         raise ShapeError("limbs", request.limbs, "give the frames at the tips of two limbs or more, with commas")
-    robot = robots.load(str(path), base="floating")
+    robot = robots.load(str(path), base="floating", shapes="fit")
     if not np.isfinite(robot.limits.acceleration[robot.base_nv :]).all():
         robot = robot.with_limits(acceleration=QUICK)
     if robot.self_pairs is None and robot.shapes:
