@@ -10,9 +10,11 @@ import pytest
 
 from tests.climb.on_stones import on_stones
 from tests.climb.referee import between, body_speeds, fastest_share, least_distances, slipped
+from wbc.climb import motion
 from wbc.climb.clear import Clearances
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
+from wbc.climb.move_path import SwingShape
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
@@ -84,6 +86,17 @@ def test_knots_are_where_the_stances_are() -> None:
     assert np.allclose(np.array(lifts[1:]) - lands[:-1], 0.5)
 
 
+def test_motions_that_were_found_are_kept() -> None:
+    robot = climber("hexapod")
+    scene, stances = on_stones(robot, np.random.default_rng(3), 0.06, 2)
+    mover = Mover(robot, scene)
+    first, again = (carry_out(robot, scene, stances, mover=mover) for _ in range(2))
+    one, other = stances.stances[:2]
+    assert mover.moved(one, other) is mover.moved(replace(one), replace(other))
+    np.testing.assert_array_equal(first.q, again.q)
+    np.testing.assert_array_equal(first.q, carry_out(robot, scene, stances).q)
+
+
 def test_limbs_in_the_air_at_the_end_or_the_beginning() -> None:
     robot = climber("hexapod")
     scene, stances = on_stones(robot, np.random.default_rng(2), 0.05)
@@ -149,6 +162,20 @@ def test_moves_that_nothing_bears_are_refused() -> None:
     scene, stances = on_stones(robot, np.random.default_rng(1), 0.05)
     with pytest.raises(MoveError, match=r"do not bear the robot .* lack 0.25 of its weight"):
         carry_out(robot, scene, stances, MotionOptions(tries=0), balance=_Never())
+
+
+def test_a_proof_that_stays_open_at_few_instants_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = climber("walker")
+    scene, stances = on_stones(robot, np.random.default_rng(1), 0.2)
+    mover = Mover(robot, scene)
+    quick = SwingShape(mover.lift, window=(0.1, 0.5))
+    monkeypatch.setattr(Mover, "_shapes", lambda *_: iter([quick]))
+    assert mover.moved(*stances.stances[2:4])[0].times[-1] > 0.0
+    monkeypatch.setattr(motion, "PARTS", (1,))
+    with pytest.raises(MoveError) as open_:
+        Mover(robot, scene).moved(*stances.stances[2:4])
+    assert open_.value.nearest is not None
+    assert open_.value.nearest.distance > open_.value.nearest.required
 
 
 def test_a_tip_is_near_its_own_stone_only() -> None:

@@ -12,6 +12,7 @@ from tests.climb.bearing import slack_by_scipy
 from tests.climb.stones import reached_by_all, stones
 from tests.repeats import repeats
 from wbc.climb.balance import Equilibrium
+from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace, LimbAt, Route
@@ -20,6 +21,7 @@ from wbc.climb.scene import ClimbScene, Foothold
 from wbc.climb.scenes import draw, placed, size_of
 from wbc.climb.search import NoStancesError, StanceOptions, find_stances
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
+from wbc.climb.world import ClimbWorld, PostureOutcome
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 
 
@@ -64,6 +66,37 @@ def test_stances_through_a_course_stand(name: str, family: str) -> None:
     check(robot, course.scene, path)
     assert np.linalg.norm(robot.body_pose(path.stances[-1].q).translation - goal.position) <= goal.within + 1e-9
     assert path.stances[0] is start
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("hexapod", "stepping_stones"), ("anymal_c", "stairs"), ("a1", "stairs"), ("a1", "rubble")],
+)
+def test_no_posture_of_the_search_is_one_that_motions_refuse(name: str, family: str) -> None:
+    robot, stood = climber(name), 0
+    for seed in range(repeats(2)):
+        rng, course = np.random.default_rng(seed), draw(family, size_of(robot), seed)
+        world, clearances = ClimbWorld(robot, course.scene, clear=0.01), Clearances(robot, course.scene)
+        start = placed(robot, course.start)
+        feet = np.array([robot.contact_pose(start, limb).translation for limb in range(len(robot.limbs))])
+        for _ in range(60):
+            on = course.scene.positions[rng.integers(len(course.scene.footholds))] - course.start.translation
+            away = np.linalg.norm(world.places[:, None, 9:] - feet - on, axis=2)
+            contacts = world.contacts([int(rng.choice(near)) for near in np.argsort(away, axis=0)[:12].T])
+            contacts[rng.random(len(contacts)) < 0.1] = FREE_LIMB
+            held = world.hold[contacts[contacts >= 0]]
+            able = [at < 0 or world.cone_of[limb, at] >= 0 for limb, at in enumerate(contacts)]
+            if len(set(held)) < len(held) or not all(able):
+                continue
+            state = world.state_of(start)
+            state[9:12] += on + 0.15 * world.length * rng.uniform(-1.0, 1.0, 3)
+            state[:9] = (state[:9].reshape(3, 3) @ pin.exp3(rng.uniform(-0.3, 0.3, 3))).ravel()
+            outcome, state, _, _ = world.stand(contacts, contacts, 0.0, state, followed=False)
+            if outcome == PostureOutcome.STANDS:
+                rows = [int(world.hold[place]) if place >= 0 else FREE_LIMB for place in contacts]
+                assert clearances.standing(rows, world.q_of(state)) is None
+                stood += 1
+    assert stood >= 5
 
 
 def test_little_is_missed_on_few_stones() -> None:
@@ -166,3 +199,12 @@ def _field(robot: Climber, half: int) -> tuple[ClimbScene, Stance]:
     ]
     scene = ClimbScene(holds)
     return scene, first_stance(robot, scene, robot.rest)
+
+
+def test_the_truss_climber_leaves_its_place_on_one_hand() -> None:
+    machine = climber("truss_climber")
+    course = draw("truss", size_of(machine))
+    start = first_stance(machine, course.scene, placed(machine, course.start))
+    place = machine.body_pose(placed(machine, course.goal)).translation
+    path = find_stances(machine, course.scene, start, BodyPlace(place))
+    assert len(path.stances) > 2

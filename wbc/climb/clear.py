@@ -146,27 +146,15 @@ class Clearances:
                 continue
             for stair, share in list(enumerate(STAIRS))[since:]:
                 radius = (share * self.clearance + sink) / APPROACH
-                depth = ANY_DEPTH if share else sink + SINK
+                depth = ANY_DEPTH if share else deepest(sink)
                 out.append(
                     Exemption(_stair_name(body.name, stair), mount, point, radius if share else radius + SINK, depth)
                 )
         return out
 
     @cached_property
-    def _tips(self) -> tuple[list[tuple[SweptBody, float]], ...]:
-        """Of each limb the bodies that its last joint moves, and how far they go beyond the contact's frame [m]."""
-        model, out = self.climber.robot.model, []
-        for limb, chain in zip(self.climber.limbs, self.climber.chains, strict=True):
-            tips = []
-            frame = model.frames[frame_index(model, limb.frame)]
-            contact = frame.placement * limb.placement
-            for body in bodies_of(self.climber.robot):
-                on = model.frames[frame_index(model, body.link)]
-                if on.parentJoint == chain[-1]:
-                    placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
-                    tips.append((body, _beyond(placed, contact, limb.contact.fixed == "position")))
-            out.append(tips)
-        return tuple(out)
+    def _tips(self) -> list[list[tuple[SweptBody, float]]]:
+        return sunk_tips(self.climber)
 
     @cached_property
     def _pairs(self) -> tuple[list[Pair], tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
@@ -235,6 +223,26 @@ class Clearances:
     @cached_property
     def _radii(self) -> Array:
         return np.array([b.shape.reach for b in self.scene.bodies.values()])
+
+
+def sunk_tips(climber: Climber) -> list[list[tuple[SweptBody, float]]]:
+    """Of each limb the bodies that its last joint moves, and how far they go beyond the contact's frame [m]."""
+    model, out = climber.robot.model, []
+    for limb, chain in zip(climber.limbs, climber.chains, strict=True):
+        tips = []
+        contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement
+        for body in bodies_of(climber.robot):
+            on = model.frames[frame_index(model, body.link)]
+            if on.parentJoint == chain[-1]:
+                placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
+                tips.append((body, _beyond(placed, contact, limb.contact.fixed == "position")))
+        out.append(tips)
+    return out
+
+
+def deepest(sink: float) -> float:
+    """How deep a tip may be in what its limb holds [m], of how far it goes beyond the contact's frame [m]."""
+    return sink + SINK
 
 
 def _scene_name(body: str) -> str:

@@ -41,17 +41,20 @@ class Closure:
 
     climber: Climber
 
-    def closed(self, q: Array, contacts: Mapping[int, pin.SE3], body: float = HEAVY_BODY) -> tuple[Array, float]:
+    def closed(
+        self, q: Array, contacts: Mapping[int, pin.SE3], body: float = HEAVY_BODY, turned: bool = True
+    ) -> tuple[Array, float]:
         """The configuration near q with contact frames of limbs where they hold, and the largest error left [m, rad].
 
         Args:
             contacts: limb -> pose of its contact frame in the world; only the rows that its kind fixes count.
             body: way of the body that weighs as much as 1 rad of a joint [m, rad]; 0: it stays where it is.
+            turned: whether rows of turns count; else only positions do.
         """
         out = np.array(q, dtype=np.float64)
         left = np.inf
         for step in range(STEPS + 1):
-            rows, error = self._rows(out, contacts, body)
+            rows, error = self._rows(out, contacts, body, turned)
             left = float(np.abs(error).max(initial=0.0))
             if left < CLOSED or step == STEPS or not np.isfinite(left) or left > 1e3:
                 break
@@ -101,12 +104,12 @@ class Closure:
         pin.forwardKinematics(self._model, self._data, np.asarray(q, dtype=np.float64))
         return tuple(pin.SE3(pin.updateFramePlacement(self._model, self._data, f)) for f in self._frames)
 
-    def _rows(self, q: Array, contacts: Mapping[int, pin.SE3], body: float) -> tuple[Array, Array]:
+    def _rows(self, q: Array, contacts: Mapping[int, pin.SE3], body: float, turned: bool) -> tuple[Array, Array]:
         model, data = self._model, self._data
         pin.computeJointJacobians(model, data, q)
         columns, blocks, errors = self._columns(body), [], []
         for limb, target in contacts.items():
-            rows, error = self._error(limb, target)
+            rows, error = self._error(limb, target, turned)
             jacobian = pin.getFrameJacobian(model, data, self._frames[limb], pin.ReferenceFrame.LOCAL)
             blocks.append(jacobian[rows])
             errors.append(error)
@@ -114,11 +117,11 @@ class Closure:
             return np.zeros((0, columns.shape[1])), np.zeros(0)
         return np.concatenate(blocks) @ columns, np.concatenate(errors)
 
-    def _error(self, limb: int, target: pin.SE3) -> tuple[slice, Array]:
+    def _error(self, limb: int, target: pin.SE3, turned: bool = True) -> tuple[slice, Array]:
         """Rows of the contact's twist in its own frame, and what they have to change."""
         away = pin.updateFramePlacement(self._model, self._data, self._frames[limb]).actInv(target)
         fixed = self.climber.fixed(limb)
-        if fixed == "position":
+        if fixed == "position" or not turned:
             return slice(3), away.translation
         if fixed == "axis":
             z = away.rotation[:, 2]

@@ -111,7 +111,7 @@ _MADE: dict[str, Callable[[str], Climber]] = {
     "walker": _walker,
     "two_ended": _two_ended,
     "three_pandas": _three_pandas,
-    "truss_climber": _limbed(GripHand(rolls=True)),
+    "truss_climber": _limbed(GripHand()),
     "hexapod": _limbed(PointFoot(FRICTION)),
     "hexapod_grips": _limbed(GripHand(300.0, 20.0)),
     "anymal_c": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),

@@ -34,6 +34,8 @@ LEANS = (0.0, 0.8)
 WINDOWS = ((0.2, 0.8), (0.1, 0.5), (0.5, 0.9))
 #: Instants of a move at which equilibrium is looked at
 INSTANTS = 12
+#: Into how many parts intervals of a path are divided for its proof, one after the other, while that stays open
+PARTS = (1, 2, 4)
 
 
 class MoveError(InfeasibleError):
@@ -70,7 +72,7 @@ class MotionOptions:
 
     Attributes:
         clearance: distance that links keep from bodies [m].
-        apart: distance that links keep from each other [m].
+        apart: distance that links keep from each other [m]; a loop that follows the motion is some tenths of a mm off.
         lift: how far contacts are lifted off what they leave and land on [m]; 0: a sixteenth of the shortest limb.
         tries: random postures through which limbs go where nothing simpler is clear, at most.
         seed: of those.
@@ -81,7 +83,7 @@ class MotionOptions:
     """
 
     clearance: float = 0.01
-    apart: float = 0.0
+    apart: float = 0.001
     lift: float = 0.0
     tries: int = 20
     seed: int = 0
@@ -126,12 +128,14 @@ class Mover:
     timing: PathTiming = field(init=False)
     lift: float = field(init=False)
     checked: WeakSet[Stance] = field(init=False, default_factory=WeakSet, repr=False)
+    _made: dict[bytes, tuple[TimedMove, float | None]] = field(init=False, default_factory=dict, repr=False)
 
     def moved(self, one: Stance, other: Stance, row: int = 0) -> tuple[TimedMove, float | None]:
         """The motion from a stance to the next one, from rest to rest, and its least margin of equilibrium.
 
-        Limbs in both stances at the same foothold hold it; others go on curves along the normals, higher where that is
-        not clear, evenly in their joints, or at last through random postures.
+        Limbs in both stances at the same foothold hold it; others go on curves along the normals, with their turns
+        where that is possible, higher where that is not clear, evenly in their joints, or at last through random
+        postures. A motion that was found is kept.
 
         Args:
             row: of the stance in its path, for errors.
@@ -139,6 +143,12 @@ class Mover:
         Raises:
             MoveError: no way was found that keeps contacts, limits, clearances and equilibrium: which, and by how much.
         """
+        key = b"".join(np.array(s.contacts).tobytes() + s.q.tobytes() for s in (one, other))
+        if key not in self._made:
+            self._made[key] = self._found(one, other, row)
+        return self._made[key]
+
+    def _found(self, one: Stance, other: Stance, row: int) -> tuple[TimedMove, float | None]:
         for stance, which in ((one, row), (other, row + 1)):
             if stance not in self.checked:
                 self._check(stance, which, row)
@@ -199,8 +209,14 @@ class Mover:
     def _refused(self, path: MovePath, one: Stance, other: Stance, row: int) -> tuple[MoveError | None, float | None]:
         """Why a path is none, and the least margin of equilibrium on it."""
         contacts = list(zip(one.contacts, other.contacts, strict=True))
-        velocities = path.velocities(path.coordinates, path.at(path.s, 1))
-        nearest = self.clearances.moving(contacts, path.s, path.q, velocities)
+        for parts in PARTS:
+            s = np.interp(np.arange(parts * (len(path.s) - 1) + 1) / parts, np.arange(len(path.s)), path.s)
+            at = path.at(s)
+            velocities = path.velocities(at, path.at(s, 1))
+            nearest = self.clearances.moving(contacts, s, path.configurations(at), velocities)
+            # The body's cubic is not known better than between the instants given: more of them decide what is open
+            if nearest is None or nearest.distance < nearest.required:
+                break
         if nearest is not None:
             text = f"{_told(nearest)} at {100.0 * nearest.time:.0f} % of the way"
             return _refused(row, nearest.distance, text, nearest), None
@@ -252,12 +268,14 @@ def carry_out(
     stances: StancePath,
     options: MotionOptions | None = None,
     balance: Balanced | None = None,
+    mover: Mover | None = None,
 ) -> ContactPlan:
     """The timed motion through stances: held contacts keep their places within 1e-4 m, every move is proven clear
     between instants, in least time under limits of joints and body, at rest in every stance.
 
     Args:
         balance: what says whether contacts bear the robot, at 12 instants of a move; None: nothing does.
+        mover: in place of options and balance one that keeps the motions that it found before.
 
     Raises:
         MoveError: no way from a stance to the next one: which pair is too near, or which limit is passed, by how much.
@@ -265,8 +283,9 @@ def carry_out(
             without limits. What :class:`Clearances` raises.
     """
     given = MotionOptions() if options is None else validation.instance("options", options, MotionOptions, "options")
+    given = mover.options if mover else given
     path = _checked(climber, scene, stances)
-    mover = Mover(climber, scene, given, balance)
+    mover = mover or Mover(climber, scene, given, balance)
     times, q, v = [np.zeros(1)], [path[0].q[None]], [np.zeros((1, climber.robot.nv))]
     moves, margins, now = list[ContactMove](), list[float](), 0.0
     for row, (one, other) in enumerate(itertools.pairwise(path)):

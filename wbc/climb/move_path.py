@@ -19,15 +19,18 @@ from wbc.validation import Array
 
 #: Share of a path in which a limb lifts, and in which it lands
 LIFTING = 0.2
+#: Share of a path in which a limb keeps its turn as it lifts, and as it lands, where it cannot keep it all the way
+ALIGNED = 0.1
 #: Intervals of a path at first: they are doubled until contacts hold between them
 FEWEST = 20
 #: Intervals of a path at most
-MOST = 80
+MOST = 160
 #: Largest error of a held contact between samples [m, rad]
 HELD = 2e-5
 #: How far limbs that lift or land may be from their curves between samples [m]: less than tips may sink in
 STRAYED = 1e-3
-#: Largest change of a joint from sample to sample, as a share of 1 rad in the coarsest path: more is a jump
+#: Largest change of a joint from sample to sample beyond what it is asked to make, as a share of 1 rad in the coarsest
+#: path: more is a jump
 JUMP = 0.6
 
 
@@ -42,7 +45,8 @@ class SwingShape:
     Attributes:
         height: how far the contact is lifted along the normal that it leaves, and along the one that it lands on [m].
         lean: how much of that goes towards where the limb's contact is at rest, at most this share of the height [1].
-        joints: the limb goes from lifted to lifted posture evenly in its joints; else its contact goes on a curve.
+        joints: the limb goes from lifted to lifted posture evenly in its joints; else its contact goes on a curve,
+            where its turn is free between lift and land if it cannot be kept.
         tucked: share of the way to its resting angles that it bends in the middle; of paths in the joints.
         window: from where to where on the path the body moves [1].
         via: limb -> angles through which it goes in the middle; of paths in the joints.
@@ -172,6 +176,8 @@ class _Moving:
         zero = np.zeros(3)
         held = [normals[a] for a, b in pairs if a == b != FREE_LIMB]
         up = np.sum(held, axis=0) if held else zero
+        #: Steps of joints that limbs in the air are asked to make, from sample to sample [m, rad]
+        self.even: Array | float = 0.0
         self.rise = shape.rise * up / max(float(np.linalg.norm(up)), 1e-9)
         self.lifts = {
             k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k])) for k in self.swings
@@ -203,9 +209,9 @@ class _Moving:
         else:
             self._close(s, q, held, LIGHT_BODY if self.shape.yields else HEAVY_BODY)
             if self.shape.joints:
-                self._by_joints(s, q, curves)
+                self._by_joints(s, q, curves, LIFTING)
             else:
-                self._close(s, q, curves, 0.0)
+                self._by_curves(s, q, curves)
         q[0], q[-1] = self.one.q, self.other.q
         self._check(q, count)
         return MovePath(self.closure, self.held, s, q)
@@ -259,9 +265,26 @@ class _Moving:
         turned = start.rotation @ pin.exp3(x * x * (3.0 - 2.0 * x) * turn)
         return pin.SE3(turned, position)
 
-    def _by_joints(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
-        """Limbs in the air lift and land on their curves, and in between go evenly in their joints."""
-        up, down = (int(k) for k in np.flatnonzero((s > LIFTING - 1e-9) & (s < 1.0 - LIFTING + 1e-9))[[0, -1]])
+    def _by_curves(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
+        """Limbs in the air go on their curves. Where they cannot with their turns, as from branch to branch or past a
+        singular wrist, these are free in between: joints go evenly but for what positions on the curves need.
+        """
+        kept = q.copy()
+        try:
+            self._close(s, q, curves, 0.0)
+            self._check(q, len(s) - 1)
+        except InfeasibleError as error:
+            if isinstance(error, HeldError) or all(self.climber.fixed(limb) == "position" for limb in curves):
+                raise
+            q[:] = kept
+            between = self._by_joints(s, q, curves, ALIGNED)
+            self._close(s[between], q[between], {k: curve[between] for k, curve in curves.items()}, 0.0, turned=False)
+
+    def _by_joints(self, s: Array, q: Array, curves: Mapping[int, Array], share: float) -> slice:
+        """Limbs in the air lift and land on their curves over a share of the path, and in between, which is returned,
+        go evenly in their joints.
+        """
+        up, down = (int(k) for k in np.flatnonzero((s > share - 1e-9) & (s < 1.0 - share + 1e-9))[[0, -1]])
         for part in (slice(up + 1), slice(down, None)):
             self._close(s[part], q[part], {limb: curve[part] for limb, curve in curves.items()}, 0.0)
         for limb in self.swings:
@@ -277,14 +300,22 @@ class _Moving:
                 if limb in self.shape.via or self.shape.tucked:
                     between = between + 16.0 * (x * (1.0 - x)) ** 2 * (via - at_middle)
                 q[k] = self.climber.with_limb(q[k], limb, between)
+        self.even = self._steps(q)
+        self.even[:up], self.even[down:] = 0.0, 0.0
+        for limb in self.held:
+            self.even[:, self.climber.joints(limb) - 6] = 0.0
+        return slice(up + 1, down)
 
-    def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float) -> None:
-        """Brings contacts to poses in the world, ``(samples, 12)``; the body as well, where limbs cannot follow."""
-        if body < LIGHT_BODY and all(self.closure.followed(limb, q, poses) for limb, poses in wanted.items()):
+    def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float, turned: bool = True) -> None:
+        """Brings contacts to poses in the world, ``(samples, 12)``, or to their positions only; the body as well, where
+        limbs cannot follow.
+        """
+        batched = turned and body < LIGHT_BODY
+        if batched and all(self.closure.followed(limb, q, poses) for limb, poses in wanted.items()):
             return
         for k in range(len(s)):
             contacts = {limb: pin.SE3(p[k, :9].reshape(3, 3), p[k, 9:]) for limb, p in wanted.items()}
-            q[k], left = self.closure.closed(q[k], contacts, body)
+            q[k], left = self.closure.closed(q[k], contacts, body, turned)
             if left > 1e3 * CLOSED:
                 worst = max(contacts, key=lambda limb: self.closure.error(q[k], {limb: contacts[limb]}))
                 kind, name = InfeasibleError if body == 0.0 else HeldError, self.climber.limbs[worst].name
@@ -296,12 +327,16 @@ class _Moving:
         number = self.climber.robot.dof_names.index(dof)
         return HeldError if any(number in self.climber.joints(limb) for limb in self.held) else InfeasibleError
 
+    def _steps(self, q: Array) -> Array:
+        """Of joints from sample to sample [m, rad]."""
+        return np.array([pin.difference(self.climber.robot.model, a, b)[6:] for a, b in itertools.pairwise(q)])
+
     def _check(self, q: Array, count: int) -> None:
-        robot = self.climber.robot
-        steps = np.array([pin.difference(robot.model, a, b)[6:] for a, b in itertools.pairwise(q)])
-        most = JUMP * FEWEST / count
-        if steps.size and np.abs(steps).max() > most:
-            k, joint = np.unravel_index(int(np.abs(steps).argmax()), steps.shape)
+        robot, most = self.climber.robot, JUMP * FEWEST / count
+        steps = self._steps(q)
+        jumps = np.abs(steps - self.even)
+        if jumps.size and jumps.max() > most:
+            k, joint = np.unravel_index(int(jumps.argmax()), steps.shape)
             name, size = robot.dof_names[6 + int(joint)], float(abs(steps[k, joint]))
             raise self._kind(name)(name, size, f"jumps by {size:.3g} rad or m on the way to the next stance")
         if worst := beyond_limits(robot, q):

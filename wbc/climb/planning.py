@@ -11,7 +11,7 @@ from wbc import validation
 from wbc.climb.balance import Equilibrium
 from wbc.climb.climber import Climber
 from wbc.climb.goal import Goal
-from wbc.climb.motion import MotionOptions, MoveError, carry_out
+from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import AT_START, StanceOptions, find_stances
@@ -25,7 +25,7 @@ class ClimbOptions:
     """How a plan is made.
 
     Attributes:
-        stances, motion: of the search and of the motion.
+        stances, motion: of the search and of the motion; stances keep the clearances of both.
         again: how often stances are sought again without a move that has no motion, at most.
     """
 
@@ -48,11 +48,16 @@ def plan_climb(
     """
     given = ClimbOptions() if options is None else validation.instance("options", options, ClimbOptions, "ClimbOptions")
     first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
-    forbidden, balance = set(given.stances.forbidden), Equilibrium(climber, scene)
+    forbidden, mover = set(given.stances.forbidden), Mover(climber, scene, given.motion, Equilibrium(climber, scene))
+    sought = replace(
+        given.stances,
+        clearance=max(given.stances.clearance, given.motion.clearance),
+        apart=max(given.stances.apart, given.motion.apart),
+    )
     for tries in range(given.again + 1):
-        stances = find_stances(climber, scene, first, goal, replace(given.stances, forbidden=frozenset(forbidden)))
+        stances = find_stances(climber, scene, first, goal, replace(sought, forbidden=frozenset(forbidden)))
         try:
-            return carry_out(climber, scene, stances, given.motion, balance)
+            return carry_out(climber, scene, stances, mover=mover)
         except MoveError as error:
             contacts = [tuple(stance.contacts) for stance in stances.stances]
             # A body that cannot shift is kept from the move that it shifts for

@@ -24,13 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.climb.clear import TOLERANCE
 from wbc.climb.climber import Climber
 from wbc.climb.foothold_graph import ways_over_footholds
 from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
-from wbc.climb.world import ClimbWorld, PostureOutcome
+from wbc.climb.world import SPARE, ClimbWorld, PostureOutcome
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
@@ -377,7 +378,7 @@ class StanceSearch:
                 raise no_stances("start.q", float(angles[k]), reason, "start")
         if not numbers[0] >= 0.0:
             raise no_stances("start", float(numbers[0]), self._why_not_borne(first, numbers[0]), "start")
-        if numbers[1] < 0.0:
+        if numbers[1] < -SPARE - TOLERANCE:
             reason = f"{nearest} are {-numbers[1]:.3g} m nearer to each other than they may be"
             raise no_stances("start.q", float(numbers[1]), reason, "start")
         return _Node(first.contacts, first.state, 0, float(numbers[0]))

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.clearance import bodies_of
 from wbc.climb.chain import library, limb_table
+from wbc.climb.clear import deepest, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
 from wbc.climb.reach import LIMIT_MARGIN
@@ -27,6 +29,8 @@ from wbc.validation import Array
 
 #: Turns about its normal at which a foothold is tried that says nothing of them, by limbs that fix their turn
 TURNS = 12
+#: What postures keep more than motions have to [m]: between two postures links may come nearer
+SPARE = 1e-3
 #: Rows of a cone and singular values below this are none
 TINY = 1e-12
 
@@ -55,6 +59,7 @@ class _PieceNumbers(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("limb", "step", "shape", "tip")),
+        ("depth", ctypes.c_double),
         ("place", ctypes.c_double * 12),
     ]
 
@@ -126,7 +131,8 @@ class ClimbWorld:
 
     Args:
         start: a stance whose contacts count as places where they are.
-        margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies, each other [m].
+        margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies and from each other
+            [m]; ``SPARE`` more, and from what tips hold that more than :class:`Clearances` says.
 
     Attributes:
         places: poses ``(places, 12)``. hold: the foothold of each. start: places of the start's contacts.
@@ -164,7 +170,7 @@ class ClimbWorld:
         self.numbers = _ClimbNumbers(
             limbs=len(climber.limbs), footholds=len(self.places), pieces=len(links), bodies=len(names),
             pairs=len(pairs) // 2, weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
-            clear=clear, apart=apart, down=tuple(down), trunk=tuple(self.limbs.trunk),
+            clear=clear + SPARE, apart=apart + SPARE, down=tuple(down), trunk=tuple(self.limbs.trunk),
             limb=ctypes.addressof(self.limbs.numbers),
             offset=self.offsets.ctypes.data, foothold=self.places.ctypes.data,
             cone_of=self.cone_of.ctypes.data, cone=ctypes.addressof(self._cones), on=on.ctypes.data,
@@ -372,7 +378,9 @@ class ClimbWorld:
             for limb, chain in enumerate(climber.chains)
             for joint, steps in zip(chain, self.limbs.steps_to[limb], strict=True)
         }
-        found: list[tuple[int, int, int, pin.SE3]] = []
+        depths = {body.name: deepest(sink) - SPARE for tips in sunk_tips(climber) for body, sink in tips}
+        names = [body.name for body in bodies_of(climber.robot)]
+        found: list[tuple[int, int, pin.SE3]] = []
         links: list[str] = []
         shapes: list[Any] = []
         for link, group in climber.robot.shapes.items():
@@ -382,12 +390,12 @@ class ClimbWorld:
             limb, step = last_step.get(on, (-1, -1))
             for placed in group:
                 at = data.oMi[on].actInv(data.oMf[frame]) * _centre(placed)
-                found.append((limb, step, int(limb >= 0 and on == climber.chains[limb][-1]), at))
+                found.append((limb, step, at))
                 links.append(link)
                 shapes.append(placed.shape)
         pieces = (_PieceNumbers * max(1, len(found)))()
-        for k, (limb, step, tip, at) in enumerate(found):
-            pieces[k] = _PieceNumbers(limb, step, k, tip, tuple(place(at)))
+        for k, (name, (limb, step, at)) in enumerate(zip(names, found, strict=True)):
+            pieces[k] = _PieceNumbers(limb, step, k, int(name in depths), depths.get(name, 0.0), tuple(place(at)))
         bodies = list(self.scene.bodies.values())
         shapes += [body.shape for body in bodies]
         poses = np.array([place(_centre(body)) for body in bodies]).reshape(-1, 12)

@@ -285,6 +285,9 @@ class ClimbLoop:
                 if cause is None:
                     break
                 self._change(limb, cause)
+                if cause is Cause.AT_FOOTHOLD:
+                    # It bears for a tick at least, also where it is to lift again at once
+                    break
             if limb.wait(self._path_time):
                 self._waiting = True
                 late = "" if self._needs else limb.too_late(q)

@@ -53,7 +53,7 @@ int wbc_stand(climb_t *c, const int *contact, const int *bears, double wanted, c
     double from[12 + MOST_LIMBS * MOST_ANGLES];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     int how = posture(c, contact, &wish, state, state + 12, numbers, which);
-    if (how == STANDS && followed) how = follow(c, contact, &wish, from, from + 12, state, state + 12, numbers, which);
+    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, from, from + 12, state, state + 12, numbers, which);
     return how;
 }
 

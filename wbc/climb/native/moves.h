@@ -106,9 +106,9 @@ static int follow_whole(const climb_t *c, const int *contact, const double *base
 }
 
 /* Follows limbs that hold while the body goes from one posture to another, whose angles become what is come to; the slack and
- * clearance there are looked at again where these differ */
-static int follow(climb_t *c, const int *contact, const wish_t *wish, const double *base, const double *angle, const double *to,
-                  double *reached, double *slack, int *which) {
+ * clearance there, on contacts `at_last`, are looked at again where these differ */
+static int follow(climb_t *c, const int *contact, const int *at_last, const wish_t *wish, const double *base, const double *angle,
+                  const double *to, double *reached, double *slack, int *which) {
     double pose[12], now[MOST_ANGLES], center[3];
     placed_t placed[MOST_LIMBS];
     int other = 0;
@@ -134,7 +134,7 @@ static int follow(climb_t *c, const int *contact, const wish_t *wish, const doub
     *slack = INFINITY;
     for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
     if (*slack < wish->slack) return NOT_BORNE;
-    return link_clearance(c, contact, to, placed, which) >= 0.0 ? STANDS : TOUCHES;
+    return link_clearance(c, at_last, to, placed, which) >= 0.0 ? STANDS : TOUCHES;
 }
 
 /* Another beginning than the present state: the body as guessed and lower or higher, all limbs as from rest; in place */
@@ -168,7 +168,7 @@ static int lift_off(climb_t *c, const int *contact, const int *kept, double want
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     if (attempt) begin_anew(c, contact, touch, attempt, state);
     int how = posture(c, contact, &wish, state, state + 12, slack, which);
-    return how == STANDS ? follow(c, contact, &wish, from, from + 12, state, state + 12, slack, which) : how;
+    return how == STANDS ? follow(c, contact, contact, &wish, from, from + 12, state, state + 12, slack, which) : how;
 }
 
 /* From there, the posture at which limbs hold again or are at rest in the air; in place */
@@ -188,7 +188,7 @@ static int land_on(climb_t *c, const int *next, const int *kept, double wanted, 
     }
     if (attempt) begin_anew(c, next, touch, attempt, state);
     int how = posture(c, next, &wish, state, state + 12, slack, which);
-    return how == STANDS ? follow(c, kept, &wish, from, from + 12, state, state + 12, slack, which) : how;
+    return how == STANDS ? follow(c, kept, next, &wish, from, from + 12, state, state + 12, slack, which) : how;
 }
 
 #endif

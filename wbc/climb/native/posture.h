@@ -98,7 +98,7 @@ static double avoiding(const climb_t *c, const int *contact, const int *pair, co
     along_limb(c, contact, pair[0], placed, found.point, found.normal, -1.0, start, value, column, count);
     along3(found.point, found.gap, found.normal, far_point);
     if (own) along_limb(c, contact, other, placed, far_point, found.normal, 1.0, start, value, column, count);
-    return found.gap - (own ? c->apart : c->clear);
+    return found.gap - kept_distance(c, contact, pair[0], pair[1]);
 }
 
 /* One sweep of least squares; the largest move [m, rad] */

@@ -22,10 +22,11 @@ typedef struct {
     double bound[BOUNDS][4];
 } support_t;
 
-/* A shape of the robot on a step of a limb (-1, -1: on the body); `tip`: whether it is on the limb's last link */
+/* A shape of the robot on a step of a limb (-1, -1: on the body); `tip`: whether it is on the limb's last link, `depth`: then how
+ * deep it may be in what the limb holds */
 typedef struct {
     int limb, step, shape, tip;
-    double place[12];
+    double depth, place[12];
 } piece_t;
 
 /* wbc/climb/world.py has the same */
@@ -167,29 +168,34 @@ static void place_piece(const climb_t *c, int k, const double *base, const place
     compose(p->limb < 0 ? base : placed[p->limb].pose[p->step], p->place, out);
 }
 
-/* Shortest distance less what is kept [m] of links from bodies and each other, up to a positive one; the last link of a limb that holds
- * is near to what it holds. `which`: piece, and body or -1 - piece */
+/* The distance that a piece keeps from a body, or (-1 - piece) from another piece [m] */
+static double kept_distance(const climb_t *c, const int *contact, int piece, int other) {
+    const piece_t *p = c->piece + piece;
+    if (other < 0) return c->apart;
+    return p->tip && contact[p->limb] >= 0 && c->on[contact[p->limb]] == other ? -p->depth : c->clear;
+}
+
+/* Shortest distance less what is kept [m] of links from bodies and each other, up to a positive one. `which`: piece, and body or
+ * -1 - piece */
 static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     double pose[c->pieces ? c->pieces : 1][12], least = INFINITY;
     for (int k = 0; k < c->pieces; k++) place_piece(c, k, base, placed, pose[k]);
     for (int k = 0; k < c->pieces + c->pairs; k++) {
         const int own = k >= c->pieces;
-        const double keep = own ? c->apart : c->clear;
         const int i = own ? c->pair[2 * (k - c->pieces)] : k;
         const shape_t *a = c->shape + c->piece[i].shape;
         for (int j = 0; j < (own ? 1 : c->bodies); j++) {
             const int other = own ? c->pair[2 * (k - c->pieces) + 1] : j;
             const shape_t *b = c->shape + (own ? c->piece[other].shape : c->pieces + j);
             const double *at = own ? pose[other] : c->body + 12 * j;
+            const double keep = kept_distance(c, contact, i, own ? -1 - other : j);
             if (b->size[5] < 1e6) {
                 double apart[3];
                 minus3(pose[i] + 9, at + 9, apart);
-                const double sum = a->size[5] + b->size[5] + keep;
+                const double sum = a->size[5] + b->size[5] + fmax(keep, 0.0);
                 if (dot3(apart, apart) > sum * sum) continue;
             }
-            const int limb = c->piece[i].limb;
-            if (!own && c->piece[i].tip && contact[limb] >= 0 && c->on[contact[limb]] == j) continue;
             answer_t found;
             measure_shapes(&how, a, pose[i], b, at, &found);
             c->measured++;
