@@ -285,7 +285,7 @@ class ClimbLoop:
                 if cause is None:
                     break
                 self._change(limb, cause)
-                if cause is Cause.AT_FOOTHOLD:
+                if cause is Cause.SETTLED:
                     # It bears for a tick at least, also where it is to lift again at once
                     break
             if limb.wait(self._path_time):
