@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
+import heapq
+from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from wbc.climb.climber import Climber
 from wbc.climb.scene import ClimbScene
-from wbc.climb.search import StanceOptions, no_stances
+from wbc.climb.search import StanceOptions, counted, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.world import ClimbWorld, PostureOutcome
 
@@ -43,10 +45,8 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         order = np.argsort(cost, kind="stable")[:NEAREST]
         near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0]
         choices.append(near or [(1.0, FREE_LIMB)])
-    combinations = sorted(itertools.product(*choices), key=lambda chosen: sum(cost for cost, _ in chosen))
-    state, best, tried = world.state_of(at), -np.inf, 0
-    for chosen in combinations:
-        places = [place for _, place in chosen]
+    state, best, tried, outcomes = world.state_of(at), -np.inf, 0, Counter[PostureOutcome]()
+    for places in _cheapest_first(choices):
         held = [int(world.hold[place]) for place in places if place >= 0]
         if len(set(held)) < len(held):
             continue
@@ -58,8 +58,24 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         if how == PostureOutcome.STANDS:
             rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)
             return Stance(rows, world.q_of(found))
+        outcomes[how] += 1
         best = max(best, slack if how == PostureOutcome.NOT_BORNE else -np.inf)
     reason = f"none of {min(tried, STANCES)} stances on the footholds nearest to it can be stood on"
+    reason += f" ({counted(outcomes)})" if outcomes else ""
     if np.isfinite(best):
         reason += f"; the best lacks {given.margin - best:.3g} of the weight"
     raise no_stances("q", at[:3].round(3).tolist(), reason, "start")
+
+
+def _cheapest_first(choices: list[list[tuple[float, int]]]) -> Iterator[list[int]]:
+    """Combinations of one choice a limb, by the sum of their costs; the choices of a limb are sorted."""
+    first = (0,) * len(choices)
+    waiting, known = [(sum(limb[0][0] for limb in choices), first)], {first}
+    while waiting:
+        cost, at = heapq.heappop(waiting)
+        yield [limb[k][1] for limb, k in zip(choices, at, strict=True)]
+        for row, (limb, k) in enumerate(zip(choices, at, strict=True)):
+            further = (*at[:row], k + 1, *at[row + 1 :])
+            if k + 1 < len(limb) and further not in known:
+                known.add(further)
+                heapq.heappush(waiting, (cost - limb[k][0] + limb[k + 1][0], further))

@@ -16,7 +16,7 @@ import heapq
 import itertools
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,6 +66,20 @@ class NoStancesError(WbcError):
 
     cause: str = ""
     nearest: float = np.inf
+
+
+#: What became of postures, in words
+_WORDS = {
+    PostureOutcome.NOT_REACHED: "out of reach",
+    PostureOutcome.NOT_BORNE: "not borne",
+    PostureOutcome.TOUCHES: "links touch",
+    PostureOutcome.BREAKS: "a limb that holds comes to its limits on the way",
+}
+
+
+def counted(outcomes: Mapping[PostureOutcome, int]) -> str:
+    """How many postures became what, where they do not stand."""
+    return ", ".join(f"{outcomes[how]} {text}" for how, text in _WORDS.items() if outcomes.get(how))
 
 
 def no_stances(field: str, value: Any, reason: str, cause: str, nearest: float = np.inf) -> NoStancesError:
@@ -440,13 +454,7 @@ class StanceSearch:
 
     def _refusal(self, cause: str, nearest: float, best: _Node) -> NoStancesError:
         tried = sum(self.tried.values())
-        words = {
-            PostureOutcome.NOT_REACHED: "out of reach",
-            PostureOutcome.NOT_BORNE: "not borne",
-            PostureOutcome.TOUCHES: "links touch",
-            PostureOutcome.BREAKS: "a limb that holds comes to its limits on the way",
-        }
-        parts = ", ".join(f"{self.tried[how]} {text}" for how, text in words.items() if self.tried[how])
+        parts = counted(self.tried)
         saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
         which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"
         goal = self.goal.position.round(3).tolist() if isinstance(self.goal, BodyPlace) else self.goal
