@@ -325,4 +325,5 @@ def _checked(climber: Climber, scene: ClimbScene, stances: StancePath) -> list[S
 
 def _told(nearest: Nearest) -> str:
     far, least = 1e3 * nearest.distance, 1e3 * nearest.required
-    return f"{nearest.first} and {nearest.second} are {far:.1f} mm apart, and {least:.1f} mm are required"
+    text = f"{nearest.first} and {nearest.second} are {far:.3f} mm apart, and {least:.3f} mm are required"
+    return text if far < least else f"{text}, which is not proven between the instants looked at"
