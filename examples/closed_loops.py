@@ -2,6 +2,8 @@
 and the motors follow.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 
@@ -11,44 +13,9 @@ from wbc.track import Scene
 DT, SECONDS = 0.002, 4.0  # s
 
 
-def rod(side: float, name: str) -> str:
-    """A crank on the shank, and the rod that hangs from its end by a ball joint."""
-    return f"""<body name="{name}_crank" pos="0 {side} -0.05"><joint name="{name}_motor" axis="0 1 0" range="-1.2 1.2"/>
-        <geom type="capsule" fromto="0 0 0 -0.05 0 0" size="0.008" mass="0.1"/>
-        <body name="{name}_rod" pos="-0.05 0 0"><joint name="{name}_ball" type="ball"/>
-        <geom type="capsule" fromto="0 0 0 0 0 -0.25" size="0.006" mass="0.1"/></body></body>"""
-
-
-def arm(number: int) -> tuple[str, str]:
-    """A crank of the delta with its rod, and the ball joint between rod and plate."""
-    angle = 2.0 * np.pi * number / 3.0
-    x, y = np.cos(angle), np.sin(angle)
-    return (
-        f"""<body name="crank{number}" pos="{0.6 + 0.1 * x} {0.1 * y} 0">
-        <joint name="motor{number}" axis="{-y} {x} 0" range="-1.2 1.2"/>
-        <geom type="capsule" fromto="0 0 0 {0.15 * x} {0.15 * y} 0" size="0.01" mass="0.2"/>
-        <body name="thin{number}" pos="{0.15 * x} {0.15 * y} 0"><joint name="ball{number}" type="ball"/>
-        <geom type="capsule" fromto="0 0 0 {-0.2 * x} {-0.2 * y} -0.35" size="0.006" mass="0.1"/></body></body>""",
-        f"""<connect name="arm{number}" body1="thin{number}" body2="plate" anchor="{-0.2 * x} {-0.2 * y} -0.35"/>""",
-    )
-
-
-arms, joins = (" ".join(parts) for parts in zip(*map(arm, range(3)), strict=True))
-MODEL = f"""<mujoco model="linkages"><compiler angle="radian"/><worldbody><body name="shank">
-    <geom type="capsule" fromto="0 0 0 0 0 -0.27" size="0.02" mass="2"/>
-    <body name="cross" pos="0 0 -0.3"><joint name="pitch" axis="0 1 0" range="-0.8 0.8"/>
-      <inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>
-      <body name="foot"><joint name="roll" axis="1 0 0" range="-0.4 0.4"/>
-        <geom type="box" pos="0.04 0 -0.04" size="0.1 0.045 0.01" mass="0.8"/></body></body>
-    {rod(0.04, "left")}{rod(-0.04, "right")}</body>
-    <body name="plate" pos="0.6 0 -0.35"><geom type="cylinder" size="0.06 0.008" mass="0.3"/>
-      <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
-      <joint name="z" type="slide" axis="0 0 1"/></body>{arms}</worldbody>
-    <equality><connect name="left" body1="left_rod" body2="foot" anchor="0 0 -0.25"/>
-    <connect name="right" body1="right_rod" body2="foot" anchor="0 0 -0.25"/>{joins}</equality></mujoco>"""
-
 driven = ("left_motor", "right_motor", *(f"motor{number}" for number in range(3)))
-robot = wbc.robots.load(MODEL, shapes="exact", actuated=driven).with_limits(velocity=dict.fromkeys(driven, 2.0))
+model = Path(__file__).with_name("linkages.xml")
+robot = wbc.robots.load(model, shapes="exact", actuated=driven).with_limits(velocity=dict.fromkeys(driven, 2.0))
 stack = wbc.Stack(robot, dt=DT)
 stack.add(wbc.tasks.EndEffector("foot", kind="orientation", gain=50.0), name="foot")
 stack.add(wbc.tasks.EndEffector("plate", kind="position", gain=50.0), name="plate")

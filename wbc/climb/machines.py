@@ -58,7 +58,7 @@ def _limbed(contact: ContactKind) -> Callable[[str], Climber]:
 
 def _table(frames: Sequence[str], shapes: str, acceleration: float, contact: ContactKind) -> Callable[[str], Climber]:
     def make(name: str) -> Climber:
-        robot = _ready(load(name, shapes=shapes, acceleration=acceleration))
+        robot = ready(load(name, shapes=shapes, acceleration=acceleration))
         limbs = [ClimbLimb(robot.frames[frame], contact) for frame in frames]
         return Climber(robot, limbs, name=name)
 
@@ -77,7 +77,7 @@ def _two_ended(name: str) -> Climber:
 
 
 def _three_pandas(name: str) -> Climber:
-    arm = _ready(load("panda", shapes="fit", neutral={"panda_joint6": pi}))
+    arm = ready(load("panda", shapes="fit", neutral={"panda_joint6": pi}))
     # The base stands on the body's side, its x axis downwards: the hands of arms at rest are below the body
     side = pin.SE3(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.25, 0.0, 0.0]))
     places = [pin.SE3(pin.utils.rotate("z", 2 * pi * k / 3), np.zeros(3)) * side for k in range(3)]
@@ -88,7 +88,7 @@ def _three_pandas(name: str) -> Climber:
 
 def _talos(hands: bool) -> Callable[[str], Climber]:
     def make(name: str) -> Climber:
-        robot = _ready(load("talos", shapes="fit", acceleration=HEAVY))
+        robot = ready(load("talos", shapes="fit", acceleration=HEAVY))
         sole = FlatFoot(SOLE, FRICTION)
         limbs = [ClimbLimb(robot.frames[f"{side}_foot"], sole, name=f"{side}_foot") for side in ("left", "right")]
         if hands:
@@ -99,9 +99,9 @@ def _talos(hands: bool) -> Callable[[str], Climber]:
     return make
 
 
-def _ready(robot: Robot) -> Robot:
-    """The robot with pairs of links that must not touch."""
-    if robot.self_pairs is not None:
+def ready(robot: Robot) -> Robot:
+    """The robot with pairs of links that must not touch, where it has shapes."""
+    if robot.self_pairs is not None or not robot.shapes:
         return robot
     return robot.with_self_pairs(find_self_pairs(robot, samples=300).kept)
 

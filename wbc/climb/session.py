@@ -25,10 +25,6 @@ from wbc.climb.scene import ClimbScene, check_scale, read_scene
 from wbc.climb.stance import Stance
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.multibody import pin
-from wbc.robots.pairs import find_self_pairs
-
-#: Acceleration of joints of a robot whose description has none [rad/s^2]
-QUICK = 60.0
 
 
 def climber_of(request: ClimbRequest) -> Climber:
@@ -47,14 +43,12 @@ def climber_of(request: ClimbRequest) -> Climber:
         raise ShapeError("limbs", request.limbs, "give the frames at the tips of two limbs or more, with commas")
     robot = robots.load(str(path), base="floating", shapes="fit")
     if not np.isfinite(robot.limits.acceleration[robot.base_nv :]).all():
-        robot = robot.with_limits(acceleration=QUICK)
-    if robot.self_pairs is None and robot.shapes:
-        robot = robot.with_self_pairs(find_self_pairs(robot, samples=300).kept)
+        robot = robot.with_limits(acceleration=machines.QUICK)
     kinds: dict[str, ContactKind] = {
         "point": PointFoot(request.friction), "flat": FlatFoot(friction=request.friction), "grip": GripHand(),
         "rolling-grip": GripHand(rolls=True), "suction": SuctionPad(friction=request.friction),
     }  # fmt: skip
-    return Climber(robot, [ClimbLimb(frame, kinds[request.hold]) for frame in frames], name=path.stem)
+    return Climber(machines.ready(robot), [ClimbLimb(frame, kinds[request.hold]) for frame in frames], name=path.stem)
 
 
 def course_of(request: ClimbRequest, climber: Climber) -> tuple[ClimbScene, pin.SE3, pin.SE3]:

@@ -107,10 +107,6 @@ class SE3(LikePinocchio):
         out[:3, 3:] = skew(self._translation) @ self._rotation
         return out
 
-    def toActionMatrix(self) -> Array:
-        """As :attr:`action`."""
-        return self.action
-
     def inverse(self) -> SE3:
         """The pose that takes R x + p to x."""
         return _pose(self._rotation.T.copy(), -(self._translation @ self._rotation))
@@ -360,11 +356,6 @@ class Inertia(LikePinocchio):
     def copy(self) -> Inertia:
         """An inertia of its own."""
         return Inertia(self)
-
-    def se3Action(self, pose: SE3) -> Inertia:
-        """As ``pose.act``."""
-        moved: Inertia = pose.act(self)
-        return moved
 
     def __add__(self, other: Inertia) -> Inertia:
         mass = self.mass + other.mass
