@@ -21,7 +21,7 @@ from bench.pool import ROOT
 from bench.prepare import prepare
 from bench.program import publish
 from bench.versions import versions
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 from wbc.native import toolchain
 
 OWN = ("wbc", "casadi", "pin", "numpy", "daqp")
@@ -72,5 +72,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     main()

@@ -18,6 +18,7 @@ from PIL import Image
 import wbc
 from bench.gallery import save
 from bench.pool import ROOT
+from tests.plan.scenes import SHELF, panda
 from tests.walking.trials.torque_trials import walker_of
 from tests.walking.trials.trials import among
 from wbc.track import Scene, render
@@ -27,6 +28,8 @@ from wbc.walking.run.session import perform_walk
 SIZE, SMALL = (800, 540), (480, 330)
 #: Pictures of a film, and how far round the path of a hand there is something to see [m]
 FRAMES, ROUND = 24, 0.5
+#: A hand that points away from the robot
+FORWARDS = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 #: Pictures of a walk, and how long each is shown [s]
 STEPS, SHOWN = 60, 0.2
 
@@ -83,12 +86,33 @@ def posts(_: dict[str, Any], file: Path) -> None:
     save([image for _, image in pictures(run, run.log, SMALL, STEPS)], file, SHOWN)
 
 
+def shelf(_: dict[str, Any], file: Path) -> None:
+    """A Panda's planned law out of one cell of a shelf and into another one."""
+    stack = panda(*SHELF)
+    planner, neutral = stack.planner(), stack.robot.neutral
+    into, target = (wbc.SE3(FORWARDS, np.array(place)) for place in ((0.58, 0.22, 0.22), (0.58, -0.22, 0.57)))
+    path = planner.plan(planner.plan(neutral, {"hand": into}).q[-1], {"hand": target}, paths=8)
+    law = path.law()
+    scene = Scene(stack.robot, dark=["panda_hand"], detail=0.004)
+    for k, (sides, place) in enumerate(SHELF):
+        scene.add_shape(wbc.shapes.Box(sides), wbc.SE3(np.eye(3), np.array(place)), f"board {k}", (0.75, 0.66, 0.5))
+    q, _v = path.configurations(law, np.linspace(0.0, law.duration, 2 * FRAMES))
+    scene.add_path(np.array([stack.robot.pose(x, "panda_hand_tcp").translation for x in q]), radius=0.006)
+    corners = np.array(list(product((-0.1, 0.8), (-0.5, 0.5), (0.0, 0.9))))
+    frame, frames = scene.film(render.framed(corners, SMALL, 4.2, 0.45)), []
+    for x in q:
+        scene.add_robot(x)
+        frames.append(Image.fromarray(frame()))
+    save(frames, file)
+
+
 #: File -> the example that it is drawn from, "" for none, and how
 PICTURES: dict[str, tuple[str, Callable[[dict[str, Any], Path], None]]] = {
     "dual_arm.png": ("dual_arm", dual_arm),
     "mobile_base.png": ("mobile_base", mobile_base),
     "mobile_base_film.gif": ("mobile_base", film),
     "walk_posts.gif": ("", posts),
+    "plan_shelf.gif": ("", shelf),
 }
 
 

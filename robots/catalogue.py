@@ -59,13 +59,14 @@ def load(
     effort: Any = None,
     loops: bool | str | os.PathLike[str] | Sequence[AnyLoop] = True,
     actuated: Sequence[str] | None = None,
+    arguments: Mapping[str, str] | None = None,
 ) -> Robot:
     """A robot from the table, a file, a model, or a chain of Denavit-Hartenberg rows.
 
     Args:
         robot: a name of the table (:func:`names`), ``walker`` or ``two_ended_arm`` (see :func:`~wbc.robots.walker`), a
-            name of :func:`~wbc.robots.operator_arm`, a path of a URDF, SDF or MJCF file, MJCF as a string, a
-            ``pin.Model``, a ``mujoco.MjModel``, or DH rows.
+            name of :func:`~wbc.robots.operator_arm`, a path of a URDF, xacro, SDF, MJCF or USD file, MJCF as a string,
+            a ``pin.Model``, a ``mujoco.MjModel``, or DH rows.
         base: ``fixed``, ``floating`` (free flyer: q has position and quaternion x, y, z, w), ``planar`` (x, y,
             cos, sin; any direction) or ``differential`` (planar, sideways velocity must stay 0, see
             ``Robot.locked_dofs``). Default: the table's, or the one that the model or file brings, or fixed.
@@ -89,8 +90,10 @@ def load(
         actuated: names of the joints with motors, see :meth:`~wbc.robot.Robot.with_actuated`; ``"transmissions"``:
             those with a ``<transmission>`` in the URDF file. Default: of an MJCF file with actuators the joints that
             these move, else all.
+        arguments: of a xacro file, name -> value. Such a file runs expressions and reads files that it names.
 
     Raises:
+        MissingPackageError: what reads xacro or USD is not installed.
         LoopError: no configuration closes the loops.
         UnknownNameError: no such robot (nearest names first), base, joint or frame.
         RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF,
@@ -98,11 +101,14 @@ def load(
         UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover.
         ShapeError, NotFiniteError, RangeError, BoundsError: a bad limit, lock or neutral value.
 
-    Cannot do: xacro files; shapes of SDF files. What a robot cannot hold of a file is named in the log.
+    Cannot do: shapes of SDF and USD files. What a robot cannot hold of a file is named in the log.
     """
     recipe, source, made = _find(robot)
     more, own = _loops(loops)
     changes: dict[str, Any] = {"loops": own, "actuated": actuated}
+    if arguments is not None:
+        given = validation.mapping("arguments", arguments, "names to values")
+        changes["arguments"] = {str(key): str(value) for key, value in given.items()}
     if lock is not None:
         changes["lock"] = lock_mapping(lock)
         changes["pairs"] = ""  # other links move against each other

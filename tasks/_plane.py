@@ -12,6 +12,7 @@ import casadi as ca
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.robot import Robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import WORLD, Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _stereographic as stereo
@@ -39,10 +40,10 @@ class Plane:
 
 
 @lru_cache(maxsize=32)
-def _angle(item: PlaneItem, robot: Robot) -> ca.Function:
+def _angle(item: PlaneItem, robot: Robot) -> SingleState:
     """q -> the angle of a plane; kept, since every reset of a controller asks for it."""
     kin = Tracer(Kinematics(robot.model))
-    return ca.Function("angle", [kin.q], [kin.expand(item._turned(kin, ca.SX(0)))])
+    return SingleState(ca.Function("angle", [kin.q], [kin.expand(item._turned(kin, ca.SX(0)))]))
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class PlaneItem(Item):
         Builds the expression when it is first asked on a robot: for set-up and inspection, not for a control loop.
         """
         q = robot.configuration("q", q)
-        return float(_angle(self, robot)(q))
+        return float(_angle(self, robot)(q)[0][0, 0])
 
     def _against(self) -> PlaneReference:
         return self.reference if self.reference is not None else PlaneReference()

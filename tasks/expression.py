@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import NotFiniteError, ShapeError, UnknownNameError
 from wbc.pickling import by_name_or_value
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
@@ -127,10 +128,9 @@ class Expression(Task):
         if jacobian.nnz() == 0:
             raise ShapeError("Expression.function", trace.error, "the result does not depend on the configuration")
         outputs = [trace.tracer.expand(trace.error), jacobian]
-        function = ca.Function("check", [trace.tracer.q, trace.symbols.vector], outputs)
+        function = SingleState(ca.Function("check", [trace.tracer.q, trace.symbols.vector], outputs))
         values = [run_time.flat(robot, d.name, d, d.default) for d in self.declared]
-        outcome = function(robot.neutral, np.concatenate([np.zeros(0), *values]))
-        error, matrix = (np.array(part.full()) for part in outcome)
+        error, matrix = function(robot.neutral, np.concatenate([np.zeros(0), *values]))
         if not np.isfinite(error).all():
             raise NotFiniteError("Expression.function", error.ravel(), "the error at the neutral configuration")
         if not np.isfinite(matrix).all():

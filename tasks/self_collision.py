@@ -246,6 +246,11 @@ class SelfCollision(Constraint):
             known[key] = most_apart(robot, shapes, [_names(pair) for pair in pairs], enough)
         return known[key]
 
+    def kept_pairs(self, robot: Robot) -> list[tuple[ShapePair, float]]:
+        """Pairs of shapes that keep apart, and the most of the margin that each keeps [m]; infinite: all of it."""
+        pairs = self._shape_pairs(robot)
+        return list(zip(pairs, map(float, self._kept(robot, pairs)), strict=True))
+
     def _kept(self, robot: Robot, pairs: list[ShapePair]) -> Array:
         """The margin that each pair keeps at most [m]; infinite where postures leave room for any."""
         most = self._most_apart(robot)

@@ -16,11 +16,21 @@ import pytest
 
 #: Module -> package
 OPTIONAL = {"pinocchio": "pin", "coal": "coal", "toppra": "toppra", "ruckig": "ruckig"}
+#: Those that are too large for the environment of the tests
+OPTIONAL |= {
+    "cyclonedds": "cyclonedds",
+    "foxglove": "foxglove-sdk",
+    "pxr": "usd-core",
+    "rerun": "rerun-sdk",
+    "torch": "torch",
+}
+#: Extras that bring them
+EXTRAS = "foxglove|laws|rerun|ros2|torch|usd"
 LACKING = {module: package for module, package in OPTIONAL.items() if find_spec(module) is None}
 #: What an error says in this process or another
 _WANTED = re.compile(
     rf"No module named '({'|'.join(LACKING)})'"
-    rf"|needs this package: pip install '?({'|'.join(LACKING.values())}|wbc\[laws\])"
+    rf"|needs this package: pip install '?({'|'.join(LACKING.values())}|wbc\[(?:{EXTRAS})\])"
 )
 _skipped: Counter[str] = Counter()
 

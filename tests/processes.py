@@ -86,6 +86,12 @@ def _said(path: str) -> bytes:
         return file.read() or b""
 
 
+def processor_time(process: int) -> float:
+    """What a process has used [s]."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def left(known: set[int], seconds: float = GRACE) -> dict[int, str]:
     """Commands of the descendants that are not among the known ones and do not end within some seconds."""
     until = time.monotonic() + seconds

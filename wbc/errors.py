@@ -125,6 +125,10 @@ class StructureFileError(WbcError):
     """A file that describes no structure to walk on; ``field`` names the line and the column."""
 
 
+class ClipFileError(WbcError):
+    """A file that holds no clip of motion, or one that cannot be read."""
+
+
 class CompileError(WbcError):
     """The C compiler was asked for and could not build the tick."""
 

@@ -11,15 +11,24 @@ from wbc.errors import WbcError
 #: Extra of pyproject.toml -> modules that it brings
 EXTRAS = {
     "analysis": ("flint",),
+    "clips": ("ezc3d",),
     "cluster": ("distributed",),
+    "formats": ("mcap", "msgspec", "rosbags"),
+    "foxglove": ("foxglove",),
+    "gymnasium": ("gymnasium",),
     "laws": ("ruckig", "toppra"),
     "mujoco": ("mujoco",),
     "osqp": ("osqp",),
     "plots": ("matplotlib",),
     "programs": ("py_trees", "pydantic", "yaml"),
     "recordings": ("pyarrow",),
+    "rerun": ("rerun",),
+    "ros2": ("cyclonedds",),
     "studies": ("pydantic", "yaml"),
+    "torch": ("torch",),
+    "usd": ("pxr",),
     "viewer": ("viser", "websockets"),
+    "xacro": ("xacrodoc",),
     "zeromq": ("zmq",),
 }
 

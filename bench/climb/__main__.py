@@ -23,8 +23,22 @@ from typing import Any
 
 #: What the loop does not know under torques: friction, masses, delay [s]
 UNKNOWN = {"slippery": 0.8, "mass_error": 0.05, "delay": 0.005}
+#: Rule of the checker by which closed contacts stay [m]
+SLIPS = "closed contact slips"
 #: Heads of the table
-HEADS = ("robot", "scene", "walked", "steps", "climb s", "plan s", "plan / climb", "real time", "else")
+HEADS = (
+    "robot",
+    "scene",
+    "walked",
+    "steps",
+    "climb s",
+    "plan s",
+    "plan / climb",
+    "real time",
+    "ticks / real time",
+    "slip mm",
+    "else",
+)
 
 
 def one(robot: str, scene: str, seed: int, plant: str) -> dict[str, Any]:
@@ -74,13 +88,16 @@ def table(cells: Iterable[dict[str, Any]]) -> str:
     rows = [HEADS, ("---",) * len(HEADS)]
     for (robot, scene), group in groups.items():
         walked = [cell for cell in group if cell["result"] == "walked"]
-        numbers = ["", "", "", "", ""]
+        numbers = [""] * 7
         if walked:
             count = len(walked)
-            steps, length, planning, real = (
-                sum(cell[key] for cell in walked) / count for key in ("steps", "duration", "planning", "real_time")
+            steps, length, planning, real, ticks = (
+                sum(cell[key] for cell in walked) / count
+                for key in ("steps", "duration", "planning", "real_time", "loop_real_time")
             )
+            slip = max(cell["least"].get(SLIPS) or 0.0 for cell in walked)
             numbers = [f"{steps:.0f}", f"{length:.1f}", f"{planning:.2f}", f"{planning / length:.2f}", f"{real:.1f}"]
+            numbers += [f"{ticks:.1f}", f"{1e3 * slip:.2f}"]
         others = collections.Counter(f"{c['result']}: {c['reason']}" for c in group if c["result"] != "walked")
         why = "; ".join(f"{count} {text}" if count > 1 else text for text, count in others.items())
         rows.append((robot, scene, f"{len(walked)} of {len(group)}", *numbers, why.replace("|", "/")[:300]))

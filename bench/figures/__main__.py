@@ -16,7 +16,7 @@ import sys
 from bench.figures import floors, pages, store
 from bench.figures.index import FIGURES, Figure, render, write_blocks
 from bench.pool import ROOT
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 
 
 def measure(figure: Figure) -> None:
@@ -87,5 +87,5 @@ def main(given: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     sys.exit(main())

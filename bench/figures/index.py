@@ -11,6 +11,7 @@ from typing import Any
 from bench import report
 from bench.figures import pages, store
 from bench.ik import tables as ik
+from bench.plan import tables as plan
 from bench.pool import ROOT
 from bench.walk.page import page_sheets
 
@@ -51,6 +52,13 @@ class Figure:
         return " ".join(self.command) if self.command else f"python -m bench.figures --only {self.name}"
 
 
+def _retarget_page(data: Any) -> str:
+    """Imported for its own page only: the bench loads the whole package."""
+    from bench.retarget import page
+
+    return page(data)
+
+
 _ALL = (
     Figure(
         "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 15.0, ("make", "bench"),
@@ -73,6 +81,17 @@ _ALL = (
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("cortex_m7", (*TICK, "wbc/export", "tests/export/single.py", "bench/cortex_m7"), 5.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
+    Figure(
+        "plan", ("wbc/plan", "bench/plan"), 60.0,
+        ("python", "-m", "bench.plan", "--peers-python", ".venv-plan/bin/python", "--write", "bench/data/plan.json"),
+        "bench/data/plan.json", {"peers": plan.page},
+    ),
+    Figure(
+        "retarget", (*TICK, "wbc/retarget", "bench/retarget.py", "bench/retarget_peers.py"), 15.0,
+        ("python", "-m", "bench.retarget", "--peers-python", ".venv-peers/bin/python", "--json",
+         "bench/data/retarget.json"),
+        "bench/data/retarget.json", {"peers": _retarget_page},
+    ),
     Figure("demo", (*TICK, "wbc/track"), 0.5),
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
     Figure("identification", ("wbc/identification",), 2.0),
@@ -83,6 +102,7 @@ _ALL = (
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
     Figure("programs", ("examples", "bench/programs"), 0.1),
+    Figure("recorded", (*TICK, "wbc/record", "wbc/formats", "wbc/batch"), 2.0),
     Figure("relative_motion", ("wbc/published/relative_motion", "wbc/symbolic/taylor.py"), 0.2),
     Figure("resolvers", (*TICK, "wbc/resolvers", "wbc/coordinates", "bench/resolvers"), 1.0),
     Figure("sensing", ("wbc/proximity",), 1.0),

@@ -21,7 +21,7 @@ from bench.ik.run import BLOCKS, OURS, PEERS, Protocol, about, many, measure, ro
 from bench.pool import ROOT
 from bench.program import bars, publish, terminal
 from bench.versions import versions
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 
 #: Poses a chain for wbc and for each peer, in a quick run and in a full one
 QUICK, FULL = (1000, 100), (10_000, 1000)
@@ -109,5 +109,5 @@ def main(given: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     main()

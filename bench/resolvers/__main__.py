@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from bench.resolvers.drives import DT, SECONDS, Outcome, drive, methods
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 
 HEAD = "| method | one resolution [us] | fastest joint [rad/s] | twist lost [m/s, rad/s] | after the return [rad] |"
 
@@ -30,5 +30,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     main()

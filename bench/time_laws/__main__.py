@@ -20,7 +20,7 @@ from bench.program import Record, bars, measure, publish
 from bench.time_laws import least_time, states, ticks
 from bench.time_laws.tables import sheets
 from tests.trajectory.suite import INSTANCES
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 
 PACKAGES = ("wbc", "toppra", "ruckig", "numpy", "scipy", "pin")
 
@@ -132,5 +132,5 @@ def main(given: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     main()

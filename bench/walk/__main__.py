@@ -22,7 +22,7 @@ from bench.walk.machine import Job, Machine, Record
 from bench.walk.planning import planning_jobs
 from bench.walk.planning_tables import planning_sheet
 from wbc.errors import RangeError
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
 
@@ -83,5 +83,5 @@ def main(given: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     main()

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.processes import processor_time
 from wbc.cli import completion
 from wbc.cli.app import COMMANDS, CommandGroup, app, command
 
@@ -89,12 +90,6 @@ def test_what_needs_a_clone_is_hidden_elsewhere(monkeypatch: pytest.MonkeyPatch)
     assert not {name for name, one in CommandGroup().commands.items() if one.hidden}
     monkeypatch.setattr(Path, "is_file", lambda _: False)
     assert {name for name, one in CommandGroup().commands.items() if one.hidden} == hidden
-
-
-def processor_time(process: int) -> float:
-    """What a process has used [s]."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 @pytest.mark.parametrize("wait", [0.5, 1.0])

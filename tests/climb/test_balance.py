@@ -89,6 +89,10 @@ def test_motors_that_are_too_weak_do_not_bear() -> None:
         weak = Climber(robot.robot.with_limits(effort=effort), robot.limbs, robot.rest)
         margin = Equilibrium(weak, scene).margin([0, 1, 2, 3], robot.rest, motors=True)
         assert (margin > -np.inf and margin > -1.0) == stands
+        effort[6:] = 2.0 * least
+        strong = Climber(robot.robot.with_limits(effort=effort), robot.limbs, robot.rest)
+        part = Equilibrium(strong, scene).margin([0, 1, 2, 3], robot.rest, motors=True, effort=0.5 * share)
+        assert part == pytest.approx(margin, abs=1e-6)
 
 
 def _least_torque(robot: Climber) -> float:

@@ -8,23 +8,47 @@ import numpy as np
 import pytest
 
 from tests.climb.by_hand import TRIPODS, climber, gait
-from wbc.climb import ContactPlan
+from tests.repeats import ALL, MORE, repeats
+from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, Equilibrium, first_stance, plan_climb, scenes
 from wbc.climb.checker import CheckRules, check
-from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions
+from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions, PlanReference
 from wbc.climb.plants import ClimbPlant, PlantErrors
 
+#: What plan and loop do not know: friction, masses, delay [s]
+UNKNOWN = {"friction": 0.8, "mass": 0.05, "delay": 0.005}
+#: Climbers, what they climb, and the part of it that does for a short test
+COURSES = (
+    ("anymal_c", "stepping_stones", 0.12),
+    ("hexapod", "stepping_stones", 0.12),
+    ("wall_climber", "wall", 0.3),
+)
 
-def _carried_out(plan: ContactPlan, errors: PlantErrors) -> tuple[ClimbRun, float]:
+
+def _carried_out(plan: ContactPlan, errors: PlantErrors, most: float = 10.0) -> tuple[ClimbRun, float]:
     """The run, and the largest ratio of friction to normal force by MuJoCo's contacts of feet that press with 5 N."""
     plant = ClimbPlant(plan.climber, plan.scene, errors)
     loop, ratio = ClimbLoop(plan, plant, options=LoopOptions(delay=errors.delay)), 0.0
-    while not loop.ended and loop.time < 10.0:
+    while not loop.ended and loop.time < most:
         loop.tick()
         forces = plant.contact_forces()
         pressing = forces[:, 0] > 5.0
         if pressing.any():
             ratio = max(ratio, float((forces[pressing, 1] / forces[pressing, 0]).max()))
     return loop.result(), ratio
+
+
+def _least_with_motors(plan: ContactPlan, effort: float) -> float:
+    """The least margin with a share of the motors' efforts, at rest, as limbs lift, half-way and as they land."""
+    balance, reference = Equilibrium(plan.climber, plan.scene), PlanReference(plan, plan.climber.robot)
+    margins, moves = [], sorted(plan.moves, key=lambda move: move.lift)
+    for move in moves:
+        held = list(plan.start)
+        for other in moves:
+            if other.lift <= move.lift:
+                held[other.limb] = other.lands if other.land <= move.lift else -1
+        for time in np.linspace(move.lift, move.land, 3):
+            margins.append(balance.margin(held, reference.q(time), motors=True, effort=effort))
+    return min(margins)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -40,6 +64,28 @@ def test_a_hexapod_walks_in_tripods(seed: int) -> None:
     weight = plan.climber.mass * 9.81
     pressed = sum(run.log[f"wrench.limb{k}.fz"] for k in range(1, 7))
     assert abs(pressed[-1] - weight) < 0.02 * weight
+
+
+@pytest.mark.parametrize(
+    ("name", "scene", "part", "seed"), [(*course, k) for course in COURSES for k in range(repeats(1))]
+)
+def test_courses_are_walked(name: str, scene: str, part: float, seed: int) -> None:
+    """A fifth of the stones and holds is missing."""
+    robot = climber(name)
+    course = scenes.draw(scene, scenes.size_of(robot), seed, density=0.8)
+    q, end = (scenes.placed(robot, frame) for frame in (course.start, course.goal))
+    first, last = (robot.body_pose(posture).translation for posture in (q, end))
+    options = ClimbOptions.by_torques()
+    start = first_stance(robot, course.scene, q, options.stances)
+    goal = first + (part if MORE < ALL else 1.0) * (last - first)
+    plan = plan_climb(robot, course.scene, start, BodyPlace(goal), options)
+    assert plan.moves
+    assert _least_with_motors(plan, 0.9) > 0.0
+    run, ratio = _carried_out(plan, PlantErrors(**UNKNOWN, seed=seed), 2.0 * plan.times[-1] + 10.0)
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    report = check(run.log, robot, course.scene, CheckRules.by_torques())
+    assert report.clean, str(report)
+    assert ratio < 0.8 * 0.6 + 1e-6
 
 
 def test_grips_hang_and_go_on() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -22,9 +23,11 @@ from wbc.coordinates import (
     PlaneAngleRows,
     PointRows,
     mode_pairs,
+    motion_cue,
     parts,
 )
 from wbc.coordinates.control.pair_stack import row_count
+from wbc.coordinates.control.rank_loss import Condition
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.robots import load, operator_arm
@@ -94,6 +97,24 @@ def test_a_switch_keeps_rates_continuous_and_what_both_pairs_hold(control: PairC
     # The same switch without a blend asks for more
     J = np.vstack((control.rates(q)[TIP], control.rates(q)[ALPHA]))
     assert np.abs(np.linalg.solve(J, (0.1, 0.05, -0.04, 0.0)) - after[-1]).max() > 0.005
+
+
+def test_casadi_converts_nothing_in_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it does, it drops an interrupt that comes meanwhile."""
+    control, converted = PairController(ARM, PAIRS[:3], backend="vm"), list[object]()
+    control.reset(STATE)
+    asked = vars(ca)["DM_from_array"]
+    monkeypatch.setattr(ca, "DM_from_array", lambda value, *given: (converted.append(value), asked(value, *given))[1])
+    # Its expressions are made once
+    motion_cue(ARM, PAIRS[1], STATE, (0.1, 0.0, 0.0))
+    assert converted
+    converted.clear()
+    control.command((0.1, 0.0, 0.0))
+    control.switch("shoulder", 0.1)
+    for _ in range(20):
+        assert control.step(STATE).condition is Condition.REGULAR
+        assert motion_cue(ARM, PAIRS[1], STATE, (0.1, 0.0, 0.0)).share == pytest.approx(1.0)
+    assert not converted
 
 
 def test_self_motion_after_a_drive_holds_the_tip_where_it_stops(control: PairController) -> None:

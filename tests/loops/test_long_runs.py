@@ -1,4 +1,6 @@
-"""Random ticks within limits of position, velocity and acceleration; with ``REPEATS=200`` 10^5 of each mechanism."""
+"""Random ticks within limits of position, velocity and acceleration, of velocities, accelerations and torques; with
+``REPEATS=200`` 10^5 of each mechanism and linkage.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,9 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import NAMED, random_linkage
+from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors
 from tests.loops.test_reading import CASSIE
+from tests.loops.test_torques import linkage, needed, rows_at
 from tests.repeats import repeats
 from wbc.robot import Robot
 
@@ -66,3 +69,50 @@ def test_mechanisms(name: str) -> None:
 @pytest.mark.parametrize("seed", range(LINKAGES))
 def test_random_linkages(seed: int) -> None:
     run(bounded(wbc.robots.load(random_linkage(seed), shapes="none"), seed), TICKS, seed)
+
+
+def run_second_order(robot: Robot, text: str, command: str, count: int, seed: int) -> None:
+    """Every tick is solved and moves within limits; its accelerations keep loops closed up to the second order, and its
+    torques are those that MuJoCo says they need. What a plant keeps, the configuration between ticks, is closed here.
+    """
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, rng, limits, moved = stack.compile(command=command), np.random.default_rng(seed), robot.limits, 0.0
+    motors, q, v = list(robot.motors), robot.neutral, np.zeros(robot.nv)
+    for k in range(count):
+        if k % EPISODE == 0:
+            q, v = robot.neutral, np.zeros(robot.nv)
+            controller.reset(q)
+        if k % 60 == 0:
+            controller["posture"].target = pin.integrate(robot.model, q, 2.0 * rng.normal(size=robot.nv))
+        step = controller.step(q, v)
+        assert step.status == "solved", (k, step)
+        assert np.isfinite(step.a).all()
+        assert (np.abs(step.v) <= limits.velocity * (1.0 + 1e-6)).all(), k
+        assert (np.abs(step.a) <= limits.acceleration * (1.0 + 1e-6)).all(), k
+        if command == "torque":
+            torques, missing = needed(robot, text, q, v, step.a)
+            size = max(1.0, float(np.abs(torques).max()))
+            assert np.abs(missing).max() < 1e-6 * size, k
+            assert np.abs(step.torque[motors] - torques).max() < 1e-6 * size, k
+        reached = pin.integrate(robot.model, q, (v + 0.5 * DT * step.a) * DT)
+        q = robot.closed(reached)
+        assert np.abs(robot.difference(reached, q)).max() < DT**2, k
+        rows, v = rows_at(robot, q), np.array(step.v)
+        v -= np.linalg.pinv(rows, 1e-7) @ rows @ v
+        assert max(robot.loop_gaps(q).values()) <= 1e-9, k
+        moved = max(moved, float(np.abs(step.v).max()))
+    assert moved > 0.1, "nothing moved"
+
+
+@pytest.mark.parametrize("command", ["acceleration", "torque"])
+@pytest.mark.parametrize("name", NAMED)
+def test_mechanisms_of_second_order(name: str, command: str) -> None:
+    text = with_motors(NAMED[name], MOTORS[name])
+    robot = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=200.0)
+    run_second_order(robot, text, command, max(TICKS // 5, 60), 0)
+
+
+@pytest.mark.parametrize("seed", range(min(repeats(3), 24)))
+def test_random_linkages_of_second_order(seed: int) -> None:
+    text, robot = linkage(seed)
+    run_second_order(robot, text, "torque" if seed % 2 else "acceleration", max(TICKS // 5, 60), seed)

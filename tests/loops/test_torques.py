@@ -58,11 +58,16 @@ def stack_of(robot: Robot) -> wbc.Stack:
     return stack.add(wbc.tasks.JointLimits())
 
 
+@cache
+def rows_of(robot: Robot) -> ca.Function:
+    """q -> Jacobian of the loops."""
+    kin = Tracer(Kinematics(robot.model))
+    return ca.Function("rows", [kin.q], [ca.densify(kin.jacobian(robot.loops.error(kin)))])
+
+
 def rows_at(robot: Robot, q: Array) -> Array:
     """Jacobian of the loops."""
-    kin = Tracer(Kinematics(robot.model))
-    slope = kin.jacobian(robot.loops.error(kin))
-    return np.array(ca.Function("rows", [kin.q], [ca.densify(slope)])(q))
+    return np.array(rows_of(robot)(q))
 
 
 def moving(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -72,12 +77,18 @@ def moving(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
     return q, v - np.linalg.pinv(rows, 1e-7) @ rows @ v
 
 
+@cache
+def simulated(robot: Robot, text: str) -> tuple[mujoco.MjModel, mujoco.MjData, MujocoJoints]:
+    """A file as MuJoCo has it."""
+    model = mujoco.MjModel.from_xml_string(text)
+    return model, mujoco.MjData(model), MujocoJoints(model, robot)
+
+
 def needed(robot: Robot, text: str, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
     """(torques of the motors, how far these and forces in loops are from moving the robot so) for accelerations, by
     MuJoCo's mass matrix, bias forces and Jacobian of the equalities: M a + h = S' tau + J' f.
     """
-    model = mujoco.MjModel.from_xml_string(text)
-    data, joints = mujoco.MjData(model), MujocoJoints(model, robot)
+    model, data, joints = simulated(robot, text)
     joints.put_q(data.qpos, q)
     joints.put_v(data.qvel, q, v)
     mujoco.mj_forward(model, data)

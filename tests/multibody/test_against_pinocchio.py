@@ -120,6 +120,9 @@ def test_poses_turns_and_inertias(seed: int) -> None:
     turn = own.Quaternion.FromTwoVectors(first, second).matrix()
     alike(turn, pin.Quaternion.FromTwoVectors(first, second).matrix(), "two vectors")
     alike(own.Quaternion.FromTwoVectors(first, -first).matrix() @ first, -first, "opposite vectors")
+    for pair in ((first, 0.0 * first), (0.0 * first, first)):
+        ours, theirs = (module.Quaternion.FromTwoVectors(*pair).coeffs() for module in (own, pin))
+        alike(ours, theirs, "a vector without a direction")
     bodies = [random_inertia(rng) for _ in range(2)]
     a, b = (own.Inertia(body.mass, body.lever, body.inertia) for body in bodies)
     alike((a + mine.act(b)).matrix(), (bodies[0] + pose.act(bodies[1])).matrix(), "inertia")

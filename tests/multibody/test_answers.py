@@ -14,6 +14,7 @@ STORED = np.load(FILE)
 ALIKE = 1e-12
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", wbc.robots.names())
 def test_kinematics_and_dynamics(name: str) -> None:
     robot = wbc.robots.load(name, shapes="none")

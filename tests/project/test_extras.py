@@ -12,21 +12,30 @@ from tests.project.layout import pyproject
 from wbc.extras import EXTRAS
 
 #: Modules whose distribution is called otherwise
-DISTRIBUTIONS = {"flint": "python-flint", "py_trees": "py-trees", "yaml": "pyyaml", "zmq": "pyzmq"}
+DISTRIBUTIONS = {"flint": "python-flint", "pxr": "usd-core", "py_trees": "py-trees", "yaml": "pyyaml", "zmq": "pyzmq"}
 #: What needs each extra; laws of motion need two packages, each for its own kind
 LEAST_TIME = "wbc.trajectory.time_optimal([[0.0], [1.0]], [1.0], [4.0])"
 JERK_LIMITED = "wbc.trajectory.online(1, 0.01, velocity=1.0, acceleration=1.0, jerk=1.0)"
 USES = {
     "analysis": "from wbc.analysis import ExactModel",
+    "clips": "from wbc.retarget.sources import c3d; c3d.read_c3d(None)",
     "cluster": "from wbc.study import carrying_out; carrying_out.connected(2, None).__enter__()",
+    "formats": "from wbc.formats import read_motion; read_motion('arm.urdf')",
+    "foxglove": "from wbc.formats.live import FoxgloveSink; FoxgloveSink()",
+    "gymnasium": "from wbc.learning import stack_actions; stack_actions(None, None, None, None, None)",
     "laws": LEAST_TIME,
     "mujoco": "wbc.robots.load('<mujoco/>')",
     "osqp": "stack.compile(solver='osqp', backend='vm')",
     "plots": "from wbc import style; style.pyplot().__enter__()",
     "programs": "from wbc.program import Program",
     "recordings": "from wbc.log import log; log._read_parquet(None)",
+    "rerun": "from wbc.formats.rerun_file import RerunSink; RerunSink('x.rrd')",
+    "ros2": "from wbc.formats import Ros2Plant; Ros2Plant(robot)",
     "studies": "from wbc.study import Study",
+    "torch": "from wbc.learning import command_layer; command_layer(None)",
+    "usd": "open('x.usda', 'w').close(); wbc.robots.load('x.usda')",
     "viewer": "wbc.viewer.show(controller)",
+    "xacro": "open('x.xacro', 'w').close(); wbc.robots.load('x.xacro')",
     "zeromq": "from wbc.viewer.zeromq import ZeroMqEnd; ZeroMqEnd('tcp://127.0.0.1:0', '', 1.0)",
 }
 URDF = """<robot name="arm">

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import threading
@@ -635,7 +636,10 @@ def test_who_waits_long_is_told_and_who_does_not_is_not(
         monkeypatch.setattr(cache, "SLOW", 0.05)
         cache.fetch("slow", slow, what="a stack", advice="do this")
         *told, last = caplog.messages
-        assert set(told) == {"compiling a stack: 0 s so far; it is kept for the next time; do this"}
+        # A busy machine may sleep for longer than it is told to
+        assert {re.sub(r"\d+", "0", line) for line in told} == {
+            "compiling a stack: 0 s so far; it is kept for the next time; do this"
+        }
         assert last.startswith("compiling a stack ended after ")
         caplog.clear()
         cache.fetch("slow", slow)

@@ -10,6 +10,7 @@ import pytest
 
 import wbc
 from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.extras import MissingPackageError
 from wbc.trajectory import Law, jerk_limited, many, time_optimal
 
 RNG = np.random.default_rng(5)
@@ -55,6 +56,17 @@ def test_a_motion_without_a_law_ends_no_others(processes: int) -> None:
     for ask in (lambda: laws[1], lambda: laws.at(0.1), lambda: list(laws)):
         with pytest.raises(WbcError, match=r"motion 1\.target"):
             ask()
+
+
+def without_package(_waypoints: Any) -> Law:
+    """A law of a package that is not installed."""
+    raise MissingPackageError("laws", "ruckig", "a jerk-limited law needs this package")
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_missing_package_ends_all(processes: int) -> None:
+    with pytest.raises(MissingPackageError, match="ruckig"):
+        many(without_package, np.zeros((3, 2)), processes=processes)
 
 
 def test_bad_input_is_refused() -> None:

@@ -21,6 +21,7 @@ from wbc.tasks.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from wbc.ik import InverseKinematics, Solution
+    from wbc.plan import MotionPlanner, PlannedPath
 
 log = logging.getLogger("wbc")
 
@@ -173,3 +174,34 @@ class Stack(Declaration):
         """
         kinematics = self.inverse_kinematics(goals, backend)
         return kinematics.solve(q0, targets, seed=seed, budget=budget, restarts=restarts, tolerance=tolerance)
+
+    def planner(self, keep: Iterable[str] = ()) -> MotionPlanner:
+        """A planner of paths on which every hard row of these constraints holds, kept for many queries.
+
+        Args:
+            keep: names of tasks whose errors stay 0 on every path, as a level cup or a tray between two hands.
+
+        Raises:
+            WbcError: as :class:`wbc.plan.MotionPlanner`.
+        """
+        from wbc.plan import MotionPlanner
+
+        return MotionPlanner(self, keep)
+
+    def plan(
+        self, q0: Any, goal: Any, *, keep: Iterable[str] = (), seed: int = 0, seconds: float = 10.0
+    ) -> PlannedPath:
+        """A path from a configuration to a goal: :meth:`planner` and its ``plan`` in one; docs/plan.md.
+
+            path = stack.plan(q0, {"hand": pose})
+            law = path.law()
+
+        Args:
+            q0: where it begins [nq].
+            goal: a configuration [nq], targets by task, or a list of these of which one is to be reached.
+            keep: as for :meth:`planner`. seed: of the samples. seconds: after which the search is over [s].
+
+        Raises:
+            WbcError: as :meth:`wbc.plan.MotionPlanner.plan`.
+        """
+        return self.planner(keep).plan(q0, goal, seed=seed, seconds=seconds)

@@ -14,6 +14,7 @@ from wbc.batch import numbers
 from wbc.batch.batch_step import BatchStep
 from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import BatchEngine, Clones, Compiled, Given
+from wbc.batch.pullback import Pullback, reason_against
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
 from wbc.controller.together import main_input
@@ -21,6 +22,7 @@ from wbc.cores import cores
 from wbc.errors import RangeError, ShapeError, SolverError
 from wbc.stack.codegen import unit_groups
 from wbc.stack.layout import Slot
+from wbc.stack.program import left_to_loops
 from wbc.tasks.inputs import require_order
 from wbc.tick.buffers import INFINITE
 from wbc.tick.native import NativeTick
@@ -269,6 +271,21 @@ class Batch:
             if isinstance(tick, NativeTick) and not (soft or layout.cascade)
             else None
         )
+
+    @cached_property
+    def pullback(self) -> Pullback:
+        """What differentiates backwards.
+
+        Raises:
+            SolverError: the stack's ticks are not all in its CasADi functions. CompileError: no compiler.
+        """
+        why = reason_against(self._core.context)
+        if not why and (self.derivatives is None or any(left_to_loops(self._core.stack, self._layout))):
+            why = "it is not compiled, or measures distances in a loop"
+        if why:
+            raise SolverError("pull", self._core.stack.robot.name, f"the stack has no backward pass: {why}")
+        assert self.derivatives is not None
+        return Pullback(self.derivatives, self._core.context, self.threads)
 
     def __len__(self) -> int:
         return self.count

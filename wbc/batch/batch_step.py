@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from wbc import validation
+from wbc.batch import numbers
 from wbc.batch.derivatives import Derivatives
+from wbc.batch.pullback import Pullback
 from wbc.controller.step import Step
 from wbc.errors import CommandError, SolverError
 from wbc.stack.layout import CLOSED
@@ -30,6 +32,33 @@ class StepOwner(Protocol):
     def derivatives(self) -> Derivatives | None:
         """What differentiates all ticks at once; None where each is done alone."""
 
+    @property
+    def pullback(self) -> Pullback:
+        """What differentiates backwards.
+
+        Raises:
+            SolverError: the stack's ticks are not all in its CasADi functions.
+        """
+
+
+class Pulled:
+    """Gradients of :meth:`BatchStep.pull`."""
+
+    def __init__(self, parts: Mapping[str, Array], context: Context) -> None:
+        self._parts, self._context = parts, context
+
+    def by(self, name: str, value: str | None = None) -> Array:
+        """By ``"q"``, by ``"v"``, the velocity that accelerations count from, or by an item's value [n, k].
+
+        Raises:
+            UnknownNameError: no such item or value.
+        """
+        if value is None:
+            return self._parts[{"q": "q", "v": "v_last"}[validation.one_of("by", name, ("q", "v"))]]
+        block = self._context.layout.blocks[validation.one_of("by", name, self._context.layout.blocks)]
+        slots = block.slots
+        return self._parts["p"][:, slots[validation.one_of(f"by.{name}", value, slots)].span]
+
 
 class BatchStep:
     """Result of one tick of n robots; arrays are read-only.
@@ -42,6 +71,7 @@ class BatchStep:
     def __init__(self, reports: Array, owner: StepOwner, context: Context) -> None:
         reports.flags.writeable = False
         self._reports, self._context, self._owner, self._changes = reports, context, owner, owner.changes
+        self._kept: Array | None = None
         self.command: Array = reports[:, : context.nv]
         self.v: Array = self.command
         if context.command != "velocity":
@@ -170,6 +200,43 @@ class BatchStep:
         if (together := self._owner.derivatives) is not None:
             return together.find(name, value, self._reports, self._owner.inputs)
         return np.stack([self[k].derivative(name, value) for k in range(len(self))])
+
+    def keep(self) -> None:
+        """Keep a copy of what the ticks were given, so that :meth:`pull` works when the batch has gone on.
+
+        Raises:
+            SolverError: it has gone on already.
+        """
+        self._given("q")
+        self._kept = self._owner.inputs.copy()
+
+    def pull(self, weights: Any) -> Pulled:
+        """The gradient of ``sum(weights * v)`` by all that the ticks were given, backwards in one pass.
+
+            step.pull(w).by("q"), step.pull(w).by("hand", "target")         # [n, nq], [n, 12]
+
+        It is by the numbers as they are: of a pose by those of its rotation, column by column, and its position, of a
+        quaternion by its four; along what these may not do it means nothing. Robots whose rows do not all hold have
+        zeros, see :attr:`solved`.
+
+        Args:
+            weights: [n, nv].
+
+        Raises:
+            ShapeError, NotFiniteError: bad weights. SolverError: the batch has gone on since; strict levels, soft rows,
+                spheres and capsules to keep clear of, calm stacks, or accelerations. CompileError: no compiler.
+        """
+        inputs = self._kept
+        if inputs is None:
+            self._given("q")
+            inputs = self._owner.inputs
+        w = numbers.rows("weights", weights, len(self), self._context.nv)
+        good = self.solved
+        found = self._owner.pullback.find(w[good], self._reports[good], inputs[good])
+        whole = {name: np.zeros((len(self), part.shape[1])) for name, part in found.items()}
+        for name, part in found.items():
+            whole[name][good] = part
+        return Pulled(whole, self._context)
 
     def __repr__(self) -> str:
         codes, names = self.status_codes, list(Status)

@@ -38,6 +38,10 @@ class Derivatives:
         memory = context.memory
         self._base, self._size = memory["H"].start, memory["unusable"].start - memory["H"].start
 
+    def twin(self) -> Derivatives:
+        """Another one with a tick of its own, for another thread."""
+        return Derivatives(self._tick.twin(), self._context)
+
     def find(self, name: str, value: str | None, reports: Array, inputs: Array) -> Array:
         """[n, nv, k] for reports and inputs of n robots, whose ticks are over.
 
@@ -58,7 +62,7 @@ class Derivatives:
         # Accelerations count from where the tick found them
         self._given(before, "v_last")[:] = self._given(before, "v_in")
         x, force = reports[:, memory["v"]], reports[:, memory["multipliers"]]
-        H, _, A, low, high = self._problems(before)
+        H, _, A, low, high = self.problems(before)
         holds = (force != 0.0) | (low == high)
         rows = np.concatenate([np.broadcast_to(np.eye(n), (len(x), n, n)), A], axis=1) * holds[:, :, None]
         diagonal = np.where(holds, -_REGULAR / H.max(axis=(1, 2))[:, None], 1.0)
@@ -68,7 +72,7 @@ class Derivatives:
             for by in (_STEP, -_STEP):
                 moved = before.copy()
                 moves(moved, k, by)
-                ends.append(self._problems(moved))
+                ends.append(self.problems(moved))
             with np.errstate(invalid="ignore"):
                 dH, dg, dA, dlow, dhigh = ((up - down) / (2.0 * _STEP) for up, down in zip(*ends, strict=True))
                 side = np.nan_to_num(np.where(force > 0.0, dhigh, dlow), posinf=0.0, neginf=0.0)
@@ -81,7 +85,7 @@ class Derivatives:
         where, start = self._context.memory[name], self._context.memory.report
         return inputs[:, where.start - start : where.stop - start]
 
-    def _problems(self, inputs: Array) -> tuple[Array, Array, Array, Array, Array]:
+    def problems(self, inputs: Array) -> tuple[Array, Array, Array, Array, Array]:
         """H, g, A, lower and upper bounds of all."""
         layout, memory = self._context.layout, self._context.memory
         n, m, given = layout.variables, layout.general_rows, np.ascontiguousarray(inputs)
@@ -163,3 +167,27 @@ def _solved(H: Array, rows: Array, diagonal: Array, right: Array) -> Array:
     rest = right - system @ x
     system[:, range(n, n + m), range(n, n + m)] = diagonal
     return np.asarray((x + np.linalg.solve(system, rest))[:, :n])
+
+
+def solved(H: Array, A: Array, holds: np.ndarray, right: Array) -> tuple[Array, Array]:
+    """y [n], and mu of the bounds and rows [n + m], of H y + C_S' mu = right, C_S y = 0, for each robot."""
+    count, n, m = H.shape[0], H.shape[1], A.shape[1]
+    bound, row = holds[:, :n], holds[:, n:]
+    free = ~bound
+    # A variable at its bound leaves the problem: its row and column are those of the identity
+    system = np.zeros((count, n + m, n + m))
+    system[:, :n, :n] = H * (free[:, :, None] & free[:, None, :])
+    system[:, range(n), range(n)] += bound
+    system[:, n:, :n] = A * (row[:, :, None] & free[:, None, :])
+    system[:, :n, n:] = system[:, n:, :n].transpose(0, 2, 1)
+    regular = np.where(row, -_REGULAR / H.max(axis=(1, 2))[:, None], 1.0) if m else np.zeros((count, 0))
+    system[:, range(n, n + m), range(n, n + m)] = regular
+    side = np.concatenate([right * free, np.zeros((count, m))], axis=1)[:, :, None]
+    x = np.linalg.solve(system, side)
+    if m:
+        exact = system.copy()
+        exact[:, range(n, n + m), range(n, n + m)] = np.where(row, 0.0, 1.0)
+        x = x + np.linalg.solve(system, side - exact @ x)
+    y, mu = x[:, :n, 0], x[:, n:, 0] * row
+    pull = right - (H @ y[:, :, None])[:, :, 0] - (A.transpose(0, 2, 1) @ mu[:, :, None])[:, :, 0]
+    return y, np.concatenate([pull * bound, mu], axis=1)

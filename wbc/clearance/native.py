@@ -19,7 +19,8 @@ from wbc.native.library import load_library
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
-_SOURCES = Path(__file__).parent / "native"
+#: The C of a sweep, which the planner includes
+SOURCES = Path(__file__).parent / "native"
 _INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs", "depth", "aim")
 _ARRAYS = (
     *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
@@ -62,7 +63,7 @@ def library() -> ctypes.PyDLL:
     Raises:
         CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
-    found = checked(load_library(kernel(_SOURCES / "sweep.c", HEADERS)), wbc_sweep_size=_SweepStruct)
+    found = checked(load_library(kernel(SOURCES / "sweep.c", HEADERS)), wbc_sweep_size=_SweepStruct)
     found.wbc_sweep.argtypes = [ctypes.c_void_p, ctypes.c_int]
     found.wbc_sweep_at.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_void_p]
     return found
@@ -125,6 +126,38 @@ class NativeSweep:
         self.low[chosen], self.high[chosen], self.when[chosen] = np.inf, np.inf, 0.0
         self._functions.wbc_sweep(self._at, len(chosen))
         return None if it.stopped < 0 else int(it.stopped)
+
+    def hold_still(self, scalars: int) -> None:
+        """Two knots with scalars of degree 1 between them, whose numbers another code writes: see :attr:`ends`."""
+        self._take(
+            Motion(
+                np.array([0.0, 1.0]),
+                np.zeros((1, scalars, 2)),
+                np.zeros((0, 2, 12)),
+                np.zeros(scalars),
+                np.zeros((0, 2)),
+            ),
+            (),
+        )
+        self.restart()
+
+    def restart(self) -> None:
+        """Pairs in the order in which they were given."""
+        self._chosen[:] = np.arange(len(self._chosen))
+
+    def require(self, required: Array) -> None:
+        """Other distances that the pairs keep [m], [pairs]."""
+        self._arrays["required"][:] = required
+
+    @property
+    def address(self) -> int:
+        """Of the structure."""
+        return ctypes.addressof(self._sweep)
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Addresses of the scalars at both knots, scalars x 2, and of how far these are apart."""
+        return self._arrays["control"].ctypes.data, self._arrays["rate"].ctypes.data
 
     def at(self, pair: int, knots: float) -> Array:
         """Distance, nearest points and what counts of a pair of the last motion, [8]."""

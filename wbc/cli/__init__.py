@@ -10,10 +10,11 @@ def main() -> None:
     """Entry point of the command ``wbc``."""
     try:
         # Imported here, so that importing the package for its documentation costs nothing
-        from wbc.cli.app import app
-        from wbc.interrupts import obey_kill
+        from wbc.interrupts import obey_interrupts
 
-        obey_kill()
+        obey_interrupts()
+        from wbc.cli.app import app
+
         app()
     except KeyboardInterrupt:
         # While the interpreter still imports: nothing has begun, and nothing is to be said

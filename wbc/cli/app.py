@@ -64,7 +64,9 @@ COMMANDS = {
             "compare": "walk.Compare",
         },
     ),
+    "plan": Listed("Find a path to a pose or configuration, clear of obstacles.", {"": "plan.PlanPath"}),
     "climb": Listed("Climb and walk with any limbs on any scene.", {"": "climb.ClimbTo"}),
+    "retarget": Listed("Clips of people and animals onto robots.", {"": "retarget.RetargetClips"}),
     "view": Listed(
         "See and drive robots, and see runs, in the browser.",
         {"show": "view.ViewShow", "play": "view.Play", "pairs": "view.ViewPairs", "climb": "view.Climb"},
@@ -97,6 +99,7 @@ COMMANDS = {
     "study": Listed("Do many trials of a scenario, here or on a cluster.", {"": "study.Trials"}),
     "export": Listed("Write one control cycle, QP solver included, as C99.", {"": "export.Export"}),
     "replay": Listed("Do the ticks of a recording again, bit for bit.", {"": "replay.ReplayRun"}),
+    "convert": Listed("Write runs as MCAP, CSV, npz, for Rerun or LeRobot.", {"": "convert.ConvertRun"}),
     "docs": Listed("Write pages from what the code declares (in a clone).", {"": "docs.Docs"}, in_clone=True),
 }
 

@@ -213,6 +213,8 @@ def parser(name: str, command: type[ReadCommand], as_json: bool = True) -> Any:
     call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     vars(call)["__signature__"] = inspect.Signature(parameters)
     text = re.split(r"^(?:Attributes|Raises):$", inspect.getdoc(command) or "", flags=re.M)[0]
+    # Lines of a paragraph are one, which the terminal breaks anew
+    text = re.sub(r"(?<=\S)\n(?=[^\s*-])", " ", text)
     call.__doc__ = escape(MARKUP.sub(r"\1\2", text)).strip()
     single = typer.Typer(add_completion=False, rich_markup_mode="rich")
     single.command(name)(call)

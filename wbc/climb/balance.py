@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,23 +39,26 @@ class Equilibrium:
 
     Args:
         climber, scene: the robot and what it climbs.
+        friction: share of the coefficients of friction that counts [1].
 
-    Cannot do: see dynamics; it holds for a robot at rest or slow.
+    :class:`wbc.climb.path_loads.PathLoads` adds what motion needs.
     """
 
-    def __init__(self, climber: Climber, scene: ClimbScene) -> None:
+    def __init__(self, climber: Climber, scene: ClimbScene, friction: float = 1.0) -> None:
         self.climber = validation.instance("climber", climber, Climber, "a Climber")
         self.scene = validation.instance("scene", scene, ClimbScene, "a ClimbScene")
-        self.world = ClimbWorld(climber, scene)
+        share = validation.scalar("friction", friction, low=0.0, high=1.0)
+        self.world = ClimbWorld(climber, scene, friction=share)
         self._regions: dict[tuple[int, ...], Region] = {}
 
-    def margin(self, contacts: Sequence[int], q: Array, *, motors: bool = False) -> float:
+    def margin(self, contacts: Sequence[int], q: Array, *, motors: bool = False, effort: float = 1.0) -> float:
         """Slack t [1] of contacts at a configuration; below 0 they do not bear the robot, and by -t of its weight each
         contact lacks. -inf: their wrenches span no six directions; +inf: nothing weighs, and they hold the body.
 
         Args:
             contacts: for each limb the row of its foothold, or ``FREE_LIMB``.
             motors: whether torques at rest stay within the efforts of the joints as well; -inf where they cannot.
+            effort: share of the efforts that counts then [1].
 
         Raises:
             ShapeError, RangeError: contacts that are none; a q of another shape.
@@ -63,9 +67,20 @@ class Equilibrium:
         at = validation.real_array("q", q, (self.climber.robot.nq,))
         poses = self._poses(held, at)
         if motors:
-            return self._with_motors(held, at, poses)
+            return self._with_motors(held, at, poses, effort)
         places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
         return self.world.slack(places, self.climber.center_of_mass(at), poses)[0]
+
+    def wrench_slacks(self, contacts: Sequence[int], q: Array, point: Array, wrenches: Array) -> tuple[Array, Array]:
+        """Slacks of contacts, turned as in a configuration, for wrenches that they have to give, and their bounds: as
+        of :meth:`ClimbWorld.wrench_slacks`.
+
+        Raises:
+            ShapeError, RangeError: contacts that are none.
+        """
+        held = self._checked(contacts)
+        places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
+        return self.world.wrench_slacks(places, self._poses(held, q), point, wrenches)
 
     def region(self, contacts: Sequence[int]) -> Region:
         """Where the centre of mass may be, across gravity, for t >= 0; kept for each set of contacts.
@@ -99,6 +114,13 @@ class Equilibrium:
             here = axes @ middle
             self._regions[held] = Region(middle, axes, corners + here, outer + here, torque=False)
         return self._regions[held]
+
+    @cached_property
+    def moving_model(self) -> pin.Model:
+        """The robot's model in the gravity of the scene."""
+        model = self.climber.robot.model.copy()
+        model.gravity.linear = np.array(self.scene.gravity, dtype=np.float64)
+        return model
 
     def _checked(self, contacts: Sequence[int]) -> tuple[int, ...]:
         held = tuple(int(row) for row in contacts)
@@ -145,7 +167,7 @@ class Equilibrium:
         r = np.concatenate([-gravity * self.climber.mass / weight, np.zeros(3)])
         return G, r, A, np.concatenate([*slacks, []]), np.concatenate([*sides, []])
 
-    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array) -> float:
+    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array, effort: float) -> float:
         """The slack with torques of motors within their efforts, which take no part in it."""
         robot, weight = self.climber.robot, self.world.weight
         model, data = robot.model, robot.model.createData()
@@ -168,7 +190,7 @@ class Equilibrium:
                 force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
                 pulled.append(J.T @ np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
         motors = [dof for dof in robot.motors if np.isfinite(robot.limits.effort[dof])]
-        torque, most = -np.hstack(pulled)[motors], robot.limits.effort[motors] / weight
+        torque, most = -np.hstack(pulled)[motors], effort * robot.limits.effort[motors] / weight
         sides = np.vstack([np.hstack([A, s[:, None]]), np.hstack([torque, np.zeros((len(motors), 1))])])
         sides = np.vstack([sides, np.hstack([-torque, np.zeros((len(motors), 1))])])
         ends = np.concatenate([b, most - own[motors], most + own[motors]])

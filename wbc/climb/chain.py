@@ -120,6 +120,16 @@ class LimbTable:
         step = ctypes.cast(self.numbers[limb].step, ctypes.POINTER(StepNumbers)).contents
         return np.array(step.place[9:])
 
+    def touch(self, limb: int, angles: Array) -> Array:
+        """Contact poses in the body's frame ``(n, 12)`` at some angles ``(n, k)``."""
+        angles = np.ascontiguousarray(angles)
+        out = np.empty((len(angles), 12))
+        library().wbc_touches(
+            ctypes.byref(self.numbers[limb]), ctypes.c_long(len(angles)),
+            *(ctypes.c_void_p(a.ctypes.data) for a in (angles, out)),
+        )  # fmt: skip
+        return out
+
     def _fill(self) -> Array:
         """Steps and masses of all limbs; the trunk's mass and centre."""
         model, rest = self.climber.robot.model, self.climber.rest
@@ -209,9 +219,6 @@ class LimbTable:
         count = SAMPLES.get(len(rest), SAMPLES_BEYOND)
         spread = qmc.Sobol(len(rest), scramble=True, seed=0).random(count)
         angles = np.ascontiguousarray(np.vstack([rest, low + spread * (high - low)]))
-        touch = np.empty((len(angles), 12))
-        library().wbc_touches(
-            ctypes.byref(row), ctypes.c_long(len(angles)), *(ctypes.c_void_p(a.ctypes.data) for a in (angles, touch))
-        )
+        touch = self.touch(limb, angles)
         self._kept += [angles, touch]
         row.samples, row.sample, row.touch = len(angles), angles.ctypes.data, touch.ctypes.data

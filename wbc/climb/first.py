@@ -46,7 +46,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0]
         choices.append(near or [(1.0, FREE_LIMB)])
     state, best, tried, outcomes = world.state_of(at), -np.inf, 0, Counter[PostureOutcome]()
-    for places in _cheapest_first(choices):
+    for places in cheapest_first(choices):
         held = [int(world.hold[place]) for place in places if place >= 0]
         if len(set(held)) < len(held):
             continue
@@ -67,7 +67,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
     raise no_stances("q", at[:3].round(3).tolist(), reason, "start")
 
 
-def _cheapest_first(choices: list[list[tuple[float, int]]]) -> Iterator[list[int]]:
+def cheapest_first(choices: list[list[tuple[float, int]]]) -> Iterator[list[int]]:
     """Combinations of one choice a limb, by the sum of their costs; the choices of a limb are sorted."""
     first = (0,) * len(choices)
     waiting, known = [(sum(limb[0][0] for limb in choices), first)], {first}

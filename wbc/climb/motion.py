@@ -12,15 +12,17 @@ import numpy as np
 
 from wbc import validation
 from wbc.clearance import Nearest
+from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.joint_values import beyond_limits
 from wbc.climb.move_path import HeldError, MovePath, SwingShape, move_path
+from wbc.climb.path_loads import LEAST, PathLoads
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene, reaches
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
-from wbc.climb.time_law import MotionSpeeds, PathTiming, TimedMove
+from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.validation import Array
 
@@ -32,7 +34,7 @@ HIGHER = (1.0, 2.0, 0.5, 4.0)
 LEANS = (0.0, 0.8)
 #: Parts of a path in which the body moves: while limbs are lifted, at first, at last
 WINDOWS = ((0.2, 0.8), (0.1, 0.5), (0.5, 0.9))
-#: Instants of a move at which equilibrium is looked at
+#: Instants of a move at which equilibrium is looked at where nothing weighs, and motors where something does
 INSTANTS = 12
 #: Into how many parts intervals of a path are divided for its proof, one after the other, while that stays open
 PARTS = (1, 2, 4)
@@ -76,7 +78,11 @@ class MotionOptions:
         lift: how far contacts are lifted off what they leave and land on [m]; 0: a sixteenth of the shortest limb.
         tries: random postures through which limbs go where nothing simpler is clear, at most.
         seed: of those.
+        margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight.
+        inertia: share of the slack of equilibrium at rest that accelerations may use, where something weighs [1].
+        friction: share of the coefficients of friction on which equilibrium counts on the way [1].
         speeds: see :class:`MotionSpeeds`.
+        effort: share of the joints' efforts within which torques at rest stay on the way [1]; inf: they do not count.
 
     Raises:
         RangeError, NotFiniteError, ShapeError: a number that is none of these.
@@ -87,12 +93,23 @@ class MotionOptions:
     lift: float = 0.0
     tries: int = 20
     seed: int = 0
+    margin: float = 0.0
+    inertia: float = 0.5
+    friction: float = 1.0
     speeds: MotionSpeeds = field(default_factory=MotionSpeeds)
+    effort: float = np.inf
 
     def __post_init__(self) -> None:
         for name in ("clearance", "apart", "lift"):
             value = validation.scalar(f"MotionOptions.{name}", getattr(self, name), low=0.0, unit="m")
             object.__setattr__(self, name, value)
+        margin = validation.scalar("MotionOptions.margin", self.margin, low=0.0, high=1.0)
+        object.__setattr__(self, "margin", margin)
+        if not self.effort > 0.0:
+            raise RangeError("MotionOptions.effort", self.effort, "expected a share above 0")
+        for name in ("inertia", "friction"):
+            share = validation.scalar(f"MotionOptions.{name}", getattr(self, name), low=0.0, high=1.0, open_low=True)
+            object.__setattr__(self, name, share)
         validation.integer("MotionOptions.tries", self.tries)
         validation.integer("MotionOptions.seed", self.seed)
         validation.instance("MotionOptions.speeds", self.speeds, MotionSpeeds, "MotionSpeeds")
@@ -164,9 +181,9 @@ class Mover:
                 stuck = stuck or isinstance(error, HeldError)
                 refusals.append((0.0, 0.0, _refused(row, error.value, str(error), None)))
                 continue
-            refusal, margin = self._refused(path, one, other, row)
+            refusal, margin, loads = self._refused(path, one, other, row)
             if refusal is None:
-                return self.timing.timed(path), margin
+                return self.timing.timed(path, loads), margin
             if margin is not None:
                 unborne = True
                 refusals.append((2.0, margin, refusal))
@@ -206,8 +223,10 @@ class Mover:
         if nearest is not None:
             raise _refused(row, nearest.distance, f"in stance {which + 1} {_told(nearest)}", nearest, True)
 
-    def _refused(self, path: MovePath, one: Stance, other: Stance, row: int) -> tuple[MoveError | None, float | None]:
-        """Why a path is none, and the least margin of equilibrium on it."""
+    def _refused(
+        self, path: MovePath, one: Stance, other: Stance, row: int
+    ) -> tuple[MoveError | None, float | None, PathLoads | None]:  # fmt: skip
+        """Why a path is none, the least margin of equilibrium on it, and what contacts have to bear."""
         contacts = list(zip(one.contacts, other.contacts, strict=True))
         for parts in PARTS:
             s = np.interp(np.arange(parts * (len(path.s) - 1) + 1) / parts, np.arange(len(path.s)), path.s)
@@ -219,18 +238,37 @@ class Mover:
                 break
         if nearest is not None:
             text = f"{_told(nearest)} at {100.0 * nearest.time:.0f} % of the way"
-            return _refused(row, nearest.distance, text, nearest), None
+            return _refused(row, nearest.distance, text, nearest), None, None
         if self.balance is None:
-            return None, None
+            return None, None, None
         held = tuple(a if a == b else FREE_LIMB for a, b in contacts)
-        picked = path.q[np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))]
-        margins = [self.balance.margin(held, q) for q in picked]
-        least = float(min(margins))
-        if least < 0.0:
-            part = 100.0 * int(np.argmin(margins)) / (len(margins) - 1)
-            text = f"the contacts that hold do not bear the robot at {part:.0f} % of the way: they lack {-least:.3g} of"
-            return _refused(row, least, f"{text} its weight", None), least
-        return None, least
+        loads, needed = None, 0.0
+        if isinstance(self.balance, Equilibrium) and np.any(self.scene.gravity):
+            # Second derivatives of a path are largest at its samples
+            where = np.unique(np.concatenate([GRID, path.s]).round(9))
+            loads = PathLoads(self.balance, path, held, where, self.options.inertia)
+            margins, needed = loads.at_rest, max(LEAST, self.options.margin)
+        else:
+            picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
+            where, margins = path.s[picked], np.array([self.balance.margin(held, q) for q in path.q[picked]])
+        least, part, what = float(margins.min()), 100.0 * where[int(np.argmin(margins))], "contacts that hold"
+        if least >= needed and loads is not None and self.options.effort < np.inf:
+            margins, where = self._driven(held, path)
+            if margins.min() < needed:
+                least, part = float(margins.min()), 100.0 * where[int(np.argmin(margins))]
+                what = "motors of the limbs that hold"
+        if least < needed:
+            text = f"the {what} do not bear the robot at {part:.0f} % of the way: they lack"
+            return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, None
+        return None, least, loads
+
+    def _driven(self, held: Sequence[int], path: MovePath) -> tuple[Array, Array]:
+        """Margins of equilibrium with motors along a path, and where on it these are."""
+        assert isinstance(self.balance, Equilibrium)
+        picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
+        effort = self.options.effort
+        margins = [self.balance.margin(held, q, motors=True, effort=effort) for q in path.q[picked]]
+        return np.array(margins), path.s[picked]
 
     def _shapes(self, one: Stance, other: Stance) -> Iterator[SwingShape]:
         """From the simplest on."""
@@ -274,7 +312,7 @@ def carry_out(
     between instants, in least time under limits of joints and body, at rest in every stance.
 
     Args:
-        balance: what says whether contacts bear the robot, at 12 instants of a move; None: nothing does.
+        balance: what says whether contacts bear the robot, at instants of a move; None: nothing does.
         mover: in place of options and balance one that keeps the motions that it found before.
 
     Raises:

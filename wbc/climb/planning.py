@@ -11,11 +11,13 @@ from wbc import validation
 from wbc.climb.balance import Equilibrium
 from wbc.climb.climber import Climber
 from wbc.climb.goal import Goal
+from wbc.climb.let_go import joined, let_go
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import AT_START, StanceOptions, find_stances
 from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.time_law import MotionSpeeds
 from wbc.errors import RangeError
 from wbc.validation import Array
 
@@ -33,11 +35,23 @@ class ClimbOptions:
     motion: MotionOptions = field(default_factory=MotionOptions)
     again: int = 30
 
+    @classmethod
+    def by_torques(cls) -> ClimbOptions:
+        """For a loop of torques: on the way a slack of 0.05 weights with three quarters of friction, 0.08 where limbs
+        lift and land, nine tenths of the joints' efforts and three tenths of their accelerations, as limbs of other
+        masses than thought stray in proportion to these.
+        """
+        return cls(
+            StanceOptions(margin=0.08, effort=0.9),
+            MotionOptions(margin=0.05, effort=0.9, friction=0.75, speeds=MotionSpeeds(acceleration_share=0.3)),
+        )
+
 
 def plan_climb(
     climber: Climber, scene: ClimbScene, start: Stance | Array, goal: Goal, options: ClimbOptions | None = None
 ) -> ContactPlan:
     """The motion of a climber to a goal. A move for which no motion is found is left out, and stances are sought again.
+    Limbs in the air that touch a body leave it first, as of :func:`let_go`.
 
     Args:
         start: a stance, or a configuration ``(nq)``: then each limb at a foothold holds it.
@@ -48,7 +62,9 @@ def plan_climb(
     """
     given = ClimbOptions() if options is None else validation.instance("options", options, ClimbOptions, "ClimbOptions")
     first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
-    forbidden, mover = set(given.stances.forbidden), Mover(climber, scene, given.motion, Equilibrium(climber, scene))
+    lifting, first = let_go(climber, scene, first, given.motion)
+    equilibrium = Equilibrium(climber, scene, given.motion.friction)
+    forbidden, mover = set(given.stances.forbidden), Mover(climber, scene, given.motion, equilibrium)
     sought = replace(
         given.stances,
         clearance=max(given.stances.clearance, given.motion.clearance),
@@ -57,7 +73,8 @@ def plan_climb(
     for tries in range(given.again + 1):
         stances = find_stances(climber, scene, first, goal, replace(sought, forbidden=frozenset(forbidden)))
         try:
-            return carry_out(climber, scene, stances, mover=mover)
+            plan = carry_out(climber, scene, stances, mover=mover)
+            return plan if lifting is None else joined(lifting, plan)
         except MoveError as error:
             contacts = [tuple(stance.contacts) for stance in stances.stances]
             # A body that cannot shift is kept from the move that it shifts for

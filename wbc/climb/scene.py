@@ -26,6 +26,8 @@ from wbc.walking.holds.surface import PlaneSurface
 
 #: From the approach direction of a structure's hold to the outward normal of a foothold
 FLIP = pin.SE3(pin.utils.rotate("x", pi), np.zeros(3))
+#: A hold that does not say what it is on is on a body as near as this [m]: less than a hand is wide
+MOUNTED = 0.01
 #: A scene whose footholds are all within this share of a robot's span is of another scale [1]
 LEAST_SHARE = 0.02
 
@@ -163,6 +165,20 @@ class ClimbScene:
         gone = {self.row(foothold) for foothold in ids}
         return replace(self, footholds=tuple(f for k, f in enumerate(self.footholds) if k not in gone))
 
+    def held_by(self, limbs: Sequence[str]) -> ClimbScene:
+        """The scene whose footholds only some limbs may hold, by name; those that none of them may are left out.
+
+        Raises:
+            ShapeError: none would be left.
+        """
+        names = validation.strings("limbs", tuple(limbs))
+        some = []
+        for foothold in self.footholds:
+            able = tuple(name for name in names if not foothold.limbs or name in foothold.limbs)
+            if able:
+                some.append(replace(foothold, limbs=able))
+        return replace(self, footholds=some)
+
     def moved(self, pose: Any) -> ClimbScene:
         """The scene moved by a pose in the world; gravity stays.
 
@@ -177,7 +193,8 @@ class ClimbScene:
 def of_structure(structure: Structure, gravity: Any = (0.0, 0.0, 0.0)) -> ClimbScene:
     """The scene of a structure: its holds are footholds, its surface is the body ``surface``, its obstacles are bodies.
 
-    A hold's largest tilt is not used: hands are exact.
+    A hold's largest tilt is not used: hands are exact. A hold that does not say what it is on is on the body that is
+    nearest to it within ``MOUNTED``.
 
     Args:
         gravity: [m/s^2]; structures have none.
@@ -185,12 +202,19 @@ def of_structure(structure: Structure, gravity: Any = (0.0, 0.0, 0.0)) -> ClimbS
     Raises:
         ShapeError, NotFiniteError: gravity that is not three finite numbers.
     """
-    rolls = {"free": 0, "fixed": 1}
+    rolls, positions = {"free": 0, "fixed": 1}, structure.positions
+    near = {obstacle.id: obstacle.distance(positions) for obstacle in structure.obstacles}
+    if structure.surface is not None:
+        near["surface"] = structure.surface.height(positions)
+    names, away = list(near), np.abs(np.array(list(near.values()))).reshape(len(near), len(positions))
+    mounts = [names[k] if names else "" for k in (away.argmin(axis=0) if names else np.zeros(len(positions), int))]
+    on = [
+        hold.on or (mount if names and away[:, k].min() <= MOUNTED else "")
+        for k, (hold, mount) in enumerate(zip(structure.holds, mounts, strict=True))
+    ]
     footholds = [
-        Foothold(
-            hold.id, hold.pose * FLIP, hold.on, rolls=rolls[hold.roll] if isinstance(hold.roll, str) else hold.roll
-        )
-        for hold in structure.holds
+        Foothold(hold.id, hold.pose * FLIP, body, rolls=rolls[hold.roll] if isinstance(hold.roll, str) else hold.roll)
+        for hold, body in zip(structure.holds, on, strict=True)
     ]
     bodies = {obstacle.id: SceneBody(obstacle.shape, obstacle.placement) for obstacle in structure.obstacles}
     if structure.surface is not None:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import TOLERANCE
 from wbc.climb.climber import Climber
 from wbc.climb.foothold_graph import ways_over_footholds
@@ -37,6 +38,8 @@ from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
+#: Of margins: what two linear programs differ by [weights]
+ROUNDING = 1e-6
 #: Of a limb's length: how far a step goes, as the search guesses
 STRIDE = 0.5
 #: How much dearer the way that is left is than the steps so far
@@ -82,6 +85,11 @@ def counted(outcomes: Mapping[PostureOutcome, int]) -> str:
     return ", ".join(f"{outcomes[how]} {text}" for how, text in _WORDS.items() if outcomes.get(how))
 
 
+def counted_words(outcomes: Mapping[str, int]) -> str:
+    """How many of what was looked at became what, the most frequent first."""
+    return ", ".join(f"{outcomes[how]} {how}" for how in sorted(outcomes, key=lambda how: -outcomes[how]))
+
+
 def no_stances(field: str, value: Any, reason: str, cause: str, nearest: float = np.inf) -> NoStancesError:
     """The error with its attributes."""
     error = NoStancesError(field, value, reason)
@@ -101,6 +109,7 @@ class StanceOptions:
         seconds: time of the search, at most [s]; a search that it ends is not the same on another machine.
         gait: sets of limbs, by name, that go at once where that can be.
         forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
+        effort: share of the joints' efforts within which torques at rest stay [1]; inf: efforts do not count.
     """
 
     margin: float = 0.02
@@ -111,10 +120,13 @@ class StanceOptions:
     seconds: float = np.inf
     gait: tuple[tuple[str, ...], ...] = ()
     forbidden: frozenset[tuple[tuple[int, ...], tuple[int, ...]]] = frozenset()
+    effort: float = np.inf
 
     def __post_init__(self) -> None:
         for name in ("margin", "limits", "clearance", "apart"):
             validation.scalar(f"StanceOptions.{name}", getattr(self, name), low=0.0)
+        if not self.effort > 0.0:
+            raise RangeError("StanceOptions.effort", self.effort, "expected a share above 0")
         validation.integer("StanceOptions.moves", self.moves, 1)
         if not self.seconds > 0.0:
             raise RangeError("StanceOptions.seconds", self.seconds, "expected a time above 0 s")
@@ -195,6 +207,8 @@ class StanceSearch:
         self._spread = float(np.linalg.norm(self.world.touch[:, 9:], axis=1).max())
         self._far, self._goal_body, self._limb = self._distances()
         self._sets = [tuple(climber.row(name) for name in names) for names in options.gait]
+        counted = options.effort < np.inf and np.any(scene.gravity)
+        self._balance = Equilibrium(climber, scene) if counted else None
 
     def run(self) -> StancePath:
         """The way found, see :func:`find_stances`."""
@@ -253,6 +267,8 @@ class StanceSearch:
         known = node.lifts.get(key)
         if known is None or (known[1] < attempt and known[0][0] != PostureOutcome.STANDS):
             lifted = self.world.lift(node.contacts, kept, margin, node.state, attempt)
+            if lifted[0] == PostureOutcome.STANDS and not self._driven(kept, lifted[1]):
+                lifted = PostureOutcome.NOT_BORNE, *lifted[1:]
             node.lifts[key] = lifted, attempt
             self.tried[lifted[0]] += lifted[0] != PostureOutcome.STANDS
         how, lift, before, _, moves = node.lifts[key][0]
@@ -262,10 +278,20 @@ class StanceSearch:
             return None
         node.stuck.difference_update(np.flatnonzero(node.contacts != after).tolist())
         how, land, slack, _ = self.world.land(after, kept, margin, lift, attempt)
+        if how == PostureOutcome.STANDS and not self._driven(kept, land):
+            how = PostureOutcome.NOT_BORNE
         self.tried[how] += 1
         if how != PostureOutcome.STANDS:
             return None
         return _Node(after, land, node.steps + 1, min(before, slack), node, lift if moves else None)
+
+    def _driven(self, kept: NDArray[np.int32], state: Array) -> bool:
+        """Whether motors hold a posture on contacts, with the margin asked for."""
+        if self._balance is None:
+            return True
+        q, effort = self.world.q_of(state), self.options.effort
+        slack = self._balance.margin(self._rows(kept), q, motors=True, effort=effort)
+        return slack >= self.options.margin - ROUNDING
 
     def _moves(self, node: _Node) -> Iterator[tuple[float, NDArray[np.int32]]]:
         """Moves from a stance, with what they promise to cost, the least first; far ones come last."""

@@ -14,15 +14,12 @@ from wbc.climb import machines, scenes
 from wbc.climb.checker import CheckRules, ClimbReport, check
 from wbc.climb.climber import Climber, ClimbLimb
 from wbc.climb.contacts import ContactKind, FlatFoot, GripHand, PointFoot, SuctionPad
-from wbc.climb.first import first_stance
-from wbc.climb.goal import BodyPlace
 from wbc.climb.loop import ClimbLoop, ClimbRun, LoopOptions
 from wbc.climb.plan import ContactPlan
-from wbc.climb.planning import plan_climb as planned
 from wbc.climb.plants import ClimbPlant, PlantErrors
 from wbc.climb.request import ClimbRequest
 from wbc.climb.scene import ClimbScene, check_scale, read_scene
-from wbc.climb.stance import Stance
+from wbc.climb.sources import source_of
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.multibody import pin
 
@@ -61,7 +58,8 @@ def course_of(request: ClimbRequest, climber: Climber) -> tuple[ClimbScene, pin.
     if path.suffix:
         gravity = np.zeros(3) if request.gravity is None else np.array(request.gravity)
         scene = read_scene(path, gravity)
-        if request.start is None or request.goal is None:
+        needs_goal = not request.drive and not request.limb
+        if request.start is None or (request.goal is None and needs_goal):
             ids = [foothold.id for foothold in scene.footholds]
             raise UnknownNameError("start" if request.start is None else "goal", None, ids)
         frames = None
@@ -76,6 +74,8 @@ def course_of(request: ClimbRequest, climber: Climber) -> tuple[ClimbScene, pin.
         start = scene.footholds[scene.row(request.start)].pose
     if request.goal is not None:
         goal = scene.footholds[scene.row(request.goal)].pose
+    elif path.suffix:
+        goal = start
     ahead = goal.translation - start.translation
     return scene, _facing(start, ahead), _facing(goal, ahead)
 
@@ -114,14 +114,9 @@ def climb(request: ClimbRequest, checked: bool = True, backend: str = "auto") ->
     validation.instance("request", request, ClimbRequest, "a ClimbRequest")
     climber = climber_of(request)
     scene, start, goal = course_of(request, climber)
-    q = scenes.placed(climber, start)
-    place = BodyPlace(climber.body_pose(scenes.placed(climber, goal)).translation)
     begun = time.process_time()
-    plan = planned(climber, scene, first_stance(climber, scene, q), place)
+    source = source_of(request, climber, scene, start, goal)
     planning = time.process_time() - begun
-
-    def replan(now: ClimbScene, stance: Stance) -> ContactPlan:
-        return planned(climber, now, stance, place)
 
     plant, options, rules = None, LoopOptions(), CheckRules()
     if request.plant == "mujoco":
@@ -131,12 +126,12 @@ def climb(request: ClimbRequest, checked: bool = True, backend: str = "auto") ->
             LoopOptions(delay=request.delay),
             CheckRules.by_torques(),
         )
-    loop = ClimbLoop(plan, plant, replan=replan, options=options, backend=backend)
+    loop = ClimbLoop(source.first, plant, replan=source.replan, onward=source.onward, options=options, backend=backend)
     begun = time.process_time()
-    run = loop.run(most=2.0 * float(plan.times[-1]) + 10.0)
+    run = loop.run(source.most, source.before_tick)
     looping = time.process_time() - begun
     report = check(run.log, climber, scene, rules) if checked else None
-    return ClimbDone(plan, run, report, planning, looping)
+    return ClimbDone(source.first, run, report, planning, looping)
 
 
 def _facing(pose: pin.SE3, ahead: np.ndarray) -> pin.SE3:

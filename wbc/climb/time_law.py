@@ -9,6 +9,7 @@ import numpy as np
 from wbc import validation
 from wbc.climb.climber import Climber
 from wbc.climb.move_path import MovePath
+from wbc.climb.path_loads import PathLoads
 from wbc.errors import InfeasibleError, RangeError
 from wbc.validation import Array
 
@@ -16,8 +17,13 @@ from wbc.validation import Array
 KNOTS = 0.02
 #: Intervals of the path on which least time is sought, finer towards its ends, where it is slow
 INTERVALS = 64
+GRID = (1.0 - np.cos(np.linspace(0.0, np.pi, INTERVALS + 1))) / 2.0
 #: How often a law is slowed by what its cubics need beyond the limits at most: each time is exact for the one before
 SLOWED = 3
+#: How often a law is sought with rows for what contacts lacked in the one before
+CUTS = 5
+#: By which factor a law may be slowed for what they lack instead
+NEARLY = 1.02
 
 
 @dataclass(frozen=True)
@@ -90,14 +96,17 @@ class PathTiming:
                         name = f"limit of {what} of {self.climber.robot.dof_names[dof]}"
                         raise RangeError(name, float(value), "expected a finite one, or least time has no bound")
 
-    def timed(self, path: MovePath) -> TimedMove:
+    def timed(self, path: MovePath, loads: PathLoads | None = None) -> TimedMove:
         """Knots of the fastest motion along a path.
+
+        Args:
+            loads: what contacts have to bear on a grid, then also that of the law; None: they bear all.
 
         Raises:
             InfeasibleError: nothing moves.
         """
-        s = (1.0 - np.cos(np.linspace(0.0, np.pi, INTERVALS + 1))) / 2.0
-        speed = self._speeds(path, s)
+        s = GRID if loads is None else loads.s
+        speed = self._speeds(path, s, loads)
         span = 2.0 * np.diff(s) / np.maximum(speed[1:] + speed[:-1], 1e-12)
         # Between points of the grid the path acceleration is constant; long intervals get knots inside
         parts = [max(1, int(np.ceil(x / KNOTS))) for x in span]
@@ -126,7 +135,7 @@ class PathTiming:
         q[0], q[-1] = path.q[0], path.q[-1]
         return TimedMove(t, q, path.velocities(coordinates, rates))
 
-    def _speeds(self, path: MovePath, s: Array) -> Array:
+    def _speeds(self, path: MovePath, s: Array, loads: PathLoads | None) -> Array:
         """ds/dt at the points of a grid."""
         first, second = path.at(s, 1), path.at(s, 2)
         velocity, acceleration = self._limits
@@ -134,7 +143,15 @@ class PathTiming:
         if not moves.any():
             raise InfeasibleError("path", 0.0, "no joint moves from this stance to the next one")
         a, b = first[:, moves] / acceleration[moves], second[:, moves] / acceleration[moves]
-        return fastest(s, a, b, self._squared(first, velocity))
+        squared = self._squared(first, velocity)
+        if loads is None:
+            return fastest(s, a, b, squared)
+        for _ in range(CUTS):
+            speed = fastest(s, a, b, squared, loads.rows)
+            slower = loads.lacking(np.diff(speed**2) / (2.0 * np.diff(s)), speed**2)
+            if slower <= NEARLY:
+                break
+        return speed / slower
 
     def _squared(self, slopes: Array, velocity: Array) -> Array:
         """Bounds of (ds/dt)^2 of joints' velocities and of the body's speed and turn rate."""
@@ -164,31 +181,38 @@ class PathTiming:
         return ratio * (1.0 + 1e-6) if ratio > 1.0 else 1.0
 
 
-def fastest(s: Array, a: Array, b: Array, squared: Array) -> Array:
+def fastest(s: Array, a: Array, b: Array, squared: Array, sided: tuple[Array, Array] | None = None) -> Array:
     """Path speeds ds/dt of the fastest motion from rest to rest, at the points of a grid ``(n)``.
 
-        |a u + b x| <= 1,   x <= squared,   x' = x + 2 u (s' - s)       u = d2s/dt2, x = (ds/dt)^2
+        |a u + b x| <= 1,   c u + d x <= 1,   x <= squared,   x' = x + 2 u (s' - s)      u = d2s/dt2, x = (ds/dt)^2
 
-    with rows at both ends of each interval (TOPP-RA: Pham and Pham, IEEE T-RO 34, 2018). No row has a constant, so that
-    rest is always possible, and the largest x from which the end can be reached has a closed form: a row is a strip
-    |u + r x| <= p, and two strips meet while (r - r') x <= p + p'.
+    with rows at both ends of each interval (TOPP-RA: Pham and Pham, IEEE T-RO 34, 2018). Rest keeps all rows, so that
+    it is always possible, and the largest x from which the end can be reached has a closed form: rows bound
+    u + r x by -p and p', and two rows leave a u while (r - r') x <= p + p'.
 
     Args:
-        a, b: ``(n, rows)``. squared: bounds ``(n)``.
+        a, b: ``(n, rows)``. squared: bounds ``(n)``. sided: c and d ``(n, rows)``, or none.
     """
     span = np.diff(s)
+    if sided is not None:
+        a, b = np.concatenate([a, sided[0]], axis=1), np.concatenate([b, sided[1]], axis=1)
     # At the end of an interval the square of the speed is x + 2 u span
     inertia = np.concatenate([a[:-1], a[1:] + 2.0 * span[:, None] * b[1:]], axis=1)
     bend = np.concatenate([b[:-1], b[1:]], axis=1)
+    both = np.ones(inertia.shape[1], dtype=bool)
+    if sided is not None:
+        both.reshape(2, -1)[:, -sided[0].shape[1] :] = False
     size = np.abs(inertia)
     none = size <= 1e-9 * size.max()
     safe = np.where(none, 1.0, inertia)
     width = np.where(none, np.inf, 1.0 / np.abs(safe))
+    above, below = (np.where(both | (part > 0.0), width, np.inf) for part in (inertia, -inertia))
     lean = np.where(none, 0.0, bend / safe)
-    most = np.minimum(squared[:-1], (1.0 / np.maximum(np.where(none, np.abs(bend), 0.0), 1e-300)).min(axis=1))
+    felt = np.where(both, np.abs(bend), bend)
+    most = np.minimum(squared[:-1], (1.0 / np.maximum(np.where(none, felt, 0.0), 1e-300)).min(axis=1))
     for k in range(lean.shape[1]):
         over = lean - lean[:, k : k + 1]
-        limit = np.where(over > 0.0, (width + width[:, k : k + 1]) / np.where(over > 0.0, over, 1.0), np.inf)
+        limit = np.where(over > 0.0, (above + below[:, k : k + 1]) / np.where(over > 0.0, over, 1.0), np.inf)
         most = np.minimum(most, limit.min(axis=1))
     high = np.zeros(len(s))
     for k in range(len(span) - 1, -1, -1):
@@ -196,14 +220,14 @@ def fastest(s: Array, a: Array, b: Array, squared: Array) -> Array:
         stop, go = lean[k] - next_, next_ - lean[k]
         limits = np.concatenate(
             [
-                np.where(stop > 0.0, width[k] / np.where(stop > 0.0, stop, 1.0), np.inf),
-                np.where(go > 0.0, (high[k + 1] * next_ + width[k]) / np.where(go > 0.0, go, 1.0), np.inf),
+                np.where(stop > 0.0, above[k] / np.where(stop > 0.0, stop, 1.0), np.inf),
+                np.where(go > 0.0, (high[k + 1] * next_ + below[k]) / np.where(go > 0.0, go, 1.0), np.inf),
             ]
         )
         high[k] = min(float(most[k]), float(limits.min()))
     x = np.zeros(len(s))
     for k in range(len(span)):
-        up = float((width[k] - lean[k] * x[k]).min())
+        up = float((above[k] - lean[k] * x[k]).min())
         x[k + 1] = min(max(x[k] + 2.0 * span[k] * up, 0.0), high[k + 1])
     x[-1] = 0.0
     return np.sqrt(x)

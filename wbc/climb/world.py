@@ -133,6 +133,7 @@ class ClimbWorld:
         start: a stance whose contacts count as places where they are.
         margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies and from each other
             [m]; ``SPARE`` more, and from what tips hold that more than :class:`Clearances` says.
+        friction: share of the coefficients of friction that counts [1].
 
     Attributes:
         places: poses ``(places, 12)``. hold: the foothold of each. start: places of the start's contacts.
@@ -141,7 +142,7 @@ class ClimbWorld:
 
     def __init__(
         self, climber: Climber, scene: ClimbScene, start: Stance | None = None, margin: float = LIMIT_MARGIN,
-        clear: float = 0.0, apart: float = 0.0,
+        clear: float = 0.0, apart: float = 0.0, *, friction: float = 1.0,
     ) -> None:  # fmt: skip
         self.climber, self.scene, self.margin = climber, scene, margin
         self.limbs = limb_table(climber, margin)
@@ -149,7 +150,7 @@ class ClimbWorld:
             library(), wbc_piece_size=_PieceNumbers, wbc_cone_size=_ConeNumbers, wbc_climb_size=_ClimbNumbers
         )
         self._code.wbc_slack.restype = ctypes.c_double
-        self._code.wbc_candidates.restype = ctypes.c_long
+        self._code.wbc_candidates.restype = self._code.wbc_first_touch.restype = ctypes.c_long
         counts = [len(rest) for rest in self.limbs.rest]
         self.offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         gravity = np.asarray(scene.gravity, dtype=np.float64)
@@ -160,7 +161,7 @@ class ClimbWorld:
         names = list(scene.bodies)
         on_body = [names.index(h.on) if h.on in names else -1 for h in scene.footholds]
         on = np.array(on_body, dtype=np.int32)[self.hold]
-        self._cones, self.cone_of = self._shapes_of_cones(turns)
+        self._cones, self.cone_of = self._shapes_of_cones(turns, friction)
         pieces, links, shapes, poses, pairs = self._bodies()
         self.links, self.bodies = links, names
         self._shape_table = ShapeTable(shapes)
@@ -226,6 +227,25 @@ class ClimbWorld:
             slack = np.inf if slack > 1e-9 else -np.inf
         return slack, bound
 
+    def wrench_slacks(
+        self, contacts: Sequence[int], poses: Array, point: Array, wrenches: Array
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Slacks ``(n)`` in shares of weight for wrenches that the contacts have to give, and bounds ``(n, 7)``:
+
+            slack(w) <= b[0] + b[1:] w      for every w about that point
+
+        Args:
+            poses: of the contacts ``(limbs, 12)``. point: in the world ``(3)`` [m].
+            wrenches: ``(n, 6)``: force and moment about the point [weights, weights m].
+        """
+        given, at = np.ascontiguousarray(wrenches), np.ascontiguousarray(point)
+        slacks, bounds = np.empty(len(given)), np.empty((len(given), 7))
+        self._code.wbc_wrench_slacks(
+            self._world, _at(self.contacts(contacts)), _at(poses), _at(at), ctypes.c_long(len(given)), _at(given),
+            _at(slacks), _at(bounds),
+        )  # fmt: skip
+        return slacks, bounds
+
     def look(self, contacts: NDArray[np.int32], state: Array) -> tuple[Array, str]:
         """Slack, clearance [m] and each limb's distance from its foothold [m] of a state; what is nearest."""
         numbers, which = np.zeros(2 + len(self.climber.limbs)), np.zeros(4, dtype=np.int32)
@@ -285,6 +305,17 @@ class ClimbWorld:
         )  # fmt: skip
         return PostureOutcome(how), out, float(slack[0]), which
 
+    def first_touch(self, contacts: NDArray[np.int32], states: Array) -> tuple[int, str] | None:
+        """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may
+        be, and the names of what is; None: in none.
+        """
+        contacts, states = np.ascontiguousarray(contacts, dtype=np.int32), np.ascontiguousarray(states)
+        which = np.zeros(4, dtype=np.int32)
+        row = self._code.wbc_first_touch(
+            self._world, ctypes.c_long(len(states)), _at(contacts), _at(states), _at(which)
+        )
+        return None if row == len(states) else (int(row), self.touching(which))
+
     def candidates(
         self, contacts: NDArray[np.int32], state: Array, least: float, most: float, guesses: bool = True
     ) -> tuple[NDArray[np.int32], Array]:
@@ -339,7 +370,7 @@ class ClimbWorld:
             contacts.append(at)
         return np.array(poses), np.array(hold, dtype=np.int32), np.array(turned), tuple(contacts)
 
-    def _shapes_of_cones(self, turned: Array) -> tuple[Any, NDArray[np.int32]]:
+    def _shapes_of_cones(self, turned: Array, share: float) -> tuple[Any, NDArray[np.int32]]:
         """Each cone once, and which of them each limb has at each place, -1 where it may not hold."""
         limbs, holds = self.climber.limbs, self.scene.footholds
         table = np.full((len(limbs), len(holds)), FREE_LIMB, dtype=np.int32)
@@ -350,7 +381,7 @@ class ClimbWorld:
             for k, hold in enumerate(holds):
                 if hold.limbs and one.name not in hold.limbs:
                     continue
-                key = (limb, min(own, float(hold.friction)))
+                key = (limb, share * min(own, float(hold.friction)))
                 if key not in known:
                     known[key] = len(self._slack_cones)
                     self._slack_cones.append(SlackCone.of(_slipping(one.contact, key[1])))

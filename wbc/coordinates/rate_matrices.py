@@ -12,7 +12,7 @@ from wbc.coordinates import expressions
 from wbc.coordinates.rows import Coordinate
 from wbc.native.compiled_function import compiled
 from wbc.robot import Robot
-from wbc.stack.evaluation import SingleState
+from wbc.symbolic.evaluation import SingleState
 from wbc.validation import Array
 
 

@@ -12,8 +12,8 @@ from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
 from wbc.multibody import pin
 from wbc.stack.declaration import Declaration, Entry
-from wbc.stack.evaluation import SingleState
 from wbc.symbolic import Kinematics, Tracer
+from wbc.symbolic.evaluation import SingleState
 from wbc.tasks import Fixed, Hold, Mechanism, inputs as run_time
 from wbc.tasks.base import Constraint, Task
 from wbc.validation import Array

@@ -23,7 +23,7 @@ import pathlib
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -201,13 +201,16 @@ class LogFile:
             file.seek(-_END, os.SEEK_END)
             return file.read(4) == b"PK\x05\x06"
 
-    def chunks(self) -> Iterator[Array]:
+    def chunks(self, wait: Callable[[], bool] | None = None) -> Iterator[Array]:
         """The rows of each chunk in turn, ticks x all numbers; memory holds one chunk.
+
+        Args:
+            wait: is called where a file that is still written ends: True reads on, False ends here.
 
         Raises:
             LogFileError: a chunk is damaged.
         """
-        for name, content in self._members():
+        for name, content in self._members(wait):
             if not name.startswith("ticks."):
                 continue
             packed = np.load(io.BytesIO(content), allow_pickle=False)
@@ -241,7 +244,7 @@ class LogFile:
         part = self.parts[name]
         return np.concatenate([np.zeros((0, part.stop - part.start)), *(rows[:, part] for rows in self.chunks())])
 
-    def _members(self) -> Iterator[tuple[str, bytes]]:
+    def _members(self, wait: Callable[[], bool] | None = None) -> Iterator[tuple[str, bytes]]:
         """(name, content) of every whole member, in the order of the file."""
         try:
             file = self.path.open("rb")
@@ -249,15 +252,22 @@ class LogFile:
             reason = validation.no_such(self.path, f"cannot be read: {error.strerror}")
             raise self.error(self.field, str(self.path), reason) from error
         with file:
-            while len(head := file.read(_LOCAL.size)) == _LOCAL.size:
-                mark, _, _, method, _, _, check, size, plain, name_size, extra = _LOCAL.unpack(head)
-                if mark != b"PK\x03\x04":
+            start, whole = 0, True
+            while whole or (wait is not None and wait()):
+                file.seek(start)
+                head = file.read(_LOCAL.size)
+                if whole := len(head) == _LOCAL.size:
+                    mark, _, _, method, _, _, check, size, plain, name_size, extra = _LOCAL.unpack(head)
+                    if mark != b"PK\x03\x04":
+                        return
+                    name = file.read(name_size).decode("utf-8", "replace")
+                    file.seek(extra, os.SEEK_CUR)
+                    content = file.read(size)
+                    whole = len(content) == size != 0
+                elif head.startswith(b"PK\x05\x06"):
                     return
-                name = file.read(name_size).decode("utf-8", "replace")
-                file.seek(extra, os.SEEK_CUR)
-                content = file.read(size)
-                if len(content) < size or size == 0:
-                    return
-                if method != 0 or size != plain or zlib.crc32(content) != check:
-                    raise self.error(self.field, str(self.path), f"the part {name} is damaged")
-                yield name, content
+                if whole:
+                    if method != 0 or size != plain or zlib.crc32(content) != check:
+                        raise self.error(self.field, str(self.path), f"the part {name} is damaged")
+                    start = file.tell()
+                    yield name, content

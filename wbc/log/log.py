@@ -8,7 +8,7 @@ import pathlib
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -140,9 +140,14 @@ def load(run: str | os.PathLike[str]) -> Log:
 def _read_part(file: LogFile) -> Log:
     if "kinds" not in file.about:
         raise LogFileError("run", str(file.path), "a recording of ticks: wbc.Recording(run).log() is its log")
-    kinds, rows = file.about["kinds"], file.rows()
+    return replace(log_of(file, file.rows()), tables=file.tables())
+
+
+def log_of(file: LogFile, rows: Array) -> Log:
+    """Rows of a file that a :class:`~wbc.log.TickRecorder` wrote, as a log without tables."""
+    kinds = file.about["kinds"]
     columns = {name: rows[:, place.start].astype(kinds[name]) for name, place in file.parts.slices.items()}
-    return Log(columns, file.about["units"], file.about["meta"], file.tables())
+    return Log(columns, file.about["units"], file.about["meta"])
 
 
 def _read_npz(path: pathlib.Path) -> Log:

@@ -32,8 +32,8 @@ from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, c
 from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robot import Robot
-from wbc.stack.evaluation import SingleState
 from wbc.symbolic import Kinematics, TwoVelocityDynamics
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.two_velocities import PER_BODY
 from wbc.validation import Array
 

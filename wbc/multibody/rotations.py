@@ -187,9 +187,10 @@ def axis_turn(axis: str, angle: float) -> Array:
 
 
 def least_turn(a: Any, b: Any) -> Array:
-    """The quaternion of the least turn that takes the direction of a to that of b."""
-    first, second = vector(a, 3), vector(b, 3)
-    first, second = first / np.linalg.norm(first), second / np.linalg.norm(second)
+    """The quaternion of the least turn that takes the direction of a to that of b; where one of them is 0, which has no
+    direction, Pinocchio's (0, 0, 0, sqrt(1/2)), which is no rotation.
+    """
+    first, second = (x / (float(np.linalg.norm(x)) or 1.0) for x in (vector(a, 3), vector(b, 3)))
     cosine = float(first @ second)
     if cosine < APART - 1.0:
         # Half a turn about any axis across takes a to -a, and the rest is small

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -123,10 +123,37 @@ class Recording(LogFile):
         Raises:
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
-        table, units = self.table(), {"t": "s"} | self.units
-        columns: dict[str, np.ndarray] = {"t": self.time, "flag": self["flag"][:, 0].astype(int)}
-        columns |= {name: np.asarray(values) for name, values in table.items() if name not in ("time", "status")}
-        return Log(columns, {name: units.get(name, "") for name in columns}, self.about)
+        pieces = [log for log, _ in self.logs()]
+        names = self.column_units
+        columns = {name: np.concatenate([np.zeros(0), *(log[name] for log in pieces)]) for name in names}
+        return Log(columns | {"flag": columns["flag"].astype(int)}, names, self.about)
+
+    @property
+    def column_units(self) -> dict[str, str]:
+        """Column of :meth:`log` -> unit, "" for none.
+
+        Raises:
+            RecordingError: it is of an older version, which kept no names, residuals and margins.
+        """
+        return {"t": "s", "flag": ""} | {name: unit for name, unit, _, _ in self._columns()}
+
+    def logs(self, wait: Callable[[], bool] | None = None) -> Iterator[tuple[Log, Array]]:
+        """Each chunk in turn: its log, and its rows as they are.
+
+        Args:
+            wait: as of :meth:`wbc.log.LogFile.chunks`.
+
+        Raises:
+            RecordingError: damaged, or of an older version, which kept no names, residuals and margins.
+        """
+        units, time = self.column_units, 0.0
+        places = {name: self.parts[part].start + place for name, _, part, place in self._columns()}
+        for rows in self.chunks(wait):
+            times = np.cumsum([time, *rows[:, places["dt"]]])
+            time = float(times[-1])
+            columns: dict[str, np.ndarray] = {"t": times[:-1], "flag": rows[:, self.parts["flag"].start].astype(int)}
+            columns |= {name: rows[:, place] for name, place in places.items()}
+            yield Log(columns, units, self.about), rows
 
     def _names(self, part: str) -> list[list[Any]]:
         """What ``about.json`` says of the numbers of a part.

@@ -28,6 +28,8 @@ from wbc.robot.sources.mjmodel import compiled, is_mjmodel, read_mjmodel
 from wbc.robot.sources.sdf import read_sdf
 from wbc.robot.sources.srdf import Srdf, read_srdf
 from wbc.robot.sources.urdf import read_urdf
+from wbc.robot.sources.usd import SUFFIXES, converted
+from wbc.robot.sources.xacro import SUFFIX, expanded
 
 log = logging.getLogger("wbc")
 
@@ -38,7 +40,8 @@ _FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 
 def read(source: Any, base: str | None, recipe: Recipe) -> Description:
-    """The description in a URDF, SDF or MJCF file, a ``pin.Model``, a ``mujoco.MjModel`` or rows of :class:`DHRow`.
+    """The description in a URDF, xacro, SDF, MJCF or USD file, a ``pin.Model``, a ``mujoco.MjModel`` or rows of
+    :class:`DHRow`.
 
     Raises:
         RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
@@ -50,6 +53,10 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
         return Description(model, kind)
     if isinstance(source, (str, os.PathLike)):
         path = pathlib.Path(source)
+        if path.suffix.lower() in (SUFFIX, *SUFFIXES) and path.is_file():
+            if recipe.arguments and path.suffix.lower() != SUFFIX:
+                raise RobotFileError("arguments", dict(recipe.arguments), "only xacro files take arguments")
+            path = expanded(path, recipe.arguments) if path.suffix.lower() == SUFFIX else converted(path)
         _, tree = read_xml(path)
         if tree.tag == "robot":
             return read_urdf(path, tree, base, recipe.mimic_leaders)
@@ -170,7 +177,7 @@ def looks_like_path(text: str) -> bool:
     """Whether a string that is no known robot name is meant as a path."""
     path = pathlib.Path(text)
     return (
-        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".xacro", ".sdf")
+        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".sdf", SUFFIX, *SUFFIXES)
         or len(path.parts) > 1
         or validation.exists("robot", text)
     )

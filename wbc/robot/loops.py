@@ -16,6 +16,7 @@ from wbc.errors import WbcError
 from wbc.multibody import pin
 from wbc.robot.limits import Limits
 from wbc.robot.shortest_steps import CLOSED, DEPENDENT, ShortestSteps
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -221,12 +222,12 @@ class Closing:
         kin = Tracer(Kinematics(model))
         error = ca.SX(ca.vertcat(*[loop.error(kin) for loop in loops]))
         outputs = [ca.densify(part) for part in kin.expanded(error, ca.densify(kin.slope(error)))]
-        self._function = ca.Function("loops", [kin.q], outputs)
+        self._function = SingleState(ca.Function("loops", [kin.q], outputs))
 
     def look(self, q: Array) -> tuple[Array, Array]:
         """(residual [rows], its Jacobian [rows, nv])."""
         error, jacobian = self._function(q)
-        return np.array(error).ravel(), np.array(jacobian)
+        return error[:, 0], jacobian
 
     def close(self, q: Array) -> tuple[Array, float]:
         """As :meth:`ShortestSteps.root`: (configuration, what its loops are open by there [m, rad])."""

@@ -6,6 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
@@ -61,6 +62,14 @@ class MujocoJoints:
         numbers = {name: j for j, name in enumerate(names.joints)}
         for k, name in enumerate(robot.joint_names, start=1):
             self._add(model, k, name, numbers)
+        # Numbers that are copied, all at once; then what differs
+        plain = [(at, start, nq) for at, _, start, _, nq, _ in self._places if nq != 2]
+        self._from_qpos, self._to_q = (_spans([(one[k], one[2]) for one in plain]) for k in (0, 1))
+        pairs = [(dof, column, nv) for _, dof, _, column, _, nv in self._places]
+        self._from_qvel, self._to_v = (_spans([(one[k], one[2]) for one in pairs]) for k in (0, 1))
+        self._turned = [start + nq - 4 for _, start, nq in plain if nq in (4, 7)]
+        self._endless = [(at, start) for at, _, start, _, nq, _ in self._places if nq == 2]
+        self._free = [(at, column) for at, _, _, column, nq, _ in self._places if nq == 7]
         self._compare(model, names)
 
     def _add(self, model: mujoco.MjModel, k: int, name: str, numbers: dict[str, int]) -> None:
@@ -130,13 +139,11 @@ class MujocoJoints:
             ShapeError: another number of numbers.
         """
         here, q = self._checked("qpos", qpos, 0), np.empty(self._robot.nq)
-        for at, _, start, _, nq, _ in self._places:
-            if nq == 2:
-                q[start : start + 2] = np.cos(here[at]), np.sin(here[at])
-            else:
-                q[start : start + nq] = here[at : at + nq]
-                if nq in (4, 7):
-                    q[start + nq - 4 : start + nq] = here[at + nq - 4 : at + nq][TO_PINOCCHIO]
+        q[self._to_q] = here[self._from_qpos]
+        for turn in self._turned:
+            q[turn : turn + 4] = q[turn : turn + 4][TO_PINOCCHIO]
+        for at, start in self._endless:
+            q[start : start + 2] = np.cos(here[at]), np.sin(here[at])
         return q
 
     def v(self, qpos: Any, qvel: Any) -> Array:
@@ -146,10 +153,9 @@ class MujocoJoints:
             ShapeError: another number of numbers.
         """
         here, rates, v = self._checked("qpos", qpos, 0), self._checked("qvel", qvel, 1), np.empty(self._robot.nv)
-        for at, dof, _, column, nq, nv in self._places:
-            v[column : column + nv] = rates[dof : dof + nv]
-            if nq == 7:
-                v[column : column + 3] = _rotation(here[at + 3 : at + 7]).T @ rates[dof : dof + 3]
+        v[self._to_v] = rates[self._from_qvel]
+        for at, column in self._free:
+            v[column : column + 3] = _rotation(here[at + 3 : at + 7]).T @ v[column : column + 3]
         return v
 
     def put_q(self, qpos: Array, q: Any) -> None:
@@ -188,6 +194,12 @@ class MujocoJoints:
         return np.asarray(numbers)
 
 
+def _spans(spans: list[tuple[int, int]]) -> NDArray[np.intp]:
+    """Indices of (first, count)s, one after the other."""
+    return np.array([first + k for first, count in spans for k in range(count)], dtype=np.intp)
+
+
 def _rotation(quaternion: Array) -> Array:
     """Of w, x, y, z."""
-    return np.asarray(pin.Quaternion(np.array(quaternion)[TO_PINOCCHIO]).toRotationMatrix())
+    w, x, y, z = quaternion.tolist()
+    return np.asarray(pin.Quaternion(w, x, y, z).toRotationMatrix())

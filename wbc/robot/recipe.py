@@ -54,6 +54,7 @@ class Recipe:
         actuated: joints with motors, see :meth:`~wbc.robot.Robot.with_actuated`; ``"transmissions"``: those that the
             file has a ``<transmission>`` of; None: as an MJCF file says, else all.
         loops: whether closed loops of the description are kept, see :meth:`~wbc.robot.Robot.with_loops`.
+        arguments: of a xacro file, name -> value.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Recipe:
     problem: str = ""
     actuated: Sequence[str] | None = None
     loops: bool = True
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
 
 def lock_mapping(lock: Any) -> dict[str, float | None]:

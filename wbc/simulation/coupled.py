@@ -12,6 +12,7 @@ from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.simulation.dynamics import ConstrainedDynamics, Grip
 from wbc.simulation.plant import GripKind
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.tracer import Tracer
@@ -78,8 +79,8 @@ class CoupledDynamics(ConstrainedDynamics):
 
     def _looked(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
         assert self._loops is not None
-        error, jacobian, bias = (np.array(part) for part in self._loops(q, v))
-        return error.ravel(), jacobian, bias.ravel()
+        error, jacobian, bias = self._loops(q, v)
+        return error[:, 0], jacobian, bias[:, 0]
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
         """Hold these frames, and no others."""
@@ -142,13 +143,13 @@ class CoupledDynamics(ConstrainedDynamics):
         return np.vstack(K), np.concatenate(drift)
 
 
-def _rows(robot: Robot, model: pin.Model) -> ca.Function:
+def _rows(robot: Robot, model: pin.Model) -> SingleState:
     """(q, v) -> (e, J, (dJ/dt) v) of the loops' rows."""
     tracer = Tracer(Kinematics(model))
     error = robot.loops.error(tracer)
     bias = tracer.second(error, MotionExpressions(tracer.kinematics))[1]
     outputs = [ca.densify(part) for part in (*tracer.expanded(error, ca.densify(tracer.slope(error))), bias)]
-    return ca.Function("loops", [tracer.q, tracer.v], list(ca.cse(outputs)))
+    return SingleState(ca.Function("loops", [tracer.q, tracer.v], list(ca.cse(outputs))))
 
 
 def _mass(model: pin.Model, data: pin.Data, q: Array) -> Array:

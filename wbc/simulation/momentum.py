@@ -32,4 +32,5 @@ class Balance:
     def by_gravity(self, q: Array, h: float) -> Array:
         """In a time h [s]."""
         place = pin.centerOfMass(self._model, self._data, q)
-        return h * np.append(self._weight, pin.skew(place) @ self._weight)
+        (a, b, c), (x, y, z) = place.tolist(), self._weight.tolist()
+        return h * np.array([x, y, z, b * z - c * y, c * x - a * z, a * y - b * x])

@@ -93,6 +93,8 @@ class PlantMotors:
         self._noisy, self._slows = bool(self._noise.any()), bool(np.isfinite(self._no_load).any())
         #: Whether there is friction at all
         self.rubs = bool(self.damping.any())
+        #: Whether torques depend on velocities
+        self.felt = self.rubs or self._slows
 
     def _spread(self, name: str, value: Any, count: int) -> Array:
         field, low = f"Motors.{name}", 0.0

@@ -114,17 +114,19 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         """Whole time steps."""
         h, drive, state = self.time_step, self._drive, self._state
         for _ in range(round(dt / h)):
-            seen = self.read()
-            torque = self._motors_on(seen.v)
+            # Motors whose torque does not depend on velocities need none
+            v = self.read().v if drive.felt else state.command
+            torque = self._motors_on(v)
             if drive.rubs:
-                torque = torque - drive.friction(seen.v)
+                torque = torque - drive.friction(v)
+            q = self._joints.q(self.data.qpos) if self._balance.falls else None
             MujocoPlant.apply(self, Command(CommandKind.TORQUE, torque))
             self._slide(h)
             for name in list(state.off):
                 self._close(name)
             super().advance(h)
-            if self._balance.falls:
-                state.fallen += self._balance.by_gravity(seen.q, h)
+            if q is not None:
+                state.fallen += self._balance.by_gravity(q, h)
 
     def grasp(self, frame: str, pose: pin.SE3, kind: GripKind = GripKind.POSE) -> None:
         """A frame is held at a pose of the world.

@@ -22,6 +22,7 @@ KERNELS = (
     "climb/native/climb.c",
     "coordinates/control/native/singular.c",
     "geometry/native/geometry.c",
+    "plan/native/plan.c",
     "proximity/native/sensor.c",
     "resolvers/fsp/native/fsp.c",
     "walking/native/planner.c",
@@ -41,7 +42,7 @@ def build() -> list[Path]:
         texts = generic.origins(variant)
         tasks[kernel.ahead(texts)] = partial(generic.compiling(variant, portable=True), texts)
     for name in KERNELS:
-        texts = kernel.texts_of(_WBC / name, _WBC / "geometry" / "native")
+        texts = kernel.texts_of(_WBC / name, *(_WBC / folder / "native" for folder in ("clearance", "geometry")))
         tasks[kernel.ahead(texts)] = partial(toolchain.compile_kernel, texts, portable=True)
     for old in set(kernel.AHEAD.glob("*.so")) - set(tasks):
         old.unlink()

@@ -26,6 +26,7 @@ from wbc.stack.tables import (
     rate_table,
     reported_slacks,
     stops,
+    taken_out,
 )
 from wbc.symbolic.kinematics import Kinematics
 
@@ -81,6 +82,8 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
                 "CALM": int(stack.calm),
                 "BENDING": sum(bent_rows(layout, program)),
                 "ELASTIC": int(layout.elastic),
+                "REDUCED": taken_out(stack, layout),
+                "REDUCED_NV": layout.variables if taken_out(stack, layout) else 0,
                 "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),

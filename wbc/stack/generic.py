@@ -35,7 +35,7 @@ from wbc.stack.memory import (
 SIZES = (
     "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "ELASTIC", "UNITS",
     "LAST_ORDER", "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST",
-    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED",
+    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED", "REDUCED", "REDUCED_NV",
 )  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING", "FAR")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of

@@ -7,8 +7,10 @@ import numpy as np
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram
+from wbc.tasks._contact import Unactuated
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Row
+from wbc.tasks.mechanism import Mechanism
 
 #: What a direction that a level leaves to later ones may cost its rows at full joint speed, in their unit per second
 DISTURBANCE = 1e-6
@@ -89,6 +91,12 @@ def bent_rows(layout: Layout, program: TickProgram) -> list[int]:
         for block in layout.of_form("rows"):
             out[block.span] *= 1 + int(getattr(block.entry.item, "exact", False))
     return [int(x) for x in out]
+
+
+def taken_out(stack: Declaration, layout: Layout) -> int:
+    """Equality rows that every tick of a robot with loops has: they are taken out of its QP; 0 without loops."""
+    blocks = layout.of_form("rows") if stack.robot.loops else ()
+    return sum(len(block.rows) for block in blocks if isinstance(block.entry.item, (Mechanism, Unactuated)))
 
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.multibody import pin
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 
 Vector = NDArray[np.float64]
@@ -44,13 +45,13 @@ class TaylorJacobian:
         q, s, n = kinematics.q, ca.SX.sym("s", kinematics.nv), kinematics.nv
         jacobian = ca.densify(ca.jacobian(rows, q) @ kinematics.tangent_map)
         self.rows, self._model, self._count = int(rows.shape[0]), kinematics.model, int(symbols.shape[0])
-        self.value = ca.Function("value", [q, symbols], [ca.densify(rows)])
-        self._exact = ca.Function("exact", [q, symbols], [jacobian])
+        self.value = SingleState(ca.Function("value", [q, symbols], [rows]))
+        self._exact = SingleState(ca.Function("exact", [q, symbols], [jacobian]))
         terms = [ca.vec(ca.substitute(jacobian, q, kinematics.integrate(q, s)))]
         for _ in range(self.order or 0):
             terms.append(ca.vec(ca.jacobian(terms[-1], s)))
-        at_rest = [ca.densify(ca.substitute(term, s, ca.SX.zeros(n, 1))) for term in terms]
-        self._terms = ca.Function("terms", [q, symbols], at_rest)
+        at_rest = [ca.substitute(term, s, ca.SX.zeros(n, 1)) for term in terms]
+        self._terms = SingleState(ca.Function("terms", [q, symbols], at_rest))
         self.latch(pin.neutral(self._model), np.zeros(self._count))
 
     def latch(self, q: Vector, parameters: Sequence[float] | Vector = ()) -> None:
@@ -62,14 +63,14 @@ class TaylorJacobian:
         q = validation.ordinary_array("q", q, (self._model.nq,))
         self.parameters = validation.ordinary_array("parameters", parameters, (self._count,))
         self.q0, n = q, self._model.nv
-        found = self._terms.call([q, self.parameters])
+        found = self._terms(q, self.parameters)
         #: J [rows, nv], its derivatives [rows, nv, nv] and [rows, nv, nv, nv], as far as the order has them
-        self.terms = [np.array(term).reshape((self.rows, *(n,) * (k + 1)), order="F") for k, term in enumerate(found)]
+        self.terms = [term.reshape((self.rows, *(n,) * (k + 1)), order="F") for k, term in enumerate(found)]
 
     def at(self, q: Vector) -> Vector:
         """J [rows, nv] at a configuration, by the terms of the order, or exactly."""
         if self.order is None:
-            return np.array(self._exact(q, self.parameters))
+            return self._exact(q, self.parameters)[0]
         s = pin.difference(self._model, self.q0, q)
         J: Vector = self.terms[0].copy()
         if self.order > 0:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.api import Stack
 from wbc.errors import RangeError, ShapeError
 from wbc.ik.continuation import Tracker
 from wbc.ik.engine import SearchEngine
@@ -42,7 +41,7 @@ class Followed:
 
 
 def follow(
-    stack: Stack,
+    stack: Declaration,
     poses: Path,
     start: Any,
     task: str,
@@ -101,7 +100,7 @@ def follow(
 class _Seeker:
     """Configurations at one pose after the other, and how far the frame is off between them."""
 
-    def __init__(self, stack: Stack, poses: Path, task: str, tolerance: float) -> None:
+    def __init__(self, stack: Declaration, poses: Path, task: str, tolerance: float) -> None:
         validation.instance("stack", stack, Declaration, "a wbc Stack")
         if validation.instance("poses", poses, Path, "a path of poses").space != "poses":
             raise ShapeError("poses", poses.space, "expected a path of poses")

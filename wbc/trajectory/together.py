@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.cores import cores
 from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.extras import MissingPackageError
 from wbc.trajectory.laws.law import Law, State
 from wbc.validation import Array
 
@@ -92,6 +93,7 @@ def many(law: Callable[..., Law], *motions: Any, processes: int | None = None, *
 
     Raises:
         ShapeError: arguments of different n, or none. RangeError: no number of processes.
+        MissingPackageError: the law needs a package that is not installed.
     """
     if not motions:
         raise ShapeError("motions", motions, "expected arrays with an axis of motions first")
@@ -117,5 +119,8 @@ def _made(task: tuple[Callable[..., Law], tuple[Any, ...], dict[str, Any]]) -> M
     law, own, common = task
     try:
         return law(*own, **common)
+    except MissingPackageError:
+        # No law of any motion can be made
+        raise
     except WbcError as error:
         return error

@@ -20,7 +20,7 @@ from tests.walking.trials.second_checker import second_check
 from tests.walking.trials.structures import FAMILIES, PITCH, random_structure
 from tests.walking.trials.torque_trials import NECK, Record, torque, violations, walker_of
 from wbc.errors import RangeError, WbcError
-from wbc.interrupts import obey_kill
+from wbc.interrupts import obey_interrupts
 from wbc.robots import Walker
 from wbc.validation import Array
 from wbc.walking import PlaneSurface, Structure, save_structure
@@ -296,7 +296,7 @@ def _ends(rng: np.random.Generator, structure: Structure) -> tuple[str, str]:
 
 
 if __name__ == "__main__":
-    obey_kill()
+    obey_interrupts()
     if len(sys.argv) != 4 or sys.argv[1] not in PARTS:
         raise RangeError("arguments", sys.argv[1:], f"expected PART NAME FOLDER, a part of {', '.join(PARTS)}")
     print(json.dumps(tried(sys.argv[1], sys.argv[2], Path(sys.argv[3]))))

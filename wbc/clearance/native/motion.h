@@ -123,6 +123,10 @@ static void place_body(sweep_t *s, int b) {
     for (int k = 0; k < s->chain_length[b]; k++, moved += 2) {
         const int f = s->chain[s->depth * b + k];
         const double *off = s->deviation + 4 * f;
+        if (off[0] == 0.0 && off[1] == 0.0 && off[2] == 0.0 && off[3] == 0.0) {
+            moved[2] = moved[0], moved[3] = moved[1];
+            continue;
+        }
         reach_ = farthest_from(s->pose + 12 * f, s->kind[f] == FREE ? 0 : s->axis + 5 * f, ends, line[7]);
         moved[2] = moved[0] + gone(off[0], off[1], reach_);
         moved[3] = moved[1] + gone(off[2], off[3], reach_);

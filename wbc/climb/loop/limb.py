@@ -29,8 +29,14 @@ NEAR_LANDING = 0.1
 NEAR_BY_RATES = 1e-3
 #: The same by torques, which are not exact [m]
 NEAR_BY_TORQUES = 3e-3
-#: Weight of a contact's force that hands its load over
-UNLOADED = 1e8
+#: By torques, how much farther beside its foothold than that a foot may be as it closes [1]
+BESIDE = 2.5
+#: By torques, how much nearer to its surface than that a foot has to be [1]: below 1 mm its load hardly throws it
+ABOVE = 3.0
+#: Weight of a contact's force that hands its load over [m^2/s^4 per N^2, of tasks of weight 1]: 1e4 leaves mN
+UNLOADED = 1e4
+#: The same in the air, where it is 0: of the size of other weights, as a tick takes longer where they are far apart
+OPEN = 1.0
 #: Rounding of times [s]
 INSTANT = 1e-9
 
@@ -72,7 +78,7 @@ class LimbMachine:
         self._force = items[f"{self.name} contact force"] if parts.torques else None
         self._bearing = 0.0 if self._force is None else self._force.weight
         self._item: FootholdContact = parts.stack[f"{self.name} contact"].item
-        fields = ("target", "feedforward")
+        fields = ("target", "feedforward", *(["acceleration"] * parts.torques))
         self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
         self._loading, near = (parts.options.unload if parts.torques else 0.0), parts.options.latch_distance
         self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
@@ -88,6 +94,7 @@ class LimbMachine:
         """A plan begins, in which this limb has these moves and is closed on a foothold, or not."""
         self._moves, self._footholds, self._reference = moves, tuple(plan.scene.footholds), reference
         self._gone, self._late, self.held = set[int](), 0.0, held
+        self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
         self._pose = self._planned_pose(0.0)
 
     def stand(self, foothold: int, q: Array, now: float) -> str:
@@ -173,9 +180,7 @@ class LimbMachine:
             return Cause.LANDING_NEARS if ahead >= move.land - NEAR_LANDING else None
         if path_time < move.land - INSTANT or move.lands in self._gone:
             return None
-        off, turned = self.off(q)
-        there = off <= self._near and turned <= self._parts.options.latch_angle
-        return Cause.AT_FOOTHOLD if there else None
+        return Cause.AT_FOOTHOLD if self._there(q) else None
 
     def wait(self, path_time: float) -> bool:
         """Whether the plan has to wait for it, a tick more."""
@@ -226,11 +231,15 @@ class LimbMachine:
         if self._late > 0.0 and parts.torques and not self._kind.pulls:
             normal, press = self._target.rotation[:, 2], parts.options.press
             place, speed = place - press * self._late * normal, speed - press * normal
-        if self._kind.fixed == "position":
-            self._aim.write(np.concatenate([place, speed]))
-            return
-        turn = now.rotation @ pin.log3(now.rotation.T @ then.rotation) / parts.dt
-        self._aim.write(np.concatenate([now.rotation.T.ravel(), place, speed, turn]))
+        aim, rate = [place], speed
+        if self._kind.fixed != "position":
+            turn = now.rotation @ pin.log3(now.rotation.T @ then.rotation) / parts.dt
+            aim, rate = [now.rotation.T.ravel(), place], np.concatenate([speed, turn])
+        aim.append(rate)
+        if parts.torques:
+            aim.append((rate - self._rate) / parts.dt)
+            self._rate = rate
+        self._aim.write(np.concatenate(aim))
 
     def off(self, q: Array) -> tuple[float, float]:
         """How far it is from its foothold [m], and how far turned as far as its contact fixes that [rad]."""
@@ -242,16 +251,30 @@ class LimbMachine:
             return off, float(np.arccos(np.clip(pose.rotation[:, 2] @ target.rotation[:, 2], -1.0, 1.0)))
         return off, float(np.linalg.norm(pin.log3(pose.rotation.T @ target.rotation)))
 
+    def _there(self, q: Array) -> bool:
+        """Whether it is near enough to its foothold to close; a foot that touches, also a little beside it."""
+        off, turned = self.off(q)
+        if self._parts.torques and not self._kind.pulls:
+            away = self._target.actInv(self._seen_pose(q)).translation
+            off = max(ABOVE * float(away[2]), -float(away[2]), float(np.hypot(away[0], away[1])) / BESIDE)
+        return off <= self._near and turned <= self._parts.options.latch_angle
+
     def _close(self, foothold: int, q: Array) -> None:
         """Its rows are hard."""
         target, inputs = self._target, dict[str, Any]()
         if self._force is not None:
             if not self._kind.pulls:
-                # Where the foot is on the ground, which may be a little off the plan's foothold
+                # Where the foot is, which may be a little beside the plan's foothold; above the surface it goes on down
                 pose = self._seen_pose(q)
-                target = pin.SE3(target.rotation if self._kind.fixed == "position" else pose.rotation, pose.translation)
-            slopes, bounds = self._item.numbers(self._footholds[foothold].friction)
+                normal = target.rotation[:, 2]
+                above = max(0.0, float(normal @ (pose.translation - target.translation)))
+                turn = target.rotation if self._kind.fixed == "position" else pose.rotation
+                target = pin.SE3(turn, pose.translation - above * normal)
+            slopes, bounds = self._item.numbers(self._footholds[foothold].friction, self._parts.options.friction)
             inputs = {"slopes": slopes, "bounds": bounds}
+            if self.state is LimbState.LATCHING:
+                # It has no load yet: a force that nothing answers would throw the limb at what it is to hold
+                self._force.weight = UNLOADED
             self._force.ramp(self._bearing, self._loading)
         self._contact.set(target=target, **inputs)
         self._contact.enabled, self._swing.enabled = True, False
@@ -262,11 +285,14 @@ class LimbMachine:
     def _open(self, q_planned: Array) -> None:
         """It follows the plan through the air."""
         self._contact.enabled, self._swing.enabled = False, True
+        if self._force is not None:
+            self._force.weight = OPEN
         if self._parts.plant is not None and self._kind.pulls:
             self._parts.plant.release(self._frame)
         pin.forwardKinematics(self._parts.robot.model, self._planned, q_planned)
         self._pose = pin.updateFramePlacement(self._parts.robot.model, self._planned, self._number).copy()
         self.held, self._late = FREE_LIMB, 0.0
+        self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
 
     def _at(self, foothold: int, time: float) -> pin.SE3:
         """The contact pose at a foothold: its place and normal, and the turn about it that the plan has."""

@@ -37,6 +37,7 @@ class Cause(StrEnum):
     SETTLED = "it bears its load"
     NO_FOOTHOLD = "the plan has no foothold for it"
     HOLD_LOST = "what it held is gone"
+    LIMB_FAILED = "it holds no more"
     NEW_PLAN = "a new plan begins"
 
 
@@ -53,6 +54,10 @@ TRANSITIONS: dict[tuple[LimbState, Cause], LimbState] = {
     (LimbState.HELD, Cause.HOLD_LOST): LimbState.FREE,
     (LimbState.UNLOADING, Cause.HOLD_LOST): LimbState.FREE,
     (LimbState.LATCHING, Cause.HOLD_LOST): LimbState.FREE,
+    # A limb that fails
+    (LimbState.HELD, Cause.LIMB_FAILED): LimbState.FREE,
+    (LimbState.UNLOADING, Cause.LIMB_FAILED): LimbState.FREE,
+    (LimbState.LATCHING, Cause.LIMB_FAILED): LimbState.FREE,
     # A plan that begins where another was broken off: limbs that are closed hold, those in the air are free
     (LimbState.UNLOADING, Cause.NEW_PLAN): LimbState.HELD,
     (LimbState.LATCHING, Cause.NEW_PLAN): LimbState.HELD,

@@ -32,6 +32,8 @@ from wbc.validation import Array
 
 #: A planner: from a scene as it is now, and where the robot stands
 Replan = Callable[[ClimbScene, Stance], ContactPlan]
+#: What comes after a plan that is done: from the scene and where the robot stands; None: nothing
+Onward = Callable[[ClimbScene, Stance], ContactPlan | None]
 #: Time in which the plan comes to a stop, or goes on again, where a limb is late [s]
 STOPPING = 0.2
 #: Rates with which a robot is at rest [m/s, rad/s]
@@ -83,7 +85,8 @@ class ClimbLoop:
 
     Args:
         plan: what is carried out, from its first configuration. plant: default: the kinematic one.
-        replan: the planner; None: where one is needed the run ends, and says so. options: see there.
+        replan: the planner; None: where one is needed the run ends, and says so. onward: what comes after a plan that
+            is done; None: nothing does. options: see there.
         backend: as of ``Stack.compile``.
 
     Raises:
@@ -96,11 +99,12 @@ class ClimbLoop:
         plant: Plant | None = None,
         *,
         replan: Replan | None = None,
+        onward: Onward | None = None,
         options: LoopOptions | None = None,
         backend: str = "auto",
     ) -> None:
         _check_plan(plan)
-        options, self._replan = options or LoopOptions(), replan
+        options, self._replan, self._onward = options or LoopOptions(), replan, onward
         kinds = (CommandKind.VELOCITY,) if plant is None else tuple(plant.commands)
         self._torques = CommandKind.VELOCITY not in kinds and CommandKind.TORQUE in kinds
         kind = CommandKind.TORQUE if self._torques else CommandKind.VELOCITY
@@ -121,7 +125,8 @@ class ClimbLoop:
         self._recorder = ClimbRecorder(plan, self._torques, self.dt)
         self._outcome: ClimbOutcome | None = None
         self._reason, self._scene = "", plan.scene
-        self._needs, self._waiting, self._due = "", False, -inf
+        self._needs, self._turns, self._waiting, self._due = "", "", False, -inf
+        self._failed: set[str] = set()
         self._path_time, self._rate = 0.0, 1.0
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._ahead = StateAhead(self.robot, options.delay, self.dt)
@@ -140,15 +145,18 @@ class ClimbLoop:
 
     # ------------------------------------------------------------------ what users do
 
-    def run(self, most: float | None = None) -> ClimbRun:
+    def run(self, most: float | None = None, before_tick: Callable[[ClimbLoop], None] | None = None) -> ClimbRun:
         """Tick until the plan is done, or something ends it.
 
         Args:
-            most: time on the plant's clock [s]; None: until the end.
+            most: time on the plant's clock [s]; None: until the end. before_tick: is called with the loop before every
+                tick, and may tell it what has changed.
         """
         try:
             with self._connection:
                 while self._outcome is None and (most is None or self._state.time < most):
+                    if before_tick is not None:
+                        before_tick(self)
                     self.tick()
         except PlantError as error:
             self._end(ClimbOutcome.PLANT_FAILED, str(error))
@@ -169,6 +177,7 @@ class ClimbLoop:
         """
         if not np.array_equal(scene.gravity, self._scene.gravity):
             raise RangeError("scene.gravity", scene.gravity, "the stack was compiled for another one")
+        scene = self._able(scene)
         self._scene = scene
         plan, left = self._plans[-1], {foothold.id for foothold in scene.footholds}
         gone = {k for k, foothold in enumerate(plan.scene.footholds) if foothold.id not in left}
@@ -181,6 +190,40 @@ class ClimbLoop:
         if set(scene.bodies) != set(before) or any(scene.bodies[k] is not before[k] for k in before):
             self._needs = self._needs or "the bodies of the scene are others"
         self._due = -inf
+
+    def redirect(self, reason: str) -> None:
+        """The rest of the plan is not wanted any more: limbs in the air land, the robot comes to rest, and the planner
+        is asked.
+
+        Args:
+            reason: in words, for a run that ends there.
+        """
+        self._turns, self._due = validation.name("reason", reason), -inf
+
+    def fail(self, limb: str) -> None:
+        """A limb holds no more, now and for the rest of the run; its joints still move. What is left of the plan is not
+        carried out: the robot comes to rest, and the planner is asked for a way on the other limbs.
+
+        Raises:
+            UnknownNameError: no such limb.
+        """
+        names = [one.name for one in self._limbs]
+        machine = self._limbs[names.index(validation.one_of("limb", limb, names))]
+        self._failed.add(limb)
+        if machine.state in CLOSED:
+            self._change(machine, Cause.LIMB_FAILED)
+        self._scene = self._able(self._scene)
+        self._needs, self._due = self._needs or f"{limb} holds no more", -inf
+
+    def _able(self, scene: ClimbScene) -> ClimbScene:
+        """A scene as limbs that have not failed may hold it."""
+        names = [limb.name for limb in self._limbs]
+        return scene.held_by([name for name in names if name not in self._failed]) if self._failed else scene
+
+    @property
+    def scene(self) -> ClimbScene:
+        """As :meth:`see` has it, for limbs that have not failed."""
+        return self._scene
 
     @property
     def ended(self) -> bool:
@@ -214,6 +257,8 @@ class ClimbLoop:
             PlantError: the plant has no valid reading.
         """
         dt = self.dt
+        if self._turns and all(limb.state in STANDING for limb in self._limbs):
+            self._needs, self._turns = self._needs or self._turns, ""
         aimed = 0.0 if self._needs or self._waiting else 1.0
         if self._rate != aimed:
             self._rate += min(max(aimed - self._rate, -dt / STOPPING), dt / STOPPING)
@@ -239,7 +284,7 @@ class ClimbLoop:
         motion = state.q, state.v, command
         self._recorder.add((state.time, ahead), motion, self._held, self._states, step.status == "solved", wrenches)
         if ahead >= self._reference.end and all(limb.coming is None for limb in self._limbs):
-            self._end(ClimbOutcome.ARRIVED, "")
+            self._go_on()
 
     def _write(self, q_next: Array) -> None:
         """The reference of this tick, and of the limbs in the air."""
@@ -274,6 +319,10 @@ class ClimbLoop:
         for limb in self._limbs:
             move = limb.coming
             if move is not None and move.lift < ahead and limb.state in STANDING:
+                if self._turns or self._needs:
+                    # Nothing lifts any more on a plan that is given up
+                    ahead = max(min(ahead, move.lift), self._path_time)
+                    continue
                 ready = limb.state is LimbState.FREE or limb.unloaded(now)
                 if not (ready and self._borne(limb, move)):
                     ahead = max(min(ahead, move.lift), self._path_time)
@@ -320,10 +369,26 @@ class ClimbLoop:
         ordered = sorted(plan.moves, key=lambda move: move.lift)
         for row, limb in enumerate(self._limbs):
             limb.begin([move for move in ordered if move.limb == row], plan, reference, plan.start[row])
-        self._needs, self._waiting, self._due = "", False, -inf
+        self._needs, self._turns, self._waiting, self._due = "", "", False, -inf
         self._path_time, self._rate = 0.0, 1.0
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._look()
+
+    def _go_on(self) -> None:
+        """A plan is done: what comes after it, if anything does."""
+        after = None
+        if self._onward is not None:
+            try:
+                after = self._onward(self._scene, self.stance)
+                if after is not None:
+                    _check_plan(after)
+            except WbcError as error:
+                self._end(ClimbOutcome.STOPPED, f"nothing comes after the plan; {error}")
+                return
+        if after is None:
+            self._end(ClimbOutcome.ARRIVED, "")
+        else:
+            self._begin(after)
 
     def _plan_anew(self) -> None:
         """The robot is at rest, and what is left of the plan cannot be done."""

@@ -8,7 +8,7 @@ from wbc import validation
 from wbc.simulation import CommandKind
 
 #: Periods of loops of velocities and of torques [s]
-PERIODS = {CommandKind.VELOCITY: 0.01, CommandKind.TORQUE: 0.001}
+PERIODS = {CommandKind.VELOCITY: 0.01, CommandKind.TORQUE: 0.002}
 
 
 @dataclass(frozen=True)
@@ -16,12 +16,13 @@ class LoopOptions:
     """What a loop does besides its plan.
 
     Attributes:
-        period: of a tick [s]; None: 0.01 for velocities, 0.001 for torques.
+        period: of a tick [s]; None: 0.01 for velocities, 0.002 for torques.
         latch_distance: how far from its foothold a limb closes [m]; None: 1 mm by velocities, 3 mm by torques.
         latch_angle: how far its z axis, or the pose where that is fixed, may be turned then [rad].
         patience: how long the plan waits for a limb that is late [s].
         unload: time in which a limb hands over its load before it lifts, and takes it after it lands, of torques [s].
         bandwidth: omega of a = a_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q), of torques [1/s].
+        friction: share of the coefficients of friction on which torques count [1].
         delay: of the torques, which the loop knows [s].
         press: speed at which a foot that is late goes on against its foothold's normal, of torques [m/s].
 
@@ -35,6 +36,7 @@ class LoopOptions:
     patience: float = 1.0
     unload: float = 0.08
     bandwidth: float = 30.0
+    friction: float = 0.75
     delay: float = 0.0
     press: float = 0.02
 
@@ -45,5 +47,6 @@ class LoopOptions:
             validation.scalar(f"LoopOptions.{name}", getattr(self, name), low=0.0, open_low=True)
         for name in ("unload", "delay", "press"):
             validation.scalar(f"LoopOptions.{name}", getattr(self, name), low=0.0)
+        validation.scalar("LoopOptions.friction", self.friction, low=0.0, high=1.0, open_low=True)
         if self.period is not None:
             validation.scalar("LoopOptions.period", self.period, low=0.0, open_low=True, unit="s")

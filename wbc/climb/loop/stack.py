@@ -109,10 +109,10 @@ class FootholdContact(Contact):
             matrix[row, column] = inputs["slopes"][k]
         return Cone(matrix, -ca.SX.inf(len(self._pattern)), inputs["bounds"])
 
-    def numbers(self, friction: float) -> tuple[Array, Array]:
-        """``slopes`` and ``bounds`` on a surface with this coefficient of friction, of which the lower counts."""
+    def numbers(self, friction: float, share: float = 1.0) -> tuple[Array, Array]:
+        """``slopes`` and ``bounds`` on a surface with this coefficient of friction: a share of the lower one counts."""
         own: float | None = getattr(self.kind, "friction", None)
-        lower: dict[str, Any] = {} if own is None else {"friction": min(own, friction)}
+        lower: dict[str, Any] = {} if own is None else {"friction": share * min(own, friction)}
         a, b = replace(self.kind, **lower).cone()
         return a[self._borne][:, list(self.axes)][self._pattern], b[self._borne]
 

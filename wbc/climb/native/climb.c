@@ -1,5 +1,6 @@
 /* What the planner of climbing asks for many times. */
 #include "moves.h"
+#include "spans.h"
 
 long long wbc_step_size(void) { return (long long)sizeof(step_t); }
 long long wbc_limb_size(void) { return (long long)sizeof(limb_t); }
@@ -34,6 +35,12 @@ void wbc_climb_forget(climb_t *c) {
 /* The slack of contacts at a centre of mass and its bound over that, 4; `poses` of contacts: 0 for those of their places */
 double wbc_slack(climb_t *c, const int *contact, const double *poses, const double *center, double *bound) {
     return slack_by_program(c, contact, poses, center, bound);
+}
+
+/* The slacks of contacts for n wrenches about a point, 6 each, and their bounds over these, 7 each */
+void wbc_wrench_slacks(climb_t *c, const int *contact, const double *poses, const double *point, long n, const double *wrench,
+                       double *slack, double *bound) {
+    for (long k = 0; k < n; k++) slack[k] = slack_of_wrench(c, contact, poses, point, wrench + 6 * k, bound + 7 * k);
 }
 
 static void padded(const climb_t *c, const int *contact, int *out) {
@@ -135,4 +142,26 @@ double wbc_stretch(const climb_t *c, const int *contact, const double *touch, co
 void wbc_center(const climb_t *c, const double *state, double *center) {
     placed_t placed[MOST_LIMBS];
     place_all(c, state, state + 12, placed, center);
+}
+
+/* As follow_contact, forwards */
+int wbc_follow(const limb_t *l, int count, const double *wanted, const double *step, double *angle) {
+    return follow_contact(l, count, wanted, 12, step, angle);
+}
+
+int wbc_hold_spans(const limb_t *l, int count, const double *wanted, int at, const double *start, int tries, int most,
+                   const double *step, double *angles, int *first, int *last) {
+    return hold_spans(l, count, wanted, at, start, tries, most, step, angles, first, last);
+}
+
+/* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there */
+long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state, int *which) {
+    placed_t placed[MOST_LIMBS];
+    double center[3];
+    for (long k = 0; k < n; k++) {
+        const double *at = state + k * (12 + c->offset[c->limbs]);
+        place_all(c, at, at + 12, placed, center);
+        if (link_clearance(c, contact + k * c->limbs, at, placed, which) < 0.0) return k;
+    }
+    return n;
 }

@@ -82,9 +82,10 @@ static support_t *support_of(climb_t *c, const int *contact) {
     return c->support[at] = made;
 }
 
-/* The slack [1] of wrenches of contacts at a centre of mass, by the program; fills `bound`, over the centre of mass. `poses`: of
- * the contacts, limb by limb; 0: those of their places */
-static double slack_by_program(climb_t *c, const int *contact, const double *poses, const double *center, double *bound) {
+/* The slack [1] of wrenches of contacts that give `wrench`: force, then moment about `point` [weights, weights m]; `bound` b, with which
+ * slack <= b0 + b1..6 wrench for every wrench about that point. `poses`: of the contacts, limb by limb; 0: those of their places */
+static double slack_of_wrench(climb_t *c, const int *contact, const double *poses, const double *point, const double *wrench,
+                              double *bound) {
     int n = 0, m = 0, count = 0;
     double middle[3] = {0};
     for (int l = 0; l < c->limbs; l++) {
@@ -94,7 +95,7 @@ static double slack_by_program(climb_t *c, const int *contact, const double *pos
         const double *pose = poses ? poses + 12 * l : c->foothold + 12 * contact[l];
         for (int i = 0; i < 3; i++) middle[i] += pose[9 + i];
     }
-    memset(bound, 0, 4 * sizeof *bound);
+    memset(bound, 0, 7 * sizeof *bound);
     if (n < 6) return bound[0] = -INFINITY;
     const size_t needed = 6 * (size_t)n + (size_t)m * n + 2 * (size_t)m + balance_work(n, m);
     if ((size_t)c->largest < needed) {
@@ -102,7 +103,7 @@ static double slack_by_program(climb_t *c, const int *contact, const double *pos
         if (!work) return bound[0] = -INFINITY;
         c->work = work, c->largest = (int)needed;
     }
-    double *G = c->work, *A = G + 6 * n, *b = A + (size_t)m * n, *s = b + m, r[6], all[7];
+    double *G = c->work, *A = G + 6 * n, *b = A + (size_t)m * n, *s = b + m, r[6];
     memset(G, 0, sizeof *G * (6 * (size_t)n + (size_t)m * n));
     for (int i = 0; i < 3; i++) middle[i] /= count;
     int column = 0, row = 0;
@@ -129,18 +130,26 @@ static double slack_by_program(climb_t *c, const int *contact, const double *pos
         column += cone->forces;
     }
     double arm[3], moment[3], by[3];
-    minus3(center, middle, arm);
-    cross3(arm, c->down, moment);
-    for (int i = 0; i < 3; i++) r[i] = -c->down[i], r[3 + i] = -moment[i] / c->length;
+    minus3(point, middle, arm);
+    cross3(arm, wrench, moment);
+    for (int i = 0; i < 3; i++) r[i] = wrench[i], r[3 + i] = (wrench[3 + i] + moment[i]) / c->length;
     c->programs++;
-    const double slack = largest_slack(n, m, G, r, A, b, s, all, s + m);
-    cross3(c->down, all + 4, by);
-    bound[0] = all[0];
-    for (int i = 0; i < 3; i++) {
-        bound[1 + i] = -by[i] / c->length;
-        bound[0] += -all[1 + i] * c->down[i] - bound[1 + i] * middle[i];
-    }
+    const double slack = largest_slack(n, m, G, r, A, b, s, bound, s + m);
+    for (int i = 4; i < 7; i++) bound[i] /= c->length;
+    cross3(bound + 4, arm, by);
+    for (int i = 0; i < 3; i++) bound[1 + i] += by[i];
     if (slack == -INFINITY) bound[0] = slack;
+    return slack;
+}
+
+/* The same where they bear the robot at rest with a centre of mass; `bound` over that, 4 numbers */
+static double slack_by_program(climb_t *c, const int *contact, const double *poses, const double *center, double *bound) {
+    const double weight[6] = {-c->down[0], -c->down[1], -c->down[2]};
+    double all[7];
+    const double slack = slack_of_wrench(c, contact, poses, center, weight, all);
+    /* Moved by d the weight has the moment d x (-down) about the old centre */
+    cross3(all + 4, c->down, bound + 1);
+    bound[0] = all[0] + dot3(all + 1, weight) - dot3(bound + 1, center);
     return slack;
 }
 

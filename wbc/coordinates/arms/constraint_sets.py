@@ -15,6 +15,7 @@ from wbc.coordinates.rows import Coordinate
 from wbc.coordinates.samples import ROUNDING, rank, states_of
 from wbc.coordinates.scales import scales
 from wbc.robot import Robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.validation import Array
 
 #: Random configurations at which the rank of a set is looked at
@@ -45,11 +46,9 @@ class Sampled:
     def _rows(self) -> dict[Coordinate, Array]:
         robot = self._robot
         states = states_of(robot, SET_STATES)
-        function = expressions.rate_function(robot, self._every)
-        rates = function.map(len(states))(states.T).full()
+        rates = SingleState(expressions.rate_function(robot, self._every))
         own, dofs = scales(robot, self._every)
-        whole = rates.reshape(len(own), len(states), robot.nv).swapaxes(0, 1)
-        whole = (own[:, None] * whole * dofs)[:, :, self._columns]
+        whole = (own[:, None] * np.array([rates(q)[0] for q in states]) * dofs)[:, :, self._columns]
         out, start = {}, 0
         for one in self._every:
             count = len(expressions.labels(robot, one))

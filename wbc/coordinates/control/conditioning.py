@@ -22,6 +22,7 @@ from wbc.native.compiled_function import generated_library
 from wbc.native.library import load_library
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -87,7 +88,8 @@ class Conditioning:
         if len(self._columns) != len(self.groups) or not all(self._columns):
             raise ShapeError("brakes", brakes, "expected names of joints for each group, not of all joints")
         self._row_scale, self.dof_scale = scales(robot, every, length)
-        self._rates, self._slope = _functions(robot, every, len(self._row_scale))
+        self._functions = _functions(robot, every, len(self._row_scale))
+        self._rates, self._slope = map(SingleState, self._functions)
         self._native = self._load(backend) if backend != "vm" else None
         if backend == "native" and self._native is None:
             raise CompileError("backend", backend, f"cannot compile: {', '.join(toolchain.missing())}")
@@ -160,7 +162,7 @@ class Conditioning:
             left[rows] = u[:, -1] * self._row_scale[rows]
             right[:] = 0.0
             self._sigma[g], right[columns] = sigma[-1], v[-1]
-            self._slopes[g] = np.asarray(self._slope(q, left, right * self.dof_scale).full()).ravel()
+            self._slopes[g] = self._slope(q, left, right * self.dof_scale)[0][:, 0]
         return self._sigma.copy(), self._slopes.copy(), self._right.copy()
 
     def size(self, q: Array, group: int) -> float:
@@ -173,7 +175,7 @@ class Conditioning:
     def matrices(self, q: Array) -> list[Array]:
         """The scaled matrix of each group, for checks."""
         q = checked_configuration(self.robot, q)
-        every = self._row_scale[:, None] * np.asarray(self._rates(q).full()) * self.dof_scale
+        every = self._row_scale[:, None] * self._rates(q)[0] * self.dof_scale
         return [every[np.ix_(rows, columns)] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def many(self, states: Array) -> list[Array]:
@@ -181,9 +183,8 @@ class Conditioning:
         states = validation.ordinary_array("states", states)
         if states.ndim != 2 or states.shape[1] != self.robot.nq or not len(states):
             raise ShapeError("states", states, f"expected configurations side by side [states, {self.robot.nq}]")
-        rates = self._rates.map(len(states))(states.T).full()
-        every = rates.reshape(len(self._row_scale), len(states), self.robot.nv).swapaxes(0, 1)
-        every = self._row_scale[:, None] * every * self.dof_scale
+        rates = np.array([self._rates(q)[0] for q in states])
+        every = self._row_scale[:, None] * rates * self.dof_scale
         return [every[:, rows][:, :, columns] for rows, columns in zip(self._rows, self._columns, strict=True)]
 
     def _load(self, backend: str) -> ctypes._NamedFuncPointer | None:
@@ -203,8 +204,7 @@ class Conditioning:
 
     def _source(self) -> str:
         generator = ca.CodeGenerator("rows.c", {"with_header": False})
-        functions = (self._rates, self._slope)
-        for function in functions:
+        for function in self._functions:
             generator.add(function)
         most = max(map(len, self._rows))
         sizes = {
@@ -212,9 +212,9 @@ class Conditioning:
             "ROWS": len(self._row_scale),
             "GROUPS": len(self.groups),
             "MOST": most,
-            "WORK_W": max(1, *(f.sz_w() for f in functions)),
-            "WORK_IW": max(1, *(f.sz_iw() for f in functions)),
-            "ARGUMENTS": max(f.sz_arg() + f.sz_res() for f in functions),
+            "WORK_W": max(1, *(f.sz_w() for f in self._functions)),
+            "WORK_IW": max(1, *(f.sz_iw() for f in self._functions)),
+            "ARGUMENTS": max(f.sz_arg() + f.sz_res() for f in self._functions),
         }
         tables = [
             *(f"#define {name} {value}" for name, value in sizes.items()),

@@ -17,6 +17,7 @@ from wbc.coordinates.samples import ROUNDING
 from wbc.coordinates.scales import scales
 from wbc.errors import ShapeError
 from wbc.robot import Robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.validation import Array
@@ -86,12 +87,12 @@ def motion_cue(robot: Robot, pair: CoordinatePair, q: Any, rates: Any) -> Motion
     q = robot.configuration("q", q)
     names = tuple(f"{one} {row.label}" for one in pair.task for row in expressions.labels(robot, one))
     asked = validation.ordinary_array("rates", rates, (len(names),))
-    task, spread, held = (np.asarray(part.full()) for part in _function(robot, pair)(q))
+    task, spread, held = _function(robot, pair)(q)
     return _cue(task, held, spread, asked, names)
 
 
 @lru_cache(maxsize=KEPT)
-def _function(robot: Robot, pair: CoordinatePair) -> ca.Function:
+def _function(robot: Robot, pair: CoordinatePair) -> SingleState:
     """q -> (J_T, S, J_C): rows of the task, how they count, and rows of the constraint."""
     kin = Tracer(Kinematics(robot.model))
     task, held = ([expressions.matrix(robot, kin, one) for one in side] for side in (pair.task, pair.constraint))
@@ -101,7 +102,7 @@ def _function(robot: Robot, pair: CoordinatePair) -> ca.Function:
     scale, columns = scales(robot, pair.constraint, length)
     J_T, J_C = ca.vertcat(*task) @ np.diag(columns), ca.vertcat(ca.SX(0, robot.nv), *held) @ np.diag(columns)
     whole = J_T, np.diag(size) @ served.spread(robot, kin), np.diag(scale) @ J_C if pair.constraint else J_C
-    return ca.Function("cue", [kin.q], [kin.expand(ca.densify(one)) for one in whole])
+    return SingleState(ca.Function("cue", [kin.q], [kin.expand(ca.densify(one)) for one in whole]))
 
 
 def _cue(task: Array, held: Array, spread: Array, asked: Array, names: tuple[str, ...]) -> MotionCue:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +21,7 @@ from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import WORLD
 from wbc.validation import Array
 
@@ -99,15 +99,15 @@ class CarriedMotion:
         """
         pair, q = self.leg(time).pair, self.at(time)
         task, held = (
-            np.asarray(_rates(self.robot, side)(q).full()) @ self.velocity if side else np.zeros(0)
+            _rates(self.robot, side)(q)[0] @ self.velocity if side else np.zeros(0)
             for side in (pair.task, pair.constraint)
         )
         return task, held
 
 
 @lru_cache(maxsize=KEPT)
-def _rates(robot: Robot, rows: tuple[Coordinate, ...]) -> ca.Function:
-    return expressions.rate_function(robot, rows)
+def _rates(robot: Robot, rows: tuple[Coordinate, ...]) -> SingleState:
+    return SingleState(expressions.rate_function(robot, rows))
 
 
 def carry(
@@ -171,7 +171,7 @@ class _SampleSearch:
         counts = [len(expressions.labels(robot, one)) for one in every]
         starts = dict(zip(every, np.cumsum([0, *counts]).tolist(), strict=False))
         sizes = dict(zip(every, counts, strict=True))
-        self._rates = expressions.rate_function(robot, every)
+        self._rates = SingleState(expressions.rate_function(robot, every))
         self._rows, self._columns = scales(robot, every)
         self._system = [(one, starts[one] + k, k) for one in reversed(bodies) for k in range(6)]
         self._pairs, self._given = list(pairs), len(pairs)
@@ -201,7 +201,7 @@ class _SampleSearch:
         found = self._kept.get(s)
         if found is None:
             q = pin.integrate(self._robot.model, self._q0, s * self.step)
-            found = self._rows[:, None] * np.asarray(self._rates(q).full()) * self._columns
+            found = self._rows[:, None] * self._rates(q)[0] * self._columns
             self._kept[s] = found
         return found
 

@@ -20,6 +20,7 @@ from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
 
@@ -108,7 +109,7 @@ class SystemMotion:
         for one in self.coordinates:
             expressions.check(robot, "rows", one)
         self._whole = rows is None
-        self._rates = expressions.rate_function(robot, self.coordinates)
+        self._rates = SingleState(expressions.rate_function(robot, self.coordinates))
         self._rows, self._columns = scales(robot, self.coordinates)
 
     def jacobian(self, q: Any) -> Array:
@@ -117,8 +118,7 @@ class SystemMotion:
         Raises:
             ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        found: Array = np.asarray(self._rates(self.robot.configuration("q", q)).full())
-        return found
+        return self._rates(self.robot.configuration("q", q))[0]
 
     def scaled(self, q: Any) -> Array:
         """J_S(q) with metres over the length of the arm that they belong to: what ranks are looked at in."""

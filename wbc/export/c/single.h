@@ -75,6 +75,9 @@ typedef int wbc_bits;
 #define SETTLED (64.0f * EPS)
 #define FIRMLY (256.0f * EPS)
 #define PUSHING 1e-4f
+#define CLEAR_PIVOT 1e-1f
+#define PIVOT 1e-2f
+#define REDUCES 0
 #define QUICK_BOUND 1e-3f
 #define GOOD_BOUND 1e-3f
 #define GOOD_VIOLATION (256.0f * EPS)

@@ -21,6 +21,7 @@ from wbc.motion_control.motion import Motion
 from wbc.published.newton_euler.dynamics import ArmDynamics, dynamics_of, measured
 from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.three_link import closed_form
+from wbc.symbolic.evaluation import SingleState
 from wbc.validation import Array
 
 #: Poles of the thesis: a rise time of 0.01 s, critically damped [1/s]
@@ -61,7 +62,7 @@ class Decoupling:
         decoupled = ca.vertcat(*rows)
         v = ca.SX.sym("v", len(rows))
         u = ca.solve(decoupled, ca.diag(ca.DM(gains)) @ v - ca.vertcat(*last))
-        self._law = ca.Function("law", [x, t, v], [u, decoupled])
+        self._law = SingleState(ca.Function("law", [x, t, v], [u, decoupled]))
 
     def input(self, x: Array, v: Array, time: float = 0.0) -> Array:
         """u at a state and new inputs v.
@@ -69,13 +70,12 @@ class Decoupling:
         Raises:
             RangeError: D* is singular there.
         """
-        x = validation.ordinary_array("x", x, (self._law.numel_in(0),))
+        x = validation.ordinary_array("x", x, self._law.inputs[0].shape)
         v = validation.ordinary_array("v", v, (len(self.degrees),))
         u, decoupled = self._law(x, validation.scalar("time", time), v)
-        matrix = np.array(decoupled)
-        if not np.linalg.cond(matrix) < 1e12:
+        if not np.linalg.cond(decoupled) < 1e12:
             raise RangeError("x", x, "the inputs do not decouple the outputs here")
-        return np.array(u).ravel()
+        return u[:, 0]
 
 
 class DecoupledArm:

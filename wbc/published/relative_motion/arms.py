@@ -14,6 +14,7 @@ from wbc.robot import Robot
 from wbc.robot.transmission import Transmission
 from wbc.robots.link_tree import TreeLink, build_model
 from wbc.robots.operator_chains import X, Y, Z
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.validation import Array
 
@@ -73,16 +74,16 @@ def wrist_drives() -> Transmission:
 
 
 @functools.cache
-def _fourth() -> ca.Function:
+def _fourth() -> SingleState:
     """Rotation of frame 4, which the first four joints turn, and position of the hand."""
     kinematics = Kinematics(manipulator().model)
     rotation = kinematics.pose("F4").rotation
-    return ca.Function("fourth", [kinematics.q], [ca.densify(rotation), ca.densify(kinematics.pose("tip").position)])
+    return SingleState(ca.Function("fourth", [kinematics.q], [rotation, kinematics.pose("tip").position]))
 
 
 def hand(q: Array) -> tuple[Array, float]:
     """Position [m] and yaw [rad] of the levelled hand: tan alpha = -x4y / x4x (3.13), 0 along +y, positive to +x."""
-    rotation, position = (np.array(x) for x in _fourth()(q))
+    rotation, position = _fourth()(q)
     return position[:, 0], float(np.arctan2(-rotation[1, 0], rotation[0, 0]))
 
 
@@ -97,7 +98,7 @@ def levelled(q: Array) -> Array:
         RangeError: x4 is vertical, and q5 is arbitrary.
     """
     q = validation.ordinary_array("q", q, (6,))
-    R = np.array(_fourth()(q)[0])
+    R = _fourth()(q)[0]
     up = np.hypot(R[2, 1], R[2, 2])
     if up < NONE:
         raise RangeError("q", q, "axis x4 is vertical: no turn of the wrist levels the hand")

@@ -58,7 +58,7 @@ class LevelHand:
 
     def residual(self, q: Array) -> float:
         """P; 0 where the levelled hand has the latched yaw, or that and half a turn."""
-        return float(self.taylor.value(q, self._turn)[3])
+        return float(self.taylor.value(q, self._turn)[0][3, 0])
 
     def step(self, q: Array, increment: Array) -> Array:
         """The published solve: one step of Newton for an increment of the position and the whole error of the yaw.

@@ -55,9 +55,11 @@ class _Joint:
 
     @property
     def along_z(self) -> pin.SE3:
-        """The joint's pose, turned so that its axis is z."""
+        """The joint's pose, turned so that its axis is z, where it has one."""
+        if not self.axis.any():
+            return self.pose
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), self.axis).toRotationMatrix()
-        return self.pose * pin.SE3(turn if self.axis.any() else np.eye(3), np.zeros(3))
+        return self.pose * pin.SE3(turn, np.zeros(3))
 
 
 def read_sdf(path: pathlib.Path, tree: ElementTree.Element, base: str | None = None) -> Description:

@@ -156,7 +156,7 @@ static void assemble(wbc_tick *t, int screen) {
         t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
         for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
-    t->prepared = t->curved = t->lost_known = 0;
+    t->prepared = t->curved = t->lost_known = t->reduced = t->whole = 0;
 #if SOFT_ROWS > 0
     t->settled = 0;
 #endif

@@ -22,9 +22,9 @@
 #define TURNING 1.0
 
 #if BENDING > 0
-/* What each row loses of what it keeps until q (+) v dt: its residual changes by another amount than its rate says. That of one v
- * is asked for again and again, and evaluated once. */
-static void lose(wbc_tick *t, const double *v) {
+/* By how much what rows keep changes until q (+) v dt, into `lost_there`. That of one v is asked for again and again, and evaluated
+ * once. */
+static void change_of_kept(wbc_tick *t, const double *v) {
     if (!t->lost_known || memcmp(v, t->lost_of, sizeof t->lost_of)) {
         const double *arg[4] = {t->q, v, t->p, &t->dt};
         double *res[1] = {t->report.lost};
@@ -33,9 +33,13 @@ static void lose(wbc_tick *t, const double *v) {
         memcpy(t->lost_of, v, sizeof t->lost_of);
         t->lost_known = 1;
     }
-    memcpy(t->report.lost, t->lost_there, MC * sizeof(double));
+}
+
+/* What each row loses of it: it changes by another amount than its rate says */
+static void lose(wbc_tick *t, const double *v) {
+    change_of_kept(t, v);
     for (int k = 0; k < MC; k++) {
-        const double loss = bent[k] ? t->report.lost[k] - row_at(t, k, v) * t->dt : 0.0;
+        const double loss = bent[k] ? t->lost_there[k] - row_at(t, k, v) * t->dt : 0.0;
         t->report.lost[k] = isfinite(loss) && t->free_low[k] == t->free_high[k] ? loss : 0.0;
     }
 }
@@ -46,10 +50,13 @@ static void lose(wbc_tick *t, const double *v) {
 EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
 #if BENDING > 0
     double worst = 0.0;
-    lose(t, t->report.v);
+    if (all) change_of_kept(t, t->report.v);
+    else lose(t, t->report.v);
     for (int k = 0; k < MC; k++) {
-        if (!bent[k] || t->free_low[k] != t->free_high[k]) continue;
-        t->report.lost[k] += (t->bend[k] + (all ? row_at(t, k, t->report.v) - t->free_low[k] : 0.0)) * t->dt;
+        if (all) t->report.lost[k] = 0.0;
+        if (!bent[k] || t->free_low[k] != t->free_high[k] || !isfinite(t->lost_there[k])) continue;
+        /* What the rate says cancels where all is asked for */
+        t->report.lost[k] = all ? t->lost_there[k] + (t->bend[k] - t->free_low[k]) * t->dt : t->report.lost[k] + t->bend[k] * t->dt;
         worst = larger(worst, fabs(t->report.lost[k]) / row_scale[k]);
     }
     return worst / t->dt;
@@ -106,7 +113,7 @@ static void foresee(wbc_tick *t) {
         bend_row(t, k, -t->report.lost[k] / t->dt);
         t->low[NV + k] = t->high[NV + k] = t->free_low[k];
     }
-    if (t->prepared) right_side(t);
+    if (t->prepared && !t->reduced) right_side(t);
 }
 
 #if LEVELS == 0
@@ -125,12 +132,41 @@ static int same_rows(const wbc_tick *t) {
     return 1;
 }
 
+/* The same where equality rows are taken out: the sides of exact ones, by what they lose */
+static int bend_reduced(wbc_tick *t) {
+    double change[WIDE], opened = 0.0;
+    wbc_tick_find_lost(t, 1);
+    for (int n = 0; n < t->reduced; n++) {
+        const int k = t->equal_row[n];
+        change[n] = bent[k] == 2 ? t->report.lost[k] / t->dt : 0.0;
+        if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
+    }
+    if (opened <= EXACT) return 0;
+    for (int n = 0; n < t->reduced; n++) {
+        const int k = t->equal_row[n];
+        if (change[n] == 0.0) continue;
+        bend_row(t, k, t->bend[k] - change[n]);
+        t->low[NV + k] = t->high[NV + k] = t->free_low[k];
+    }
+    correct_reduced(t, change, NULL);
+    return 1;
+}
+
 /* Exact rows make up for what they lose at the command, with the factors of the rows that hold it: M dy = change of the sides, and
  * multipliers as they follow. 0 where other rows would hold it, and the search is to go on with the sides as they are then */
 static int make_up(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
-    if (!t->factored || work->n_active == 0) return 1;
+    if (!t->factored || (work->n_active == 0 && !t->reduced)) return 1;
     for (int n = 0; n < REFINED; n++) {
+        if (REDUCES && t->reduced) {
+            if (!bend_reduced(t)) return 1;
+            if (!same_rows(t)) {
+                bend_rows(t, t->bend);
+                return 0;
+            }
+            command(t);
+            continue;
+        }
         double mu[ACTIVE_MAX], change[ACTIVE_MAX], dy[WIDE] = {0}, opened = 0.0;
         wbc_tick_find_lost(t, 1);
         for (int a = 0; a < work->n_active; a++) {

@@ -2,7 +2,7 @@
 #ifndef WBC_CERTIFY_H
 #define WBC_CERTIFY_H
 
-#include "wide.h"
+#include "reduced_bound.h"
 
 /* No output is NaN: an error without a value is reported as inf, a margin as -inf */
 static void replace_nan(double *x, int count, double by) {
@@ -45,7 +45,7 @@ static double sharp_bound(wbc_tick *t, const double *size) {
 
 /* Roundings that a term of H v + g and of forces on it goes through in `gradient` and `add_forces` at most: its product, those of
  * four rows, of the groups of four rows or columns, and what comes after */
-#define SUMMED(t) ((NV < WIDE / 4 + 8 ? NV : WIDE / 4 + 8) + (t)->daqp.n_active + 4)
+#define SUMMED(t) ((NV < WIDE / 4 + 8 ? NV : WIDE / 4 + 8) + (t)->daqp.n_active + (t)->reduced + 4)
 
 /* residual = H v + g, and the size of the terms that were added up; four rows at a time */
 static void gradient(const wbc_tick *t, const double *v, double *residual, double *size) {
@@ -101,6 +101,7 @@ static void add_forces(wbc_tick *t, const double *v, double *residual, double *s
         const double gap = fabs(lambda * (value - given - (t->sense[i] & LOWER ? t->low[i] : t->high[i])));
         if (gap > out->complementarity) out->complementarity = gap;
     }
+    if (REDUCES && t->reduced) add_equality_forces(t, v, residual, size);
     /* Any multiplier of the right sign certifies: that of an active bound is what the other forces leave, which takes
      * their rounding too */
     for (int a = 0; a < work->n_active; a++) {
@@ -139,6 +140,10 @@ static void examine(wbc_tick *t) {
         /* residual of the exact sum: what was computed plus the rounding of its terms */
         size[i] = fabs(residual[i]) + SUMMED(t) * EPS * size[i];
     }
+    if (REDUCES && t->reduced) {
+        out->error_bound = reduced_bound(t, size);
+        return;
+    }
     out->error_bound = t->factored || t->curved ? WBC_INF : quick_bound(t, size);
     if (out->error_bound > QUICK_BOUND) out->error_bound = sharp_bound(t, size);
 }
@@ -148,6 +153,13 @@ static void examine(wbc_tick *t) {
 static void refine(wbc_tick *t) {
     DAQPWorkspace *work = &t->daqp;
     double dy[WIDE] = {0}, mu[ACTIVE_MAX];
+    if (REDUCES && t->reduced) {
+        double missed[WIDE];
+        memcpy(missed, t->missed, sizeof t->missed);
+        correct_reduced(t, missed, t->scratch);
+        command(t);
+        return;
+    }
     for (int i = 0; i < NV; i++) axpy(dy, t->inverse + i * WIDE, -t->scratch[i], i);
     for (int a = 0; a < work->n_active; a++) mu[a] = side_gap(t, a) + seen_through(t, work->WS[a], dy);
     solve_gram(t, work->n_active, mu);
@@ -162,7 +174,7 @@ static void refine(wbc_tick *t) {
 /* The same with the bound in wide arithmetic where it is not good enough */
 static void examine_closely(wbc_tick *t) {
     examine(t);
-    if (t->report.error_bound > GOOD_BOUND) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
+    if (t->report.error_bound > GOOD_BOUND && !t->reduced) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
 }
 
 /* No refinement is worth its while */

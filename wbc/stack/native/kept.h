@@ -3,7 +3,7 @@
 #ifndef WBC_KEPT_H
 #define WBC_KEPT_H
 
-#include "factor.h"
+#include "reduced.h"
 
 /* Weighted errors without what the rows that keep their direction hold at `step`, in a metric with firm rows */
 static void without_kept(const wbc_tick *t, const double *step, double *force) {
@@ -16,6 +16,17 @@ static void without_kept(const wbc_tick *t, const double *step, double *force) {
 /* What equality rows that bend hold against the weighted errors, behind those */
 static void held_back(const wbc_tick *t, const double *step, double *force) {
     for (int k = 0; k < MC; k++) force[MT + k] = bent[k] ? -t->strength[k] * row_at(t, k, step) : 0.0;
+}
+
+/* The same where they are taken out of the problem: what slope - (H + more / dof_scale^2) step leaves on the variables that they give */
+static void held_by_reduced(const wbc_tick *t, const double *slope, const double *step, double more, double *force) {
+    double rest[WIDE], lambda[WIDE];
+    times_hessian(t, step, rest);
+    for (int i = 0; i < NV; i++) rest[i] += more / (dof_scale[i] * dof_scale[i]) * step[i] - slope[i];
+    multipliers_of(t, rest, lambda);
+    for (int k = 0; k < MC; k++) force[MT + k] = 0.0;
+    for (int k = 0; k < t->reduced; k++)
+        if (bent[t->equal_row[k]]) force[MT + t->equal_row[k]] = -lambda[k];
 }
 
 /* Whether rows are exact: closed loops */

@@ -87,9 +87,13 @@ INLINE double along(const wbc_tick *t, int k, const double *v) {
     return sum;
 }
 
-/* x = H^-1 b, in the metric that the factor has */
+/* x = H^-1 b, in the metric that the factor has; of a reduced problem among the motions that are left */
 static void solve_with(const wbc_tick *t, const double *b, double *x) {
     double y[WIDE];
+    if (REDUCES && t->reduced) {
+        solve_reduced(t, b, x);
+        return;
+    }
     memcpy(y, b, sizeof y);
     solve_transposed(t, y);
     solve_upper(t, y, x);
@@ -135,8 +139,16 @@ INLINE void blend(double *matrix, const double *free, double share) {
     }
 }
 
+/* The factor of H, with equality rows in it or taken out */
+static int refactor(wbc_tick *t) { return REDUCES && t->reduced ? factor_reduced(t, 0.0) : factor(t); }
+
 /* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
 static int cut_off(wbc_tick *t, const double *free, double more) {
+    if (REDUCES && t->reduced) {
+        const int ok = factor_reduced(t, more);
+        t->prepared = ok && more == 0.0;
+        return ok;
+    }
     load(t);
     blend(t->R, free, 1.0);
     for (int i = 0; more != 0.0 && i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
@@ -150,6 +162,12 @@ static int cut_off(wbc_tick *t, const double *free, double more) {
 static void find_pivots(const wbc_tick *t, double *least, double *most) {
     double pivot[NV];
     *least = WBC_INF, *most = 0.0;
+    for (int a = 0; REDUCES && t->reduced && a < t->width; a++) {
+        const double root = 1.0 / t->reduced_inverse[a];
+        *least = smaller(*least, root * root);
+        *most = larger(*most, root * root);
+    }
+    if (REDUCES && t->reduced) return;
     for (int i = 0; i < NV; i++) pivot[i] = dof_scale[i] / t->inverse_diagonal[i];
     for (int i = 0; i < NV; i++) {
         *least = smaller(*least, pivot[i] * pivot[i]);
@@ -172,6 +190,7 @@ INLINE void less_row(const double *a, const int *col, int count, double f, const
  * leaves are small differences, and the curvature along them must not be noise. `more` is on the diagonal besides. */
 static void sharpen(const wbc_tick *t, const double *free, double more, const double *b, double *x) {
     double least, most;
+    if (REDUCES && t->reduced) return;
     find_pivots(t, &least, &most);
     for (int n = 0; most > APART * least && n < SHARPENED; n++) {
         wide r[NV];
@@ -200,17 +219,16 @@ static double held_short(const double *slope, double length) {
     return steepest / TRUSTED * (1.0 - TRUSTED / length);
 }
 
-/* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then; 0 for none */
-static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, int *changed) {
+/* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then, by `more`; 0 for none */
+static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, double *more) {
     solve_with(t, slope, step);
     sharpen(t, free, 0.0, slope, step);
     const double length = largest_step(step);
     if (length > TRUSTED) {
-        const double more = held_short(slope, length);
-        *changed = 1;
-        if (!cut_off(t, free, more)) return 0;
+        *more = held_short(slope, length);
+        if (!cut_off(t, free, *more)) return 0;
         solve_with(t, slope, step);
-        sharpen(t, free, more, slope, step);
+        sharpen(t, free, *more, slope, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
     return 1;
@@ -218,15 +236,18 @@ static int trusted_step(wbc_tick *t, const double *free, const double *slope, do
 
 /* Weighted errors that the step in the metric R leaves, and what equality rows hold against them; `changed`: R is another one then */
 static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force, int *changed) {
-    double step[WIDE], slope[WIDE] = {0};
+    double step[WIDE], slope[WIDE] = {0}, more = 0.0;
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
-    if (!trusted_step(t, free, slope, step, changed)) return 0;
+    const int ok = trusted_step(t, free, slope, step, &more);
+    *changed |= more != 0.0;
+    if (!ok) return 0;
     along_all(t, step, force);
     for (int k = 0; k < LEADING; k++) force[k] = t->weight[k] * t->report.factor[k] * (error[k] - force[k]);
     for (int k = LEADING; k < MT; k++) force[k] = 0.0;
     if (KEPT) without_kept(t, step, force);
-    held_back(t, step, force);
+    if (REDUCES && t->reduced) held_by_reduced(t, slope, step, more, force);
+    else held_back(t, step, force);
     return 1;
 }
 
@@ -277,8 +298,8 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     /* The factor that is used has equality rows in it, and they are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
-    t->prepared = equalities ? factor(t) : 1;
-    int held = 0;
+    t->prepared = equalities ? refactor(t) : 1;
+    int held = t->reduced;
     for (int k = 0; k < MC; k++) held |= bent[k] && t->strength[k] != 0.0;
     if (!t->prepared || !amended || !held) return 1;
     /* What is definite by little only makes a step that is too long for what is held */
@@ -288,7 +309,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     if (length <= TRUSTED) return 1;
     const double more = held_short(slope, length);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
-    t->prepared = factor(t);
+    t->prepared = refactor(t);
     return 1;
 }
 
@@ -352,10 +373,11 @@ static void reach(wbc_tick *t) {
     }
     gather(t, error, slope);
     t->prepared = 1;
-    const int blocked = find_free(t, slope, free), exact = has_exact_rows();
-    /* Exact rows are firm at once: with less, a step is one off the mechanism */
+    const int blocked = find_free(t, slope, free);
+    /* Exact rows are taken out, or firm at once: with less, a step is one off the mechanism */
+    const int exact = has_exact_rows() && !(REDUCES && !blocked && eliminate(t));
     t->firm = exact;
-    if (!(blocked || exact ? cut_off(t, free, 0.0) : factor(t))) {
+    if (!(blocked || exact ? cut_off(t, free, 0.0) : refactor(t))) {
         t->prepared = t->firm = 0;
         return;
     }
@@ -368,7 +390,7 @@ static void reach(wbc_tick *t) {
         t->firm = exact || KEPT;
         int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, force, &changed);
         /* Errors that are left push against rows that bend: with how much is seen where these are firm */
-        if (BENDING > 0 && found && !t->firm && counted(t, error, force, least) > 0.0) {
+        if (BENDING > 0 && found && !t->firm && !t->reduced && counted(t, error, force, least) > 0.0) {
             t->firm = 1;
             found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, force, &changed);
         }
@@ -380,7 +402,7 @@ static void reach(wbc_tick *t) {
         t->curved = add_curvature(t, free, error, slope, force, least);
         if (!t->prepared) return;
         if (!t->curved) t->prepared = prepared;
-        if (!t->curved && changed && !(blocked ? cut_off(t, free, 0.0) : (t->prepared = factor(t)))) return;
+        if (!t->curved && changed && !(blocked ? cut_off(t, free, 0.0) : (t->prepared = refactor(t)))) return;
     }
 #endif
     const double allowed = CALM ? stoppable(t, free, error, largest) : largest;
@@ -405,7 +427,7 @@ static void reach(wbc_tick *t) {
         for (int i = 0; i < NV; i++) t->g[i] -= follow[i];
     }
 #endif
-    if (t->prepared) right_side(t);
+    if (t->prepared && !t->reduced) right_side(t);
 }
 
 #endif

@@ -337,6 +337,8 @@ static int elastic(wbc_tick *t) {
 
 static int relaxed(wbc_tick *t) {
     double base[WIDE] = {0};
+    t->reduced = 0;
+    t->whole = 1;
     if (ELASTIC) {
         const int flag = elastic(t);
         if (flag >= 0 || t->spent) return flag;

@@ -67,6 +67,11 @@ int torque(const double **arg, double **res, long long *iw, double *w, int mem);
 #define TOO_FAR 1e50
 /* How far DAQP may miss the side of a row */
 #define SEARCH_SETTINGS(s) ((s).primal_tol = 1e-11)
+/* Rows of length one give variables whose entries, beside other rows, are at least the first of these; where there are none, the
+ * second; those that depend on others more are left in */
+#define CLEAR_PIVOT 1e-2
+#define PIVOT 1e-4
+#define REDUCES (REDUCED > 0 && LEVELS == 0 && SOFT_ROWS == 0 && !KEPT)
 typedef long double wbc_wide;
 #define WIDE_EPS (0.5L * LDBL_EPSILON)
 typedef long long wbc_bits;

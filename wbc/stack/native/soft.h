@@ -7,7 +7,7 @@
 #ifndef WBC_SOFT_H
 #define WBC_SOFT_H
 
-#include "active_set.h"
+#include "reduced_search.h"
 
 /* Corrections of the rows that are held, before all is left to the search */
 #define CORRECTED 12
@@ -173,6 +173,13 @@ static int optimum(wbc_tick *t, double angle) {
     }
     if (flag < 0) unmelt(t);
 #else
+    if (REDUCES) {
+        flag = reduced_optimum(t);
+        if (flag >= 0) return flag;
+        if (t->reduced) t->prepared = 0;
+        t->reduced = 0;
+        t->whole = 1;
+    }
     t->factored = 0;
     if (!t->prepared && !factor(t)) {
         steady(t->H);

@@ -129,6 +129,12 @@ static int answer(wbc_tick *t, int *nameless) {
     for (int n = 0; n < REFINED && flag == WBC_SOLVED && !make_up(t); n++) flag = wbc_tick_solve(t);
 #endif
     wbc_tick_certify(t);
+    if (REDUCES && t->reduced && flag == WBC_SOLVED && !good(&t->report)) {
+        /* With all variables, whose certificate is sharper */
+        t->reduced = t->prepared = 0;
+        t->whole = 1;
+        return answer(t, nameless);
+    }
     if (t->cap == 0.0 && unsound(t, flag) && (again_at_prices(t, flag) || primal(t) || primal_of_the_rest(t, flag))) {
         flag = (int)(t->report.flag = flag == WBC_RELAXED ? WBC_RELAXED : WBC_SOLVED);
         /* Rows that contradicted each other by rounding only: their frozen bounds are not what is to be certified */

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from struct import Struct
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.operators import quick_operators
 from wbc.trajectory.jerk.braking import guarded, reach
 from wbc.trajectory.jerk.course import Point
@@ -19,22 +19,6 @@ WALL_TOLERANCE = 1e-9
 SHARE = 1e-12
 #: The most ticks for which a state is known to be clear
 TICKS = 1e6
-
-
-class Kernel:
-    """A scalar function of one array, bound to where the array stands: a call costs a microsecond."""
-
-    def __init__(self, function: ca.Function, at: Array) -> None:
-        self._function, self._out = function, np.zeros(1)
-        buffer: Any = function.buffer()
-        self._buffer, self._run = buffer
-        self._buffer.set_arg(0, memoryview(at.reshape(-1).data))
-        self._buffer.set_res(0, memoryview(self._out.data))
-
-    def __call__(self) -> float:
-        self._run()
-        value: float = self._out[0]
-        return value
 
 
 class Walls:
@@ -72,10 +56,10 @@ class Walls:
         top = fastest + acceleration * acceleration / jerk
         stop = 3.0 * (top + acceleration * acceleration / jerk)
         self._changes = (dt * top).tolist(), (dt * (top + stop)).tolist()
-        self.state = np.zeros(3 * len(far))
+        self._ticks_clear = SingleState(self._ticks())
+        self.state = self._ticks_clear.inputs[0]
         self._memory = memoryview(self.state.data)
         self._pack = Struct(f"{len(self.state)}d").pack_into
-        self._ticks_clear = Kernel(self._ticks(), self.state)
 
     def contain(self, position: list[float]) -> bool:
         """Whether a position is within; not if a number of it is none or infinite."""
@@ -93,7 +77,8 @@ class Walls:
 
         So long as the joints keep the limits of acceleration and jerk, and of velocity but for the overshoot a^2/2j.
         """
-        ticks = self._ticks_clear()
+        self._ticks_clear.run()
+        ticks = self._ticks_clear.output[0]
         return 1 + int(ticks) if ticks >= 0.0 else 0
 
     @quick_operators()

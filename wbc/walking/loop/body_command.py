@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
-from wbc.stack.evaluation import SingleState
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, log3, to_quaternion
 from wbc.validation import Array
 from wbc.walking.body_path import BodyPath

@@ -14,7 +14,7 @@ from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robots import Walker
-from wbc.stack.evaluation import SingleState
+from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.operators import quick_operators
 from wbc.symbolic.rotations import exp3, from_quaternion, left_jacobian, quaternion_product

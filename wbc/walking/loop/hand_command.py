@@ -11,7 +11,7 @@ import numpy as np
 from wbc.multibody import pin
 from wbc.native.compiled_function import compiled
 from wbc.robots import WalkerData
-from wbc.stack.evaluation import SingleState
+from wbc.symbolic.evaluation import SingleState
 from wbc.validation import Array
 from wbc.walking.loop.hand_pace import BEHIND, angle
 from wbc.walking.loop.state import Axes, Swinging

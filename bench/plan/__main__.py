@@ -1,0 +1,129 @@
+"""``python -m bench.plan``: this package's planner beside OMPL with Coal and RoboPlan, on one core.
+
+    python -m bench.plan --peers-python .venv-plan/bin/python              # 300 problems: robots x scenes x seeds
+    python -m bench.plan --robots panda --scenes shelf --seeds 5 --write bench/data/plan.json
+
+The peers are ``pip install ompl roboplan coal`` in an environment of their own; without ``--peers-python`` they are
+left out. Times are of processors: planning and shortening from one configuration to another, without what is prepared
+once a scene.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import time
+from typing import Any
+
+import numpy as np
+
+from bench.figures.store import stamp
+from bench.plan import descriptions, judge, problems
+from bench.plan.tables import CONTENDERS, ratios, table
+from wbc.plan import NoPathError
+
+#: Seconds that each planner has
+SECONDS = 10.0
+
+
+def solved_here(planner: Any, problem: problems.Problem, seed: int) -> dict[str, Any]:
+    """A path of this package's."""
+    q = planner.coordinates.configuration
+    begin = time.process_time()
+    try:
+        path = planner.plan(q(problem.start), q(problem.goal), seed=seed, seconds=SECONDS).points.tolist()
+    except NoPathError:
+        path = None
+    return {"path": path, "seconds": time.process_time() - begin}
+
+
+class Peer:
+    """A process that plans as another package does."""
+
+    def __init__(self, python: str, name: str, core: int) -> None:
+        command = [python, str(pathlib.Path(__file__).with_name("peers.py")), name, str(core)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def solve(self, problem: dict[str, Any]) -> dict[str, Any]:
+        """A path, and the time that it took."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(problem) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"a peer ended with {self._process.wait()}")
+        return dict(json.loads(line))
+
+    def close(self) -> None:
+        """End it."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def row(robot: str, scene: str, seed: int, peers: dict[str, Peer]) -> dict[str, Any]:
+    """All planners on one problem."""
+    problem, planner = problems.problem(robot, scene, seed)
+    found = {"wbc": solved_here(planner, problem, seed)}
+    native = planner.native(planner.coordinates.configuration(problem.start))
+    problem.low, problem.high = (np.array(side) for side in (native.sample_low, native.sample_high))
+    if peers:
+        limits = problem.low.tolist(), problem.high.tolist()
+        text, links, boxes = descriptions.urdf(planner.coordinates, limits, problem.boxes)
+        kept = planner.stack["self"].item.kept_pairs(planner.stack.robot)
+        pairs = {frozenset((a[0], b[0])) for (a, b), _ in kept}
+        names = planner.coordinates.names
+        given = {
+            "urdf": text, "srdf": descriptions.srdf(pairs, links, boxes, names), "joints": names, "seed": seed,
+            "low": limits[0], "high": limits[1], "start": problem.start.tolist(), "goal": problem.goal.tolist(),
+            "seconds": SECONDS,
+        }  # fmt: skip
+        found |= {name: peer.solve(given) for name, peer in peers.items()}
+    referee = judge.CoalJudge(problem, planner)
+    out: dict[str, Any] = {"robot": robot, "scene": scene, "seed": seed}
+    for name, answer in found.items():
+        path = answer["path"]
+        out[name] = {
+            "seconds": answer["seconds"],
+            "length": None if path is None else judge.length(path),
+            "fault": "" if path is None else referee.fault(path),
+        }
+    return out
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robots", default=",".join(problems.ROBOTS))
+    parser.add_argument("--scenes", default=",".join(problems.SCENES))
+    parser.add_argument("--seeds", type=int, default=19)
+    parser.add_argument("--peers-python", default="")
+    parser.add_argument("--core", type=int, default=0)
+    parser.add_argument("--write", type=pathlib.Path)
+    options = parser.parse_args()
+    os.sched_setaffinity(0, {options.core})
+    peers = {n: Peer(options.peers_python, n, options.core) for n in CONTENDERS[1:]} if options.peers_python else {}
+    rows, begun = [], stamp()
+    try:
+        for robot in options.robots.split(","):
+            for scene in options.scenes.split(","):
+                for seed in range(options.seeds):
+                    rows.append(row(robot, scene, seed, peers))
+                    print(json.dumps(rows[-1]), flush=True)
+    finally:
+        for peer in peers.values():
+            peer.close()
+    print(table(rows, ("wbc", *peers)))
+    if peers:
+        print(ratios(rows, tuple(peers)))
+    print(f"load {os.getloadavg()[0]:.2f}")
+    if options.write:
+        options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""A process in the peers' environment: a problem a line in, a path a line out. Imports nothing of this package.
+
+python peers.py ompl|roboplan [core]
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+#: (seed, seconds) -> points of a path, None: none
+Plan = Callable[[int, float], list[list[float]] | None]
+#: Step of collision checks along edges, the default of RoboPlan [rad]
+STEP = 0.05
+
+
+def ompl_of(problem: dict[str, Any]) -> Plan:
+    """RRT-Connect of OMPL, with Pinocchio and Coal to say what is free."""
+    import pinocchio as pin
+    from ompl import base, geometric
+
+    with (
+        tempfile.NamedTemporaryFile("w", suffix=".urdf") as file,
+        tempfile.NamedTemporaryFile("w", suffix=".srdf") as groups,
+    ):
+        file.write(problem["urdf"])
+        file.flush()
+        groups.write(problem["srdf"])
+        groups.flush()
+        model = pin.buildModelFromUrdf(file.name)
+        bodies = pin.buildGeomFromUrdf(model, file.name, pin.GeometryType.COLLISION)
+        bodies.addAllCollisionPairs()
+        pin.removeCollisionPairs(model, bodies, groups.name)
+    data, geometry = model.createData(), bodies.createData()
+    order = [model.joints[model.getJointId(name)].idx_q for name in problem["joints"]]
+    n, q = len(order), np.zeros(model.nq)
+
+    def is_valid(state: Any) -> bool:
+        for k, at in enumerate(order):
+            q[at] = state[k]
+        return not pin.computeCollisions(model, data, bodies, geometry, q, True)
+
+    space = base.RealVectorStateSpace(n)
+    bounds = base.RealVectorBounds(n)
+    for k in range(n):
+        bounds.setLow(k, problem["low"][k])
+        bounds.setHigh(k, problem["high"][k])
+    space.setBounds(bounds)
+
+    def plan(seed: int, seconds: float) -> list[list[float]] | None:
+        information = base.SpaceInformation(space)
+        information.setStateValidityChecker(is_valid)
+        information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())
+        information.setup()
+        ends = []
+        for name in ("start", "goal"):
+            state = information.allocState()
+            for k in range(n):
+                state[k] = problem[name][k]
+            ends.append(state)
+        definition = base.ProblemDefinition(information)
+        definition.setStartAndGoalStates(*ends)
+        planner = geometric.RRTConnect(information)
+        planner.setProblemDefinition(definition)
+        planner.setup()
+        if not planner.solve(seconds):
+            return None
+        path = definition.getSolutionPath()
+        if definition.hasApproximateSolution():
+            return None
+        geometric.PathSimplifier(information).simplifyMax(path)
+        return [[state[k] for k in range(n)] for state in path.getStates()]
+
+    return plan
+
+
+def roboplan_of(problem: dict[str, Any]) -> Plan:
+    """RRT-Connect and shortcuts of RoboPlan."""
+    from roboplan import core, rrt
+
+    scene = core.Scene("scene", core.loadUrdfSceneDescriptionFromXml(problem["urdf"]))
+    scene.importSrdf(problem["srdf"])
+    options = rrt.RRTOptions(group_name="arm", rrt_connect=True, max_nodes=100000, collision_check_step_size=STEP)
+    names = scene.getJointGroupInfo("arm").joint_names
+    order = [names.index(name) for name in problem["joints"]]
+
+    def configuration(values: Any) -> Any:
+        out = np.zeros(len(order))
+        out[order] = values
+        return core.JointConfiguration(list(names), out)
+
+    def plan(seed: int, seconds: float) -> list[list[float]] | None:
+        options.max_planning_time = seconds
+        planner = rrt.RRT(scene, options)
+        planner.setRngSeed(seed)
+        try:
+            path = planner.plan(configuration(problem["start"]), configuration(problem["goal"]))
+        except RuntimeError:
+            return None
+        shorter = core.PathShortcutter(
+            scene, core.PathShortcuttingOptions(group_name="arm", max_step_size=STEP, seed=seed)
+        )
+        path = shorter.shortcut(path)
+        return [[float(x[k]) for k in order] for x in path.positions]
+
+    return plan
+
+
+MAKERS = {"ompl": ompl_of, "roboplan": roboplan_of}
+
+
+def main() -> None:
+    """See the module."""
+    if len(sys.argv) > 2:
+        os.sched_setaffinity(0, {int(sys.argv[2])})
+    answers = os.fdopen(os.dup(1), "w")
+    # What is printed besides says nothing to anybody
+    for number in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+    if sys.argv[1] == "ompl":
+        from ompl import util
+
+        # Once a process: later seeds count for nothing
+        util.RNG.setSeed(1)
+    for line in sys.stdin:
+        problem = json.loads(line)
+        plan = MAKERS[sys.argv[1]](problem)
+        begin = time.process_time()
+        path = plan(problem["seed"], problem["seconds"])
+        took = time.process_time() - begin
+        print(json.dumps({"path": path, "seconds": took}), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()

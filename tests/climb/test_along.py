@@ -1,0 +1,188 @@
+"""Bodies that go their way while limbs change footholds, or that are driven; limbs that work; climbs that go on."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, machines, plan_climb
+from wbc.climb.along import BodyTrack, plan_along
+from wbc.climb.checker import check
+from wbc.climb.climber import Climber
+from wbc.climb.drive import ClimbDrive, standing_plan
+from wbc.climb.limb_work import moved_by, plan_limb_work
+from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
+from wbc.climb.resume import stance_in
+from wbc.climb.scene import of_structure
+from wbc.climb.search import NoStancesError
+from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
+from wbc.walking import cylinder, remove_rows
+from wbc.walking.holds.built_in import grid_pose
+
+INCH = 0.0254
+
+
+def over(t: float, a: float, heading: float = 0.0) -> pin.SE3:
+    """The body over the published cylinder."""
+    return grid_pose(t, a, 152 * INCH, heading)
+
+
+@pytest.fixture(scope="module")
+def walker() -> Climber:
+    return machines.climber("walker")
+
+
+@pytest.fixture(scope="module")
+def scene() -> ClimbScene:
+    return of_structure(cylinder(rigid=True))
+
+
+@pytest.fixture(scope="module")
+def plan(walker: Climber, scene: ClimbScene) -> ContactPlan:
+    return plan_along(walker, scene, BodyTrack((over(13, 8), over(13, 12)), 4 * INCH))
+
+
+@pytest.fixture(scope="module")
+def run(plan: ContactPlan) -> ClimbRun:
+    return ClimbLoop(plan, backend="vm").run()
+
+
+def clean(run: ClimbRun, climber: Climber, scene: ClimbScene) -> None:
+    """It arrived, and the checker, which knows no planner, finds nothing."""
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    report = check(run.log, climber, scene)
+    assert report.clean, str(report)
+
+
+def test_the_body_goes_on_while_limbs_change_footholds(plan: ContactPlan, run: ClimbRun, walker: Climber,
+                                                       scene: ClimbScene) -> None:  # fmt: skip
+    clean(run, walker, scene)
+    assert plan.moves
+    t, q = run.log["t"], run.log.array("q")
+    speed = np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1) / np.diff(t)
+    between = speed[(t[1:] > 0.5) & (t[1:] < t[-1] - 0.5)]
+    assert between.mean() >= 0.98 * 4 * INCH
+    assert between.min() > 0.5 * 4 * INCH
+    assert speed.max() <= 1.01 * 4 * INCH
+    # On its straight way, with its turn
+    along = q[:, :3] - over(13, 8).translation
+    way = over(13, 12).translation - over(13, 8).translation
+    way /= np.linalg.norm(way)
+    assert np.linalg.norm(along - (along @ way)[:, None] * way, axis=1).max() < 1e-3
+
+
+def test_a_round_way_on_a_cylinder_keeps_its_distance(walker: Climber, scene: ClimbScene) -> None:
+    track = BodyTrack((over(11, 12), over(13, 12)), 4 * INCH)
+    axis_distance = [np.linalg.norm(pose.translation[:2]) for pose in track.sampled]
+    np.testing.assert_allclose(axis_distance, 152 * INCH, atol=1e-9)
+    np.testing.assert_allclose(track.sampled[-1].homogeneous, over(13, 12).homogeneous, atol=1e-9)
+    # Twists are those of the poses, by differences of Pinocchio's own
+    h = track.instants[1]
+    for k in (5, 20):
+        step = pin.log6(track.sampled[k - 1].actInv(track.sampled[k + 1])).vector / (2.0 * h)
+        np.testing.assert_allclose(track.twists[k], step, atol=1e-6)
+    turned = plan_along(walker, scene, track)
+    clean(ClimbLoop(turned, backend="vm").run(), walker, scene)
+
+
+def test_ways_without_footholds_are_refused(walker: Climber) -> None:
+    less = of_structure(remove_rows(cylinder(rigid=True), "10-20"))
+    with pytest.raises(NoStancesError, match=r"all limbs can hold to \d+ % of it"):
+        plan_along(walker, less, BodyTrack((over(13, 8), over(13, 12)), 6 * INCH))
+    for poses, speed, error in (
+        ((over(13, 8),), 0.1, ShapeError), ((over(13, 8), over(13, 9)), 0.0, RangeError),
+        ((over(13, 8), over(13, 8)), 0.1, RangeError), ((over(13, 8), over(13, 9)), 1e-5, RangeError),
+    ):  # fmt: skip
+        with pytest.raises(error):
+            BodyTrack(poses, speed)
+
+
+def test_a_start_that_is_not_on_the_way_is_refused(plan: ContactPlan, walker: Climber, scene: ClimbScene) -> None:
+    with pytest.raises(RangeError, match="off the beginning"):
+        plan_along(walker, scene, BodyTrack((over(13, 9), over(13, 12)), 0.1), Stance(plan.start, plan.q[0]))
+
+
+def test_a_climb_goes_on_from_its_log(run: ClimbRun, walker: Climber, scene: ClimbScene) -> None:
+    # While a limb is in the air, and while all hold
+    aloft = next(time for time, _, state, _ in run.changes if state is LimbState.SWINGING) + 0.9
+    for at in (aloft, None):
+        stance = stance_in(run.log, walker, scene, at)
+        assert (min(stance.contacts) < 0) == (at is aloft)
+        ahead = walker.body_pose(stance.q).translation + [0.0, 0.0, -0.1]
+        clean(ClimbLoop(plan_climb(walker, scene, stance, BodyPlace(ahead)), backend="vm").run(), walker, scene)
+    with pytest.raises(RangeError, match="the log is from"):
+        stance_in(run.log, walker, scene, 1e3)
+    with pytest.raises(ShapeError, match="its scene is another"):
+        stance_in(run.log, walker, scene.without("1,1"))
+
+
+def test_a_driven_body_takes_up_other_rates(plan: ContactPlan, walker: Climber, scene: ClimbScene) -> None:
+    drive, start = ClimbDrive(walker), Stance(plan.start, plan.q[0])
+    loop = ClimbLoop(standing_plan(walker, scene, start), replan=drive.following, onward=drive.onward, backend="vm")
+    places = [walker.body_pose(loop.stance.q).translation]
+    for twist in ([0.08, 0.0, 0.0, 0.0, 0.0, 0.0], [-0.06, 0.0, 0.0, 0.0, 0.0, 0.02]):
+        until = loop.time + 2.0
+        while loop.time < until:
+            drive.steer(twist, loop)
+            loop.tick()
+        places.append(walker.body_pose(loop.stance.q).translation)
+    while not loop.ended:
+        drive.finish(loop)
+        loop.tick()
+    clean(loop.result(), walker, scene)
+    moved = np.diff([place[2] for place in places])
+    assert moved[0] < -0.08
+    assert moved[1] > -0.02
+
+
+def test_a_limb_works_while_the_others_hold(plan: ContactPlan, walker: Climber, scene: ClimbScene) -> None:
+    start = Stance(plan.start, plan.q[0])
+    row = walker.row("arm3")
+    pose = walker.contact_pose(start.q, row)
+    up = pin.SE3(pose.rotation, pose.translation + 0.1 * pose.rotation[:, 2])
+    back = scene.footholds[start.contacts[row]].id
+    work = plan_limb_work(
+        walker, scene, start, "arm3", [up, *moved_by(up, [0.04, 0.0, 0.04, 0.0, 0.0, 0.0], 1.0), back]
+    )
+    run = ClimbLoop(work, backend="vm").run()
+    clean(run, walker, scene)
+    assert [move.lands for move in work.moves][-1] == start.contacts[row]
+    q = run.log.array("q")
+    body = np.linalg.norm(q[:, :3] - q[0, :3], axis=1)
+    assert body.max() < 1e-3
+    highest = max(
+        float((walker.contact_pose(at, row).translation - pose.translation) @ pose.rotation[:, 2]) for at in q[::5]
+    )
+    assert highest > 0.09
+    with pytest.raises(UnknownNameError):
+        plan_limb_work(walker, scene, start, "arm4", [up])
+    with pytest.raises(InfeasibleError, match="out of reach"):
+        plan_limb_work(walker, scene, start, "arm3", ["1,1"])
+    with pytest.raises(RangeError, match="it is for arm1"):
+        plan_limb_work(walker, scene, start, "arm3", [scene.footholds[start.contacts[0]].id])
+
+
+def test_a_limb_that_fails_is_lifted_and_the_others_go_on() -> None:
+    from wbc.climb.request import ClimbRequest
+    from wbc.climb.session import climb
+
+    done = climb(ClimbRequest(robot="hexapod_grips", scene="cylinder", goal="0,8", fail=("limb1 at 1",)), backend="vm")
+    assert done.run.outcome is ClimbOutcome.ARRIVED, done.run.reason
+    assert done.report is not None
+    assert done.report.clean, str(done.report)
+    failed = [(limb, state) for _, limb, state, cause in done.run.changes if cause is Cause.LIMB_FAILED]
+    column = done.run.log["contact.limb1"]
+    assert failed in ([("limb1", LimbState.FREE)], [])
+    assert (column[done.run.log["t"] > 1.05] == -1).all()
+    assert len(done.run.plans) == 2
+
+
+def test_footholds_of_able_limbs(scene: ClimbScene) -> None:
+    first, *rest = scene.footholds[:4]
+    some = dataclasses.replace(scene, footholds=[dataclasses.replace(first, limbs=("arm1",)), *rest])
+    able = some.held_by(["arm2", "arm3"])
+    assert [foothold.id for foothold in able.footholds] == [foothold.id for foothold in rest]
+    assert {foothold.limbs for foothold in able.footholds} == {("arm2", "arm3")}

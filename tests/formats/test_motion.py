@@ -1,0 +1,203 @@
+"""Recordings of other programs, written by these formats' own writers, are read as they were written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import wbc
+from tests.formats.runs import recorded
+from tests.refusals import assert_refused
+from tests.repeats import repeats
+from wbc.errors import UnknownNameError
+from wbc.formats import FormatError, PlayedPlant, RecordedMotion, answered, convert, read_motion
+from wbc.multibody import pin
+from wbc.simulation import Connection
+
+NANO = 1_000_000_000
+
+
+def states(
+    rng: np.random.Generator, joints: list[str], count: int
+) -> list[tuple[int, list[str], np.ndarray, np.ndarray]]:
+    """Joint states of two publishers, each of some joints, in random order: time [ns], names, positions, velocities."""
+    cut = int(rng.integers(1, len(joints)))
+    out = []
+    for k in range(count):
+        names = joints[:cut] if k % 2 else joints[cut:]
+        names = [str(name) for name in rng.permutation(names)]
+        out.append((10 * NANO + k * 1_000_003, names, rng.normal(size=len(names)), rng.normal(size=len(names))))
+    return out
+
+
+def held(written: list[Any], joints: list[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What is known after each message, from the first on after which all joints are."""
+    last, rows, times, rates = {}, [], [], []
+    for time, names, q, v in written:
+        last |= {name: (a, b) for name, a, b in zip(names, q, v, strict=True)}
+        if len(last) == len(joints):
+            times.append(time)
+            rows.append([last[name][0] for name in joints])
+            rates.append([last[name][1] for name in joints])
+    return (np.array(times) - written[0][0]) / NANO, np.array(rows), np.array(rates)
+
+
+def write_ros(folder: Path, kind: str, written: list[Any], tf: dict[str, Any]) -> Path:
+    """A bag by rosbags: ROS 1, or ROS 2 in one of its storages."""
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
+    if kind == "ros1":
+        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+    types = store.types
+    path = folder / ("x.bag" if kind == "ros1" else kind)
+    writer = Writer1(path) if kind == "ros1" else Writer2(path, version=9, storage_plugin=StoragePlugin[kind.upper()])
+    more = {"seq": 0} if kind == "ros1" else {}
+
+    def header(time: int, frame: str) -> Any:
+        stamp = types["builtin_interfaces/msg/Time"](time // NANO, time % NANO)
+        return types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame, **more)
+
+    def data(message: Any, name: str) -> bytes:
+        return bytes((store.serialize_ros1 if kind == "ros1" else store.serialize_cdr)(message, name))
+
+    with writer:
+        channel = {
+            topic: writer.add_connection(topic, name, typestore=store)
+            for topic, name in (("/joint_states", "sensor_msgs/msg/JointState"), ("/tf", "tf2_msgs/msg/TFMessage"))
+        }
+        for time, names, q, v in written:
+            message = types["sensor_msgs/msg/JointState"](header(time, ""), names, q, v, np.zeros(0))
+            writer.write(channel["/joint_states"], time, data(message, "sensor_msgs/msg/JointState"))
+        for child, (parent, times, poses) in tf.items():
+            for time, pose in zip(times, poses, strict=True):
+                move = types["geometry_msgs/msg/Vector3"](*pose[:3])
+                turn = types["geometry_msgs/msg/Quaternion"](*pose[3:])
+                one = types["geometry_msgs/msg/TransformStamped"](
+                    header(time, parent), child, types["geometry_msgs/msg/Transform"](move, turn)
+                )
+                message = types["tf2_msgs/msg/TFMessage"]([one])
+                writer.write(channel["/tf"], time, data(message, "tf2_msgs/msg/TFMessage"))
+    return path if kind != "mcap" else next(path.glob("*.mcap")) if len(written) % 2 else path
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+@pytest.mark.parametrize("seed", range(repeats(3)))
+def test_bags_are_read_as_they_were_written(kind: str, seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    joints = [f"j{k}" for k in range(int(rng.integers(2, 9)))]
+    written = states(rng, joints, int(rng.integers(4, 40)))
+    times = [written[0][0] + 7_000_000 * k for k in range(5)]
+    poses = [pin.SE3ToXYZQUAT(pin.SE3.Random()) for _ in range(10)]
+    tf = {"a": ("map", times, poses[:5]), "b": ("a", times, poses[5:])}
+    motion = read_motion(write_ros(tmp_path, kind, written, tf))
+    t, q, v = held(written, joints)
+    order = [motion.joints.index(name) for name in joints]
+    assert np.allclose(motion.t, t, atol=1e-6)
+    assert np.array_equal(motion.q[:, order], q)
+    assert motion.v is not None
+    assert np.array_equal(motion.v[:, order], v)
+    for k in range(5):
+        at = motion.frames["b"].t[k]
+        due = pin.XYZQUATToSE3(poses[k]) * pin.XYZQUATToSE3(poses[5 + k])
+        assert np.allclose(motion.pose("b", at).homogeneous, due.homogeneous)
+        assert np.allclose(motion.pose("b", at, "a").homogeneous, pin.XYZQUATToSE3(poses[5 + k]).homogeneous)
+    half = motion.pose("a", 0.0035)
+    ends = [pin.XYZQUATToSE3(pose) for pose in poses[:2]]
+    assert np.allclose(half.homogeneous, (ends[0] * pin.exp6(0.5 * pin.log6(ends[0].inverse() * ends[1]))).homogeneous)
+    assert_refused(lambda: motion.pose("c", 0.0), UnknownNameError, "frame")
+    assert_refused(lambda: motion.pose("a", 0.0, "b"), FormatError, "hang")
+
+
+def foxglove(file: Path, topics: dict[str, tuple[str, list[dict[str, Any]]]], encoding: str = "json") -> Path:
+    """An MCAP file of JSON messages, by the package mcap."""
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        for topic, (name, said) in topics.items():
+            schema = writer.register_schema(name, "jsonschema", b"{}")
+            channel = writer.register_channel(topic, encoding, schema)
+            for k, message in enumerate(said):
+                writer.add_message(channel, k * NANO, json.dumps(message).encode(), k * NANO)
+        writer.finish()
+    return file
+
+
+def state(**positions: Any) -> dict[str, Any]:
+    return {"joints": [{"name": name, "position": value} for name, value in positions.items()]}
+
+
+def test_what_is_no_motion_is_refused(tmp_path: Path) -> None:
+    def read(**topics: Any) -> RecordedMotion:
+        return read_motion(foxglove(tmp_path / "x.mcap", topics))
+
+    good = ("foxglove.JointStates", [state(a=0.0), state(a=1.0)])
+    motion = read(states=good, other=("foxglove.Log", [{}]))
+    assert motion.remarks == ("not read: other (foxglove.Log in json)",)
+    assert motion.at(0.25).tolist() == [0.25]
+    assert_refused(lambda: read(other=("foxglove.Log", [{}])), FormatError, "other (foxglove.Log")
+    assert_refused(lambda: read(states=("foxglove.JointStates", [state(a=float("nan"))])), FormatError, "finite")
+    turned = {"parent_frame_id": "a", "child_frame_id": "b", "translation": dict.fromkeys("xyz", 0.0)}
+    bad = turned | {"rotation": dict.fromkeys("xyzw", 0.0)}
+    assert_refused(lambda: read(tf=("foxglove.FrameTransform", [bad])), FormatError, "unit quaternion")
+    unit = turned | {"rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    circle = read(
+        tf=(
+            "foxglove.FrameTransforms",
+            [{"transforms": [unit, unit | {"parent_frame_id": "b", "child_frame_id": "a"}]}],
+        )
+    )
+    assert_refused(lambda: circle.pose("a", 0.0), FormatError, "circle")
+    assert_refused(lambda: read_motion(tmp_path / "x.mcap", ["/no"]), FormatError, "/no")
+    assert_refused(lambda: read_motion(tmp_path / "no.mcap"), FormatError, "no such file")
+    (tmp_path / "junk.mcap").write_bytes(b"junk" * 100)
+    assert_refused(lambda: read_motion(tmp_path / "junk.mcap"), FormatError, "cannot be read")
+    assert_refused(lambda: read_motion(foxglove(tmp_path / "x.mcap", {"s": good}, "protobuf")), FormatError, "protobuf")
+    robot = wbc.robots.load("ur5")
+    assert_refused(lambda: motion.configurations(robot), UnknownNameError, "shoulder_pan_joint")
+    assert motion.configurations(robot, ["a"]).tolist() == [robot.neutral.tolist()] * 2
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_the_same_stack_would_have_done_the_same(seed: int, tmp_path: Path) -> None:
+    """Joints with two numbers each among them; what another one would have done is another thing."""
+    recording = wbc.Recording(recorded(tmp_path, seed))
+    motion = read_motion(convert(recording.path, "mcap")[0])
+    controller = wbc.replaying.ticks.compiled(recording, backend="vm")
+    robot, targets = controller.stack.robot, recording.inputs["hand.target"]
+    q = motion.configurations(robot)
+    assert np.allclose(q, recording["q"])
+
+    def aim(one: wbc.Controller, time: float) -> None:
+        place = targets[round(time / one.stack.dt)]
+        one["hand"].target = pin.SE3(place[:9].reshape(3, 3, order="F"), place[9:])
+
+    log = answered(controller, motion, aim)
+    assert np.allclose(log["t"], motion.t)
+    # How it came to its first state nobody knows
+    assert np.allclose(log.array("command")[1:], recording["v"][1:], atol=1e-6)
+    assert np.abs(answered(controller, motion).array("command") - recording["v"]).max() > 1e-3
+
+
+def test_a_played_plant_goes_its_own_way(tmp_path: Path) -> None:
+    motion = read_motion(
+        foxglove(tmp_path / "x.mcap", {"s": ("foxglove.JointStates", [state(elbow_joint=x) for x in (0.0, 1.0)])})
+    )
+    robot = wbc.robots.load("ur5")
+    plant = PlayedPlant(robot, motion)
+    connection, place = Connection(plant, robot, 0.25), list(robot.joint_names).index("elbow_joint")
+    seen = [connection.reset(robot.neutral)]
+    seen += [connection.drive(np.full(robot.nv, 0.1)) for _ in range(4)]
+    assert np.allclose([one.q[place] for one in seen], [0.0, 0.25, 0.5, 0.75, 1.0])
+    assert np.allclose([one.v[place] for one in seen], 1.0)
+    plant.advance(0.25)
+    assert not plant.read().valid
+    assert [time for time, _ in plant.given][:4] == [0.0, 0.25, 0.5, 0.75]
+    short = RecordedMotion(("elbow_joint",), np.zeros(1), np.zeros((1, 1)), None, {})
+    assert_refused(lambda: PlayedPlant(robot, short), FormatError, "two joint states")

@@ -1,0 +1,52 @@
+"""Loops are taken out of a tick's QP: its answers are those of a solver in Python that has all variables and rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.loops.mechanisms import NAMED
+from tests.loops.test_torques import DT, driven, linkage, moving
+from tests.repeats import covering, repeats
+from wbc.robot import Robot
+
+COMMANDS = ("velocity", "acceleration", "torque")
+#: Torques by accelerations: entries of mass matrices of the mechanisms, and forces in their loops, are below
+TORQUES = 1e3
+
+
+def compare(robot: Robot, command: str, seed: int, states: int) -> None:
+    """Commands and multipliers of both, where rows bind and where none does."""
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    own, whole = (stack.compile(command=command, solver=solver) for solver in ("daqp", "python"))
+    rng, bound = np.random.default_rng(seed), 0
+    for _ in range(states):
+        q, v = moving(robot, rng)
+        target = pin.integrate(robot.model, q, float(rng.choice([0.02, 3.0])) * rng.normal(size=robot.nv))
+        steps = []
+        for controller in (own, whole):
+            controller.reset(q)
+            controller["posture"].target = target
+            steps.append(controller.step(q, 0.1 * v))
+        one, other = (np.array(step.command) for step in steps)
+        assert steps[0].status == steps[1].status == "solved"
+        errors = [step.certificate.error_bound for step in steps]
+        assert errors[0] <= 1e-7
+        # Of velocities both make up for what loops bend by to 1e-10 of a length or rad in 2 ms, and levers differ
+        most = 1e-6 if command == "velocity" else sum(errors)
+        assert np.abs(one - other).max() <= most * (1.0 if command != "torque" else TORQUES), (one, other)
+        assert {row.row for row in steps[0].binding} == {row.row for row in steps[1].binding}
+        bound += steps[0].iterations > 0
+    assert bound, "no row bound"
+
+
+@pytest.mark.parametrize(("name", "command"), covering([name for name in NAMED if name != "parallelogram"], COMMANDS))
+def test_answers_of_mechanisms(name: str, command: str) -> None:
+    compare(driven(name).with_limits(acceleration=10.0), command, 0, repeats(12))
+
+
+@pytest.mark.parametrize("seed", range(repeats(3)))
+def test_answers_of_random_linkages(seed: int) -> None:
+    compare(linkage(seed)[1].with_limits(acceleration=10.0), COMMANDS[seed % 3], seed, 12)

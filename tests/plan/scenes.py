@@ -1,0 +1,109 @@
+"""Stacks before obstacles, and a judge of paths that shares no code with the planner: Pinocchio with Coal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import wbc
+from wbc.plan import PlannedPath
+from wbc.robot import Robot
+from wbc.shapes import Box, Capsule, Cylinder, Sphere
+
+#: Sides and place of the boards of a shelf before a Panda [m]
+SHELF = (
+    *(((0.35, 0.9, 0.02), (0.65, 0.0, z)) for z in (0.05, 0.4, 0.75)),
+    *(((0.35, 0.02, 0.7), (0.65, y, 0.4)) for y in (-0.45, 0.0, 0.45)),
+)
+
+
+def at(x: float, y: float, z: float) -> pin.SE3:
+    """A place without a turn."""
+    return pin.SE3(np.eye(3), np.array([x, y, z]))
+
+
+def reaching(x: float, y: float, z: float) -> pin.SE3:
+    """A hand that points forwards."""
+    return pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2.0, 0.0), np.array([x, y, z]))
+
+
+def panda(*boxes: tuple[tuple[float, ...], tuple[float, ...]], margin: float = 0.003) -> wbc.Stack:
+    """A Panda with limits among boxes (sides, place)."""
+    stack = wbc.Stack(wbc.robots.load("panda"), dt=0.01)
+    stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+    stack.add(wbc.tasks.JointLimits())
+    stack.add(wbc.tasks.SelfCollision(), name="self")
+    for k, (sides, place) in enumerate(boxes):
+        stack.add(wbc.tasks.Obstacle(Box(sides), pose=at(*place), margin=margin), name=f"box{k}")
+    return stack
+
+
+def base_with_a_body() -> Robot:
+    """A base that drives in any direction, with a cylinder as its body."""
+    locked = ["*gripper*", "*wheel*", "*finger*", "arm_*", "head_*", "torso_*"]
+    robot = wbc.robots.load("tiago_pro", shapes="none", lock=locked)
+    body = wbc.shapes.PlacedShape(Cylinder(0.3, 0.3), at(0.0, 0.0, 0.2))
+    return robot.with_shapes({robot.frames["base"]: [body]})
+
+
+class CoalJudge:
+    """Distances of the bodies of a stack by Coal.
+
+    Args:
+        poses: of obstacles that stand elsewhere than they were declared.
+    """
+
+    def __init__(self, stack: wbc.Stack, poses: dict[str, pin.SE3] | None = None) -> None:
+        robot = stack.robot
+        self.model, self.bodies = robot.model, pin.GeometryModel()
+        numbers: dict[str, list[int]] = {}
+        for link, shapes in robot.shapes.items():
+            frame = self.model.frames[self.model.getFrameId(link)]
+            for k, placed in enumerate(shapes):
+                pose = frame.placement * placed.placement * pin.SE3(np.eye(3), placed.shape.center)
+                body = pin.GeometryObject(f"{link} {k}", frame.parentJoint, pose, _coal(placed.shape))
+                numbers.setdefault(link, []).append(self.bodies.addGeometryObject(body))
+        self.required: list[float] = []
+        for entry in stack.constraints:
+            item = entry.item
+            if isinstance(item, wbc.tasks.SelfCollision):
+                for (a, i, _), (b, j, _) in (pair for pair, _ in item.kept_pairs(robot)):
+                    self.bodies.addCollisionPair(pin.CollisionPair(numbers[a][i], numbers[b][j]))
+                    self.required.append(item.margin)
+            elif isinstance(item, wbc.tasks.Obstacle):
+                pose = (poses or {}).get(entry.name, item.pose)
+                shape = item.parts[0]
+                other = pin.GeometryObject(entry.name, 0, pose * pin.SE3(np.eye(3), shape.center), _coal(shape))
+                number = self.bodies.addGeometryObject(other)
+                for link, k, _ in item.pairs(robot):
+                    self.bodies.addCollisionPair(pin.CollisionPair(numbers[link][k], number))
+                    self.required.append(item.margin)
+        self.data, self.geometry = self.model.createData(), self.bodies.createData()
+
+    def margin(self, q: Any) -> float:
+        """The least distance of a pair, less what it keeps [m]."""
+        pin.computeDistances(self.model, self.data, self.bodies, self.geometry, q)
+        found = [result.min_distance for result in self.geometry.distanceResults]
+        return float(np.min(np.array(found) - self.required))
+
+    def least(self, path: PlannedPath, step: float = 0.005) -> float:
+        """The least margin along the straight pieces of a path, looked at every ``step`` [rad]."""
+        out = np.inf
+        for one, other in zip(path.points[:-1], path.points[1:], strict=True):
+            for share in np.linspace(0.0, 1.0, int(np.linalg.norm(other - one) / step) + 2):
+                out = min(out, self.margin(path.coordinates.configuration(one + share * (other - one))))
+        return out
+
+
+def _coal(shape: Any) -> Any:
+    if isinstance(shape, Capsule):
+        return coal.Capsule(shape.radius, shape.length)
+    if isinstance(shape, Cylinder):
+        return coal.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, Box):
+        return coal.Box(*shape.size)
+    assert isinstance(shape, Sphere)
+    return coal.Sphere(shape.radius)

@@ -1,0 +1,159 @@
+"""Rows that hold on whole paths: level cups, trays in two hands, cones, planar bases, mimic joints and closed loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc
+from tests.loops.mechanisms import NAMED
+from tests.plan.scenes import CoalJudge, at, base_with_a_body
+from tests.repeats import repeats
+from wbc.errors import CommandError, InfeasibleError, UnsupportedJointError
+from wbc.plan import MotionPlanner, PlannedPath
+from wbc.shapes import Box
+
+DOWN = pin.rpy.rpyToMatrix(np.pi, 0.0, 0.0)
+
+
+def behind_a_wall(*items: tuple[str, object]) -> wbc.Stack:
+    """A Panda whose hand goes from one side of a wall to the other."""
+    stack = wbc.Stack(wbc.robots.load("panda"), dt=0.01)
+    stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+    stack.add(wbc.tasks.JointLimits())
+    stack.add(wbc.tasks.Obstacle(Box((0.3, 0.05, 0.5)), pose=at(0.5, 0.0, 0.25), margin=0.003), name="wall")
+    for name, item in items:
+        stack.add(item, name=name)
+    return stack
+
+
+def samples(path: PlannedPath, count: int = 400) -> np.ndarray:
+    """Configurations all along the smooth path."""
+    smooth = path.smooth
+    return path.coordinates.configuration(smooth.evaluate(np.linspace(smooth.knots[0], smooth.knots[-1], count)))
+
+
+def across(stack: wbc.Stack, keep: tuple[str, ...] = (), seed: int = 0) -> tuple[MotionPlanner, PlannedPath]:
+    planner = stack.planner(keep=keep)
+    free = behind_a_wall().planner()
+    start = free.plan(stack.robot.neutral, {"hand": pin.SE3(DOWN, np.array([0.5, 0.3, 0.25]))}).q[-1]
+    return planner, planner.plan(start, {"hand": pin.SE3(DOWN, np.array([0.5, -0.3, 0.2]))}, seed=seed)
+
+
+def test_a_cup_stays_level() -> None:
+    """The task's error is 0 on the whole spline, which is clear by Coal."""
+    stack = behind_a_wall(("cup", wbc.tasks.AxisAlign("panda_hand_tcp", axis=(0, 0, -1))))
+    planner, path = across(stack, ("cup",))
+    judge = CoalJudge(stack)
+    for q in samples(path):
+        assert stack.robot.pose(q, "panda_hand_tcp").rotation[2, 2] == pytest.approx(-1.0, abs=1e-9)
+        assert judge.margin(q) > -1.1e-4
+    assert path.law().certificate.satisfied
+    with pytest.raises(InfeasibleError, match=r"goal: no configuration that meets hand"):
+        planner.plan(path.q[0], {"hand": pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.5]))})
+
+
+def test_a_cup_stays_within_a_cone_and_a_box() -> None:
+    cone = wbc.tasks.AxisCone("panda_hand_tcp", axis=(0, 0, -1), half_angle=0.05)
+    box = wbc.tasks.WorkspaceBox("panda_hand_tcp", lower=(0.2, -0.4, 0.1), upper=(0.6, 0.4, 0.75))
+    stack = behind_a_wall(("cup", cone), ("box", box))
+    _, path = across(stack)
+    for q in samples(path):
+        pose = stack.robot.pose(q, "panda_hand_tcp")
+        assert np.arccos(min(1.0, -pose.rotation[2, 2])) < 0.05 + 1e-6
+        assert (pose.translation > np.array([0.2, -0.4, 0.1]) - 1e-6).all()
+        assert (pose.translation < np.array([0.6, 0.4, 0.75]) + 1e-6).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tray_stays_between_two_hands(seed: int) -> None:
+    robot = wbc.robots.load("pr2", base="fixed", lock=["?_gripper_*", "laser_*", "torso_*", "head_*"], shapes="none")
+    hands = robot.frames["left_hand"], robot.frames["right_hand"]
+    grasp = robot.pose(robot.neutral, hands[0]).actInv(robot.pose(robot.neutral, hands[1]))
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.RelativePose(*hands), name="tray")
+    stack.add(wbc.tasks.EndEffector(hands[0], kind="position"), name="left")
+    stack.add(wbc.tasks.JointLimits())
+    planner = stack.planner(keep=("tray",))
+    place = robot.pose(robot.neutral, hands[0]).translation
+    path = planner.plan(robot.neutral, {"left": place + np.array([0.1, 0.1, 0.15])}, seed=seed)
+    assert np.linalg.norm(robot.pose(path.q[-1], hands[0]).translation - place - [0.1, 0.1, 0.15]) < 1e-6
+    for q in samples(path):
+        held = robot.pose(q, hands[0]).actInv(robot.pose(q, hands[1]))
+        assert np.linalg.norm(pin.log6(grasp.actInv(held)).vector) < 1e-5
+
+
+def test_a_planar_base_drives_round_a_wall() -> None:
+    robot = base_with_a_body()
+    frame = robot.frames["base"]
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.EndEffector(frame, kind="position"), name="base")
+    stack.add(wbc.tasks.Obstacle(Box((0.1, 2.0, 1.0)), pose=at(1.0, 0.0, 0.5), margin=0.02), name="wall")
+    goal = robot.pose(robot.neutral, frame).translation + np.array([2.0, 0.0, 0.0])
+    path = stack.plan(robot.neutral, {"base": goal})
+    assert np.abs(path.points[:, 1]).max() > 1.0
+    judge = CoalJudge(stack)
+    assert judge.least(path, 0.01) > -1.1e-4
+    q, v = path.configurations(path.law(), np.linspace(0.0, 1.0, 9))
+    later, _ = path.configurations(path.law(), np.linspace(0.0, 1.0, 9) + 1e-6)
+    for one, rate, other in zip(q, v, later, strict=True):
+        np.testing.assert_allclose(robot.difference(one, other) / 1e-6, rate, atol=1e-4)
+
+
+def test_rows_of_velocities_alone_are_refused() -> None:
+    robot = wbc.robots.load("tiago", shapes="none")
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.Posture())
+    with pytest.raises(CommandError, match=r"mechanism.*velocities"):
+        stack.plan(robot.neutral, robot.neutral)
+
+
+def test_fingers_that_mimic_follow() -> None:
+    robot = wbc.robots.load("panda", lock=())
+    if not robot.couplings:
+        pytest.skip("this description couples no fingers")
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.JointLimits())
+    goal = robot.closed(robot.random(1)) if robot.loops else robot.neutral.copy()
+    path = stack.plan(robot.neutral, goal)
+    c = robot.couplings[0]
+    index = robot.position_index
+    np.testing.assert_allclose(
+        path.q[:, index[c.follower]], c.ratio * path.q[:, index[c.leader]] + c.offset, atol=1e-12
+    )
+
+
+def test_without_a_compiler_rows_run_on_the_virtual_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same path, from the same expressions."""
+    stack = behind_a_wall(("cup", wbc.tasks.AxisAlign("panda_hand_tcp", axis=(0, 0, -1))))
+    _, compiled = across(stack, ("cup",))
+    monkeypatch.setattr("wbc.plan.rows.toolchain.available", lambda: False)
+    _, interpreted = across(stack, ("cup",))
+    np.testing.assert_allclose(interpreted.points, compiled.points, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "gripper", "jansen", "parallelogram"])
+@pytest.mark.parametrize("seed", range(repeats(3)))
+def test_closed_loops_stay_closed(name: str, seed: int) -> None:
+    """To a configuration that the mechanism can be moved to by small steps."""
+    robot = wbc.robots.load(NAMED[name])
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.JointLimits())
+    way = np.random.default_rng(seed).normal(size=robot.nv)
+    goal = start = robot.closed(robot.neutral)
+    for _ in range(15):
+        goal = robot.closed(robot.integrate(goal, 0.05 * np.sqrt(robot.nv) * way / np.linalg.norm(way)))
+    assert np.linalg.norm(robot.difference(start, goal)) > 0.1
+    path = stack.plan(start, goal, seed=seed)
+    np.testing.assert_allclose(path.q[[0, -1]], [start, goal], atol=1e-9)
+    for q in samples(path, 100):
+        assert max(robot.loop_gaps(q).values()) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["ankle", "delta"])
+def test_loops_with_ball_joints_are_refused(name: str) -> None:
+    stack = wbc.Stack(wbc.robots.load(NAMED[name]), dt=0.01)
+    stack.add(wbc.tasks.JointLimits())
+    with pytest.raises(UnsupportedJointError, match=r"joint '.*ball\d?'"):
+        stack.planner()

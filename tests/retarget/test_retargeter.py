@@ -1,0 +1,214 @@
+"""Motions keep feet still and limits kept, on robots of any kind; measured here by Pinocchio alone."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.retarget import clips, motions
+from wbc import robots
+from wbc.errors import NotFiniteError, RangeError, ShapeError
+from wbc.multibody import pin
+from wbc.retarget import Clip, CorrespondenceError, Retargeted, Retargeter, RetargetOptions, RetargetWeights
+from wbc.retarget.solids import balls_of_joints
+
+#: Most that a foot in stance slides, and that anything is below the ground [m]
+SLIDE, DEPTH = 1e-4, 1e-3
+
+
+@functools.cache
+def retargeter(name: str) -> Retargeter:
+    """Of a robot by name, compiled once."""
+    return Retargeter(name)
+
+
+@functools.cache
+def motion(robot: str, name: str, start: float = 0.4, end: float = 2.4) -> Retargeted:
+    """A part of a clip on a robot."""
+    return retargeter(robot).run(motions.part(getattr(clips, name)().clip, start, end))
+
+
+def check(found: Retargeted) -> None:
+    """Nothing slides, sinks, breaks a limit or jumps."""
+    assert np.isfinite(found.q).all()
+    assert found.q.shape == (len(found.time), found.robot.nq)
+    assert motions.breaches(found) == (0, 0, 0)
+    for limb in found.stance:
+        assert motions.largest_slide(found, limb) < SLIDE, limb
+    errors = found.errors
+    assert errors.penetration < DEPTH
+    assert (errors.position, errors.velocity, errors.acceleration, errors.jumps) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(("robot", "most"), [("g1", 0.006), ("talos", 0.02), ("icub", 0.02), ("human", 0.006)])
+def test_a_walk_on_humanoids(robot: str, most: float) -> None:
+    found = motion(robot, "walk")
+    check(found)
+    assert found.errors.mean < most
+    true = clips.walk().stance
+    for limb, foot in (("left_leg", "LeftFoot"), ("right_leg", "RightFoot")):
+        a = int(0.4 * 60.0)
+        assert np.mean(found.stance[limb] == true[foot][a : a + len(found.time)]) > 0.85
+
+
+@pytest.mark.parametrize("robot", ["a1", "anymal_c", "solo12"])
+@pytest.mark.parametrize("name", ["dog", "walk", "crawl"])
+def test_quadrupeds_follow_dogs_and_people(robot: str, name: str) -> None:
+    found = motion(robot, name)
+    check(found)
+    assert found.errors.mean < 0.02
+    assert all(marks.mean() > 0.2 for marks in found.stance.values())
+
+
+@pytest.mark.parametrize("name", ["run", "turn", "jump", "stairs", "sit", "dance"])
+def test_every_clip_on_g1(name: str) -> None:
+    found = motion("g1", name, 0.5, 2.5)
+    check(found)
+    assert found.errors.mean < 0.015
+
+
+def test_soles_do_not_sink_by_the_robot_files_own_bodies() -> None:
+    found = motion("talos", "walk")
+    robot = found.robot
+    last = {found.body.limbs[limb].joints[-1] for limb in ("left_leg", "right_leg")}
+    bodies = balls_of_joints(robot, last)
+    data = robot.model.createData()
+    lowest = np.inf
+    for q in found.q:
+        pin.forwardKinematics(robot.model, data, q)
+        lowest = min(lowest, *(balls.lowest(data.oMi[joint]) for joint, balls in bodies.items()))
+    assert -DEPTH < lowest < 0.01
+
+
+def test_stairs_lift_the_feet_by_their_height() -> None:
+    found = retargeter("g1").run(clips.stairs().clip)
+    _, places = motions.places(found, found.body.limbs["left_leg"].end)
+    heights = places[found.stance["left_leg"], 2]
+    climbed = clips.stairs().stances["LeftFoot"][-1].pose[2] - clips.stairs().stances["LeftFoot"][0].pose[2]
+    scale = retargeter("g1").correspondence(clips.stairs().clip.skeleton).scale
+    assert heights[-1] - heights[0] == pytest.approx(scale * climbed, abs=0.01)
+    check(found)
+
+
+def test_points_alone_will_do() -> None:
+    whole = motion("g1", "walk")
+    found = retargeter("g1").run(motions.pointed(motions.part(clips.walk().clip, 0.4, 2.4)))
+    check(found)
+    legs = slice(7, 19)
+    assert np.abs(found.q[:, legs] - whole.q[:, legs]).mean() < 0.08
+
+
+def test_another_heading_is_the_same_motion() -> None:
+    clip = motions.part(clips.walk().clip, 0.4, 1.4)
+    found = retargeter("g1").run(motions.turned(clip, 1.1))
+    same = motion("g1", "walk", 0.4, 1.4)
+    assert np.abs(found.q[:, 7:] - same.q[:, 7:]).max() < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_people_of_other_sizes_at_other_rates(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    rate = float(random.choice([15.0, 30.0, 75.0, 240.0]))
+    size = float(random.uniform(0.6, 1.8))
+    clip = motions.part(clips.walk(seed, rate).clip, 0.4, 2.0)
+    skeleton = replace(clip.skeleton, offsets=size * clip.skeleton.offsets)
+    if seed % 2:
+        skeleton = motions.nameless(skeleton)
+    found = retargeter("g1").run(replace(clip, skeleton=skeleton, points=size * clip.points))
+    check(found)
+    assert found.rate == rate
+    assert found.errors.mean < 0.01
+
+
+def test_the_rate_of_the_motion_may_be_another() -> None:
+    clip = motions.part(clips.walk().clip, 0.4, 1.4)
+    found = Retargeter("simple_humanoid", options=RetargetOptions(rate=50.0)).run(clip)
+    assert found.rate == 50.0
+    assert len(found.q) == 51
+    assert found.time[-1] == pytest.approx(1.0)
+    assert motions.breaches(found) == (0, 0, 0)
+
+
+def test_what_cannot_be_served_gives_way_and_is_said() -> None:
+    """Joints as slow as these cannot run: the motion keeps its limits, and says what it gave up and when."""
+    slow = robots.load("g1").with_limits(velocity=2.5)
+    found = Retargeter(slow).run(motions.part(clips.run().clip, 0.6, 1.8))
+    assert motions.breaches(found) == (0, 0, 0)
+    assert found.given_up
+    assert all(0.0 <= given.start <= given.end <= 1.3 for given in found.given_up)
+    assert any("left_leg" in str(given) or "right_leg" in str(given) for given in found.given_up)
+    for limb in found.stance:
+        assert motions.largest_slide(found, limb) < SLIDE
+
+
+def test_arms_of_a_robot_that_stands_fixed() -> None:
+    found = Retargeter("alex_nub_hands").run(motions.part(clips.dance().clip, 0.0, 1.5))
+    assert motions.breaches(found) == (0, 0, 0)
+    assert found.errors.mean < 0.03
+    assert not any(marks.any() for marks in found.stance.values())
+
+
+def test_links_keep_clear_of_each_other() -> None:
+    plain, clip = motion("talos", "dance", 0.5, 1.5), motions.part(clips.dance().clip, 0.5, 1.5)
+    found = Retargeter("talos", options=RetargetOptions(clearance=0.01)).run(clip)
+    pairs = found.robot.self_pairs
+    assert pairs
+    assert plain.robot.self_pairs != pairs
+    assert motions.breaches(found) == (0, 0, 0)
+
+
+def test_the_pelvis_goes_over_the_feet_for_balance() -> None:
+    clip = motions.part(clips.walk().clip, 0.4, 2.0)
+    offsets = []
+    for weight in (0.0, 200.0):
+        found = Retargeter("g1", options=RetargetOptions(balance=weight)).run(clip)
+        model = found.robot.model
+        off = []
+        for k, q in enumerate(found.q):
+            mass = pin.centerOfMass(model, model.createData(), q)
+            one = [limb for limb in ("left_leg", "right_leg") if found.stance[limb][k]]
+            if len(one) == 1:
+                _, place = motions.places(replace(found, q=found.q[k : k + 1]), found.body.limbs[one[0]].end)
+                off.append(abs(mass[1] - place[0, 1]))
+        offsets.append(np.median(off))
+    assert offsets[1] < 0.6 * offsets[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (lambda c: replace(c, points=np.where(np.arange(3) == 2, np.nan, c.points)), NotFiniteError, "Hips at frame 0"),
+        (lambda c: replace(c, points=c.points[:, :5]), ShapeError, "expected"),
+        (lambda c: replace(c, points=c.points[:0], turns=None), ShapeError, "a frame at least"),
+        (lambda c: replace(c, turns=c.turns[:3]), ShapeError, "clip.turns"),
+        (lambda c: replace(c, rate=0.0), RangeError, "rate"),
+    ],
+)
+def test_a_clip_that_is_none_is_refused(change, error: type[Exception], words: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(error, match=words):
+        retargeter("simple_humanoid").run(change(motions.part(clips.walk().clip, 0.0, 0.2)))
+
+
+def test_bad_options_are_refused() -> None:
+    with pytest.raises(RangeError, match=r"options\.acceleration"):
+        RetargetOptions(acceleration=0.0)
+    with pytest.raises(RangeError, match=r"weights\.foot"):
+        RetargetWeights(foot=-1.0)
+    with pytest.raises(ShapeError, match="options"):
+        Retargeter("simple_humanoid", options={"rate": 3})  # type: ignore[arg-type]
+    made = retargeter("simple_humanoid")
+    with pytest.raises(CorrespondenceError, match="give a skeleton"):
+        made.correspondence()
+    other = Retargeter("simple_humanoid", clips.skeleton(clips.DOG_BONES))
+    with pytest.raises(CorrespondenceError, match="not those of the skeleton"):
+        other.run(motions.part(clips.walk().clip, 0.0, 0.2))
+
+
+def test_a_clip_of_one_frame_is_a_pose() -> None:
+    clip: Clip = motions.part(clips.sit().clip, 0.5, 0.5)
+    found = retargeter("g1").run(clip)
+    assert found.q.shape == (1, 36)
+    assert found.errors.mean < 0.02

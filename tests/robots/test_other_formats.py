@@ -1,0 +1,138 @@
+"""Robots in xacro and USD: the same as what they were made of, and refused by name where they cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wbc
+from tests.refusals import assert_refused
+from tests.repeats import repeats
+from wbc.errors import RobotFileError
+from wbc.multibody import pin
+
+XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="count" default="2"/><xacro:property name="count" value="$(arg count)"/>
+<link name="link0"/>
+<xacro:macro name="segment" params="i">
+<link name="link${i}">
+<inertial><mass value="${0.5*i}"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+<collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+<joint name="joint${i}" type="revolute"><parent link="link${i-1}"/><child link="link${i}"/><origin xyz="0 0 ${0.1*i}"/>
+<axis xyz="0 1 0"/><limit lower="${-pi/2}" upper="${pi/2}" velocity="1" effort="1"/></joint>
+<xacro:if value="${i &lt; int(count)}"><xacro:segment i="${i+1}"/></xacro:if></xacro:macro>
+<xacro:segment i="1"/></robot>"""
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_a_xacro_file_is_what_it_expands_to(count: int, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf.xacro").write_text(XACRO)
+    robot = wbc.robots.load(tmp_path / "arm.urdf.xacro", arguments={"count": count})
+    assert robot.joint_names == tuple(f"joint{k}" for k in range(1, count + 1))
+    assert np.allclose(robot.limits.position_upper, np.pi / 2)
+    assert np.allclose(robot.pose(robot.neutral, f"link{count}").translation[2], 0.1 * sum(range(1, count + 1)))
+    assert np.isclose(pin.computeTotalMass(robot.model), 0.5 * sum(range(1, count + 1)))
+    assert len(robot.shapes) == count
+
+
+def test_a_xacro_file_that_cannot_be_expanded_is_refused(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.xacro"
+    bad.write_text('<robot name="a" xmlns:xacro="x"><link name="${no_such}"/></robot>')
+    assert_refused(lambda: wbc.robots.load(bad), RobotFileError, "no_such")
+    bad.write_text('<robot name="a" xmlns:xacro="x"><xacro:include filename="$(find nowhere)/x.xacro"/></robot>')
+    assert_refused(lambda: wbc.robots.load(bad), RobotFileError, "nowhere")
+    assert_refused(lambda: wbc.robots.load(tmp_path / "none.xacro"), RobotFileError, "no such file")
+    stage = tmp_path / "x.usda"
+    stage.write_text("#usda 1.0\n")
+    assert_refused(lambda: wbc.robots.load(stage, arguments={"a": 1}), RobotFileError, "only xacro")
+
+
+def stage_of(model: pin.Model, path: Path, unit: float, turned: bool) -> None:
+    """A model of joints with one coordinate as a stage of its own unit, bodies at a random configuration."""
+    from pxr import Gf, Usd, UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.randomConfiguration(model))
+
+    def quaternion(rotation: np.ndarray) -> Any:
+        x, y, z, w = pin.Quaternion(rotation).coeffs().tolist()
+        return Gf.Quatf(w, x, y, z)
+
+    for j in range(1, model.njoints):
+        body = UsdGeom.Xform.Define(stage, f"/robot/link{j}")
+        place = data.oMi[j].homogeneous.copy()
+        place[:3, 3] /= unit
+        body.AddTransformOp().Set(Gf.Matrix4d(*place.T.ravel().tolist()))
+        UsdPhysics.RigidBodyAPI.Apply(body.GetPrim())
+        mass, inertia = UsdPhysics.MassAPI.Apply(body.GetPrim()), model.inertias[j]
+        moments, axes = np.linalg.eigh(inertia.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        mass.CreateMassAttr(inertia.mass)
+        mass.CreateCenterOfMassAttr(Gf.Vec3f(*(inertia.lever / unit).tolist()))
+        mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*(moments / unit**2).tolist()))
+        mass.CreatePrincipalAxesAttr(quaternion(axes))
+        turns = model.joints[j].shortname().startswith("JointModelR")
+        joint = (UsdPhysics.RevoluteJoint if turns else UsdPhysics.PrismaticJoint).Define(
+            stage, f"/robot/{model.names[j]}"
+        )
+        joint.CreateAxisAttr(model.joints[j].shortname()[-1])
+        parent, here = int(model.parents[j]), model.jointPlacements[j]
+        ends = [[f"/robot/link{parent}"] if parent else [], [f"/robot/link{j}"]]
+        poses = [(Gf.Vec3f(*(here.translation / unit).tolist()), quaternion(here.rotation)), (Gf.Vec3f(0), Gf.Quatf(1))]
+        if turned and not parent:
+            # The world as the second body
+            ends.reverse()
+            poses.reverse()
+        joint.CreateBody0Rel().SetTargets(ends[0])
+        joint.CreateBody1Rel().SetTargets(ends[1])
+        joint.CreateLocalPos0Attr(poses[0][0])
+        joint.CreateLocalRot0Attr(poses[0][1])
+        joint.CreateLocalPos1Attr(poses[1][0])
+        joint.CreateLocalRot1Attr(poses[1][1])
+        scale, q = (180.0 / np.pi if turns else 1.0 / unit), int(model.idx_qs[j])
+        joint.CreateLowerLimitAttr(float(model.lowerPositionLimit[q] * scale))
+        joint.CreateUpperLimitAttr(float(model.upperPositionLimit[q] * scale))
+    stage.Save()
+
+
+@pytest.mark.parametrize("seed", range(repeats(4)))
+def test_a_stage_is_the_robot_that_it_was_made_of(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    given = wbc.robots.load(["panda", "ur5", "z1", "xarm7"][seed % 4])
+    stage_of(given.model, tmp_path / "x.usda", float(rng.choice([0.01, 1.0])), bool(seed % 2))
+    robot = wbc.robots.load(tmp_path / "x.usda")
+    assert robot.joint_names == given.joint_names
+    assert np.allclose(robot.limits.position_lower, given.limits.position_lower, atol=1e-5)
+    q, data = given.random(rng), given.model.createData()
+    pin.forwardKinematics(given.model, data, q)
+    for j in range(1, given.model.njoints):
+        assert np.allclose(robot.pose(q, f"link{j}").homogeneous, data.oMi[j].homogeneous, atol=1e-6)
+    mass = pin.crba(given.model, data, q)
+    assert np.allclose(pin.crba(robot.model, robot.model.createData(), q), mass, atol=1e-5 * np.abs(mass).max())
+
+
+def test_what_a_stage_cannot_say_is_refused_by_name(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    import pxr  # noqa: F401
+
+    head = "#usda 1.0\n(metersPerUnit = 1)\n"
+    head += 'def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI"{more}]) {{ {mass} }}\n'
+    file = tmp_path / "x.usda"
+    file.write_text("#usda 1.0\n")
+    assert_refused(lambda: wbc.robots.load(file), RobotFileError, "no rigid bodies")
+    file.write_text("junk")
+    assert_refused(lambda: wbc.robots.load(file), RobotFileError, "cannot be opened")
+    file.write_text(head.format(more="", mass=""))
+    assert_refused(lambda: wbc.robots.load(file), RobotFileError, "'a' states no mass")
+    given = "float physics:mass = 1\nfloat3 physics:diagonalInertia = (1, 1, 1)\n"
+    distance = '\ndef PhysicsDistanceJoint "far" {\nrel physics:body1 = </a>\n}\n'
+    file.write_text(head.format(more=', "PhysicsMassAPI"', mass=given) + distance)
+    assert_refused(lambda: wbc.robots.load(file), RobotFileError, "PhysicsDistanceJoint")
+    file.write_text(head.format(more=', "PhysicsMassAPI", "PhysxRigidBodyAPI"', mass=given))
+    robot = wbc.robots.load(file)
+    assert robot.base == "floating"
+    assert "not represented: PhysxRigidBodyAPI of a" in caplog.text

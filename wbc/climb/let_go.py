@@ -1,0 +1,96 @@
+"""Limbs that hold no more but are still where they held are lifted off first, so that the rest can be planned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wbc.clearance import bodies_of
+from wbc.climb.clear import Clearances
+from wbc.climb.climber import Climber
+from wbc.climb.motion import MotionOptions, MoveError, carry_out
+from wbc.climb.plan import ContactPlan
+from wbc.climb.reach import LimbReach
+from wbc.climb.scene import ClimbScene, Foothold, reaches
+from wbc.climb.stance import FREE_LIMB, Stance, StancePath
+from wbc.climb.surfaces import frame_on
+from wbc.multibody import pin
+from wbc.symbolic.joint_steps import place
+
+#: How far such a limb is lifted, as shares of the shortest limb's reach, the first that can be
+LIFTS = (0.08, 0.04, 0.12, 0.02)
+
+
+def let_go(
+    climber: Climber, scene: ClimbScene, start: Stance, options: MotionOptions
+) -> tuple[ContactPlan | None, Stance]:
+    """The motion on which limbs in the air that touch a body leave it along its normal, and where the robot is then.
+
+    Returns:
+        None and the start, where no limb in the air touches, or none can be lifted.
+    """
+    clearances, contacts = Clearances(climber, scene, options.clearance), list(start.contacts)
+    footholds: list[Foothold] = []
+    near = clearances.standing(contacts, start.q) if FREE_LIMB in contacts else None
+    left, held = scene, len(scene.footholds)
+    while near is not None:
+        limb = next((k for k, at in enumerate(start.contacts) if at == FREE_LIMB and contacts[k] == FREE_LIMB
+                     and {near.first, near.second} & _links(climber, k)), None)  # fmt: skip
+        body = next((name for name in (near.first, near.second) if name in scene.bodies), None)
+        if limb is None or body is None:
+            return None, start
+        contacts[limb] = held + len(footholds)
+        footholds.append(Foothold(f"left by {climber.limbs[limb].name}", _frame(climber, scene, start, limb), body))
+        left = replace(scene, footholds=[*scene.footholds, *footholds])
+        near = Clearances(climber, left, options.clearance).standing(contacts, start.q)
+    if not footholds:
+        return None, start
+    freed = [limb for limb, at in enumerate(contacts) if at >= held]
+    reach, first = LimbReach(climber), Stance(tuple(contacts), start.q)
+    for share in LIFTS:
+        q, solved = np.array(start.q), True
+        for limb in freed:
+            normal = left.normals[contacts[limb]]
+            pose = climber.contact_pose(start.q, limb)
+            pose = pin.SE3(pose.rotation, pose.translation + share * float(reaches(climber).min()) * normal)
+            wanted = place(climber.body_pose(q).actInv(pose))[None]
+            angles, some = reach.postures(limb, wanted, climber.angles(q, limb)[None])
+            solved = solved and bool(some[0, 0])
+            q = climber.with_limb(q, limb, angles[0, 0])
+        raised = Stance(start.contacts, q)
+        if not solved or clearances.standing(raised.contacts, q) is not None:
+            continue
+        try:
+            plan = carry_out(climber, left, StancePath((first, raised), np.zeros(1)), options)
+        except MoveError:
+            continue
+        return replace(plan, scene=scene, start=start.contacts, moves=[]), raised
+    return None, start
+
+
+def joined(first: ContactPlan, then: ContactPlan) -> ContactPlan:
+    """One plan after the other, which begins at rest where the first ends; the first has no moves."""
+    last = float(first.times[-1])
+    moves = [replace(move, lift=move.lift + last, land=move.land + last) for move in then.moves]
+    parts = [
+        np.concatenate([a, b[1:]]) for a, b in ((first.times, then.times + last), (first.q, then.q), (first.v, then.v))
+    ]
+    return replace(then, moves=moves, times=parts[0], q=parts[1], v=parts[2])
+
+
+def _links(climber: Climber, limb: int) -> set[str]:
+    """Names of the links that a limb's last joint moves, and of their pieces."""
+    model = climber.robot.model
+    last = climber.chains[limb][-1]
+    on = {link for link in climber.robot.shapes if int(model.frames[model.getFrameId(link)].parentJoint) == last}
+    return on | {body.name for body in bodies_of(climber.robot) if body.link in on}
+
+
+def _frame(climber: Climber, scene: ClimbScene, start: Stance, limb: int) -> pin.SE3:
+    """Where a limb is, with its contact's axis, or that of the nearest foothold where the contact has none."""
+    pose = climber.contact_pose(start.q, limb)
+    if climber.fixed(limb) != "position":
+        return pose
+    nearest = int(np.linalg.norm(scene.positions - pose.translation, axis=1).argmin())
+    return frame_on(pose.translation, scene.normals[nearest])

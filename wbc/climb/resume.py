@@ -1,0 +1,56 @@
+"""Where a robot stood at an instant of a climb's log, from which a climb can go on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbc import validation
+from wbc.climb.climber import Climber
+from wbc.climb.closure import CLOSED, Closure
+from wbc.climb.loop.records import scene_digest
+from wbc.climb.scene import ClimbScene
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.world import held_pose
+from wbc.errors import InfeasibleError, RangeError, ShapeError
+from wbc.log import Log
+from wbc.multibody import pin
+
+#: How far a configuration of a log may be from the stance that it is taken for [m, rad]: limbs under torques close
+#: up to 3 mm beside their footholds
+NEAR_STANCE = 0.02
+
+
+def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = None) -> Stance:
+    """The stance at an instant: closed limbs at their footholds, limbs in the air free, contacts closed exactly.
+
+    Args:
+        at: time [s]; None: the last one.
+
+    Raises:
+        ShapeError: the log is of another robot or scene, or of no climb. RangeError: a time that is not in the log.
+        InfeasibleError: limbs that were closed then cannot be at their footholds.
+    """
+    validation.instance("log", log, Log, "a Log")
+    for field, own in (("robot_digest", climber.robot.fingerprint), ("scene_digest", scene_digest(scene))):
+        if log.meta.get(field) != own:
+            was = log.meta.get(field.removesuffix("_digest"))
+            raise ShapeError("log", was, f"its {field.removesuffix('_digest')} is another one than was given")
+    t = log["t"]
+    when = float(t[-1]) if at is None else validation.scalar("at", at, unit="s")
+    if not t[0] <= when <= t[-1]:
+        raise RangeError("at", when, f"the log is from {t[0]:g} to {t[-1]:g} s")
+    row = int(np.searchsorted(t, when + 1e-9, side="right")) - 1
+    q, contacts = log.array("q")[row], tuple(int(k) for k in log.array("contact")[row])
+    q = climber.robot.configuration(
+        "log.q", q / np.r_[np.ones(3), np.full(4, np.linalg.norm(q[3:7])), np.ones(len(q) - 7)]
+    )
+    held = {limb: held_pose(climber, scene, limb, hold, q) for limb, hold in enumerate(contacts) if hold != FREE_LIMB}
+    if not held:
+        raise InfeasibleError("at", when, "no limb held anything then")
+    closed, left = Closure(climber).closed(q, held)
+    moved = float(np.abs(pin.difference(climber.robot.model, q, closed)).max())
+    if left > 1e3 * CLOSED or moved > NEAR_STANCE:
+        raise InfeasibleError(
+            "at", when, f"limbs that held then are {max(left, moved):.3g} m or rad off their footholds"
+        )
+    return Stance(contacts, closed)

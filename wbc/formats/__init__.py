@@ -1,0 +1,16 @@
+"""Runs in the formats of other tools, and motions from these (floor 13). See docs/logs.md."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.formats.conversion import FORMATS as FORMATS, RunCopy as RunCopy, convert as convert, follow as follow
+    from wbc.formats.errors import FormatError as FormatError
+    from wbc.formats.motion import RecordedMotion as RecordedMotion, read_motion as read_motion
+    from wbc.formats.played import PlayedPlant as PlayedPlant, answered as answered
+    from wbc.formats.ros2_plant import Ros2Plant as Ros2Plant
+else:
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

@@ -1,0 +1,85 @@
+"""Runs over a WebSocket, as Foxglove connects to."""
+
+from __future__ import annotations
+
+import pathlib
+import time
+from typing import Any
+
+from wbc import extras
+from wbc.formats.errors import FormatError
+from wbc.formats.messages import SCHEMAS, TICK, Message, TickTree, of_scene, of_seen, of_ticks
+from wbc.formats.run import Run, SeenTick
+from wbc.log import Log
+
+#: Port that Foxglove proposes
+PORT = 8765
+
+
+class FoxgloveSink:
+    """A server on this machine, which plays a run at the speed at which it was, or as it is written.
+
+    Args:
+        path: ``HOST:PORT``, or nothing for 127.0.0.1 and port 8765.
+
+    Raises:
+        MissingPackageError: foxglove-sdk is not installed. FormatError: the address cannot be served on.
+    """
+
+    def __init__(self, path: pathlib.Path | None = None) -> None:
+        extras.require("foxglove", "a connection for Foxglove")
+        import foxglove
+
+        host, _, port = str(path or "").rpartition(":")
+        self._foxglove, self._channels, self._bodies = foxglove, dict[str, Any](), list[Message]()
+        self._context = foxglove.Context()
+        self._began: float | None = None
+
+        class LateListener(foxglove.websocket.ServerListener):  # type: ignore[misc]  # without the package it is Any
+            """Who comes later is given what was said once."""
+
+            def on_subscribe(listener, client: Any, channel: Any) -> None:
+                for message in self._bodies:
+                    if message.topic == channel.topic:
+                        self._put(message)
+
+        try:
+            self._server = foxglove.start_server(
+                name="wbc",
+                host=host or "127.0.0.1",
+                port=int(port) if port.isdigit() else PORT,
+                server_listener=LateListener(),
+                context=self._context,
+            )
+        except (RuntimeError, OSError) as error:
+            raise FormatError("address", str(path), f"cannot be served on: {error}") from error
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self._server.port)
+
+    def begin(self, run: Run) -> None:
+        """Announce the topics."""
+        self._tree = TickTree(run.units)
+        for topic, schema in {TICK: self._tree.schema, **SCHEMAS}.items():
+            self._channels[topic] = self._foxglove.Channel(topic, schema=schema, context=self._context)
+        self._bodies = list(of_scene(run))
+        for message in self._bodies:
+            self._put(message)
+
+    def write(self, log: Log, seen: list[SeenTick]) -> None:
+        """Say each tick when its time has come."""
+        messages = [*of_ticks(log, self._tree), *(message for moment in seen for message in of_seen(moment))]
+        for message in sorted(messages, key=lambda message: message.time):
+            if self._began is None:
+                self._began = time.monotonic() - message.time * 1e-9
+            time.sleep(max(0.0, self._began + message.time * 1e-9 - time.monotonic()))
+            self._put(message)
+
+    def _put(self, message: Message) -> None:
+        self._channels[message.topic].log(message.data, log_time=message.time)
+
+    def close(self) -> None:
+        """End the server."""
+        self._server.stop()

@@ -1,0 +1,285 @@
+"""A run as messages in JSON with Foxglove's schemas, for files and connections alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wbc.formats.run import Run, SeenTick
+from wbc.log import Log
+from wbc.tick.outcome import STATUSES
+from wbc.validation import Array
+from wbc.viewer.bodies import DrawnMesh
+
+#: Nanoseconds of a second
+NANO = 1_000_000_000
+#: Frame that all others are placed in
+WORLD = "world"
+#: Length of the axes that mark a target [m]
+AXIS = 0.1
+#: Members of a group that keep their names in each tick, at most
+NAMED = 3
+#: Level of foxglove.Log: rows gave way
+WARNING = 3
+#: Level of foxglove.Log: all rows hold
+INFO = 2
+
+_NUMBER: dict[str, Any] = {"type": "number"}
+_TEXT: dict[str, Any] = {"type": "string"}
+_INTEGER: dict[str, Any] = {"type": "integer"}
+
+
+def _object(title: str = "", **properties: Any) -> dict[str, Any]:
+    return {"type": "object", "properties": properties} | ({"title": title} if title else {})
+
+
+def _many(items: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+_TIME = _object(sec=_INTEGER, nsec=_INTEGER)
+_POINT = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE = _object(position=_POINT, orientation=_TURN)
+_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_TRIANGLES = _object(pose=_POSE, points=_many(_POINT), color=_COLOUR, indices=_many(_INTEGER))
+_ARROW = _object(
+    pose=_POSE, shaft_length=_NUMBER, shaft_diameter=_NUMBER, head_length=_NUMBER, head_diameter=_NUMBER, color=_COLOUR
+)
+_ENTITY = _object(
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    id=_TEXT,
+    lifetime=_TIME,
+    frame_locked={"type": "boolean"},
+    arrows=_many(_ARROW),
+    triangles=_many(_TRIANGLES),
+)
+#: Topic -> schema of its messages, all but that of ticks, which each run has of its own
+SCHEMAS = {
+    "/joint_states": _object(
+        "foxglove.JointStates",
+        timestamp=_TIME,
+        joints=_many(_object(name=_TEXT, position=_NUMBER, velocity=_NUMBER, acceleration=_NUMBER)),
+    ),
+    "/tf": _object(
+        "foxglove.FrameTransforms",
+        transforms=_many(
+            _object(timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_POINT, rotation=_TURN)
+        ),
+    ),
+    "/scene": _object("foxglove.SceneUpdate", deletions=_many(_object(id=_TEXT)), entities=_many(_ENTITY)),
+    "/why": _object("foxglove.Log", timestamp=_TIME, level=_INTEGER, message=_TEXT, name=_TEXT),
+}
+#: Group of columns -> field of a joint's state
+JOINT_PARTS = {"q": "position", "v": "velocity", "a": "acceleration"}
+#: Topic of ticks
+TICK = "/tick"
+#: Name of their schema
+TICK_SCHEMA = "wbc.Tick"
+
+
+class Message(NamedTuple):
+    """Something that is said on a topic.
+
+    Attributes:
+        topic: where. time: since the run began [ns]. data: plain data.
+    """
+
+    topic: str
+    time: int
+    data: dict[str, Any]
+
+
+class TickTree:
+    """A run's columns ``group.member`` as nested objects, but those of ``/joint_states``.
+
+    Where more than :data:`NAMED` members stand alone beside each other they are an array, as names would take a third
+    of a file: the schema says which is which.
+
+    Attributes:
+        names: columns in the order of the numbers of a tick. schema: of its messages.
+    """
+
+    def __init__(self, units: Mapping[str, str]) -> None:
+        nodes: dict[str, Any] = {}
+        joints = set(_single(units))
+        for name in units:
+            group, _, member = name.partition(".")
+            if member in joints and group in JOINT_PARTS:
+                continue
+            node, *path = nodes, *name.split(".")
+            for part in path[:-1]:
+                below = node.get(part)
+                # A column may be called as what others begin with
+                node[part] = node = below if isinstance(below, dict) else {} if below is None else {"": below}
+            node[path[-1]] = {**node[path[-1]], "": name} if isinstance(node.get(path[-1]), dict) else name
+        self.names: list[str] = []
+        self._units, self._make = units, list[tuple[str, Any]]()
+        self.schema = _object(TICK_SCHEMA, status=_TEXT)
+        for key, node in nodes.items():
+            self.schema["properties"][key], shape = self._laid_out(node)
+            self._make.append((key, shape))
+
+    def _laid_out(self, node: Any) -> tuple[dict[str, Any], Any]:
+        """(schema, shape) of a node; a shape is a place, a slice, or shapes by key."""
+        if isinstance(node, str):
+            self.names.append(node)
+            unit = self._units[node]
+            return _NUMBER | ({"description": f"[{unit}]"} if unit else {}), len(self.names) - 1
+        if len(node) > NAMED and all(isinstance(child, str) for child in node.values()):
+            begin = len(self.names)
+            self.names += node.values()
+            said = [f"{key} [{self._units[name]}]" if self._units[name] else key for key, name in node.items()]
+            return _many(_NUMBER) | {"description": ", ".join(said)}, slice(begin, len(self.names))
+        found = {key: self._laid_out(child) for key, child in node.items()}
+        schemas = {key: schema for key, (schema, _) in found.items()}
+        return _object("", **schemas), {key: shape for key, (_, shape) in found.items()}
+
+    def tick(self, numbers: list[float]) -> dict[str, Any]:
+        """The message of a tick, from its numbers in the order of :attr:`names`."""
+        return {key: _filled(shape, numbers) for key, shape in self._make}
+
+
+def _filled(shape: Any, numbers: list[float]) -> Any:
+    if isinstance(shape, dict):
+        return {key: _filled(below, numbers) for key, below in shape.items()}
+    return numbers[shape]
+
+
+def of_ticks(log: Log, tree: TickTree) -> Iterator[Message]:
+    """Two messages for each tick: all its numbers, and its joints. What is not finite is null."""
+    rows = np.column_stack([log[name] for name in tree.names]).tolist()
+    joints, parts = _joints(log)
+    motions = [(part, log.array(group).tolist(), places) for part, group, places in parts]
+    turning = _unbounded(log.units)
+    angles = np.array([np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]) for name in turning]).T.tolist()
+    codes = log["flag"].tolist() if "flag" in log else None
+    for k, time in enumerate(nanoseconds(log["t"])):
+        tick = tree.tick(rows[k])
+        if codes is not None:
+            tick["status"] = str(STATUSES[codes[k]])
+        yield Message(TICK, time, tick)
+        if joints or turning:
+            states: list[dict[str, Any]] = [{"name": name} for name in joints]
+            for part, numbers, places in motions:
+                row = numbers[k]
+                for state, place in zip(states, places, strict=True):
+                    if place is not None:
+                        state[part] = row[place]
+            for j, name in enumerate(turning):
+                states.append({"name": name, "position": angles[k][j]})
+                if f"v.{name}" in log:
+                    states[-1]["velocity"] = float(log[f"v.{name}"][k])
+            yield Message("/joint_states", time, {"timestamp": stamp(time), "joints": states})
+
+
+def _single(units: Mapping[str, str]) -> list[str]:
+    """Joints with one coordinate."""
+    return [name[2:] for name, unit in units.items() if name.startswith("q.") and unit in ("rad", "m")]
+
+
+def _unbounded(units: Mapping[str, str]) -> list[str]:
+    """Joints whose two coordinates are the cosine and sine of an angle."""
+    pairs = [name[2:-2] for name in units if name.startswith("q.") and name.endswith(".1")]
+    return [name for name in pairs if f"q.{name}.0" in units and f"q.{name}.2" not in units]
+
+
+def _joints(log: Log) -> tuple[list[str], list[tuple[str, str, list[int | None]]]]:
+    """(joints with one coordinate, (field of a joint's state, group of columns, its places in it) of each)."""
+    joints, parts = _single(log.units), []
+    for group, part in JOINT_PARTS.items():
+        names = [*log.group(group)]
+        places = [names.index(name) if name in names else None for name in joints]
+        if any(place is not None for place in places):
+            parts.append((part, group, places))
+    return joints, parts
+
+
+def of_scene(run: Run, time: int = 0) -> Iterator[Message]:
+    """What stays as it is, once: bodies of links and obstacles in their frames, and the axes of targets."""
+    entities = [_body(link, mesh, time) for link, mesh in run.meshes.items()]
+    entities += [_body(f"obstacle/{name}", mesh, time) for name, mesh in run.obstacles.items()]
+    if entities:
+        yield Message("/scene", time, {"deletions": [], "entities": entities})
+
+
+def of_seen(seen: SeenTick) -> Iterator[Message]:
+    """The messages of what is seen of a tick."""
+    time = int(nanoseconds(np.array([seen.t]))[0])
+    placed = {**seen.frames}
+    placed |= {f"target/{name}": pose for name, pose in seen.targets.items()}
+    placed |= {f"obstacle/{name}": pose for name, pose in seen.obstacles.items()}
+    if placed:
+        transforms = [
+            {
+                "timestamp": stamp(time),
+                "parent_frame_id": WORLD,
+                "child_frame_id": name,
+                "translation": _named(pose[:3]),
+                "rotation": _named(pose[3:]),
+            }
+            for name, pose in placed.items()
+            if name != WORLD
+        ]
+        yield Message("/tf", time, {"transforms": transforms})
+    if seen.targets:
+        arrows = [_target(name, time) for name in seen.targets]
+        yield Message("/scene", time, {"deletions": [], "entities": arrows})
+    if seen.why:
+        level = INFO if seen.status == "solved" else WARNING
+        rows = f"binding: {', '.join(seen.binding)}" if seen.binding else "nothing binds"
+        said = {"timestamp": stamp(time), "level": level, "message": f"{seen.why} ({rows})", "name": seen.status}
+        yield Message("/why", time, said)
+
+
+def nanoseconds(seconds: Array) -> list[int]:
+    """Times [s] in nanoseconds."""
+    out: list[int] = np.round(seconds * NANO).astype(np.int64).tolist()
+    return out
+
+
+def stamp(time: int) -> dict[str, int]:
+    """A time in nanoseconds as messages have it."""
+    return {"sec": time // NANO, "nsec": time % NANO}
+
+
+def _named(numbers: Array) -> dict[str, float]:
+    return dict(zip("xyzw", numbers.tolist(), strict=False))
+
+
+def _body(frame: str, mesh: DrawnMesh, time: int) -> dict[str, Any]:
+    r, g, b = (part / 255.0 for part in mesh.colour)
+    surface = {
+        "pose": {"position": _named(np.zeros(3)), "orientation": _named(np.array([0.0, 0.0, 0.0, 1.0]))},
+        "points": [_named(point) for point in mesh.corners.round(5).astype(float)],
+        "color": {"r": r, "g": g, "b": b, "a": 1.0},
+        "indices": mesh.triangles.ravel().tolist(),
+    }
+    return _entity(frame, f"body/{frame}", time) | {"triangles": [surface]}
+
+
+def _target(name: str, time: int) -> dict[str, Any]:
+    """The three axes of a target."""
+    half, arrows = float(np.sqrt(0.5)), []
+    # Arrows point along x
+    turns = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, half, half), (0.0, -half, 0.0, half))
+    for k, turn in enumerate(turns):
+        arrows.append(
+            {
+                "pose": {"position": _named(np.zeros(3)), "orientation": _named(np.array(turn))},
+                "shaft_length": 0.8 * AXIS,
+                "shaft_diameter": 0.05 * AXIS,
+                "head_length": 0.2 * AXIS,
+                "head_diameter": 0.1 * AXIS,
+                "color": {"r": float(k == 0), "g": float(k == 1), "b": float(k == 2), "a": 1.0},
+            }
+        )
+    return _entity(f"target/{name}", f"target/{name}", time) | {"arrows": arrows}
+
+
+def _entity(frame: str, name: str, time: int) -> dict[str, Any]:
+    still = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True}
+    return {"timestamp": stamp(time), "frame_id": frame, "id": name} | still

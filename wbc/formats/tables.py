@@ -1,0 +1,52 @@
+"""Runs as tables: text, and arrays of numpy."""
+
+from __future__ import annotations
+
+import csv
+import pathlib
+
+import numpy as np
+
+from wbc.formats.run import Run, SeenTick
+from wbc.log import Log, save
+
+
+class CsvSink:
+    """A row a tick; the head has the units."""
+
+    def __init__(self, path: pathlib.Path) -> None:
+        self._file = path.open("x", newline="", encoding="utf-8")
+        self._writer = csv.writer(self._file)
+
+    def begin(self, run: Run) -> None:
+        """The head."""
+        self._writer.writerow(f"{name} [{unit}]" if unit else name for name, unit in run.units.items())
+
+    def write(self, log: Log, seen: list[SeenTick]) -> None:
+        """Rows."""
+        self._writer.writerows(zip(*(values.tolist() for values in log.columns.values()), strict=True))
+
+    def close(self) -> None:
+        """Nothing more comes."""
+        self._file.close()
+
+
+class NpzSink:
+    """A log for :func:`wbc.log.load` and ``numpy.load``, with the same names in every run."""
+
+    def __init__(self, path: pathlib.Path) -> None:
+        self._path, self._logs = path, list[Log]()
+
+    def begin(self, run: Run) -> None:
+        """What is said of the run."""
+        self._units, self._about = run.units, run.about
+
+    def write(self, log: Log, seen: list[SeenTick]) -> None:
+        """Keep them: the file is written as a whole."""
+        self._logs.append(log)
+
+    def close(self) -> None:
+        """Write the file."""
+        columns = {name: np.concatenate([log[name] for log in self._logs] or [np.zeros(0)]) for name in self._units}
+        tables = self._logs[-1].tables if self._logs else {}
+        save(Log(columns, self._units, self._about, tables), self._path.parent, "npz", self._path.stem)

@@ -1,0 +1,79 @@
+"""Actions of a policy as values of a stack, under Gymnasium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wbc import extras, validation
+from wbc.batch.batch import Batch
+from wbc.errors import RangeError
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    import gymnasium
+
+
+def stack_actions(
+    env: gymnasium.vector.VectorEnv[Any, Any, Any],
+    batch: Batch,
+    space: gymnasium.Space[Any],
+    aim: Callable[[Batch, Array, Array], None],
+    configuration: Callable[[Any], Array],
+    velocity: Callable[[Any], Array] | None = None,
+) -> gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]:
+    """Environments whose actions are what a stack is told: it turns them into commands that keep its constraints.
+
+        env = wbc.learning.stack_actions(env, controller.batch(64), Box(-0.1, 0.1, (3,)), aim, lambda seen: seen[:, :7])
+
+    Args:
+        env: n environments whose actions are velocities of the joints [n, nv].
+        batch: of n robots. space: of the actions of one environment, as a policy sees it.
+        aim: ``(batch, actions, q)``: sets values of the batch.
+        configuration: of observations: q [n, nq]. velocity: measured velocities [n, nv]; give it where the stack limits
+            accelerations, as an environment that begins anew knows nothing of the last command.
+
+    The ``info`` of a step has ``solved`` [n] and ``command`` [n, nv].
+
+    Raises:
+        MissingPackageError: gymnasium is not installed. RangeError: another number of robots, or of actions, than
+            the environments have. ShapeError: no batch. Those of :meth:`wbc.batch.Batch.step`.
+    """
+    extras.require("gymnasium", "actions under Gymnasium")
+    import gymnasium
+
+    validation.instance("batch", batch, Batch, "a wbc Batch")
+    if env.num_envs != batch.count:
+        raise RangeError("batch", batch.count, f"expected as many robots as environments, {env.num_envs}")
+
+    class StackActions(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
+        def __init__(self) -> None:
+            super().__init__(env)
+            self.single_action_space = space
+            self.action_space = gymnasium.vector.utils.batch_space(space, env.num_envs)
+            self._seen: Any = None
+
+        def reset(
+            self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        ) -> tuple[Any, dict[str, Any]]:
+            self._seen, info = self.env.reset(seed=seed, options=options)
+            batch.reset(np.asarray(configuration(self._seen), dtype=np.float64))
+            return self._seen, info
+
+        def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+            if self._seen is None:
+                raise RangeError("step", None, "the environments have no state yet: call reset first")
+            numbers = np.asarray(actions, dtype=np.float64)
+            if len(numbers) != batch.count:
+                raise RangeError("actions", len(numbers), f"expected one for each of {batch.count} environments")
+            q = np.asarray(configuration(self._seen), dtype=np.float64)
+            aim(batch, numbers, q)
+            measured = None if velocity is None else np.asarray(velocity(self._seen), dtype=np.float64)
+            step = batch.step(q, measured)
+            kind = self.env.single_action_space.dtype
+            self._seen, reward, ended, cut, info = self.env.step(step.v.astype(kind))
+            return self._seen, reward, ended, cut, info | {"solved": step.solved, "command": step.v}
+
+    return StackActions()

@@ -1,0 +1,136 @@
+"""A planned law, carried out tick by tick: it brakes where an obstacle comes into its path, and plans anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import InfeasibleError
+from wbc.plan.path import PlannedPath, motion_of
+from wbc.plan.planner import MotionPlanner, PlanningOptions
+from wbc.trajectory import PolynomialPath, time_optimal
+from wbc.validation import Array
+
+#: Shares of what is left of a path on which braking is tried, the shortest first
+BRAKING = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedState:
+    """Where a follower is.
+
+    Attributes:
+        q: configuration [nq]. v: its velocity [nv].
+        braking: it comes to rest, since an obstacle has moved into the path. arrived: at the goal, at rest.
+    """
+
+    q: Array
+    v: Array
+    braking: bool
+    arrived: bool
+
+
+class PathFollower:
+    """Follows a law of a planned path.
+
+        follower = PathFollower(planner, planner.plan(q, goal), goal)
+        while not (state := follower.advance(dt)).arrived:
+            posture.set(target=state.q, feedforward=state.v)
+            q = robot.integrate(q, controller.step(q).v, dt)
+
+    After run-time values of the planner have changed, as the pose of an obstacle, :meth:`check` proves what is left of
+    the path again.
+
+    Args:
+        goal: of the path, for plans from elsewhere; options: of these.
+
+    Raises:
+        as :meth:`PlannedPath.law`.
+    """
+
+    def __init__(
+        self, planner: MotionPlanner, path: PlannedPath, goal: Any, options: PlanningOptions | None = None
+    ) -> None:
+        self._planner, self._goal = validation.instance("planner", planner, MotionPlanner, "a MotionPlanner"), goal
+        self._options = options
+        self._take(validation.instance("path", path, PlannedPath, "a PlannedPath"))
+
+    def _take(self, path: PlannedPath) -> None:
+        self.path, self.law, self.time, self.braking = path, path.law(), 0.0, False
+
+    def advance(self, dt: float) -> FollowedState:
+        """The state ``dt`` later [s]. At rest after braking it plans anew.
+
+        Raises:
+            RangeError: dt is no positive number. InfeasibleError, NoPathError: there is no path from where it rests.
+        """
+        self.time += validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
+        if self.braking and self.time >= self.law.duration:
+            self._take(self._planner.plan(self.state().q, self._goal, self._options))
+        return self.state()
+
+    def state(self) -> FollowedState:
+        """The present one."""
+        q, v = self.path.configurations(self.law, min(self.time, self.law.duration))
+        return FollowedState(q, v, self.braking, not self.braking and self.time >= self.law.duration)
+
+    def check(self) -> bool:
+        """Whether what is left of the path is clear of the obstacles as they are now; else it brakes on its path.
+
+        Raises:
+            InfeasibleError: no braking ends before the obstacle; it brakes as hard as it may.
+        """
+        scene = self._planner.scene()
+        left = self._left(1.0)
+        if self.braking or left is None or scene.violation(motion_of(self.path.coordinates, left)) is None:
+            return True
+        fast, brisk = self.path.motion_limits()
+        speed, hit = self._speed(), None
+        for share in BRAKING:
+            part = self._left(share)
+            assert part is not None
+            try:
+                law = time_optimal(part, fast, brisk, start_speed=speed)
+            except InfeasibleError:
+                continue
+            self.law, self.time, self.braking = law, 0.0, True
+            hit = scene.violation(motion_of(self.path.coordinates, part))
+            break
+        if hit is not None:
+            raise InfeasibleError("path", hit.distance, f"it cannot come to rest before {hit}")
+        return False
+
+    def _left(self, share: float) -> PolynomialPath | None:
+        """The beginning of what is left of the path; None where nothing is."""
+        path = self.law.path
+        assert isinstance(path, PolynomialPath)
+        here, end = self._place(), float(path.knots[-1])
+        until = here + share * (end - here)
+        if until - here < 1e-9:
+            return None
+        inner = path.knots[(path.knots > here + 1e-12) & (path.knots < until - 1e-12)]
+        knots = np.concatenate([[here], inner, [until]])
+        pieces = np.clip(np.searchsorted(path.knots, knots[:-1], side="right") - 1, 0, len(path.knots) - 2)
+        degree = int(path.degree or 0)
+        rows = []
+        for order in range(degree, -1, -1):
+            scale = float(np.prod(np.arange(1, order + 1)))
+            rows.append(
+                path.evaluate(knots[:-1], order, pieces) / scale
+                if order <= 3
+                else path.coefficients[degree - order, pieces]
+            )
+        return PolynomialPath(knots, np.array(rows))
+
+    def _place(self) -> float:
+        return self._timing(0)
+
+    def _speed(self) -> float:
+        return self._timing(1)
+
+    def _timing(self, order: int) -> float:
+        """Place on the path, or its rate."""
+        return float(self.law.timing.evaluate(np.array([min(self.time, self.law.duration)]), order)[0])

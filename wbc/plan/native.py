@@ -1,0 +1,254 @@
+"""The planner in C: trees, projections and shorter paths, a call for some samples at a time."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from wbc.clearance.native import SOURCES as SWEEP, NativeSweep
+from wbc.errors import RangeError
+from wbc.geometry.kernel import HEADERS, checked
+from wbc.native.kernel import kernel
+from wbc.native.library import load_library
+from wbc.plan.rows import PlanningRows
+from wbc.plan.scene import OPEN, PlanningScene
+from wbc.validation import Array
+
+_SOURCES = Path(__file__).parent / "native"
+#: Nodes of a tree at most
+NODES = 200_000
+#: Points of a path at most
+POINTS = 20_000
+#: What :meth:`NativePlanner.grow` ends with when the trees are full
+FULL = -1
+#: Numbers of a ``drift_t`` of ``native/plan.h``
+_DRIFT = 9
+
+
+class _KeptRows(ctypes.Structure):
+    """``kept_rows_t`` of ``native/plan.h``."""
+
+    _fields_ = [
+        ("function", ctypes.c_void_p),
+        ("equalities", ctypes.c_int),
+        ("margins", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("p", "value", "slope", "w", "iw")),
+    ]
+
+
+class _PlanStruct(ctypes.Structure):
+    """``plan_t`` of ``native/plan.h``."""
+
+    _fields_ = [
+        *((name, ctypes.c_void_p) for name in ("sweep", "drifts", "drifted", "balls", "normals")),
+        *((name, ctypes.c_double) for name in ("half", "open")),
+        *((n, ctypes.c_void_p) for n in ("control", "rate", "low", "high", "sample_low", "sample_high", "weight")),
+        *((name, ctypes.c_int) for name in ("n", "pairs", "capacity", "seeds")),
+        ("count", ctypes.c_int * 2),
+        *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "longest")),
+        ("random", ctypes.c_ulonglong),
+        ("path", _KeptRows),
+        ("goal", _KeptRows),
+        ("node", ctypes.c_void_p * 2),
+        ("parent", ctypes.c_void_p * 2),
+        ("work", ctypes.c_void_p),
+        ("meet", ctypes.c_int * 2),
+        *((name, ctypes.c_int) for name in ("edges", "projections", "measured")),
+    ]
+
+
+@functools.cache
+def library() -> ctypes.PyDLL:
+    """The compiled code.
+
+    Raises:
+        CompileError: as of :func:`wbc.geometry.kernel.library`.
+    """
+    found = checked(load_library(kernel(_SOURCES / "plan.c", SWEEP, HEADERS)), wbc_plan_size=_PlanStruct)
+    place, number = ctypes.c_void_p, ctypes.c_int
+    kinds: dict[str, Sequence[object]] = {
+        "free": (place,), "margin": (place,), "edge": (place, place), "project": (place,), "broken": (place,),
+        "reach": (place,), "draw": (place,), "root": (number, place), "grow": (number,), "path": (place, number),
+        "shorten": (place, number, number, number, number, place, number), "length": (place, number),
+    }  # fmt: skip
+    for name, arguments in kinds.items():
+        getattr(found, f"wbc_plan_{name}").argtypes = [place, *arguments]
+    for name in ("broken", "length", "margin"):
+        getattr(found, f"wbc_plan_{name}").restype = ctypes.c_double
+    return found
+
+
+class NativePlanner:
+    """A scene, its rows and two trees in memory.
+
+    Attributes:
+        scene: whose pairs are kept apart. low, high: limits of x. sample_low, sample_high: where samples are drawn.
+    """
+
+    def __init__(
+        self,
+        scene: PlanningScene,
+        rows: PlanningRows,
+        p: Array,
+        limits: tuple[Array, Array],
+    ) -> None:
+        coordinates = scene.coordinates
+        n = coordinates.count
+        self.scene, self._call, self._rows = scene, library(), {"path": rows}
+        self.low, self.high = (np.ascontiguousarray(side) for side in limits)
+        self.sample_low, self.sample_high = self.low.copy(), self.high.copy()
+        self._p, self._weight = p, coordinates.scale**-2.0
+        self._struct = it = _PlanStruct(n=n, capacity=NODES, range=1.0, step=0.1, tolerance=1e-8, drift=1e-3)
+        self._nodes = [np.empty((NODES, n)) for _ in range(2)]
+        self._parents = [np.empty(NODES, dtype=np.int32) for _ in range(2)]
+        self._points, self._others = np.empty((POINTS, n)), np.empty((POINTS, n))
+        for name in ("low", "high", "sample_low", "sample_high", "weight"):
+            setattr(it, name, getattr(self, f"_{name}" if name == "weight" else name).ctypes.data)
+        for k in range(2):
+            it.node[k], it.parent[k] = self._nodes[k].ctypes.data, self._parents[k].ctypes.data
+        self._kept: dict[str, list[Array]] = {}
+        self._compiled: dict[PlanningRows, tuple[int, int, int]] = {}
+        self.use("path", rows)
+        self.use("goal", rows)
+        swept = scene.swept()
+        self._required = swept.required.copy()
+        self._sweep = sweep = NativeSweep(swept)
+        sweep.hold_still(n)
+        it.sweep, it.pairs = sweep.address, len(scene.pairs)
+        it.control, it.rate = sweep.ends
+        bodies, pairs = len(scene.bodies), len(scene.pairs)
+        depth = max([1, *(len(chain) for chain in swept.chain)])
+        self._drifts, self._drifted = np.zeros((bodies, depth + 1, _DRIFT)), np.zeros(bodies, dtype=np.int32)
+        self._balls, self._normals = np.zeros((bodies, 4)), np.zeros((pairs, 3))
+        for name in ("drifts", "drifted", "balls", "normals"):
+            setattr(it, name, getattr(self, f"_{name}").ctypes.data)
+        self.at = ctypes.c_void_p(ctypes.addressof(it))
+        self.pad(0.0)
+
+    def prepare(self, rows: PlanningRows) -> tuple[int, int, int]:
+        """Compile rows that were not compiled before: see :meth:`PlanningRows.compiled`."""
+        if rows not in self._compiled:
+            self._compiled[rows] = rows.compiled()
+        return self._compiled[rows]
+
+    def use(self, name: str, rows: PlanningRows) -> None:
+        """Other rows of the goal, or of the path."""
+        address, integers, reals = self.prepare(rows)
+        n = self.scene.coordinates.count
+        arrays = [np.zeros(max(1, rows.count)), np.zeros(max(1, rows.count * n)), np.zeros(max(1, reals))]
+        arrays.append(np.zeros(max(1, integers), dtype=np.int64))
+        self._kept[name], self._rows[name] = arrays, rows
+        pointers = [self._p.ctypes.data, *(array.ctypes.data for array in arrays)]
+        setattr(self._struct, name, _KeptRows(address, rows.equalities, rows.margins, *pointers))
+        m = max(r.count for r in self._rows.values())
+        self._work = np.zeros(m * n + m * m + 2 * m + 2 * n + 8)
+        self._struct.work = self._work.ctypes.data
+
+    def pad(self, pad: float) -> None:
+        """Distances are kept longer by ``pad`` [m], which spares looking closely at what is nearly too near."""
+        self._sweep.require(self._required + pad)
+        # Proven is what is required without the pad
+        self._struct.open = pad
+
+    def set(self, **numbers: float) -> None:
+        """Numbers of ``native/plan.h``: range, step, tolerance, drift, longest."""
+        for name, value in numbers.items():
+            setattr(self._struct, name, value)
+
+    def begin(self, seed: int) -> None:
+        """Empty trees, and another stream of samples."""
+        it = self._struct
+        it.count[0] = it.count[1] = it.seeds = 0
+        it.longest = np.inf
+        # What was learnt before must not change what is found now
+        self._normals[:] = 0.0
+        self._sweep.restart()
+        it.random = (seed * 0x9E3779B97F4A7C15 + 0x1234567) & (2**64 - 1) or 1
+
+    def root(self, tree: int, x: Array) -> None:
+        """A root of the tree from the start, 0, or from the goals, 1."""
+        self._call.wbc_plan_root(self.at, tree, np.ascontiguousarray(x).ctypes.data)
+
+    def free(self, x: Array) -> bool:
+        """Whether x is within limits, keeps the rows and is clear."""
+        return bool(self._call.wbc_plan_free(self.at, np.ascontiguousarray(x).ctypes.data))
+
+    def margin(self, x: Array) -> float:
+        """The least distance of a pair at x, less what it keeps [m]; infinite where there is no pair."""
+        own = self._call.wbc_plan_margin(self.at, np.ascontiguousarray(x).ctypes.data)
+        return float(own + self._struct.open - OPEN)
+
+    def edge(self, x: Array, y: Array) -> bool:
+        """Whether what is straight between two free configurations is free."""
+        return bool(
+            self._call.wbc_plan_edge(self.at, np.ascontiguousarray(x).ctypes.data, np.ascontiguousarray(y).ctypes.data)
+        )
+
+    def projected(self, x: Array) -> Array | None:
+        """The nearest configuration that keeps the rows of the path; None: not found."""
+        out = np.array(x, dtype=np.float64)
+        return out if self._call.wbc_plan_project(self.at, out.ctypes.data) else None
+
+    def broken(self, x: Array) -> float:
+        """How far rows of the path are broken at x at most."""
+        return float(self._call.wbc_plan_broken(self.at, np.ascontiguousarray(x).ctypes.data))
+
+    def reach(self, x: Array) -> tuple[int, Array]:
+        """(0: goals are not met; 1: met, but not free; 2: free; the configuration), by a descent from x."""
+        out = np.array(x, dtype=np.float64)
+        return int(self._call.wbc_plan_reach(self.at, out.ctypes.data)), out
+
+    def drawn(self) -> Array:
+        """A sample."""
+        out = np.empty(len(self.low))
+        self._call.wbc_plan_draw(self.at, out.ctypes.data)
+        return out
+
+    def grow(self, samples: int) -> int:
+        """Trees with more samples: 1: they met; 0: not yet; :data:`FULL`."""
+        return int(self._call.wbc_plan_grow(self.at, samples))
+
+    def path(self) -> Array:
+        """The path through where the trees met, [points, n]."""
+        count = self._call.wbc_plan_path(self.at, self._points.ctypes.data, POINTS)
+        if count < 0:
+            raise RangeError("path", POINTS, "a path of more points than there is room for")
+        return self._points[:count].copy()
+
+    def shortened(self, points: Array, cuts: int, rounds: int) -> Array:
+        """A path that is no longer: after so many tries of cuts, and rounds in which corners are pulled in."""
+        self._points[: len(points)] = points
+        at = (self._points.ctypes.data, len(points), POINTS, cuts, rounds, self._others.ctypes.data, POINTS)
+        return self._points[: self._call.wbc_plan_shorten(self.at, *at)].copy()
+
+    def length(self, points: Array) -> float:
+        """Sum of the distances of points."""
+        return float(self._call.wbc_plan_length(self.at, np.ascontiguousarray(points).ctypes.data, len(points)))
+
+    @property
+    def equalities(self) -> int:
+        """How many rows of the path are such."""
+        return self._rows["path"].equalities
+
+    @property
+    def rows(self) -> int:
+        """How many rows the path has."""
+        return self._rows["path"].count
+
+    @property
+    def nodes(self) -> tuple[int, int]:
+        """Of both trees."""
+        return int(self._struct.count[0]), int(self._struct.count[1])
+
+    def node(self, tree: int) -> Array:
+        """All nodes of a tree."""
+        return self._nodes[tree][: self._struct.count[tree]]
+
+    @property
+    def looked(self) -> tuple[int, int]:
+        """Edges and projections so far."""
+        return int(self._struct.edges), int(self._struct.projections)

@@ -1,0 +1,75 @@
+/* What a planner works on: all arrays are Python's, which keeps them as long as this is used; wbc/plan/native.py fills it,
+ * the order of the fields is the same there. Configurations are n coordinates x; distances |x - y| are weighted. */
+#ifndef WBC_PLAN_H
+#define WBC_PLAN_H
+
+#include "sweep.c"
+
+/* Straight-line code of rows, as CasADi writes it: (x, p) -> (values, their derivatives by x, column by column) */
+typedef int (*rows_function)(const double **in, double **out, long long *iw, double *w, int memory);
+
+/* Rows that a path keeps: equalities, which come first, at 0, and margins at 0 or above */
+typedef struct {
+    rows_function function;
+    int equalities, margins;
+    const double *p;
+    double *value, *slope, *w;
+    long long *iw;
+} kept_rows_t;
+
+/* How a body drifts within half a piece of a motion, see proof.h */
+typedef struct {
+    double angular[3], linear[3], turned, reached, bent;
+} drift_t;
+
+typedef struct {
+    sweep_t *sweep;
+    drift_t *drifts;  /* bodies x (depth + 1) */
+    int *drifted;     /* bodies: the node that theirs are of; -1: it stands in the world */
+    double *balls;    /* bodies x 4: about each, its centre and radius */
+    double *normals;  /* pairs x 3: the directions that parted them last, or 0 */
+    double half;      /* half of the piece at hand */
+    double open;      /* what a proof may leave open of what is required [m] */
+    double *control, *rate; /* of the sweep: two ends, scalars x 2, and how far apart they are */
+    const double *low, *high;               /* n: limits */
+    const double *sample_low, *sample_high; /* n: where samples are drawn */
+    const double *weight;                   /* n: squares of what a coordinate counts */
+    int n, pairs, capacity, seeds, count[2];
+    double range;     /* an edge is no longer */
+    double step;      /* of edges with rows: between two projections */
+    double tolerance; /* of equalities at a configuration */
+    double drift;     /* of equalities between two of them */
+    double longest;   /* paths through samples are shorter */
+    unsigned long long random;
+    kept_rows_t path, goal; /* rows of all configurations; with those of the goal's tasks */
+    double *node[2];        /* capacity x n: trees from the start and from the goals */
+    int *parent[2];         /* -1: a root */
+    double *work;           /* for one projection: see project.h */
+    int meet[2];            /* nodes at which the trees met */
+    int edges, projections, measured; /* since it was begun */
+} plan_t;
+
+static double metric(const plan_t *p, const double *x, const double *y) {
+    double sum = 0.0;
+    for (int k = 0; k < p->n; k++) sum += p->weight[k] * (x[k] - y[k]) * (x[k] - y[k]);
+    return sqrt(sum);
+}
+
+static void copy_x(const plan_t *p, const double *from, double *to) { memcpy(to, from, p->n * sizeof *to); }
+
+/* z = x + t (y - x) */
+static void along_x(const plan_t *p, const double *x, const double *y, double t, double *z) {
+    for (int k = 0; k < p->n; k++) z[k] = x[k] + t * (y[k] - x[k]);
+}
+
+/* Uniform in [0, 1): xorshift64* (Vigna, An experimental exploration of Marsaglia's xorshift generators, 2016) */
+static double uniform(plan_t *p) {
+    p->random ^= p->random >> 12;
+    p->random ^= p->random << 25;
+    p->random ^= p->random >> 27;
+    return (double)((p->random * 2685821657736338717ULL) >> 11) * 0x1.0p-53;
+}
+
+static int has_rows(const plan_t *p) { return p->path.equalities + p->path.margins > 0; }
+
+#endif

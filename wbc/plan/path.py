@@ -1,0 +1,219 @@
+"""A path that was planned: straight pieces, or points on what equality rows leave, and smooth laws of motion on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.clearance import Motion
+from wbc.errors import InfeasibleError
+from wbc.plan.coordinates import PlanningCoordinates
+from wbc.plan.native import NativePlanner
+from wbc.stack.declaration import Declaration
+from wbc.tasks import FrameVelocityLimit
+from wbc.trajectory import Law, PolynomialPath, blend_path, jerk_limited_along, spline_path, standing_path, time_optimal
+from wbc.validation import Array
+
+#: Corners are rounded by this at most [rad, or characteristic lengths], then by half as much, until the path is proven
+ROUNDED = 0.1
+#: and by no less than this: then the law rests at the corners
+LEAST_ROUNDED = 1e-4
+#: Equality rows hold within this on a smooth path [rad, m], where points between its points may be projected
+KEPT = 1e-6
+#: Points of a smooth path at most
+MOST_POINTS = 4000
+#: Samples between two points of a smooth path at which rows are looked at
+SAMPLES = 5
+#: Joints whose acceleration nothing limits reach their full speed in this time [s]
+RAMP = 0.25
+#: and those with jerk limits their full acceleration in this [s]
+JERK_RAMP = 0.05
+#: Speed of joints without a limit [rad/s, or characteristic lengths per second]
+UNLIMITED = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """A path between configurations, on which all hard rows of the stack hold.
+
+    Attributes:
+        coordinates: in which it was planned; the laws are of these.
+        points: [points, n], straight between them; with equality rows so near to each other that these are met.
+        length: sum of their distances [rad, or characteristic lengths].
+        seconds: what planning took [s].
+        nodes: of the two trees of the last search.
+    """
+
+    coordinates: PlanningCoordinates = field(repr=False)
+    native: NativePlanner = field(repr=False)
+    stack: Declaration = field(repr=False)
+    points: Array = field(repr=False)
+    length: float
+    seconds: float
+    nodes: tuple[int, int]
+
+    @property
+    def q(self) -> Array:
+        """The configurations [points, nq]."""
+        return self.coordinates.configuration(self.points)
+
+    @cached_property
+    def smooth(self) -> PolynomialPath:
+        """The path with rounded corners, or a spline through more points where equality rows hold, proven clear again.
+
+        Raises:
+            InfeasibleError: a spline that keeps the equality rows is not clear.
+        """
+        if len(self.points) < 2 or self.length == 0.0:
+            return standing_path(self.points[0])
+        if self.native.equalities:
+            return self._spline()
+        deviation = ROUNDED
+        while deviation >= LEAST_ROUNDED:
+            path = blend_path(self.points, deviation)
+            if self.fault(path) is None:
+                return path
+            deviation *= 0.5
+        return _polyline(self.points)
+
+    def _spline(self) -> PolynomialPath:
+        points = self.points
+        why = ""
+        while len(points) < MOST_POINTS:
+            path = spline_path(points)
+            middle = 0.5 * (path.knots[:-1] + path.knots[1:])
+            if len(path.knots) != len(points):
+                points = path.evaluate(path.knots)
+            between, more = path.evaluate(middle), []
+            off = np.array([self.native.broken(x) for x in between])
+            bad = off > KEPT
+            if not bad.any():
+                fault = self.fault(path)
+                if fault is None:
+                    return path
+                why, bad = fault[1], np.ones(len(bad), dtype=bool)
+            for k in np.flatnonzero(bad):
+                x = self.native.projected(0.5 * (points[k] + points[k + 1]))
+                if x is None:
+                    raise InfeasibleError(
+                        "path", float(middle[k]), "a point between two of the path finds no way onto the rows"
+                    )
+                more.append((k + 1, x))
+            points = np.insert(points, [k for k, _ in more], [x for _, x in more], axis=0)
+        raise InfeasibleError(
+            "path", len(points), f"no spline keeps the rows and is clear: {why or 'the rows bend too much'}"
+        )
+
+    def fault(self, path: PolynomialPath) -> tuple[float, str] | None:
+        """(how far, what) of the worst thing that a path breaks; None: nothing. Bodies, and limits of polynomials, are
+        proven; rows are looked at in samples.
+        """
+        nearest = self.native.scene.violation(motion_of(self.coordinates, path))
+        if nearest is not None:
+            return nearest.distance, str(nearest)
+        controls = bernstein(path)
+        low, high = controls.min(axis=(0, 2)), controls.max(axis=(0, 2))
+        beyond = np.maximum(self.native.low - low, high - self.native.high)
+        if beyond.max() > 1e-9:
+            k = int(beyond.argmax())
+            return float(beyond[k]), f"{self.coordinates.names[k]} leaves its limits"
+        if self.native.rows:
+            share = (np.arange(SAMPLES) + 0.5) / SAMPLES
+            s = (path.knots[:-1, None] + share * np.diff(path.knots)[:, None]).ravel()
+            off = [self.native.broken(x) for x in path.evaluate(s)]
+            if max(off) > KEPT:
+                return max(off), f"a row is broken at s = {s[int(np.argmax(off))]:.4g}"
+        return None
+
+    def law(self, velocity: Any = None, acceleration: Any = None, jerk: Any = None) -> Law:
+        """The fastest law along :attr:`smooth`, from rest to rest, of the coordinates, with its certificate.
+
+        Args:
+            velocity, acceleration: limits [n], or one for all; default: the robot's, and where it has none such that
+                full speed is reached in 0.25 s.
+            jerk: None: unbounded, by :func:`wbc.trajectory.time_optimal`; a number, or ``True`` for full acceleration
+                in 0.05 s: by :func:`wbc.trajectory.jerk_limited_along`.
+
+        Raises:
+            as these two. InfeasibleError: as :attr:`smooth`.
+        """
+        fast, brisk = self.motion_limits()
+        fast = fast if velocity is None else np.broadcast_to(validation.real_array("velocity", velocity), fast.shape)
+        if acceleration is not None:
+            brisk = np.broadcast_to(validation.real_array("acceleration", acceleration), fast.shape)
+        path = self.smooth
+        if jerk is None:
+            law = time_optimal(path, fast, brisk)
+        else:
+            jerks = brisk / JERK_RAMP if jerk is True else jerk
+            law = jerk_limited_along(path, velocity=fast, acceleration=brisk, jerk=jerks, stops=True)
+        slower = self._slower(law)
+        return law.scaled(slower) if slower > 1.0 else law
+
+    def motion_limits(self) -> tuple[Array, Array]:
+        """Speeds and accelerations of the coordinates [n]."""
+        coordinates, limits = self.coordinates, self.stack.robot.limits
+        dofs = list(coordinates.dofs)
+        fast, brisk = limits.velocity[dofs].copy(), limits.acceleration[dofs].copy()
+        if self.stack.robot.base in ("planar", "differential"):
+            # Along the axes of the base, wherever these point
+            for rates in (fast, brisk):
+                rates[:2] = rates[:2].min() / np.sqrt(2.0)
+        fast = np.where(np.isfinite(fast), fast, UNLIMITED * coordinates.scale)
+        return fast, np.where(np.isfinite(brisk), brisk, fast / RAMP)
+
+    def _slower(self, law: Law) -> float:
+        """By what a law is too fast for the limits of frames' speeds, sampled."""
+        limits = [e.item for e in self.stack.constraints if isinstance(e.item, FrameVelocityLimit)]
+        if not limits:
+            return 1.0
+        robot, state = self.stack.robot, law.at(np.linspace(0.0, law.duration, 500))
+        q = self.coordinates.configuration(state.position)
+        v = self.coordinates.velocity(state.position, state.velocity)
+        most = 1.0
+        for item in limits:
+            for configuration, rate in zip(q, v, strict=True):
+                twist = robot.jacobian(configuration, item.frame) @ rate
+                for part, limit in ((twist[:3], item.linear), (twist[3:], item.angular)):
+                    if limit is not None:
+                        most = max(most, float(np.max(np.abs(part) / np.asarray(limit))))
+        return most
+
+    def configurations(self, law: Law, t: Any) -> tuple[Array, Array]:
+        """(q, v) of a law of the coordinates at a time or at several [s]."""
+        state = law.at(t)
+        x = np.asarray(state.position)
+        return self.coordinates.configuration(x), self.coordinates.velocity(x, np.asarray(state.velocity))
+
+
+def _polyline(points: Array) -> PolynomialPath:
+    """Straight pieces with corners, at which laws rest."""
+    steps = np.diff(points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    kept = lengths > 0.0
+    knots = np.concatenate([[0.0], np.cumsum(lengths[kept])])
+    return PolynomialPath(knots, np.array([steps[kept] / lengths[kept, None], points[:-1][kept]]))
+
+
+def bernstein(path: PolynomialPath) -> Array:
+    """Coefficients of the pieces, [pieces, n, degree + 1]."""
+    degree, size = int(path.degree or 0), np.diff(path.knots)
+    power = [path.coefficients[degree - k] * (size**k)[:, None] for k in range(degree + 1)]
+    rows = [sum(comb(i, k) / comb(degree, k) * power[k] for k in range(i + 1)) for i in range(degree + 1)]
+    return np.stack(rows, axis=2)
+
+
+def motion_of(coordinates: PlanningCoordinates, path: PolynomialPath) -> Motion:
+    """A path as a motion of the robot's tree, with s as its time."""
+    controls = bernstein(path)
+    if controls.shape[2] < 2:
+        controls = np.repeat(controls, 2, axis=2)
+    # Rounding may leave the pieces apart by a last digit
+    controls[1:, :, 0] = controls[:-1, :, -1]
+    n = coordinates.count
+    return Motion(path.knots, controls, np.zeros((0, len(path.knots), 12)), np.zeros(n), np.zeros((0, 2)))

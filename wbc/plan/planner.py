@@ -1,0 +1,477 @@
+"""Plans between configurations under the constraints of a stack."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.controller.compiled_stack import CompiledStack, core_of
+from wbc.controller.handles import Handles
+from wbc.errors import InfeasibleError
+from wbc.plan.coordinates import PlanningCoordinates
+from wbc.plan.goals import ConfigurationGoal, Goal, TargetGoal, goals_of
+from wbc.plan.native import NativePlanner
+from wbc.plan.path import PlannedPath
+from wbc.plan.rows import PlanningRows, RowsBuilder
+from wbc.plan.scene import OPEN, PlanningScene
+from wbc.plan.stand_in import without_distances
+from wbc.stack.artifact import compile_stack
+from wbc.stack.declaration import Declaration
+from wbc.stack.tables import stops
+from wbc.tasks import Fixed
+from wbc.validation import Array
+
+#: Samples between two looks at the clock and at Ctrl-C
+SLICE = 50
+#: Distances are kept longer by this while a path is searched [m], less where the start or the goal is nearer; after
+#: every search that ends without a path a quarter of it
+PAD = 2e-3
+#: and no less than this [m]
+LEAST_PAD = 1e-5
+#: Samples of the first search; one that ends without a path is followed by one of twice as many
+FIRST = 2000
+#: Length of the longest edges against the diagonal of the space
+RANGE = 0.12
+#: and against that in one search after the other: some spaces want short ones, some long ones
+RANGES = (1.0, 0.5, 2.0)
+#: Descents to configurations that meet a target
+DESCENTS = 100
+#: Of the cuts, the share by which every path is shortened; the shortest one then has all of them
+CANDIDATE = 4
+#: Rounds at most in which corners of the shortest path are pulled in and cut off
+ROUNDS = 6
+#: How far from a configuration without room one is sought that has [rad, or characteristic lengths]
+AWAY = (0.02, 0.05, 0.1, 0.2, 0.4)
+#: and how often
+TRIES = 20
+#: Goals of one target at most: those nearest to the start
+BRANCHES = 4
+#: Goals nearer to each other than this are one [rad, or characteristic lengths]
+APART = 0.05
+#: Coordinates without limits are searched this far from start and goals [rad, or characteristic lengths]
+BEYOND = np.pi
+#: Equalities of start and goals hold within this [m, rad]
+MET = 1e-5
+
+
+@dataclass(frozen=True)
+class PlanningOptions:
+    """How paths are searched.
+
+    Attributes:
+        seed: of the samples. The path is a function of it, of start, goal and run-time values where the time does not
+            end the search.
+        seconds: after which it is over [s].
+        paths: searched before the shortest is returned.
+        cuts: tries to cut a path short, for each of them.
+        range: edges of the trees are no longer [rad, or characteristic lengths]; None: a share of the space.
+        step: of edges that are projected onto equality rows [rad, or characteristic lengths].
+
+    Raises:
+        RangeError, ShapeError, NotFiniteError: a number that is none of these.
+    """
+
+    seed: int = 0
+    seconds: float = 10.0
+    paths: int = 2
+    cuts: int = 30
+    range: float | None = None
+    step: float = 0.1
+
+    def __post_init__(self) -> None:
+        validation.integer("seed", self.seed)
+        validation.integer("paths", self.paths, 1)
+        validation.integer("cuts", self.cuts)
+        for name in ("seconds", "range", "step"):
+            given, unit = getattr(self, name), "s" if name == "seconds" else ""
+            if given is not None or name != "range":
+                object.__setattr__(self, name, validation.scalar(name, given, low=0.0, open_low=True, unit=unit))
+
+
+class NoPathError(InfeasibleError):
+    """No path was found in the time.
+
+    Attributes:
+        nearest: configuration that was reached from the start, nearest to a goal [nq].
+        distance: its distance from that goal [rad, or characteristic lengths].
+    """
+
+    nearest: Array
+    distance: float
+
+
+class MotionPlanner(Handles):
+    """A planner of a stack, kept for many queries. Made by :meth:`wbc.Stack.planner`.
+
+        planner = stack.planner()
+        planner["shelf"].pose = pose                     # run-time values, as of a controller
+        path = planner.plan(q0, {"hand": target})        # or a configuration, or a list of goals
+        law = path.law()
+
+    Two trees grow towards each other over the joints. An edge is free where the distance of every pair of bodies is
+    proven between samples, and where the equalities (holds, loops, kept tasks) and margins (boxes, cones, planes,
+    regions) of the stack hold; onto these configurations are projected by Newton steps. docs/plan.md
+
+    Attributes:
+        stack: whose constraints hold. kept: names of tasks whose errors stay 0 on every path.
+        coordinates: in which paths are planned.
+
+    Args:
+        keep: tasks whose errors stay 0 on the whole path: a level cup, a tray between two hands.
+
+    Raises:
+        UnknownNameError: no such task. UnsupportedJointError: a floating base or ball joints.
+        CommandError: a hard constraint on velocities. CompileError: no compiler, and nothing was compiled ahead.
+    """
+
+    def __init__(self, stack: Declaration, keep: Iterable[str] = ()) -> None:
+        from wbc import __version__
+
+        declared = validation.instance("stack", stack, Declaration, "a wbc Stack").commanding("velocity")
+        names = [entry.name for entry in declared.tasks]
+        self.kept = tuple(
+            validation.one_of("keep", name, names)
+            for name in ((keep,) if isinstance(keep, str) else validation.strings("keep", keep))
+        )
+        self.stack = declared
+        self.coordinates = PlanningCoordinates.of(declared.robot, declared.length)
+        light = without_distances(declared)
+        self._controller = CompiledStack(light, compile_stack(light, "vm", __version__), "daqp")
+        self._core = core_of(self._controller)
+        super().__init__(self._core.handles, light)
+        _, lower, upper = stops(declared, self._core.layout)
+        self._limits = self.coordinates.limits(lower, upper)
+        self._builder = RowsBuilder(self._core, self.coordinates, self.kept)
+        self._rows: dict[tuple[Any, ...], PlanningRows] = {}
+        self._native: NativePlanner | None = None
+        self._switches: tuple[bool, ...] = ()
+
+    def plan(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> PlannedPath:
+        """A path from a configuration to a goal, on which every hard row of the stack holds.
+
+        Args:
+            q0: where it begins [nq]; run-time values that nobody set are taken from it, as by a controller.
+            goal: a configuration [nq]; targets by task, ``{"hand": pose}``, of which all branches are goals; or a
+                list of these, of which one is to be reached.
+            options, changes: see :class:`PlanningOptions`; ``planner.plan(q0, goal, seed=1, seconds=2.0)``.
+
+        Raises:
+            UnknownNameError, ShapeError, NotFiniteError, RotationError, RangeError: bad input.
+            InfeasibleError: start or goal break a constraint (which pair and by how much, or which row), or no
+                configuration that meets the goal was found.
+            NoPathError: none was found in the time; it has the nearest configuration that was reached.
+        """
+        search, goals = self._search(q0, goal, options, changes)
+        search.check_start()
+        search.find_goals(goals)
+        points = search.paths()
+        return PlannedPath(
+            coordinates=self.coordinates,
+            native=search.native,
+            stack=self.stack,
+            points=points,
+            length=search.native.length(points),
+            seconds=perf_counter() - search.begin,
+            nodes=search.nodes,
+        )
+
+    def branches(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> Array:
+        """Free configurations that meet a goal, those nearest to q0 first, in the planner's coordinates [m, n].
+
+        Args:
+            q0, goal, options, changes: as of :meth:`plan`.
+
+        Raises:
+            as :meth:`plan`; InfeasibleError: there is none.
+        """
+        search, goals = self._search(q0, goal, options, changes)
+        search.find_goals(goals)
+        return np.array(search.goals)
+
+    def _search(
+        self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]
+    ) -> tuple[_Search, tuple[Goal, ...]]:
+        chosen = replace(PlanningOptions() if options is None else options, **changes)
+        q = self.stack.robot.configuration("q0", q0)
+        self._core.begin(q, np.zeros(self.stack.robot.nv))
+        self._core.take_first(q)
+        goals = goals_of(self._core, goal)
+        # What is compiled once for many queries is no part of the time of one
+        native = self.native(q)
+        for target in goals:
+            if isinstance(target, TargetGoal):
+                native.prepare(self.rows(target.names))
+        return _Search(self, q, chosen), goals
+
+    def scene(self) -> PlanningScene:
+        """The bodies that are kept apart, at the present run-time values."""
+        return PlanningScene.of(self._core, self.coordinates)
+
+    def rows(self, goals: tuple[str, ...] = ()) -> PlanningRows:
+        """Rows of every configuration of a path, and of tasks that are met at its end besides.
+
+        Raises:
+            CommandError: a hard constraint on velocities.
+        """
+        switches = tuple(handle.enabled for handle in self._core.handles.values())
+        key = (switches, goals)
+        if key not in self._rows:
+            self._rows[key] = self._builder.rows(goals)
+        return self._rows[key]
+
+    def native(self, q: Array) -> NativePlanner:
+        """What is kept of the scene and the rows; made again where their run-time values have changed."""
+        switches = tuple(handle.enabled for handle in self._core.handles.values())
+        key = PlanningScene.key_of(self._core)
+        if self._native is None or self._native.scene.key != key or switches != self._switches:
+            scene = PlanningScene.of(self._core, self.coordinates)
+            self._native = NativePlanner(scene, self.rows(), self._core.tick.p, self._limits)
+            self._switches = switches
+        self._native.low[:], self._native.high[:] = self._limits
+        x = self.coordinates.of_configuration(q)
+        for entry in self.stack.constraints:
+            if isinstance(entry.item, Fixed) and self._core.handles[entry.name].enabled:
+                dofs = {d for name in entry.item.joints for d in range(*self.stack.robot.dofs(name).indices(10**6))}
+                fixed = [k for k, dof in enumerate(self.coordinates.dofs) if dof in dofs]
+                self._native.low[fixed] = self._native.high[fixed] = x[fixed]
+        return self._native
+
+    def write(self, goal: TargetGoal) -> list[Array]:
+        """Write the targets of a goal; what was there before."""
+        before = [self._core.tick.p[slot.span].copy() for slot, _ in goal.numbers]
+        for slot, numbers in goal.numbers:
+            self._core.tick.p[slot.span] = numbers
+        return before
+
+    def restore(self, goal: TargetGoal, before: list[Array]) -> None:
+        """Write back what was there before."""
+        for (slot, _), numbers in zip(goal.numbers, before, strict=True):
+            self._core.tick.p[slot.span] = numbers
+
+
+class _Search:
+    """One query."""
+
+    def __init__(self, planner: MotionPlanner, q: Array, options: PlanningOptions) -> None:
+        self.planner, self.options, self.begin = planner, options, perf_counter()
+        self.end = self.begin + options.seconds
+        self.native = planner.native(q)
+        self.native.pad(LEAST_PAD)
+        self.native.begin(options.seed)
+        self.native.set(step=options.step)
+        self.start = planner.coordinates.of_configuration(q)
+        self.goals: list[Array] = []
+        #: near start and goals, with room on all sides
+        self.first, self.last = self.start, list[Array]()
+        self.nodes = (0, 0)
+        self.pad = PAD
+
+    def check_start(self) -> None:
+        """Refuse a start that breaks a constraint."""
+        if reason := self.fault(self.start):
+            raise InfeasibleError("q0", *reason)
+        self.first = self._away(self.start)
+
+    def fault(self, x: Array) -> tuple[float, str] | None:
+        """(by how much, which constraint) x breaks most; None: none."""
+        native, coordinates = self.native, self.planner.coordinates
+        beyond = np.maximum(native.low - x, x - native.high)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] > MET:
+            limit = native.low[worst] if x[worst] < native.low[worst] else native.high[worst]
+            what = f"{coordinates.names[worst]} is beyond its limit of {limit:.4g} {coordinates.units[worst]}"
+            return float(x[worst]), what
+        x[:] = np.clip(x, native.low, native.high)
+        rows = self.planner.rows()
+        if rows.count:
+            values = np.asarray(rows.function(x, self.planner._core.tick.p)[0]).ravel()
+            off = np.concatenate([np.abs(values[: rows.equalities]), -values[rows.equalities :]])
+            worst = int(np.argmax(off))
+            if not off[worst] <= MET:
+                return float(values[worst]), f"{rows.labels[worst]} does not hold, off by {off[worst]:.3g}"
+            if native.broken(x) > 1e-8:
+                fixed = native.projected(x)
+                if fixed is not None:
+                    x[:] = fixed
+        if native.margin(x) < -OPEN and (nearest := native.scene.nearest(x)) is not None:
+            where = f"{nearest.first} and {nearest.second} are {1e3 * nearest.distance:.2f} mm apart"
+            return nearest.distance, f"{where}, {1e3 * nearest.required:.2f} mm required"
+        return None
+
+    def find_goals(self, goals: tuple[Goal, ...]) -> None:
+        """Free configurations of all goals.
+
+        Raises:
+            InfeasibleError: there is none.
+        """
+        faults = list[tuple[float, str]]()
+        for goal in goals:
+            if isinstance(goal, ConfigurationGoal):
+                x = self.planner.coordinates.of_configuration(goal.q, self.start)
+                self._widen(x)
+                if reason := self.fault(x):
+                    faults.append(reason)
+                else:
+                    self.goals.append(x)
+            else:
+                self._widen(self.start)
+                faults += self._descend(goal)
+        if not self.goals:
+            raise InfeasibleError("goal", *faults[0])
+        self.last = [self._away(x) for x in self.goals]
+        room = min(self.native.margin(self.first), max(map(self.native.margin, self.last)))
+        self.pad = max(LEAST_PAD, min(PAD, 0.5 * (room + OPEN)))
+
+    def _away(self, x: Array) -> Array:
+        """A configuration near x that has room on all sides, and is reached from it straight; x where it has room, or
+        where there is none: what leads off a contact is looked at closely, and only once.
+        """
+        native = self.native
+        if native.margin(x) + OPEN >= 2.0 * PAD:
+            return x
+        best, most = x, native.margin(x)
+        for radius in AWAY:
+            for _ in range(TRIES):
+                share = (
+                    2.0
+                    * (native.drawn() - native.sample_low)
+                    / np.maximum(native.sample_high - native.sample_low, 1e-12)
+                )
+                y = np.clip(x + radius * (share - 1.0) * self.planner.coordinates.scale, native.low, native.high)
+                if native.rows and (projected := native.projected(y)) is not None:
+                    y = projected
+                margin = native.margin(y)
+                if margin > most and native.free(y) and native.edge(x, y):
+                    best, most = y, margin
+            if most + OPEN >= 2.0 * PAD:
+                break
+        return best
+
+    def _widen(self, x: Array) -> None:
+        """Samples of coordinates without limits are drawn about start and goals."""
+        native = self.native
+        reach = BEYOND * self.planner.coordinates.scale
+        low, high = np.minimum(self.start, x) - reach, np.maximum(self.start, x) + reach
+        native.sample_low[:] = np.where(np.isfinite(native.low), native.low, low)
+        native.sample_high[:] = np.where(np.isfinite(native.high), native.high, high)
+
+    def _descend(self, goal: TargetGoal) -> list[tuple[float, str]]:
+        native, planner = self.native, self.planner
+        before = planner.write(goal)
+        free, colliding, least = list[Array](), list[Array](), np.inf
+        rows = planner.rows(goal.names)
+        try:
+            native.use("goal", rows)
+            for k in range(DESCENTS):
+                if k % SLICE == SLICE - 1 and perf_counter() > self.end:
+                    break
+                first = self.start.copy() if k == 0 else native.drawn()
+                found, x = native.reach(first)
+                for other in free:
+                    if found == 2 and self._distance(x, other) < APART:
+                        break
+                else:
+                    if found == 2:
+                        free.append(x)
+                    elif found == 1 and len(colliding) < BRANCHES:
+                        colliding.append(x)
+                    elif found == 0 and not free:
+                        values = np.asarray(rows.function(x, planner._core.tick.p)[0]).ravel()
+                        least = min(least, float(np.abs(values[: rows.equalities]).max()))
+        finally:
+            planner.restore(goal, before)
+        self.goals += sorted(free, key=lambda x: self._distance(x, self.start))[:BRANCHES]
+        if free:
+            return []
+        names = ", ".join(goal.names)
+        if colliding:
+            worst = [self.fault(x) for x in colliding]
+            off, what = max((w for w in worst if w is not None), default=(0.0, "not within limits"))
+            reason = f"none of {len(colliding)} configurations that meet {names} is free; of the best {what}"
+            return [(off, reason)]
+        at_best = f"at the nearest a row of the goal is off by {least:.3g}"
+        return [(least, f"no configuration that meets {names} was found in {DESCENTS} descents; {at_best}")]
+
+    def _distance(self, x: Array, y: Array) -> float:
+        return float(np.linalg.norm((x - y) / self.planner.coordinates.scale))
+
+    def paths(self) -> Array:
+        """The shortest of some paths.
+
+        Raises:
+            NoPathError: none in the time.
+        """
+        native, options = self.native, self.options
+        best: Array | None = None
+        shortest, samples, found = np.inf, FIRST, 0
+        for attempt in range(10**6):
+            if found >= options.paths or (attempt and perf_counter() > self.end):
+                break
+            points = self._one(attempt, samples, shortest)
+            if points is None:
+                if best is not None:
+                    break
+                samples *= 2
+                self.pad = max(LEAST_PAD, 0.25 * self.pad)
+                continue
+            found += 1
+            length = native.length(points)
+            if length < shortest:
+                best, shortest = points, length
+            if attempt == 0 and self.nodes == (0, 0):
+                return points
+        if best is None:
+            raise self._nothing()
+        return native.shortened(best, options.cuts, ROUNDS)
+
+    def _one(self, attempt: int, samples: int, shortest: float) -> Array | None:
+        """A path of one search, made shorter."""
+        native, options = self.native, self.options
+        native.pad(self.pad)
+        native.begin(options.seed + 7919 * attempt)
+        span = float(np.linalg.norm((native.sample_high - native.sample_low) / self.planner.coordinates.scale))
+        reach = RANGE * span if options.range is None else options.range
+        native.set(longest=shortest, range=reach * RANGES[attempt % len(RANGES)])
+        native.root(0, self.first)
+        roots = [k for k, x in enumerate(self.last) if native.free(x)]
+        for k in roots:
+            native.root(1, self.last[k])
+        if attempt == 0 and not native.rows:
+            for k in roots:
+                if native.edge(self.first, self.last[k]):
+                    return self._ended(np.array([self.first, self.last[k]]), k)
+        for _ in range(0, samples, SLICE):
+            met = native.grow(SLICE)
+            if met or perf_counter() > self.end:
+                break
+        self.nodes = native.nodes
+        if met != 1:
+            return None
+        points = native.path()
+        ends = [float(np.abs(points[-1] - self.last[k]).max()) for k in roots]
+        points = native.shortened(points, options.cuts // CANDIDATE, 0)
+        return self._ended(points, roots[int(np.argmin(ends))])
+
+    def _ended(self, points: Array, goal: int) -> Array:
+        """A path between what is near start and goal, with both."""
+        whole = [points] if self.first is self.start else [self.start[None], points]
+        return np.concatenate(whole if self.last[goal] is self.goals[goal] else [*whole, self.goals[goal][None]])
+
+    def _nothing(self) -> NoPathError:
+        tree, goals = self.native.node(0), np.array(self.last)
+        scale = self.planner.coordinates.scale
+        off = np.array([np.linalg.norm((tree - x) / scale, axis=1) for x in goals])
+        goal, node = np.unravel_index(int(off.argmin()), off.shape)
+        distance = float(off[goal, node])
+        reason = (
+            f"no path was found in {self.options.seconds:.3g} s, with {self.nodes[0]} configurations reached from the "
+            f"start and {self.nodes[1]} from {len(goals)} goals; the nearest is {distance:.3g} rad off a goal"
+        )
+        error = NoPathError("goal", distance, reason)
+        error.nearest, error.distance = self.planner.coordinates.configuration(tree[node]), distance
+        return error

@@ -1,0 +1,51 @@
+"""A clip: where the joints of a skeleton are, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints of a person or an animal as a tree, in an order in which parents come first.
+
+    Attributes:
+        names: of the joints; of markers and key points without a hierarchy, theirs.
+        parents: number of each joint's parent; -1 at the root, and for all where the file has no hierarchy.
+        offsets: from the parent to the joint in the rest pose, along world axes [joints, 3], z up [m].
+        ends: whether a joint is only the end of a bone (BVH's End Site) [joints].
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array
+    ends: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Joints over time, as every reader of files leaves them: z up, metres, NaN nowhere.
+
+    Attributes:
+        skeleton: whose motion it is.
+        rate: frames a second [Hz].
+        points: positions in the world [frames, joints, 3] [m]; filled in where they were not seen.
+        turns: rotations of the joints from the rest pose, in the world [frames, joints, 3, 3]; None where the file has
+            points alone.
+        seen: whether a point was in the file, and not filled in [frames, joints].
+        name: of the file, without its folder.
+        notes: what was found in the file and changed: units, the axis that is up, gaps, swapped markers.
+    """
+
+    skeleton: Skeleton
+    rate: float
+    points: Array
+    turns: Array | None
+    seen: NDArray[np.bool_]
+    name: str
+    notes: tuple[str, ...] = ()

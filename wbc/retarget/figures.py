@@ -1,0 +1,138 @@
+"""Figures of a robot's motion, measured from its configurations and its links' surfaces alone."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from wbc.multibody import pin
+from wbc.robot import Robot
+from wbc.track.scene import link_meshes
+from wbc.validation import Array
+
+#: A limit counts as kept up to this much beyond it, as a share of the limit and in rad or m
+TOLERANCE = 1e-6
+#: Points of a foot this near to its lowest one are its sole [m]
+SOLE_HEIGHT = 0.01
+#: Changes of a velocity from frame to frame beyond this are jumps [rad/s, m/s]
+JUMP = 10.0
+
+
+def motion_figures(
+    robot: Robot,
+    rate: float,
+    q: Array,
+    stance: Mapping[str, NDArray[np.bool_]],
+    *,
+    ground: float | None = 0.0,
+    balls: Collection[str] = (),
+) -> dict[str, Any]:
+    """What a motion keeps and what it does not, as plain data.
+
+    Args:
+        rate: frames a second [Hz]. q: configurations [frames, nq].
+        stance: frame of the robot -> whether it stands [frames]; names that are no frames are left out.
+        ground: height of a level ground [m]; None: there is none.
+        balls: those of the frames in ``stance`` that are centres of balls, such as hands: they may turn as they stand.
+
+    Returns:
+        ``frames``, ``rate``; ``position_breaches``, ``velocity_breaches``, ``acceleration_breaches``: frames in which a
+        joint is beyond its limit, the base left out; ``jumps``: frames after which a joint's velocity changes by more
+        than :data:`JUMP`; ``fastest`` and ``quickest``: largest velocity and acceleration as shares of their limits;
+        ``penetration``: deepest point below the ground [m]; ``penetration_frames``: with more than 1 mm of it;
+        ``slide``: largest motion along the ground of a point of a sole while it stands [m]; ``slides``: by foot.
+    """
+    model, first = robot.model, robot.base_nv
+    steps = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(q)]).reshape(-1, robot.nv)
+    velocity = steps[:, first:] * rate
+    acceleration = np.diff(velocity, axis=0) * rate
+    limits = robot.limits
+    places = robot.position_index[first:]
+    known = places >= 0
+    values = q[:, places[known]]
+    low, high = limits.position_lower[first:][known], limits.position_upper[first:][known]
+    outside = (values < low - TOLERANCE) | (values > high + TOLERANCE)
+    out: dict[str, Any] = {
+        "frames": len(q), "rate": rate, "position_breaches": int(outside.any(axis=1).sum()),
+    }  # fmt: skip
+    for name, moves, limit, share in (
+        ("velocity", velocity, limits.velocity[first:], "fastest"),
+        ("acceleration", acceleration, limits.acceleration[first:], "quickest"),
+    ):
+        part = np.abs(moves) / np.where(limit > 0.0, limit, np.inf)
+        out[f"{name}_breaches"] = int((part > 1.0 + TOLERANCE).any(axis=1).sum()) if part.size else 0
+        out[share] = float(part.max()) if part.size else 0.0
+    jumps = np.abs(np.diff(velocity, axis=0)) > JUMP
+    out["jumps"] = int(jumps.any(axis=1).sum())
+    feet = {frame: stands for frame, stands in stance.items() if frame in robot.frame_names}
+    out |= _touching(robot, q, feet, ground, balls)
+    return out
+
+
+def _touching(
+    robot: Robot, q: Array, feet: Mapping[str, NDArray[np.bool_]], ground: float | None, balls: Collection[str]
+) -> dict[str, Any]:
+    """Depths below the ground, and slides of soles."""
+    model = robot.model
+    data = model.createData()
+    surfaces = surface_points(robot)
+    frames = {name: int(model.getFrameId(name)) for name in {*surfaces, *feet}}
+    soles = {foot: np.zeros((1, 3)) if foot in balls else _own_points(robot, foot, surfaces) for foot in feet}
+    lowest = np.full(len(q), np.inf)
+    tracks = {foot: np.empty((len(q), len(soles[foot]), 3)) for foot in feet}
+    for k, row in enumerate(q):
+        pin.framesForwardKinematics(model, data, row)
+        for name, points in surfaces.items():
+            pose = data.oMf[frames[name]]
+            lowest[k] = min(lowest[k], float((points @ pose.rotation[2]).min()) + float(pose.translation[2]))
+        for foot, track in tracks.items():
+            pose = data.oMf[frames[foot]]
+            track[k] = soles[foot] @ pose.rotation.T + pose.translation
+    slides = {foot: _slide(track, np.asarray(feet[foot])) for foot, track in tracks.items()}
+    out: dict[str, Any] = {"slide": max(slides.values(), default=0.0), "slides": slides}
+    if ground is not None and surfaces:
+        depth = np.maximum(0.0, ground - lowest)
+        out |= {"penetration": float(depth.max()), "penetration_frames": int((depth > 1e-3).sum())}
+    return out
+
+
+def surface_points(robot: Robot) -> dict[str, Array]:
+    """Corners of the convex hulls of links, in their frames: no other point of a link is ever lowest [m]."""
+    out: dict[str, Array] = {}
+    for link, triangles in link_meshes(robot):
+        corners = np.unique(triangles.reshape(-1, 3), axis=0)
+        try:
+            hull = corners[ConvexHull(corners).vertices] if len(corners) > 4 else corners
+        except QhullError:
+            hull = corners
+        out[link] = np.concatenate([out[link], hull]) if link in out else hull
+    return out
+
+
+def _own_points(robot: Robot, foot: str, surfaces: Mapping[str, Array]) -> Array:
+    """Points of what the foot's joint moves, in the foot's frame; the frame's origin where it has no surface [n, 3]."""
+    model = robot.model
+    own = model.frames[model.getFrameId(foot)]
+    out = []
+    for link, points in surfaces.items():
+        other = model.frames[model.getFrameId(link)]
+        if other.parentJoint == own.parentJoint:
+            place = own.placement.actInv(other.placement)
+            out.append(points @ place.rotation.T + place.translation)
+    return np.concatenate(out) if out else np.zeros((1, 3))
+
+
+def _slide(track: Array, stands: NDArray[np.bool_]) -> float:
+    """Largest motion along the ground of a point of a sole from where its stance began [m]."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], stands, [False])).astype(int))).reshape(-1, 2)
+    worst = 0.0
+    for start, stop in edges:
+        heights = track[start, :, 2]
+        sole = track[start:stop, heights <= heights.min() + SOLE_HEIGHT, :2]
+        worst = max(worst, float(np.linalg.norm(sole - sole[0], axis=2).max()))
+    return worst

@@ -1,0 +1,200 @@
+"""Many clips: found in folders, retargeted one by one or in parallel processes, each kept when it is done."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import multiprocessing
+import os
+import pathlib
+import shutil
+import signal
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from wbc import robots, validation
+from wbc.errors import ClipFileError, WbcError
+from wbc.retarget.report import write_report
+from wbc.retarget.sources import CLIP_SUFFIXES, load_clip
+
+if TYPE_CHECKING:
+    from wbc.retarget.retargeter import Retargeter
+
+#: The file that a finished clip has
+DONE = "report.json"
+
+
+@dataclass(frozen=True)
+class ClipJob:
+    """A clip, and what is made of it.
+
+    Attributes:
+        clip: its file. folder: that its motion and report are written into.
+        robot: name or file. loading: options of :func:`~wbc.retarget.load_clip`.
+        options: fields of ``RetargetOptions`` that are not at their defaults.
+        formats: of the motion, besides npz. film: whether one is drawn.
+        correspondence: file of :meth:`~wbc.retarget.Correspondence.save` that corrects what is found.
+    """
+
+    clip: pathlib.Path
+    folder: pathlib.Path
+    robot: str
+    loading: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    formats: tuple[str, ...] = ()
+    film: bool = True
+    correspondence: pathlib.Path | None = None
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What a finished clip must have been asked for to be left as it is: plain data."""
+        plain = {"robot": self.robot, "loading": dict(self.loading), "options": dict(self.options)}
+        if self.correspondence is not None:
+            plain["correspondence"] = self.correspondence.read_text(encoding="utf-8")
+        text = json.dumps({**plain, "formats": list(self.formats)}, default=str, sort_keys=True)
+        return dict(json.loads(text))
+
+    @property
+    def is_done(self) -> bool:
+        """Whether its folder has what is asked for."""
+        try:
+            done = json.loads((self.folder / DONE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return False
+        return isinstance(done, dict) and done.get("asked") == self.asked
+
+
+@dataclass(frozen=True)
+class ClipDone:
+    """What came of a clip: figures of its report, or the reason why there are none."""
+
+    job: ClipJob
+    figures: Mapping[str, Any]
+    reason: str = ""
+
+
+def find_clips(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[pathlib.Path, pathlib.Path]]:
+    """Files of clips, and of folders all clips in them, with the path that each has in a folder of results.
+
+    Raises:
+        ClipFileError: no such file or folder, or a folder without a clip.
+    """
+    out: list[tuple[pathlib.Path, pathlib.Path]] = []
+    for given in paths:
+        path = validation.file_path("clip", given)
+        if not path.is_dir():
+            if not validation.is_file("clip", path):
+                raise ClipFileError("clip", str(path), validation.no_such(path, "there is no such file or folder"))
+            out.append((path, pathlib.Path(path.stem)))
+            continue
+        files = sorted(file for file in path.rglob("*") if file.suffix.lower() in CLIP_SUFFIXES and file.is_file())
+        if not files:
+            raise ClipFileError("clip", str(path), f"the folder has no clip ({', '.join(CLIP_SUFFIXES)})")
+        out += [(file, file.relative_to(path).with_suffix("")) for file in files]
+    taken: dict[pathlib.Path, int] = {}
+    unlike = []
+    for file, place in out:
+        taken[place] = taken.get(place, 0) + 1
+        # walk.bvh and walk.c3d, or the same name from two folders
+        unlike.append((file, place if taken[place] == 1 else place.with_name(f"{place.name}-{taken[place]}")))
+    return unlike
+
+
+def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None) -> Iterator[ClipDone]:
+    """Retarget clips, each of which is kept when it is done, in the order in which they end.
+
+    A clip that cannot be read or retargeted is an answer with its reason, and the others go on. Who stops asking, as by
+    Ctrl-C, ends the processes; what was done by then stays.
+
+    Args:
+        workers: processes; 1: all is done in this one. client: of a Dask cluster, whose workers take them instead.
+    """
+    jobs = list(jobs)
+    if client is not None:
+        from distributed import as_completed
+
+        for future in as_completed([client.submit(retarget_job, job, pure=False) for job in jobs]):
+            yield future.result()
+        return
+    if workers == 1 or len(jobs) < 2:
+        yield from map(retarget_job, jobs)
+        return
+    # Forks of a process with threads may hang
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=_deaf) as pool:
+        waiting = {pool.submit(retarget_job, job): job for job in jobs}
+        try:
+            while waiting:
+                ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    yield _answer(future, waiting.pop(future))
+        except BaseException:
+            # Those that are busy would be waited for, and are forgotten by a pool that was shut down
+            busy = list((getattr(pool, "_processes", None) or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in busy:
+                process.terminate()
+            raise
+
+
+def _answer(future: Future[ClipDone], job: ClipJob) -> ClipDone:
+    """What came of a clip, also where its process was killed."""
+    error = future.exception()
+    return future.result() if error is None else ClipDone(job, {}, f"{type(error).__name__}: {error}")
+
+
+def _deaf() -> None:
+    """Ctrl-C goes to all processes of a terminal; the first one ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def retarget_job(job: ClipJob) -> ClipDone:
+    """Retarget one clip and write its folder, whole or not at all."""
+    try:
+        clip = load_clip(job.clip, **job.loading)
+        start = time.perf_counter()
+        known = _retargeter.cache_info().hits
+        retargeter = _retargeter(job.robot, tuple(sorted(job.options.items())), job.correspondence)
+        first = _retargeter.cache_info().hits == known
+        motion = retargeter.run(clip)
+        seconds = time.perf_counter() - start
+        with _fresh(job.folder) as fresh:
+            figures = write_report(motion, fresh, job.formats, seconds=seconds, film=job.film)
+            retargeter.correspondence(clip.skeleton).save(fresh / "correspondence.yaml")
+            figures |= {"asked": job.asked, "stack_made": first}
+            (fresh / DONE).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+        return ClipDone(job, figures)
+    except WbcError as error:
+        return ClipDone(job, {}, str(error))
+    except OSError as error:
+        return ClipDone(job, {}, f"{job.folder}: {error}")
+
+
+@functools.lru_cache(maxsize=4)
+def _retargeter(robot: str, options: tuple[tuple[str, Any], ...], file: pathlib.Path | None) -> Retargeter:
+    """One for all clips of this process, since its stack is made once."""
+    # Imported for clips that can be read
+    from wbc.retarget.options import RetargetOptions
+    from wbc.retarget.retargeter import Retargeter
+
+    loaded = robots.load(robot, base="floating")
+    return Retargeter(loaded, None, RetargetOptions(**dict(options)), correspondence=file)
+
+
+@contextlib.contextmanager
+def _fresh(folder: pathlib.Path) -> Iterator[pathlib.Path]:
+    """A folder beside the one that is written, whose files move there at the end, the report last."""
+    fresh = folder / ".writing"
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir(parents=True)
+    try:
+        yield fresh
+        (folder / DONE).unlink(missing_ok=True)
+        for file in sorted(fresh.iterdir(), key=lambda file: file.name == DONE):
+            file.replace(folder / file.name)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)

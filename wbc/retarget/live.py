@@ -1,0 +1,173 @@
+"""A frame at a time, as it comes: teleoperation of a robot by a person's motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wbc import validation
+from wbc.errors import ShapeError
+from wbc.retarget.clip import Array, Skeleton
+from wbc.retarget.correspondence import Correspondence
+from wbc.retarget.engine import Engine
+from wbc.retarget.mapping import LimbPlaces, Mapper, Places
+from wbc.retarget.plan import (
+    BLEND,
+    LimbPlan,
+    MotionPlan,
+    flat_place,
+    logarithms,
+    lowering,
+    minimum_jerk,
+    raised,
+)
+from wbc.retarget.stances import FAST, HAND_HEIGHT, LEVEL, SLOW
+from wbc.rotations import exponential
+
+#: Time constant of the filter of speeds [s]
+FILTER = 0.04
+#: How fast the pelvis may rise again when standing legs no longer ask for it to be low [m/s]
+RISE = 0.3
+
+
+@dataclass
+class _LiveLimb:
+    """What is known of a limb from frame to frame: ends [m], filtered speed [m/s], its contact and its target."""
+
+    ends: Array
+    speed: float = 0.0
+    slow: bool = False
+    stands: bool = False
+    share: float = 1.0
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    heading: Array | None = None
+
+
+class LiveRetargeter:
+    """Follows frames as they come, with a delay of one frame; made by :meth:`wbc.retarget.Retargeter.live`.
+
+        live = retargeter.live(rate=50.0)
+        q = live.frame(points, turns)           # every 20 ms
+
+    Stances are seen from the frames so far; a foot that slows down near the ground is brought to it and held.
+
+    Attributes:
+        rate: frames a second [Hz]. q: the last configuration; None before the first frame.
+    """
+
+    def __init__(self, match: Correspondence, engine: Engine, skeleton: Skeleton, rate: float, every: int) -> None:
+        self.rate = rate
+        self._match, self._engine, self._every = match, engine, every
+        self._joints = len(skeleton.names)
+        self._mapper = Mapper(match)
+        rest = match.rest
+        legs = [m for m in match.limbs.values() if m.source.endswith("leg")] or list(match.limbs.values())
+        self._leg = float(np.mean([np.linalg.norm(rest[m.base] - rest[m.end]) for m in legs]))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames: the next one is the first."""
+        self._limbs: dict[str, _LiveLimb] = {}
+        self._ankle: dict[str, float] = {}
+        self._last: MotionPlan | None = None
+        self._with_turns = False
+        self._low = 0.0
+        self.q: Array | None = None
+
+    def frame(self, points: Any, turns: Any = None) -> Array:
+        """The configuration after one more frame [nq].
+
+        Args:
+            points: of the skeleton, in the world, z up [joints, 3] [m]. turns: [joints, 3, 3]; None: not known.
+
+        Raises:
+            ShapeError, NotFiniteError: not such arrays; nothing is changed.
+        """
+        given = validation.real_array("points", points, (self._joints, 3))
+        rotations = None if turns is None else validation.real_array("turns", turns, (self._joints, 3, 3))
+        if self._last is not None and (turns is not None) != self._with_turns:
+            raise ShapeError("turns", turns, "give turns in every frame or in none")
+        self._with_turns = turns is not None
+        self._look(given)
+        places = self._mapper.places(given[None], None if rotations is None else rotations[None], self._ankle)
+        now = self._targets(places)
+        if self._last is None or self.q is None:
+            self.q = self._engine.start(now, self._engine.rows(now))
+        else:
+            plan = _between(self._last, now, self._every, self._engine.dt)
+            self.q = self._engine.follow(plan, self.q)
+        self._last = now
+        return self.q.copy()
+
+    def _look(self, points: Array) -> None:
+        """Which limbs stand, as far as the frames so far say."""
+        share = 1.0 - np.exp(-1.0 / (FILTER * self.rate))
+        lowest = np.inf
+        for name, match in self._match.limbs.items():
+            ends = points[[match.end, match.tip]]
+            limb = self._limbs.setdefault(name, _LiveLimb(ends))
+            speed = float(np.sqrt(((ends - limb.ends) ** 2).sum(axis=1).max())) * self.rate
+            limb.speed += share * (speed - limb.speed)
+            limb.ends = ends
+            limb.slow = limb.speed < (FAST if limb.slow else SLOW) * self._leg
+            self._ankle[match.source] = min(self._ankle.get(match.source, np.inf), float(ends[0, 2]))
+            if match.source.endswith("leg"):
+                lowest = min(lowest, float(ends[:, 2].min()))
+        for name, match in self._match.limbs.items():
+            limb = self._limbs[name]
+            near = LEVEL if match.source.endswith("leg") else HAND_HEIGHT
+            limb.stands = limb.slow and float(limb.ends[:, 2].min()) < lowest + near * self._leg
+
+    def _targets(self, places: Places) -> MotionPlan:
+        """Targets of this frame, as a plan of one tick."""
+        body = self._match.body
+        limbs = {name: self._limb(name, limb) for name, limb in places.limbs.items()}
+        need = float(lowering(body, places.pelvis, places.turn, limbs, 1.0 / self.rate)[0])
+        self._low = max(need, self._low - RISE / self.rate)
+        pelvis = places.pelvis - np.array([0.0, 0.0, self._low])
+        return MotionPlan(self._engine.dt, pelvis, places.turn, places.chest, places.head, limbs)
+
+    def _limb(self, name: str, limb: LimbPlaces) -> LimbPlan:
+        """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
+        robot, state = self._match.body.limbs[name], self._limbs[name]
+        end, rotation = raised(robot, limb)
+        flat = rotation is not None and robot.contact == "flat"
+        stands = state.stands and not (flat and float(limb.rotation[0, 2, 2]) < 0.8)  # type: ignore[index]
+        if stands and state.share >= 1.0:
+            state.place, state.heading = flat_place(robot, limb, end, rotation if flat else None, 0, 1)
+        step = 1.0 / (BLEND * self.rate)
+        state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
+        share = float(minimum_jerk(np.array(state.share)))
+        end = state.place + share * (end - state.place) if share < 1.0 else end
+        if flat and rotation is not None and state.heading is not None and share < 1.0:
+            rotation = state.heading @ exponential(share * logarithms(state.heading.T @ rotation))
+        held = np.array([stands and state.share <= 0.0])
+        return LimbPlan(limb.middle, limb.wrist, end, rotation, held, held)
+
+
+def _between(last: MotionPlan, now: MotionPlan, every: int, dt: float) -> MotionPlan:
+    """A plan of the ticks from one frame to the next."""
+    shares = np.linspace(0.0, 1.0, every + 1)
+
+    def line(a: Array, b: Array) -> Array:
+        return np.asarray(a + shares[:, None] * (b - a))
+
+    def turn(a: Array, b: Array) -> Array:
+        if every == 1:
+            return np.concatenate([a, b])
+        return np.asarray(a @ exponential(shares[:, None] * logarithms(np.swapaxes(a, 1, 2) @ b)))
+
+    limbs = {}
+    for name, b in now.limbs.items():
+        a = last.limbs[name]
+        rotation = None if a.rotation is None or b.rotation is None else turn(a.rotation, b.rotation)
+        held = np.repeat(b.held, every + 1)
+        limbs[name] = LimbPlan(
+            line(a.middle, b.middle), line(a.wrist, b.wrist), line(a.end, b.end), rotation, held, held
+        )
+    head = None if last.head is None or now.head is None else turn(last.head, now.head)
+    return MotionPlan(
+        dt, line(last.pelvis, now.pelvis), turn(last.turn, now.turn), turn(last.chest, now.chest), head, limbs
+    )

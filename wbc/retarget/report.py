@@ -1,0 +1,187 @@
+"""What a retargeted clip leaves in its folder: the motion, figures, a film and a page."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from wbc import extras
+from wbc.multibody import pin
+from wbc.retarget.figures import motion_figures
+from wbc.retarget.outputs.writing import MOTION_FORMATS, write_motion
+from wbc.shapes import Box
+from wbc.track import render
+from wbc.track.film import save_film
+from wbc.track.page import RunPage
+from wbc.track.scene import Colour, Scene
+from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.retarget.retargeted import Retargeted
+
+#: Files of a clip's folder, besides those of more formats
+WRITTEN = ("motion.npz", "report.json", "report.txt", "film.mp4", "film.gif", "report.html")
+#: Colours of the robot, of the person beside it, and of the ground
+ROBOT: Colour = (0.32, 0.42, 0.58)
+PERSON: Colour = (0.93, 0.55, 0.15)
+GROUND: Colour = (0.80, 0.78, 0.73)
+#: Radius of a bone as drawn [m]
+BONE = 0.018
+#: Size of a film [pixels]
+FILM_SIZE = (560, 330)
+#: Pictures a second of a film [Hz]
+FILM_RATE = 10.0
+#: Pictures of a film, at most
+MOST_PICTURES = 120
+#: Side that a film is seen from [rad]
+AZIMUTH = -1.0
+#: Height that it is seen from [rad]
+ELEVATION = 0.25
+#: The person stands so far beside the robot, in heights of the robot
+ASIDE = 0.8
+#: Links reach so far beyond the joints [m]
+LINK = 0.2
+#: The ground is drawn so far beyond the motion [m]
+BEYOND = 0.7
+#: Corners of meshes closer than this are drawn as one [m]
+DETAIL = 0.02
+
+
+def write_report(
+    motion: Retargeted,
+    folder: pathlib.Path,
+    formats: Sequence[str] = (),
+    *,
+    seconds: float | None = None,
+    film: bool = True,
+) -> dict[str, Any]:
+    """Write a clip's folder, which is there; returns the figures that ``report.json`` holds.
+
+    Args:
+        formats: more formats of the motion, keys of :data:`~wbc.retarget.outputs.MOTION_FORMATS`.
+        seconds: time that retargeting took, with the making of its stack where that is new [s].
+        film: whether a film is drawn, and put on the page.
+
+    Raises:
+        UnknownNameError: no such format. ClipFileError: a file cannot be written.
+    """
+    write_motion(motion, folder / "motion.npz", "npz")
+    for kind in formats:
+        if kind != "npz":
+            write_motion(motion, folder / f"motion-{kind}{MOTION_FORMATS.get(kind, '')}", kind)
+    figures: dict[str, Any] = {"clip": motion.clip.name, "robot": motion.robot.name}
+    limbs = {limb: motion.body.limbs[limb] for limb in motion.stance}
+    feet = {limbs[limb].end: stands for limb, stands in motion.stance.items()}
+    ground = None if motion.robot.base == "fixed" else 0.0
+    balls = {limb.end for limb in limbs.values() if limb.radius > 0.0}
+    figures |= motion_figures(motion.robot, motion.rate, motion.q, feet, ground=ground, balls=balls)
+    if seconds is not None:
+        figures |= {"seconds": seconds, "frames_a_second": len(motion.q) / max(seconds, 1e-9)}
+    points = motion.errors.points
+    figures["error"] = motion.errors.mean
+    figures["errors"] = {name: {"mean": float(far.mean()), "largest": float(far.max())} for name, far in points.items()}
+    figures["given_up"] = [str(entry) for entry in motion.given_up]
+    figures["notes"] = list(motion.notes)
+    lines = text_lines(figures)
+    (folder / "report.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    page = RunPage(f"{motion.clip.name} on {motion.robot.name}", f"{len(motion.q)} frames at {motion.rate:g} Hz")
+    if film:
+        extras.require("plots", "a film", "matplotlib")
+        page.picture(save_motion_film(motion, folder / "film.mp4"), "robot, and the person beside it")
+    page.verbatim("\n".join(lines))
+    page.save(folder)
+    # Last: who goes on with a folder of clips takes a clip with this file as done
+    (folder / "report.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    return figures
+
+
+def text_lines(figures: Mapping[str, Any]) -> list[str]:
+    """The figures as lines of a report."""
+    lines = [f"{figures['clip']} on {figures['robot']}: {figures['frames']} frames at {figures['rate']:g} Hz"]
+    if "frames_a_second" in figures:
+        lines.append(f"retargeted in {figures['seconds']:.3g} s: {figures['frames_a_second']:.4g} frames a second")
+    lines.append(f"slide in stance: {1e3 * figures['slide']:.3g} mm at most")
+    lines += [f"  {foot}: {1e3 * slide:.3g} mm" for foot, slide in figures["slides"].items()]
+    if "penetration" in figures:
+        frames = figures["penetration_frames"]
+        lines.append(f"below the ground: {1e3 * figures['penetration']:.3g} mm at most, {frames} frames beyond 1 mm")
+    for what, share in (("position", ""), ("velocity", "fastest"), ("acceleration", "quickest")):
+        most = f", at most {figures[share]:.3g} of the limit" if share else ""
+        lines.append(f"{what} limits: {figures[f'{what}_breaches']} frames beyond them{most}")
+    lines.append(f"jumps: {figures['jumps']}")
+    lines.append(f"key points from their targets: {1e3 * figures['error']:.3g} mm in the mean")
+    for name, far in figures["errors"].items():
+        lines.append(f"  {name}: {1e3 * far['mean']:.3g} mm, {1e3 * far['largest']:.3g} mm at most")
+    lines += [f"gave way: {entry}" for entry in figures["given_up"]] or ["gave way: nothing"]
+    return lines + [f"note: {note}" for note in figures["notes"]]
+
+
+def save_motion_film(
+    motion: Retargeted, file: pathlib.Path, progress: Callable[[float], None] | None = None
+) -> pathlib.Path:
+    """A film of the robot and, beside it, the person's skeleton; the camera stands still. Returns the file."""
+    clip, q = motion.clip, motion.q
+    count = int(np.clip(motion.time[-1] * FILM_RATE, 2, MOST_PICTURES))
+    rows = np.unique(np.linspace(0, len(q) - 1, count).astype(int))
+    points, bones = _beside(motion, rows)
+    scene = Scene(motion.robot, colours={"*": ROBOT}, floor=False, detail=DETAIL)
+    everything = np.concatenate([points.reshape(-1, 3), _extent(motion, rows)])
+    _add_ground(scene, everything)
+    shot = scene.film(render.framed(everything, FILM_SIZE, AZIMUTH, ELEVATION, filled=0.9))
+    frames = []
+    for k, row in enumerate(rows):
+        scene.add_robot(q[row])
+        for start, end in bones:
+            line = points[k, [start, end]]
+            if np.linalg.norm(line[1] - line[0]) > BONE:
+                scene.add_path(line, colour=PERSON, radius=BONE)
+        image = Image.fromarray(shot())
+        standing = [limb for limb, stands in motion.stance.items() if stands[row]]
+        words = f"{clip.name}  {motion.time[row]:6.2f} s   stands: {', '.join(standing) or 'nothing'}"
+        ImageDraw.Draw(image).text((8, 8), words, fill=(34, 39, 46))
+        frames.append(image)
+        if progress is not None:
+            progress((k + 1) / len(rows))
+    return save_film(frames, file, len(rows) / max(float(motion.time[-1]), 1e-9))
+
+
+def _beside(motion: Retargeted, rows: NDArray[np.int_]) -> tuple[Array, list[tuple[int, int]]]:
+    """The person's points in the film's frames, scaled to the robot's height and moved aside, and its bones."""
+    clip, extent = motion.clip, _extent(motion, rows)
+    at = np.clip(np.round(motion.time[rows] * clip.rate).astype(int), 0, len(clip.points) - 1)
+    points = clip.points[at]
+    tall = float(np.ptp(clip.points[:, :, 2], axis=1).max())
+    height = float(np.ptp(extent[:, 2])) or 1.0
+    points = points * (height / max(tall, 1e-6))
+    aside = extent.mean(axis=0) - points.mean(axis=(0, 1))
+    width = float(np.ptp(points[:, :, 1])) / 2.0 + float(np.ptp(extent[:, 1])) / 2.0
+    points = points + np.array([aside[0], aside[1] + width + ASIDE * height, 0.0])
+    parents = clip.skeleton.parents
+    if max(parents) < 0:
+        # Markers without bones: each with the nearest one
+        middle = clip.points[len(clip.points) // 2]
+        apart = np.linalg.norm(middle[:, None] - middle[None], axis=2) + 1e3 * np.eye(len(middle))
+        return points, [(joint, int(other)) for joint, other in enumerate(apart.argmin(axis=1))]
+    return points, [(parent, joint) for joint, parent in enumerate(parents) if parent >= 0]
+
+
+def _extent(motion: Retargeted, rows: NDArray[np.int_]) -> Array:
+    """Places of the robot's joints in some frames, and what its links may reach beyond them [n, 3]."""
+    model, data, out = motion.robot.model, motion.robot.model.createData(), []
+    for row in rows[:: max(1, len(rows) // 40)]:
+        pin.forwardKinematics(model, data, motion.q[row])
+        out += [data.oMi[joint].translation.copy() for joint in range(1, model.njoints)]
+    places = np.array(out)
+    return np.concatenate([places, places.max(axis=0, keepdims=True) + LINK])
+
+
+def _add_ground(scene: Scene, points: Array) -> None:
+    low, high = points.min(axis=0) - BEYOND, points.max(axis=0) + BEYOND
+    middle = pin.SE3(np.eye(3), np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, -0.01]))
+    scene.add_shape(Box((float(high[0] - low[0]), float(high[1] - low[1]), 0.02)), middle, "ground", GROUND)

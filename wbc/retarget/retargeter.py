@@ -1,0 +1,267 @@
+"""From a clip to a motion of a robot."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from wbc import robots, validation
+from wbc.errors import NotFiniteError, ShapeError
+from wbc.retarget.clip import Array, Clip, Skeleton
+from wbc.retarget.correspondence import Correspondence, CorrespondenceError, correspondence
+from wbc.retarget.engine import Engine
+from wbc.retarget.live import LiveRetargeter
+from wbc.retarget.mapping import Mapper
+from wbc.retarget.options import RetargetOptions
+from wbc.retarget.plan import MotionPlan, plan_motion
+from wbc.retarget.retargeted import GivenUp, Retargeted, frame_poses
+from wbc.retarget.robot_body import RobotBody, body_of
+from wbc.retarget.stances import Marks, Stances, find_stances, intervals
+from wbc.robot import Robot
+
+#: A stance counts from where its contact is this near to its place [m]
+LANDED = 4e-5
+#: A contact that comes to stand so much later than the skeleton's is reported [s]
+LATE = 0.05
+#: A key point farther than this from its target is reported [m]
+FAR = 0.1
+#: If it stays there for longer than this [s]
+LONG = 0.1
+#: Hands of a person lead front legs where they are on the ground for this share of the clip
+ON_HANDS = 0.3
+#: Shortest leg of a skeleton, so that speeds count [m]
+LEAST_LEG = 0.05
+
+
+class Retargeter:
+    """Brings clips of people and animals onto a robot.
+
+        motion = wbc.retarget.Retargeter(wbc.robots.load("g1")).run(clip)
+        motion.q, motion.stance, motion.errors
+
+    Which points lead which links is found (:attr:`correspondence` shows it); feet that stand are hard constraints, and
+    limits of position, velocity and acceleration are kept in every tick.
+
+    Args:
+        robot: a robot, its name or its file.
+        skeleton: of the clips; None: each clip's own.
+        options: see :class:`RetargetOptions`.
+        correspondence: a file of :meth:`Correspondence.save` whose parts replace what is found; None: no file.
+
+    Raises:
+        BodyError: a robot without limbs. CorrespondenceError: a skeleton that cannot lead it, or a bad file.
+        WbcError: as of :func:`wbc.robots.load`.
+    """
+
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        skeleton: Skeleton | None = None,
+        options: RetargetOptions | None = None,
+        *,
+        correspondence: str | os.PathLike[str] | None = None,
+    ) -> None:
+        loaded = robot if isinstance(robot, Robot) else robots.load(os.fspath(robot))
+        self.options = validation.instance("options", options or RetargetOptions(), RetargetOptions, "RetargetOptions")
+        self.body: RobotBody = body_of(loaded)
+        self.skeleton, self._file = skeleton, correspondence
+        self._matches: dict[Any, Correspondence] = {}
+        self._engines: dict[Any, Engine] = {}
+        if skeleton is not None:
+            self.correspondence(skeleton)
+
+    def correspondence(self, skeleton: Skeleton | None = None, *, all_fours: bool | None = None) -> Correspondence:
+        """Which points of a skeleton lead which links; by default the skeleton that was given.
+
+        Raises:
+            CorrespondenceError: no skeleton is known, or it cannot lead the robot.
+        """
+        given = skeleton or self.skeleton
+        if given is None:
+            raise CorrespondenceError("skeleton", None, "give a skeleton, or run a clip first")
+        fours = bool(self.options.all_fours) if all_fours is None else all_fours
+        key = (given.names, given.parents, np.asarray(given.offsets).tobytes(), fours)
+        if key not in self._matches:
+            match = correspondence(self.body, given, all_fours=fours)
+            if self._file is not None:
+                match = match.read(self._file)
+            if self.options.scale is not None:
+                match = match.corrected({"scale": self.options.scale})
+            self._matches[key] = match
+        return self._matches[key]
+
+    def run(self, clip: Clip) -> Retargeted:
+        """The motion of the robot that follows a clip.
+
+        Raises:
+            ShapeError, NotFiniteError: a clip without frames, or with numbers that are none.
+            CorrespondenceError: its skeleton cannot lead the robot.
+        """
+        _check(clip, self.skeleton)
+        match, stances = self._matched(clip)
+        options = self.options
+        rate = options.rate or clip.rate
+        every = max(int(np.ceil(options.tick_rate / rate - 1e-9)), 1)
+        dt = 1.0 / (rate * every)
+        frames = int(np.floor((len(clip.points) - 1) / clip.rate * rate + 1e-6)) + 1
+        times: Array = np.asarray(np.arange((frames - 1) * every + 1) * dt, dtype=np.float64)
+        places = Mapper(match).places(clip.points, clip.turns, stances.ankle)
+        marks = {name: stances.marks[limb.source] for name, limb in match.limbs.items()}
+        plan = plan_motion(self.body, places, marks, clip.rate, times)
+        engine = self.engine(tuple(match.limbs), dt, head=plan.head is not None)
+        all_q, gave = engine.run(plan)
+        offsets = _offsets(engine.robot, self.body, plan, all_q)
+        landed = _landed(engine.robot, plan, offsets)
+        given_up = (*_gave_way(gave, dt), *_not_served(plan, offsets, landed, marks, clip.rate))
+        return Retargeted(
+            robot=engine.robot, rate=rate, time=times[::every], q=all_q[::every],
+            stance={name: marks_[::every] for name, marks_ in landed.items()},
+            given_up=tuple(sorted(given_up, key=lambda given: (given.start, given.name))),
+            notes=(*clip.notes, *match.notes), clip=clip, body=self.body, plan=plan, every=every, all_q=all_q,
+        )  # fmt: skip
+
+    def live(self, rate: float = 50.0) -> LiveRetargeter:
+        """Frames one at a time, as they come; see :class:`LiveRetargeter`.
+
+        Args:
+            rate: at which they come [Hz].
+
+        Raises:
+            RangeError: of the rate. CorrespondenceError: no skeleton was given to the retargeter.
+        """
+        match = self.correspondence()
+        rate = validation.scalar("rate", rate, low=1.0, high=1000.0, unit="Hz")
+        every = max(int(np.ceil(self.options.tick_rate / rate - 1e-9)), 1)
+        engine = self.engine(tuple(match.limbs), 1.0 / (rate * every))
+        return LiveRetargeter(match, engine, match.skeleton, rate, every)
+
+    def engine(self, limbs: tuple[str, ...], dt: float, *, head: bool = False) -> Engine:
+        """The compiled stack for ticks of some length; made once."""
+        key = (limbs, round(dt, 9), head)
+        if key not in self._engines:
+            self._engines[key] = Engine(self.body, limbs, self.options, dt, head=head)
+        return self._engines[key]
+
+    def _matched(self, clip: Clip) -> tuple[Correspondence, Stances]:
+        """The correspondence for a clip, and its stances."""
+        match = self.correspondence(clip.skeleton)
+        stances = stances_of(match, clip)
+        if self.options.all_fours is None and match.upright and not self.body.plan.upright:
+            fours = self.correspondence(clip.skeleton, all_fours=True)
+            found = stances_of(fours, clip)
+            hands = [marks.mean() for name, marks in found.marks.items() if name.endswith("arm")]
+            if fours.limbs["left_leg"].source == "left_leg" and hands and min(hands) > ON_HANDS:
+                return fours, found
+        return match, stances
+
+
+def stances_of(match: Correspondence, clip: Clip) -> Stances:
+    """Stances of a clip, of the skeleton's limbs that lead a robot's."""
+    feet: dict[str, Array] = {}
+    hands: dict[str, Array] = {}
+    lengths = []
+    for limb in match.limbs.values():
+        ends = clip.points[:, [limb.end, limb.tip]]
+        (feet if limb.source.endswith("leg") else hands)[limb.source] = ends
+        bones = np.diff(match.rest[[limb.base, limb.middle, limb.end]], axis=0)
+        if limb.source.endswith("leg"):
+            lengths.append(float(np.linalg.norm(bones, axis=1).sum()))
+    return find_stances(feet, hands, clip.rate, max(float(np.mean(lengths)) if lengths else 1.0, LEAST_LEG))
+
+
+def _check(clip: Clip, skeleton: Skeleton | None) -> None:
+    """A clip whose arrays fit its skeleton."""
+    validation.instance("clip", clip, Clip, "a Clip")
+    joints = len(clip.skeleton.names)
+    points = np.asarray(clip.points)
+    if points.ndim != 3 or points.shape[1:] != (joints, 3) or len(points) < 1:
+        raise ShapeError("clip.points", points.shape, f"expected [frames, {joints}, 3] with a frame at least")
+    if clip.turns is not None and np.shape(clip.turns) != (len(points), joints, 3, 3):
+        raise ShapeError("clip.turns", np.shape(clip.turns), f"expected [{len(points)}, {joints}, 3, 3]")
+    validation.scalar("clip.rate", clip.rate, low=1.0, high=1e4, unit="Hz")
+    bad = np.argwhere(~np.isfinite(points).all(axis=2))
+    if len(bad):
+        frame, joint = bad[0]
+        raise NotFiniteError("clip.points", points[frame, joint], f"{clip.skeleton.names[joint]} at frame {frame}")
+    if clip.turns is not None and not np.isfinite(clip.turns).all():
+        raise NotFiniteError("clip.turns", clip.name, "expected finite numbers")
+    if skeleton is not None and clip.skeleton.names != skeleton.names:
+        raise CorrespondenceError("clip.skeleton", clip.name, "its points are not those of the skeleton that was given")
+
+
+def _offsets(robot: Robot, body: RobotBody, plan: MotionPlan, q: Array) -> dict[str, tuple[Array, Array]]:
+    """Limb -> distances of its contact, and of its wrist or its contact, from their targets [ticks] [m]."""
+    frames = {name: (body.limbs[name].end, body.limbs[name].wrist) for name in plan.limbs}
+    names = tuple(dict.fromkeys(frame for pair in frames.values() for frame in pair if frame))
+    _, positions = frame_poses(robot, names, q)
+    out = {}
+    for name, (end, wrist) in frames.items():
+        limb = plan.limbs[name]
+        own = np.linalg.norm(positions[:, names.index(end)] - limb.end, axis=1)
+        hand = wrist and name.endswith("arm") and body.plan.upright
+        out[name] = own, np.linalg.norm(positions[:, names.index(wrist)] - limb.wrist, axis=1) if hand else own
+    return out
+
+
+def _landed(robot: Robot, plan: MotionPlan, offsets: dict[str, tuple[Array, Array]]) -> dict[str, Marks]:
+    """Limb -> whether its contact is at its place: of each stance the longest time for which nothing slips [ticks]."""
+    out = {}
+    for name, limb in plan.limbs.items():
+        marks = np.zeros(plan.ticks, dtype=bool)
+        for a, b in intervals(limb.stands) if robot.base != "fixed" else ():
+            still = intervals(offsets[name][0][a:b] <= LANDED)
+            if still:
+                first, last = max(still, key=lambda run: run[1] - run[0])
+                marks[a + first : a + last] = True
+        out[name] = marks
+    return out
+
+
+def _gave_way(gave: list[tuple[int, tuple[str, ...]]], dt: float) -> list[GivenUp]:
+    """Rows that gave way in their ticks, by name."""
+    ticks: dict[str, list[int]] = {}
+    for tick, names in gave:
+        for name in names:
+            ticks.setdefault(name, []).append(tick)
+    out = []
+    for name, when in ticks.items():
+        marks = np.zeros(max(when) + 1, dtype=bool)
+        marks[when] = True
+        out += [GivenUp(name, a * dt, b * dt, "gave way to limits of the joints") for a, b in _joined(marks, dt)]
+    return out
+
+
+def _not_served(
+    plan: MotionPlan,
+    offsets: dict[str, tuple[Array, Array]],
+    landed: dict[str, Marks],
+    marks: dict[str, Marks],
+    rate: float,
+) -> list[GivenUp]:
+    """Contacts that come late or are not held, and limbs far from their targets."""
+    dt, out = plan.dt, list[GivenUp]()
+    frame = np.rint(np.arange(plan.ticks) * dt * rate).astype(int)
+    for name, limb in plan.limbs.items():
+        for a, b in intervals(limb.stands):
+            late = int(np.argmax(landed[name][a:b])) if landed[name][a:b].any() else b - a
+            if late * dt > LATE:
+                out.append(GivenUp(name, a * dt, (a + late) * dt, "comes to stand later than the skeleton"))
+        toes = marks[name][np.clip(frame, 0, len(marks[name]) - 1)] & ~limb.stands
+        out += [GivenUp(name, a * dt, b * dt, "stands on its toes or heel: not held") for a, b in _joined(toes, dt)]
+        for a, b in _joined(offsets[name][1] > FAR, dt):
+            if (b - a) * dt > LONG:
+                out.append(GivenUp(name, a * dt, b * dt, f"is more than {FAR} m from its target: out of reach"))
+    return out
+
+
+def _joined(marks: Marks, dt: float) -> list[tuple[int, int]]:
+    """Runs of true, those less than a twentieth of a second apart as one."""
+    out: list[tuple[int, int]] = []
+    for a, b in intervals(marks):
+        if out and (a - out[-1][1]) * dt < 0.05:
+            out[-1] = (out[-1][0], b)
+        else:
+            out.append((a, b))
+    return out

@@ -1,0 +1,347 @@
+"""The body of a robot: limbs, hinges and soles, found from the joints' axes, the lengths of links and their bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from wbc.multibody import pin
+from wbc.retarget.body import ARM_WORDS, LEG_WORDS, BodyError, BodyPlan, PointTree, find_body, words
+from wbc.retarget.clip import Array
+from wbc.retarget.solids import LinkBalls, balls_of_joints
+from wbc.robot import Robot
+
+#: Cosine of the angle by which right and left may be off a coordinate axis: rest poses of robots are not symmetric
+STRAIGHT = 0.9
+#: Angles to which each joint is turned to see what it changes [rad]
+SWEEP = np.linspace(-np.pi, np.pi, 17)
+#: An axis whose part along a bone is below this turns the next bone against it; above, about itself
+ACROSS = 0.7
+#: A joint at least this share of the way from the middle hinge to the end may be an ankle or a wrist
+DISTAL = 0.5
+#: Joints before the middle hinge whose axes meet in the hip or the shoulder
+MEETING = 3
+#: A meeting point this share of the limb away from all joints before the middle hinge is none
+OFF = 0.3
+#: How much the place of a joint counts against the distance of axes when their meeting point is sought
+NEAR = 1e-2
+#: Points of a foot within this height above its lowest are its sole [m]
+SOLE = 0.012
+#: A sole at least this long and wide is flat, a smaller one is a point [m]
+FLAT = 0.03
+#: Height of the ankle above the sole, as share of the leg, where the description has no body of the foot
+ANKLE = 0.09
+#: A last link is no longer than this share of the chain before it: bodies in other units lie far away
+LONGEST = 0.6
+#: Radius of a hand or foot of which no body is known [m]
+TIP = 0.02
+#: Length of a last link of which nothing is known, as share of the bone before it
+HAND = 0.25
+#: Where a sole begins and ends before the ankle and beside it, of which no body is known [m]
+GUESSED_SOLE = ((-0.04, 0.10), (-0.03, 0.03))
+
+Contact = Literal["flat", "point"]
+
+
+@dataclass(frozen=True)
+class RobotLimb:
+    """A leg or an arm of a robot.
+
+    Positions are in the world at ``robot.neutral``.
+
+    Attributes:
+        joints: numbers of its joints from the trunk on.
+        base: hip or shoulder: where the axes before the middle hinge meet.
+        middle: frame at the hinge of knee or elbow.
+        wrist: frame at the ankle or wrist; "" where the last bone ends in the contact point itself.
+        end: frame of the contact: of a flat foot below the ankle in the sole, forward, left and up at rest; of a point
+            foot, and of a hand, at the centre of its ball.
+        places: base, middle, wrist, end [4, 3].
+        contact: flat or point. radius: of the ball; 0 of a flat foot [m].
+        corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
+        guessed: the description says nothing of the foot's or hand's size.
+    """
+
+    joints: tuple[int, ...]
+    base: Array
+    middle: str
+    wrist: str
+    end: str
+    places: Array
+    contact: Contact
+    radius: float
+    corners: Array
+    guessed: bool
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Base to middle, middle to wrist [m]."""
+        upper, lower = np.linalg.norm(np.diff(self.places[:3], axis=0), axis=1)
+        return float(upper), float(lower)
+
+
+@dataclass(frozen=True)
+class RobotBody:
+    """What retargeting knows of a robot.
+
+    Attributes:
+        robot: with the frames of pelvis, chest, feet and hands added.
+        plan: of its joints. limbs: by name of :data:`wbc.retarget.body.LIMBS`.
+        pelvis, chest: frames at the middle of hips and of shoulders, with the body's axes at rest.
+        places: of the two at rest [2, 3]. waist: where the axes between them meet; None where one link is both.
+        head: frame of the head, with the body's axes at rest; "" without a neck.
+        height: of the pelvis above the ground where the robot stands as at rest [m].
+        balls: what each limb's end is made of, by the limb's name, in the frame of its last joint.
+    """
+
+    robot: Robot
+    plan: BodyPlan
+    limbs: dict[str, RobotLimb]
+    pelvis: str
+    chest: str
+    places: Array
+    waist: Array | None
+    head: str
+    height: float
+    balls: dict[str, LinkBalls]
+
+    @property
+    def axes(self) -> Array:
+        """Forward, left and up at rest in the world, as columns [3, 3]."""
+        return self.plan.axes
+
+
+def joint_tree(robot: Robot) -> tuple[PointTree, pin.Data]:
+    """Joints at ``robot.neutral``, with one more point at the end of each last link."""
+    model, data = robot.model, robot.model.createData()
+    pin.forwardKinematics(model, data, robot.neutral)
+    pin.updateFramePlacements(model, data)
+    pin.computeJointJacobians(model, data, robot.neutral)
+    names = [str(name) for name in list(model.names)]
+    parents = [-1, *(int(model.parents[j]) for j in range(1, model.njoints))]
+    points = [np.array(data.oMi[j].translation) for j in range(model.njoints)]
+    if robot.base != "fixed":
+        # The world is no part of a body that moves in it
+        points[0] = points[1].copy()
+    carried = balls_of_joints(robot, [j for j in range(1, model.njoints) if j not in parents])
+    for joint in range(1, model.njoints):
+        if joint not in parents[: model.njoints]:
+            names.append(f"{names[joint]} end")
+            parents.append(joint)
+            points.append(_tip(robot, data, joint, parents, carried.get(joint)))
+    return PointTree(tuple(names), tuple(parents), np.array(points)), data
+
+
+def _tip(robot: Robot, data: pin.Data, joint: int, parents: list[int], balls: LinkBalls | None) -> Array:
+    """The point of a last link that is farthest from the joint before."""
+    model, own = robot.model, data.oMi[joint]
+    here = np.array(own.translation)
+    candidates = [np.array(data.oMf[i].translation) for i, f in enumerate(model.frames) if int(f.parentJoint) == joint]
+    before = int(parents[joint])
+    back = here - np.array(data.oMi[before].translation)
+    if float(np.linalg.norm(back)) < 1e-9 and before > 0:
+        back = here - np.array(data.oMi[int(parents[before])].translation)
+    if balls is not None:
+        candidates.append(own.act(balls.centers.mean(axis=0)))
+    most = max(LONGEST * _chain_length(data, parents, joint), 0.05)
+    candidates = [point for point in candidates if float(np.linalg.norm(point - here)) < most]
+    far = max(candidates, key=lambda point: float(np.linalg.norm(point - here)), default=here)
+    return far if float(np.linalg.norm(far - here)) > 1e-3 else here + HAND * back
+
+
+def _chain_length(data: pin.Data, parents: list[int], joint: int) -> float:
+    """Length of the chain from the root to a joint."""
+    length = 0.0
+    while (parent := int(parents[joint])) > 0:
+        length += float(np.linalg.norm(data.oMi[joint].translation - data.oMi[parent].translation))
+        joint = parent
+    return length
+
+
+def body_of(robot: Robot) -> RobotBody:
+    """Find limbs, trunk and soles of a robot.
+
+    Raises:
+        BodyError: it has no pair of limbs.
+    """
+    tree, data = joint_tree(robot)
+    fixed = robot.base == "fixed"
+    plan = find_body(tree, field="robot", arms=fixed, straight=STRAIGHT)
+    if robot.base not in ("fixed", "floating"):
+        raise BodyError("robot", robot.name, f"its base is {robot.base}; load it with base='floating' or 'fixed'")
+    said = {word for chain in plan.limbs.values() for point in chain for word in words(tree.names[point])}
+    if not fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
+        raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
+    count = robot.model.njoints
+    leaves = {name: chain[-2] if chain[-1] >= count else chain[-1] for name, chain in plan.limbs.items()}
+    balls = balls_of_joints(robot, set(leaves.values()))
+    limbs: dict[str, RobotLimb] = {}
+    new = robot
+    for name in plan.limbs:
+        limb, placed = _limb(name, robot, data, plan, balls)
+        limbs[name] = limb
+        for frame, (joint, placement) in placed.items():
+            new = _with_frame(new, frame, joint, placement)
+    kinds = ("leg", "arm") if not fixed else ("arm", "arm")
+    pelvis = _middle(limbs, kinds[0])
+    chest = _middle(limbs, kinds[1]) if f"left_{kinds[1]}" in limbs else pelvis
+    carriers = {"pelvis": (plan.pelvis, pelvis), "chest": (plan.chest, chest)}
+    if plan.head and plan.upright:
+        carriers["head"] = (max(joint for joint in plan.head if joint < count), tree.points[plan.head[0]])
+    for name, (joint, place) in carriers.items():
+        new = _with_frame(new, f"retarget_{name}", joint, data.oMi[joint].actInv(pin.SE3(plan.axes, place)))
+    waist = None
+    if plan.chest != plan.pelvis:
+        between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < count]
+        waist = _meeting(data, robot, between[:MEETING], np.mean([tree.points[j] for j in between], axis=0))
+    up = plan.axes[:, 2]
+    lowest = min(
+        (float(limb.places[3] @ up) - limb.radius for name, limb in limbs.items() if _is_foot(name, plan, fixed)),
+        default=0.0,
+    )
+    return RobotBody(
+        robot=new, plan=plan, limbs=limbs, pelvis="retarget_pelvis", chest="retarget_chest",
+        places=np.array([pelvis, chest]), waist=waist, head="retarget_head" if "head" in carriers else "",
+        height=float(pelvis @ up) - lowest,
+        balls={name: balls[limb.joints[-1]] for name, limb in limbs.items() if limb.joints[-1] in balls},
+    )  # fmt: skip
+
+
+def _with_frame(robot: Robot, name: str, joint: int, placement: pin.SE3) -> Robot:
+    """The robot with a frame at a placement in a joint's own; names of joints may be those of links elsewhere."""
+    if joint == 0:
+        return robot.with_frame(name, "world", placement)
+    frames = [(k, frame) for k, frame in enumerate(robot.model.frames) if int(frame.parentJoint) == joint]
+    parent = next(frame for k, frame in frames if int(robot.model.getFrameId(str(frame.name))) == k)
+    return robot.with_frame(name, str(parent.name), parent.placement.actInv(placement))
+
+
+def _is_foot(name: str, plan: BodyPlan, fixed: bool) -> bool:
+    return not fixed and (name.endswith("leg") or not plan.upright)
+
+
+def _middle(limbs: dict[str, RobotLimb], kind: str) -> Array:
+    return np.asarray(0.5 * (limbs[f"left_{kind}"].base + limbs[f"right_{kind}"].base))
+
+
+def _axis(robot: Robot, data: pin.Data, joint: int) -> Array:
+    """Direction of a joint's axis in the world; zero of a joint of several degrees of freedom."""
+    if int(robot.model.nvs[joint]) != 1:
+        return np.zeros(3)
+    column = np.asarray(pin.getJointJacobian(robot.model, data, joint, pin.WORLD)).reshape(6, robot.nv)
+    twist = column[:, int(robot.model.idx_vs[joint])]
+    return np.asarray(twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3])
+
+
+def _meeting(data: pin.Data, robot: Robot, joints: list[int], start: Array) -> Array:
+    """The point nearest to the axes of some joints, and a little to where they are."""
+    matrix, side = NEAR * np.eye(3), NEAR * start
+    for joint in joints:
+        axis, place = _axis(robot, data, joint), np.array(data.oMi[joint].translation)
+        across = np.eye(3) - np.outer(axis, axis)
+        matrix, side = matrix + across, side + across @ place
+    return np.asarray(np.linalg.solve(matrix, side))
+
+
+def _limb(
+    name: str, robot: Robot, data: pin.Data, plan: BodyPlan, balls: dict[int, LinkBalls]
+) -> tuple[RobotLimb, dict[str, tuple[int, pin.SE3]]]:
+    """A limb, and its frames: in which joint, and where. ``balls``: by number of the joint that carries them."""
+    points, chain, frame = plan.tree.points, plan.limbs[name], f"retarget_{name}"
+    joints = tuple(joint for joint in chain if joint < robot.model.njoints)
+    foot = _is_foot(name, plan, robot.base == "fixed")
+    tip = points[chain[-1]]
+    middle = _middle_hinge(robot, data, joints, tip)
+    before = list(joints[: joints.index(middle)]) or [joints[0]]
+    base = _meeting(data, robot, before[-MEETING:], points[before[-MEETING:][0]])
+    size = float(np.linalg.norm(tip - points[joints[0]]))
+    if float(np.linalg.norm(points[before] - base, axis=1).min()) > OFF * size:
+        base = points[before[0]]
+    wrist = _wrist(robot, data, joints, middle, tip)
+    ankle = points[wrist] if wrist else tip
+    own = balls.get(joints[-1])
+    if own is not None and float(np.linalg.norm(own.centers.mean(axis=0))) > size:
+        own = None
+    end, contact, radius, corners, guessed = _end(data.oMi[joints[-1]], own, plan.axes, ankle, tip, size, foot=foot)
+    places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
+    limb = RobotLimb(
+        joints=joints, base=base, middle=f"{frame}_middle", wrist=f"{frame}_wrist" if wrist else "", end=frame,
+        places=places, contact=contact, radius=radius, corners=corners, guessed=guessed,
+    )  # fmt: skip
+    placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
+    if wrist:
+        placed[limb.wrist] = (wrist, pin.SE3.Identity())
+    return limb, placed
+
+
+def _middle_hinge(robot: Robot, data: pin.Data, joints: tuple[int, ...], tip: Array) -> int:
+    """The knee or elbow: the joint that changes the distance from where the axes before it meet to the end of the limb
+    most, weighted with how evenly it divides the limb.
+    """
+
+    def score(count: int) -> float:
+        joint = joints[count]
+        axis, place = _axis(robot, data, joint), np.array(data.oMi[joint].translation)
+        before = joints[max(count - MEETING, 0) : count]
+        start = _meeting(data, robot, list(before), np.array(data.oMi[before[-1]].translation))
+        distances = [float(np.linalg.norm(place + pin.exp3(axis * angle) @ (tip - place) - start)) for angle in SWEEP]
+        even = min(float(np.linalg.norm(place - start)), float(np.linalg.norm(tip - place)))
+        return (max(distances) - min(distances)) * even
+
+    return joints[max(range(1, len(joints)), key=score)]
+
+
+def _wrist(robot: Robot, data: pin.Data, joints: tuple[int, ...], middle: int, tip: Array) -> int:
+    """The first joint far enough behind the middle hinge that turns across the bone; 0 without one."""
+    start = np.array(data.oMi[middle].translation)
+    reach = float(np.linalg.norm(tip - start))
+    for joint in joints[joints.index(middle) + 1 :]:
+        bone = np.array(data.oMi[joint].translation) - start
+        length = float(np.linalg.norm(bone))
+        if length > DISTAL * reach and abs(float(_axis(robot, data, joint) @ bone)) < ACROSS * length:
+            return joint
+    return 0
+
+
+def _end(
+    pose: pin.SE3, balls: LinkBalls | None, axes: Array, ankle: Array, tip: Array, size: float, *, foot: bool
+) -> tuple[pin.SE3, Contact, float, Array, bool]:
+    """Pose of the contact frame in the world, its kind and radius, corners in it, and whether it was guessed."""
+    jointed = float(np.linalg.norm(ankle - tip)) > 1e-9
+    if balls is None:
+        if foot and jointed:
+            corners = np.array([[x, y, 0.0] for x in GUESSED_SOLE[0] for y in GUESSED_SOLE[1]])
+            return pin.SE3(axes, ankle - ANKLE * size * axes[:, 2]), "flat", 0.0, corners, True
+        return pin.SE3(axes, tip), "point", TIP, np.zeros((1, 3)), True
+    centers = balls.centers @ np.asarray(pose.rotation).T + np.asarray(pose.translation)
+    local = centers @ axes
+    heights = local[:, 2] - balls.radii
+    low = heights < heights.min() + SOLE
+    sole, round_ = local[low, :2], balls.radii[low, None]
+    if foot and jointed and bool((np.ptp(sole, axis=0) > FLAT).all()):
+        place = np.array([*(ankle @ axes)[:2], heights.min()])
+        lower, upper = (sole - round_).min(axis=0) - place[:2], (sole + round_).max(axis=0) - place[:2]
+        corners = np.array([[x, y, 0.0] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])])
+        return pin.SE3(axes, axes @ place), "flat", 0.0, corners, False
+    center, radius = _ball(centers, balls.radii, tip, foot)
+    return pin.SE3(axes, center), "point", radius, np.zeros((1, 3)), False
+
+
+def _ball(centers: Array, radii: Array, tip: Array, foot: bool) -> tuple[Array, float]:
+    """Centre and radius of the ball at the end of a limb: that of a point foot, or one around a hand."""
+    if not foot:
+        middle = centers.mean(axis=0)
+        return middle, float(np.quantile(np.linalg.norm(centers - middle, axis=1) + radii, 0.5))
+    nearest = int(np.argmin(np.linalg.norm(centers - tip, axis=1)))
+    if radii[nearest] > 0.0:
+        return centers[nearest], float(radii[nearest])
+    # Corners of a mesh: the ball through those near the tip
+    near = centers[np.linalg.norm(centers - tip, axis=1) < max(0.03, 1.5 * np.linalg.norm(centers - tip, axis=1).min())]
+    matrix = np.hstack([2.0 * near, np.ones((len(near), 1))])
+    solution = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
+    center = solution[:3]
+    if float(np.linalg.norm(center - tip)) > 0.05:
+        center = tip
+    return center, float(np.linalg.norm(near - center, axis=1).max())

@@ -1,0 +1,59 @@
+"""C3D files of optical motion capture: markers with labels."""
+
+from __future__ import annotations
+
+import pathlib
+import struct
+from typing import Any
+
+import numpy as np
+
+from wbc import extras
+from wbc.retarget.sources.layouts import parents_by_name
+from wbc.retarget.sources.recorded import Recorded, no_clip, unlike
+
+#: The first bytes of a C3D file: any block of parameters, and 80 in the second byte
+KEY = 0x50
+#: The header's number of the last frame where there are more than it can hold
+MOST = 0xFFFF
+#: Units of C3D files [m]
+LENGTHS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}
+
+
+def read_c3d(path: pathlib.Path) -> Recorded:
+    """Markers of a C3D file, by the package ezc3d.
+
+    Raises:
+        MissingPackageError: ezc3d is not installed. ClipFileError: it is no C3D file, is cut off, or has no markers.
+    """
+    extras.require("clips", "a C3D file", "ezc3d")
+    import ezc3d
+
+    with path.open("rb") as stream:
+        start = stream.read(10)
+    size = path.stat().st_size
+    if len(start) < 10 or start[1] != KEY or size < 1024:
+        raise no_clip(path, "the file is empty" if size == 0 else "no C3D file, or it is cut off")
+    try:
+        data = ezc3d.c3d(str(path))
+        about: Any = data["parameters"]["POINT"]
+        points = np.moveaxis(np.asarray(data["data"]["points"], dtype=float)[:3], 0, 2).swapaxes(0, 1)
+        labels, units = about["LABELS"]["value"], about["UNITS"]["value"]
+        rate = float(np.ravel(about["RATE"]["value"])[0])
+    except (OSError, RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
+        raise no_clip(path, f"no C3D file that can be read, or it is cut off: {error}") from error
+    # ezc3d counts the frames that are there; the header has the numbers of the first and last one
+    first, last = struct.unpack("<HH", start[6:10])
+    count = last - first + 1 if last < MOST else 0
+    notes: list[str] = []
+    if points.shape[1] == 0 or len(points) < 2:
+        raise no_clip(path, f"{len(points)} frames of {points.shape[1]} markers: no clip")
+    if len(points) < count:
+        notes.append(f"the file is cut off: it has {len(points)} of {count} frames")
+    names = [label.strip() or f"marker{number + 1}" for number, label in enumerate(labels[: points.shape[1]])]
+    names += [f"marker{number + 1}" for number in range(len(names), points.shape[1])]
+    names = unlike(names, notes)
+    # A marker that is lost is NaN, or all zeros where the software wrote no residual
+    points = np.where((points == 0.0).all(axis=2, keepdims=True), np.nan, points)
+    unit = LENGTHS.get(units[0].strip().lower(), 0.0) if units else 0.0
+    return Recorded(names, parents_by_name(names), points, rate, unit=unit, usual="z", notes=notes)

@@ -1,0 +1,245 @@
+"""A clip from a file of any format, with z up, in metres, without gaps and swapped markers."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbc import validation
+from wbc.errors import RangeError, UnknownNameError
+from wbc.retarget.clip import Clip, Skeleton
+from wbc.retarget.sources import axes
+from wbc.retarget.sources.gaps import fill_gaps
+from wbc.retarget.sources.recorded import Recorded, no_clip
+from wbc.retarget.sources.swaps import mend_swaps
+from wbc.validation import Array
+
+#: Suffixes of files that are read
+CLIP_SUFFIXES = (".bvh", ".c3d", ".npz", ".npy", ".csv", ".pkl", ".pt")
+#: What a file that is not read is converted with
+CONVERTED = {
+    ".fbx": "FBX is not read: convert it to BVH, in Blender by File > Import > FBX, then Export > Motion Capture",
+    ".trc": "TRC is not read: save it as C3D or as csv with a header of names",
+    ".glb": "glTF is not read: convert it to BVH in Blender",
+    ".gltf": "glTF is not read: convert it to BVH in Blender",
+    ".asf": "ASF and AMC are not read: convert them to BVH",
+    ".amc": "ASF and AMC are not read: convert them to BVH",
+}
+#: Least frames a second [Hz]
+SLOWEST = 10.0
+#: Most frames a second [Hz]
+FASTEST = 1000.0
+#: A rate this near to a whole number is that number, as a share: files round the time of a frame
+WHOLE = 2e-3
+#: What lies this far below the ground is raised onto it [m]
+BELOW = 0.15
+#: The lowest point this far above zero is said [m]
+ABOVE = 0.3
+#: A unit that a file says is not believed where the body's size says another, by this factor
+OTHER_UNIT = 5.0
+#: Bones shorter than this are said to have no length [m]
+NO_LENGTH = 1e-4
+
+
+def load_clip(
+    path: str | os.PathLike[str],
+    *,
+    body_model: str | os.PathLike[str] | None = None,
+    names: str | Sequence[str] | None = None,
+    rate: float | None = None,
+    up: str | None = None,
+    unit: str | float | None = None,
+) -> Clip:
+    """A clip from a file: BVH, C3D, AMASS and SMPL (npz, pkl), key points (npy, npz, csv, pt).
+
+    What the file does not say is found from the motion, what is wrong in it is mended, and both are in the clip's
+    notes: the unit, the axis that is up, left-handed axes, gaps, swapped markers.
+
+        clip = wbc.retarget.load_clip("walk.bvh")
+        clip.notes      # ('y is up in the file', 'its unit is centimetres: the body is 171 of them')
+
+    Args:
+        body_model: file of SMPL, SMPL-H or SMPL-X (npz or pkl), for clips that have rotations alone.
+        names: of the joints of an array without names, or of a layout such as ``"smplx"`` or ``"lafan"``.
+        rate: frames a second where the file does not say [Hz], from 10 to 1000; it overrules the file.
+        up: axis of the file that is up, ``"x"`` to ``"-z"``; default: found.
+        unit: of the file, ``"m"``, ``"cm"``, ``"mm"``, ``"in"``, ``"ft"``, or its length [m]; default: found.
+
+    Raises:
+        ClipFileError: there is no such file, it is broken, empty, or of another format; the text says what to do.
+        RangeError: no rate, or one beyond the bounds; a body's size that fits no unit. UnknownNameError: no such axis,
+        unit or layout. ShapeError: another number of names. MissingPackageError: C3D without ezc3d.
+    """
+    file = validation.file_path("clip", path)
+    recorded = _read(file, body_model, names)
+    recorded.rate = _rate(rate, recorded)
+    return _finished(recorded, file.stem, up, unit)
+
+
+def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: str | Sequence[str] | None) -> Recorded:
+    # Readers are imported for their own files only
+    kind = file.suffix.lower()
+    if kind in CONVERTED:
+        raise no_clip(file, CONVERTED[kind])
+    if kind not in CLIP_SUFFIXES:
+        raise UnknownNameError("clip", file.suffix or str(file), CLIP_SUFFIXES)
+    if not validation.is_file("clip", file):
+        raise no_clip(file, validation.no_such(file))
+    if file.stat().st_size == 0:
+        raise no_clip(file, "the file is empty")
+    model = None if body_model is None else validation.file_path("body_model", body_model)
+    if kind == ".bvh":
+        from wbc.retarget.sources.bvh import read_bvh
+
+        return read_bvh(file)
+    if kind == ".c3d":
+        from wbc.retarget.sources.c3d import read_c3d
+
+        return read_c3d(file)
+    from wbc.retarget.sources import keypoints, smpl
+
+    if kind == ".pkl":
+        return smpl.read_smpl(file, smpl.read_smpl_pickle(file), model)
+    if kind == ".npz" and smpl.has_poses(data := keypoints.arrays_of(file)):
+        return smpl.read_smpl(file, data, model)
+    readers = {".npz": keypoints.read_npz, ".npy": keypoints.read_npy, ".csv": keypoints.read_csv}
+    return readers.get(kind, keypoints.read_tensor)(file, names)
+
+
+def _rate(given: float | None, recorded: Recorded) -> float:
+    """Frames a second."""
+    if given is None and not recorded.rate > 0.0:
+        raise RangeError("rate", recorded.rate, "the file says no frames a second; give rate= [Hz]")
+    rate = recorded.rate if given is None else validation.scalar("rate", given, low=0.0, open_low=True, unit="Hz")
+    near = round(rate)
+    rate = float(near) if near > 0 and abs(rate - near) < WHOLE * rate else rate
+    if not SLOWEST <= rate <= FASTEST:
+        asked = "" if given is not None else "; give rate= where the file is wrong"
+        raise RangeError("rate", rate, f"expected {SLOWEST:g} to {FASTEST:g} frames a second{asked}")
+    if given is not None and recorded.rate > 0.0 and abs(recorded.rate - rate) > WHOLE * rate:
+        recorded.notes.append(f"the file says {recorded.rate:.6g} frames a second")
+    return rate
+
+
+def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float | None) -> Clip:
+    """The clip with z up, in metres, with all points."""
+    _without_unseen(recorded, name)
+    notes = recorded.notes
+    # Axes and units are looked for in points without gaps
+    whole = replace(recorded, points=fill_gaps(recorded.points, recorded.parents, recorded.names, recorded.rate)[0])
+    up = _up(whole, up)
+    length = _unit(whole, up, unit)
+    to_world = axes.TO_Z_UP[up]
+    points = recorded.points @ to_world.T * length
+    turns = recorded.turns
+    mirror = np.eye(3)
+    if axes.mirrored(whole, whole.points @ to_world.T):
+        mirror = np.diag([1.0, -1.0, 1.0])
+        points = points @ mirror
+        notes.append("the file has left-handed axes: left and right are put right")
+    seen = np.isfinite(points).all(axis=2) if recorded.seen is None else recorded.seen
+    if turns is None:
+        points, said = mend_swaps(points, recorded.names, recorded.rate)
+        notes += said
+        seen = np.isfinite(points).all(axis=2)
+    points, said = fill_gaps(points, recorded.parents, recorded.names, recorded.rate)
+    notes += said
+    points = _on_the_ground(points, notes)
+    if recorded.offsets is None:
+        offsets = _offsets(points, recorded.parents)
+    else:
+        of_rest = mirror @ axes.TO_Z_UP[axes.rest_up(whole, up)]
+        offsets = recorded.offsets @ of_rest.T * length
+        assert turns is not None
+        turns = mirror @ to_world @ turns @ of_rest.T
+    sizes = np.linalg.norm(offsets, axis=1)
+    joints = zip(recorded.names, recorded.parents, sizes, strict=True)
+    short = [joint for joint, parent, size in joints if parent >= 0 and size < NO_LENGTH]
+    if short:
+        notes.append(f"bones without length end at {', '.join(short[:6])}{', ...' if len(short) > 6 else ''}")
+    ends = tuple(recorded.ends) or (False,) * len(recorded.names)
+    skeleton = Skeleton(tuple(recorded.names), tuple(recorded.parents), offsets, ends)
+    return Clip(skeleton, recorded.rate, points, turns, np.asarray(seen), name, tuple(notes))
+
+
+def _up(recorded: Recorded, given: str | None) -> str:
+    if given is not None:
+        return validation.one_of("up", given, axes.TO_Z_UP)
+    up, sure = axes.find_up(recorded)
+    if up != "z" or not sure:
+        doubt = "" if sure else ", which is not sure: give up= where that is wrong"
+        recorded.notes.append(f"{up} is up in the file{doubt}")
+    return up
+
+
+def _unit(recorded: Recorded, up: str, given: str | float | None) -> float:
+    """Length of the file's unit [m]."""
+    if given is not None:
+        return axes.unit_of(given)
+    found, size = axes.find_unit(recorded, up) if not recorded.unit else ("", 0.0)
+    if recorded.unit:
+        try:
+            found, size = axes.find_unit(recorded, up)
+        except RangeError:
+            return recorded.unit
+        # Some files say a unit that they are not in; neighbours in size are left as they say
+        ratio = axes.UNITS[found] / recorded.unit
+        if max(ratio, 1.0 / ratio) <= OTHER_UNIT:
+            return recorded.unit
+        wrong = f"the file says units of {recorded.unit:g} m, which makes a body of {size * recorded.unit:.3g} m: "
+        recorded.notes.append(f"{wrong}taken as {axes.UNIT_NAMES[found]}")
+    elif found != "m":
+        recorded.notes.append(f"its unit is {axes.UNIT_NAMES[found]}: the body is {size:.4g} of them")
+    return axes.UNITS[found]
+
+
+def _without_unseen(recorded: Recorded, name: str) -> None:
+    """Take out joints without a point in any frame; their children hang from their parents."""
+    never: NDArray[np.bool_] = np.asarray(~np.isfinite(recorded.points).all(axis=2).any(axis=0))
+    if not never.any():
+        return
+    if never.all():
+        raise no_clip(name, "no point in any frame")
+    gone = [joint for joint, lost in zip(recorded.names, never, strict=True) if lost]
+    parents = recorded.parents
+    for joint in range(len(parents)):
+        while parents[joint] >= 0 and never[parents[joint]]:
+            parents[joint] = parents[parents[joint]]
+    kept = np.flatnonzero(~never)
+    number = {int(old): new for new, old in enumerate(kept)}
+    recorded.parents = [number.get(parents[old], -1) for old in kept]
+    recorded.names = [recorded.names[old] for old in kept]
+    recorded.points = recorded.points[:, kept]
+    recorded.notes.append(f"never seen, and left out: {', '.join(gone[:6])}{', ...' if len(gone) > 6 else ''}")
+
+
+def _on_the_ground(points: Array, notes: list[str]) -> Array:
+    """Points that are not far below z = 0, as those of a root at the origin are."""
+    lowest = float(np.percentile(points[:, :, 2].min(axis=1), 5.0))
+    if lowest < -BELOW:
+        notes.append(f"raised by {-lowest:.3g} m: its lowest points were below z = 0")
+        raised: Array = points - np.array([0.0, 0.0, lowest])
+        return raised
+    if float(points[:, :, 2].min()) > ABOVE:
+        notes.append(f"its lowest point is {points[:, :, 2].min():.3g} m above z = 0")
+    return points
+
+
+def _offsets(points: Array, parents: list[int]) -> Array:
+    """Offsets of a skeleton whose file has none: bones of median lengths, as in the frame in which it is tallest."""
+    tallest = points[int(np.argmax(np.ptp(points[:, :, 2], axis=1)))]
+    offsets = np.zeros((len(parents), 3))
+    for joint, parent in enumerate(parents):
+        if parent < 0:
+            offsets[joint] = tallest[joint]
+            continue
+        step = tallest[joint] - tallest[parent]
+        length = float(np.median(np.linalg.norm(points[:, joint] - points[:, parent], axis=1)))
+        size = float(np.linalg.norm(step))
+        offsets[joint] = step * (length / size) if size > 0.0 else step
+    return offsets
