@@ -16,7 +16,7 @@ from wbc.log import Log
 from wbc.multibody import pin
 
 #: How far a configuration of a log may be from the stance that it is taken for [m, rad]: limbs under torques close
-#: up to 3 mm beside their footholds
+#: up to 7.5 mm beside their footholds
 NEAR_STANCE = 0.02
 
 

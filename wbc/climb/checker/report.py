@@ -44,7 +44,7 @@ class CheckRules:
 
     @classmethod
     def by_torques(cls) -> CheckRules:
-        """Of a simulator with soft contacts: limbs close up to 3 mm beside their footholds, grips in the body
+        """Of a simulator with soft contacts: limbs close up to 7.5 mm beside their footholds, grips in the body
         too, and feet slip by up to 5 mm; their impact accelerates joints beyond what they are asked for, up to twice.
         """
         return cls(hold_distance=0.008, slip=0.005, depth=0.004, acceleration=1.0)
