@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from wbc import validation
 from wbc.errors import WbcError
-from wbc.multibody import pin
+from wbc.multibody import is_model, pin
 from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.loops import AnyLoop
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
+from wbc.robot.sources.kinds import is_mjmodel, is_text
 from wbc.robot.sources.loop_file import read_loops
-from wbc.robot.sources.mjmodel import compiled, is_mjmodel, is_text, model_name
 from wbc.robot.sources.table import read_table
 
 if TYPE_CHECKING:
@@ -177,8 +177,11 @@ def _find(robot: Any) -> tuple[Recipe, Any, Robot | None]:
     otherwise.
     """
     if is_text(robot):
+        from wbc.robot.sources.mjmodel import compiled
+
         robot = compiled(robot)
-    if isinstance(robot, str):
+    # No name in the table has a folder in front, and reading the table takes a tenth of loading a file
+    if isinstance(robot, str) and len(pathlib.Path(robot).parts) < 2:
         recipe = _by_name().get(robot)
         if recipe is not None:
             pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
@@ -188,8 +191,10 @@ def _find(robot: Any) -> tuple[Recipe, Any, Robot | None]:
     if isinstance(robot, (str, os.PathLike)):
         return Recipe(validation.file_path("robot", robot).stem), robot, None
     if is_mjmodel(robot):
+        from wbc.robot.sources.mjmodel import model_name
+
         return Recipe(model_name(robot)), robot, None
-    return Recipe(str(robot.name) if isinstance(robot, pin.Model) else "dh"), robot, None
+    return Recipe(str(robot.name) if is_model(robot) else "dh"), robot, None
 
 
 def _made(name: str) -> tuple[Recipe, Any, Robot | None]:
@@ -198,7 +203,7 @@ def _made(name: str) -> tuple[Recipe, Any, Robot | None]:
     from wbc.robots.walker_robot import MADE, made_here, recipe_of
 
     if (made := made_here(name)) is not None:
-        return recipe_of(made), made.model, made
+        return recipe_of(made), made.tree, made
     if name in OPERATOR_ARMS:
         return *operator_recipe(name), None
     raise unknown(name, (*_by_name(), *MADE, *OPERATOR_ARMS))

@@ -29,6 +29,8 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 BODY_SHAPES = ("capsules", "prism", "none")
 #: Names that :func:`made_here` knows
 MADE = ("walker", "two_ended_arm")
+#: Where walks of bodies with arms refuse the two-ended arm
+CLIMBS = "the two-ended arm climbs: `wbc climb --robot two_ended`"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +67,6 @@ class Walker:
         return self.arms[names.index(validation.one_of("arm", name, names))]
 
     @property
-    def tolerances(self) -> WalkerData:
-        """Clearance, latch and closing: those of its data; of the two-ended arm, which has none, those of the file."""
-        return self.data if isinstance(self.data, WalkerData) else WalkerData.read()
-
-    @property
     def two_ended(self) -> bool:
         """It is the two-ended arm, and no body with arms."""
         return isinstance(self.data, TwoEndedData)
@@ -82,18 +79,7 @@ class Walker:
             ShapeError: another machine.
         """
         if not isinstance(self.data, WalkerData):
-            raise ShapeError("walker", self.robot.name, "expected a body with arms")
-        return self.data
-
-    @property
-    def two_ended_data(self) -> TwoEndedData:
-        """Numbers of the two-ended arm.
-
-        Raises:
-            ShapeError: another machine.
-        """
-        if not isinstance(self.data, TwoEndedData):
-            raise ShapeError("walker", self.robot.name, "expected the two-ended arm")
+            raise ShapeError("walker", self.robot.name, f"expected a body with arms; {CLIMBS}")
         return self.data
 
     def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
@@ -245,9 +231,7 @@ def _two_ended(data: TwoEndedData) -> Walker:
     tip, boom, far_tip = "arm1_link1", "arm2_link4", "arm2_link7"
     pairs = [(tip, BODY), (tip, boom), (tip, far_tip), (BODY, far_tip), (boom, far_tip)]
     robot = _with_shapes(robot, shapes, pairs)
-    # All joints move at once, and half of their accelerations are left for a stop
-    margins = Margins(held_clearance=0.02, swing_rate=0.9, swing_acceleration=0.5)
-    return Walker(robot, tuple(arms), 1, data, tuple(links), margins=margins)
+    return Walker(robot, tuple(arms), 1, data, tuple(links))
 
 
 def _robot(

@@ -24,7 +24,7 @@ LinkShape = tuple[str, int, PlacedShape]
 
 def joint_of(robot: Robot, link: str) -> int:
     """Number of the joint that carries a frame; 0 for the world."""
-    return 0 if link == WORLD else int(robot.model.frames[frame_index(robot.model, link)].parentJoint)
+    return 0 if link == WORLD else int(robot.tree.frames[frame_index(robot.tree, link)].parentJoint)
 
 
 def shapes_of(robot: Robot, links: Iterable[str]) -> tuple[LinkShape, ...]:

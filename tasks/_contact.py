@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
-from wbc.multibody import pin
+from wbc.multibody import algebra
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
 from wbc.tasks.frames import frame_pose
@@ -32,7 +32,7 @@ FORCE_WEIGHT = 1e-4
 
 def force_sizes(robot: Robot) -> NDArray[np.float64]:
     """How many N, 3, and N m, 3, count as much as 1 rad/s^2: the robot's weight on earth, and that by its length."""
-    mass = float(pin.computeTotalMass(robot.model))
+    mass = float(algebra(robot.tree).computeTotalMass(robot.tree))
     force = max(mass, 1e-3) * NOMINAL
     sizes: NDArray[np.float64] = np.repeat([force, force * robot.characteristic_length], 3)
     return sizes

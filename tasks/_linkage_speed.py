@@ -113,13 +113,29 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
     seen = jacobian @ ca.diag(weights)
     forces = _solved(seen, bias)
     asked = -weights * (seen.T @ forces)
-    y, held = ca.SX.sym("y", len(rows)), ca.SX.sym("c", len(dofs))
-    speed, work = kin.kinematics.tangent_map @ kin.v, ca.dot(y, bias)
-    slope = ca.densify(ca.gradient(work, kin.v))
-    growth = ca.jtimes(work + ca.dot(y, jacobian @ held), kin.q, speed) + ca.dot(slope[dofs], held)
-    both = ca.substitute(ca.vertcat(slope, growth), ca.vertcat(y, held), ca.vertcat(forces, asked))
+    y, tangent = ca.SX.sym("y", len(rows)), kin.kinematics.tangent_map
+    work = ca.dot(y, bias)
+    # One sweep backwards gives both; along q and v it would be one forwards besides
+    sweep = ca.substitute(ca.densify(ca.gradient(work, ca.vertcat(kin.q, kin.v))), y, ca.densify(forces))
+    slope, whole = sweep[kin.q.numel() :], ca.SX.zeros(robot.nv)
+    whole[dofs] = asked
+    # y' (dJ/dt) c along v is half of the slope along c, but for what motions along v and c do not commute
+    growth = ca.dot(sweep[: kin.q.numel()], tangent @ kin.v) + 1.5 * ca.dot(slope[dofs], asked)
+    growth -= 0.5 * ca.dot(asked / weights**2, _bracket(kin.q, tangent, kin.v, whole)[dofs])
     missed = ca.sumsqr(jacobian @ asked + bias) / (ca.sumsqr(bias) + LEAST**2)
-    return Bend(asked, both[:-1], both[-1], missed)
+    return Bend(asked, slope, growth, missed)
+
+
+def _bracket(q: ca.SX, tangent: ca.SX, v: ca.SX, c: ca.SX) -> ca.SX:
+    """[v, c], the velocity by which moving along v, then c, differs from the other order; of a ball joint v x c [nv].
+
+    Args:
+        tangent: dq/dt by velocities, whose columns are at right angles to each other.
+    """
+    first, second = ca.SX.sym("first", v.numel()), ca.SX.sym("second", v.numel())
+    change = ca.jtimes(tangent @ second, q, tangent @ first) - ca.jtimes(tangent @ first, q, tangent @ second)
+    out = (tangent.T @ change) / ca.sum1(tangent**2).T
+    return ca.densify(ca.substitute(out, ca.vertcat(first, second), ca.vertcat(v, c)))
 
 
 def _solved(seen: ca.SX, bias: ca.SX) -> ca.SX:

@@ -42,7 +42,7 @@ class Plane:
 @lru_cache(maxsize=32)
 def _angle(item: PlaneItem, robot: Robot) -> SingleState:
     """q -> the angle of a plane; kept, since every reset of a controller asks for it."""
-    kin = Tracer(Kinematics(robot.model))
+    kin = Tracer(Kinematics(robot.tree))
     return SingleState(ca.Function("angle", [kin.q], [kin.expand(item._turned(kin, ca.SX(0)))]))
 
 
@@ -91,7 +91,7 @@ class PlaneItem(Item):
         if self.axis is None:
             return
         validation.one_of("axis", self.axis, _revolute(robot))
-        kinematics = Kinematics(robot.model)
+        kinematics = Kinematics(robot.tree)
         if not any(self._turning(kinematics)):
             raise RangeError("axis", self.axis, f"no joint between {self.base!r} and this joint can turn the plane")
 
@@ -140,11 +140,11 @@ class PlaneItem(Item):
         return Plane(along, direction, line_square, elbow_square)
 
     def _axis_in_world(self, kin: Tracer) -> ca.SX:
-        return kin.joint_axis(int(kin.kinematics.model.getJointId(self.axis)))
+        return kin.joint_axis(int(kin.kinematics.model.getJointId(str(self.axis))))
 
     def _turning(self, kinematics: Kinematics) -> tuple[list[int], list[int]]:
         """Joints whose turning counts for the body that carries the axis, relative to the base: plus and minus."""
-        carrier = kinematics.support(kinematics.parents[int(kinematics.model.getJointId(self.axis))])
+        carrier = kinematics.support(kinematics.parents[int(kinematics.model.getJointId(str(self.axis)))])
         base = kinematics.support(kinematics.frame(self.base)[0])
         return [j for j in carrier if j not in base], [j for j in base if j not in carrier]
 

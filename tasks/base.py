@@ -478,4 +478,4 @@ def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD)
 
 
 def _joint(robot: Robot, frame: str) -> int:
-    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
+    return 0 if frame == WORLD else int(robot.tree.frames[frame_index(robot.tree, frame)].parentJoint)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import RangeError
-from wbc.multibody import pin
+from wbc.multibody import algebra
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
@@ -61,7 +61,7 @@ class CenterOfMass(Task):
     def validate(self, robot: Robot) -> None:
         """Check axes and that the robot has mass, see :meth:`Item.validate`."""
         resolve_axes(robot, "CenterOfMass.axes", self.axes, None)
-        mass = sum(float(inertia.mass) for inertia in list(robot.model.inertias)[1:])
+        mass = sum(float(inertia.mass) for inertia in list(robot.tree.inertias)[1:])
         if mass <= 0.0:
             raise RangeError("CenterOfMass", mass, f"the moving links of {robot.name!r} have no mass [kg]")
 
@@ -82,7 +82,8 @@ class CenterOfMass(Task):
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the centre of mass is at ``q``."""
-        return {"target": np.array(pin.centerOfMass(robot.model, robot.model.createData(), q))}
+        tree = robot.tree
+        return {"target": np.array(algebra(tree).centerOfMass(tree, tree.createData(), q))}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""

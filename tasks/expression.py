@@ -178,7 +178,7 @@ class Expression(Task):
         return tuple(Row(label, unit) for label, unit in zip(self.labels or default, units, strict=True))
 
     def _trace(self, robot: Robot) -> _Trace:
-        tracer = Tracer(Kinematics(robot.model))
+        tracer = Tracer(Kinematics(robot.tree))
         symbols = run_time.symbols(robot, self.declared)
         error = self.error(robot, tracer, symbols.values)
         formula, known = tracer.formula(error)

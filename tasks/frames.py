@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.multibody import pin
+from wbc.multibody import algebra, pin
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.tracer import Tracer
@@ -50,12 +50,14 @@ def point_in(kin: Tracer, frame: str, offset: tuple[float, float, float], refere
 
 
 def frame_pose(robot: Robot, frame: str, q: NDArray[np.float64]) -> pin.SE3:
-    """Pose of a named frame in the world at a configuration, by Pinocchio."""
+    """Pose of a named frame in the world at a configuration."""
+    tree = robot.tree
+    library = algebra(tree)
     if frame == WORLD:
-        return pin.SE3.Identity()
-    data = robot.model.createData()
-    pin.forwardKinematics(robot.model, data, q)
-    return pin.updateFramePlacement(robot.model, data, frame_index(robot.model, frame)).copy()
+        return library.SE3.Identity()
+    data = tree.createData()
+    library.forwardKinematics(tree, data, q)
+    return library.updateFramePlacement(tree, data, frame_index(tree, frame)).copy()
 
 
 def point_rows() -> tuple[Row, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.multibody import pin
+from wbc.multibody import is_pose, own
 from wbc.shapes import FAR
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind
@@ -117,7 +117,7 @@ def _whole_pose(field: str, declared: Input, value: Any) -> Any:
     Raises:
         ShapeError: numbers that are neither. NotFiniteError, RotationError: a part that is none.
     """
-    if not declared.part or isinstance(value, pin.SE3) or (isinstance(value, (tuple, list)) and len(value) == 2):
+    if not declared.part or is_pose(value) or (isinstance(value, (tuple, list)) and len(value) == 2):
         return value
     shape = validation.dimensions(field, value)
     if shape in ((7,), (4, 4)):
@@ -125,14 +125,14 @@ def _whole_pose(field: str, declared: Input, value: Any) -> Any:
     if declared.part == "position":
         if shape != (3,):
             raise ShapeError(field, value, f"expected a position, 3 numbers, or a pose; is of shape {shape}")
-        return pin.SE3(np.eye(3), validation.real_array(field, value, (3,)))
-    return pin.SE3(validation.rotation(field, value), np.zeros(3))
+        return own.SE3(np.eye(3), validation.real_array(field, value, (3,)))
+    return own.SE3(validation.rotation(field, value), np.zeros(3))
 
 
 def _spread(robot: Robot, field: str, declared: Input, value: Any) -> Any:
     """All numbers of a configuration or a velocity, where those of the chosen joints are given; else what is given."""
     numbers = validation.real_array(field, value)
-    model, turns = robot.model, declared.kind == "configuration"
+    model, turns = robot.tree, declared.kind == "configuration"
     starts, counts = (model.idx_qs, model.nqs) if turns else (model.idx_vs, model.nvs)
     chosen = [int(model.getJointId(name)) for name in declared.joints or ()]
     at = [k for j in chosen for k in range(int(starts[j]), int(starts[j]) + int(counts[j]))]

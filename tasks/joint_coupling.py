@@ -167,13 +167,13 @@ def _label(relation: Relation) -> str:
 
 
 def _width(robot: Robot, joint: str) -> int:
-    return int(robot.model.nvs[robot.model.getJointId(joint)])
+    return int(robot.tree.nvs[robot.tree.getJointId(joint)])
 
 
 def _unbounded(robot: Robot, joint: str) -> bool:
-    return int(robot.model.nqs[robot.model.getJointId(joint)]) == 2
+    return int(robot.tree.nqs[robot.tree.getJointId(joint)]) == 2
 
 
 def _coordinate(robot: Robot, joint: str, q: NDArray[np.float64]) -> float:
-    start = int(robot.model.idx_qs[robot.model.getJointId(joint)])
+    start = int(robot.tree.idx_qs[robot.tree.getJointId(joint)])
     return float(np.arctan2(q[start + 1], q[start]) if _unbounded(robot, joint) else q[start])

@@ -90,7 +90,7 @@ class Limit(Constraint):
         """Check the task, the rows, the numbers and the names of the inputs, see the class."""
         self.task.validate(robot)
         symbols = run_time.symbols(robot, self.task.inputs(robot))
-        if self.task.jacobian(robot, Tracer(Kinematics(robot.model)), symbols.values) is not None:
+        if self.task.jacobian(robot, Tracer(Kinematics(robot.tree)), symbols.values) is not None:
             raise ShapeError("Limit.task", self.task, "its rows are velocities: it has no error that can be limited")
         labels = [row.label for row in self.task.rows(robot)]
         for label in self.only or ():

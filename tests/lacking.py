@@ -23,9 +23,10 @@ OPTIONAL |= {
     "pxr": "usd-core",
     "rerun": "rerun-sdk",
     "torch": "torch",
+    "zenoh": "eclipse-zenoh",
 }
 #: Extras that bring them
-EXTRAS = "foxglove|laws|rerun|ros2|torch|usd"
+EXTRAS = "foxglove|laws|rerun|ros2|torch|usd|zenoh"
 LACKING = {module: package for module, package in OPTIONAL.items() if find_spec(module) is None}
 #: What an error says in this process or another
 _WANTED = re.compile(

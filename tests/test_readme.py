@@ -13,7 +13,6 @@ import pytest
 
 from wbc.walking.loop.stack import WalkStack
 from wbc.walking.loop.walk import Walk
-from wbc.walking.two_ended import TwoEndedWalk
 
 ROOT = Path(__file__).parent.parent
 
@@ -47,7 +46,6 @@ def test_short_blocks_run(page: str) -> None:
 SHORTER = {
     "torque": {},
     "motion_control": {"0.001, 2.0)": "0.001, 0.05)"},
-    "walking_two_ended": {'"6", gait': '"3", gait'},
     "walking_planner": {
         "(13, 18)": "(13, 8)",
         '"14,12"': "structure.ids[hold]",
@@ -61,8 +59,7 @@ SHORTER = {
 def test_blocks_of_robots_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As they stand, but for shorter ways; walks are begun, and others go to their ends."""
     monkeypatch.chdir(tmp_path)
-    for walk in (Walk, TwoEndedWalk):
-        monkeypatch.setattr(walk, "run", lambda self: [self.tick() for _ in range(3)])
+    monkeypatch.setattr(Walk, "run", lambda self: [self.tick() for _ in range(3)])
     stacks: list[WalkStack] = []
 
     def stack(*arguments: Any, **options: Any) -> WalkStack:

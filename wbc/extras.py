@@ -23,12 +23,13 @@ EXTRAS = {
     "programs": ("py_trees", "pydantic", "yaml"),
     "recordings": ("pyarrow",),
     "rerun": ("rerun",),
-    "ros2": ("cyclonedds",),
+    "ros2": ("cyclonedds", "rosbags"),
     "studies": ("pydantic", "yaml"),
     "torch": ("torch",),
     "usd": ("pxr",),
     "viewer": ("viser", "websockets"),
     "xacro": ("xacrodoc",),
+    "zenoh": ("zenoh", "rosbags"),
     "zeromq": ("zmq",),
 }
 

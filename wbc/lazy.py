@@ -54,6 +54,10 @@ def _no_collection() -> Iterator[None]:
         yield
     finally:
         if on:
+            if gc.get_freeze_count() == 0:
+                # What was imported lives as long as the process: both together make it old without looking through it
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 

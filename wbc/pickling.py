@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from wbc.errors import PicklingError
+from wbc.multibody import CONVERTED
 
 T = TypeVar("T")
 
@@ -21,7 +22,10 @@ T = TypeVar("T")
 def declared(thing: object) -> dict[str, Any]:
     """The attributes of an object without those that are worked out from the others."""
     kind = type(thing)
-    return {k: v for k, v in vars(thing).items() if not isinstance(getattr(kind, k, None), cached_property)}
+    worked_out = {
+        k for k in vars(thing) if k.endswith(CONVERTED) or isinstance(getattr(kind, k, None), cached_property)
+    }
+    return {k: v for k, v in vars(thing).items() if k not in worked_out}
 
 
 def restore(thing: object, state: dict[str, Any], fields: set[str]) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError, WbcError
-from wbc.multibody import pin
+from wbc.multibody import is_pose, own, pin
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -290,7 +290,7 @@ def rotation(field: str, value: Any) -> Array:
         norm = float(np.linalg.norm(raw))
         if abs(norm - 1.0) > ROTATION_TOLERANCE:
             raise RotationError(field, value, f"quaternion x, y, z, w of norm {norm:.9g}, expected 1")
-        return np.asarray(pin.Quaternion(raw / norm).matrix(), dtype=np.float64)
+        return np.asarray(own.Quaternion(raw / norm).matrix(), dtype=np.float64)
     if raw.shape != (3, 3):
         raise ShapeError(field, value, f"expected a 3x3 rotation or a quaternion (x, y, z, w), not shape {raw.shape}")
     if not _is_rotation(raw.ravel().tolist()):
@@ -306,23 +306,29 @@ def pose(field: str, value: Any) -> pin.SE3:
 
     A pair is a position with a quaternion or with a 3x3 rotation matrix.
     """
-    if isinstance(value, pin.SE3):
-        return pin.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
+    placed = own_pose(field, value)
+    return pin.SE3(placed.rotation, placed.translation)
+
+
+def own_pose(field: str, value: Any) -> own.SE3:
+    """As :func:`pose`, as this package's own."""
+    if is_pose(value):
+        return own.SE3(rotation(field, value.rotation), real_array(field, value.translation, (3,)))
     if isinstance(value, (tuple, list)) and len(value) == 2:
-        return pin.SE3(rotation(field, value[1]), real_array(field, value[0], (3,)))
+        return own.SE3(rotation(field, value[1]), real_array(field, value[0], (3,)))
     raw = real_array(field, value)
     if raw.shape == (7,):
-        return pin.SE3(rotation(field, raw[3:]), raw[:3])
+        return own.SE3(rotation(field, raw[3:]), raw[:3])
     if raw.shape == (4, 4):
         if not np.array_equal(raw[3], (0.0, 0.0, 0.0, 1.0)):
             raise RotationError(field, value, "last row of a homogeneous matrix must be 0, 0, 0, 1")
-        return pin.SE3(rotation(field, raw[:3, :3]), raw[:3, 3])
+        return own.SE3(rotation(field, raw[:3, :3]), raw[:3, 3])
     raise ShapeError(field, value, "expected a pin.SE3, a 4x4 matrix or (position, quaternion x, y, z, w)")
 
 
 def pose_numbers(field: str, value: Any) -> Array:
     """A pose as 12 numbers, rotation by columns, then position; from whatever :func:`pose` takes."""
-    matrix = value.homogeneous if isinstance(value, pin.SE3) else value
+    matrix = value if type(value) is np.ndarray or not is_pose(value) else value.homogeneous
     if type(matrix) is np.ndarray and matrix.shape == (4, 4) and matrix.dtype == np.float64:
         # The columns of the upper three rows are those of the rotation, then the position
         numbers: Array = matrix[:3].ravel(order="F")
@@ -330,7 +336,7 @@ def pose_numbers(field: str, value: Any) -> Array:
         finite = math.isfinite(x) and math.isfinite(y) and math.isfinite(z)
         if finite and _is_rotation(nine) and matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0]:
             return numbers
-    return np.ravel(pose(field, value).homogeneous[:3], order="F")
+    return np.ravel(own_pose(field, value).homogeneous[:3], order="F")
 
 
 def _is_rotation(numbers: list[float]) -> bool:

@@ -3,10 +3,12 @@
     python -m bench.climb.parity                          # the demo, courses, rows and columns
     python -m bench.climb.parity --parts courses --only=+A,-A
     python -m bench.climb.parity --parts layouts --count 20
+    python -m bench.climb.parity --parts structures families --count 35 --arms 6
 
 Of each: re-grasps, mean speed of the body between the ramps as a part of what was asked, processor time of the plan [s]
 and of a tick [us], times real time with planning, and what both checkers find. A way that has no footholds along it
-goes as the planner of stances finds one, at most as fast; its speed is that from start to goal.
+goes as the planner of stances finds one, at most as fast; its speed is that from start to goal. Random structures
+(``structures`` of the walker's trials, ``families`` of ``tests.climb.structures``) are planned over stances.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import Any
 import numpy as np
 
 import wbc.robots
+from bench.climb.structures import structure_rows
 from bench.walk.courses import COURSES
 from bench.walk.machine import Machine
 from wbc.climb import BodyPlace, ClimbLoop, ClimbOptions, ContactPlan, MotionOptions, first_stance, machines, plan_climb
@@ -132,17 +135,23 @@ def planned(climber: Any, scene: Any, case: Case) -> ContactPlan:
 def main() -> None:
     """Print the table, case by case."""
     parser = argparse.ArgumentParser(prog="python -m bench.climb.parity", description=__doc__)
-    parts = ("demo", "courses", "rows", "columns", "layouts")
+    parts = ("demo", "courses", "rows", "columns", "layouts", "structures", "families")
     parser.add_argument("--parts", nargs="+", choices=parts, default=list(parts[:4]))
     parser.add_argument("--only", default="", help="names of cases, with commas")
-    parser.add_argument("--count", type=int, default=20, help="layouts")
+    parser.add_argument("--count", type=int, default=20, help="layouts or structures")
+    parser.add_argument("--arms", type=int, help="of walkers on structures; as drawn")
     parser.add_argument("--by", nargs="+", choices=("old", "new"), default=["old", "new"])
     given = parser.parse_args()
     it, climber = Machine(wbc.robots.walker()), machines.climber("walker")
     print(f"| {' | '.join(HEADS)} |\n|{' --- |' * len(HEADS)}")
+    only = given.only.split(",") if given.only else []
     for part in given.parts:
+        if part in ("structures", "families"):
+            for row in structure_rows(part, given.count, given.arms, only, given.by):
+                print(f"| {' | '.join(map(str, row))} |", flush=True)
+            continue
         for case in cases(part, it.structure, given.count):
-            if given.only and case.name not in given.only.split(","):
+            if only and case.name not in only:
                 continue
             for by in given.by:
                 row = (case.name, by, *(old(it, case) if by == "old" else new(climber, case)))

@@ -11,7 +11,7 @@ from typing import Any
 from bench import report
 from bench.figures import pages, store
 from bench.ik import tables as ik
-from bench.plan import tables as plan
+from bench.plan import constrained, tables as plan
 from bench.pool import ROOT
 from bench.walk.page import page_sheets
 
@@ -85,6 +85,11 @@ _ALL = (
         "plan", ("wbc/plan", "bench/plan"), 60.0,
         ("python", "-m", "bench.plan", "--peers-python", ".venv-plan/bin/python", "--write", "bench/data/plan.json"),
         "bench/data/plan.json", {"peers": plan.page},
+    ),
+    Figure(
+        "plan_constrained", ("wbc/plan", "bench/plan"), 5.0,
+        ("python", "-m", "bench.plan", "--constrained", "--seeds", "8", "--write", "bench/data/plan_constrained.json"),
+        "bench/data/plan_constrained.json", {"table": constrained.page},
     ),
     Figure(
         "retarget", (*TICK, "wbc/retarget", "bench/retarget.py", "bench/retarget_peers.py"), 15.0,

@@ -5,7 +5,8 @@
 
 The peers are ``pip install ompl roboplan coal`` in an environment of their own; without ``--peers-python`` they are
 left out. Times are of processors: planning and shortening from one configuration to another, without what is prepared
-once a scene.
+once a scene; of these the search alone, and, of this package's, rounding corners, the law and its proof besides.
+``--constrained`` plans what the peers cannot state: cups that stay level, a tray in two hands, a base, a linkage.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from bench.figures.store import stamp
-from bench.plan import descriptions, judge, problems
+from bench.plan import constrained, descriptions, judge, problems
 from bench.plan.tables import CONTENDERS, ratios, table
 from wbc.plan import NoPathError
 
@@ -34,10 +35,13 @@ def solved_here(planner: Any, problem: problems.Problem, seed: int) -> dict[str,
     q = planner.coordinates.configuration
     begin = time.process_time()
     try:
-        path = planner.plan(q(problem.start), q(problem.goal), seed=seed, seconds=SECONDS).points.tolist()
+        path = planner.plan(q(problem.start), q(problem.goal), seed=seed, seconds=SECONDS)
     except NoPathError:
-        path = None
-    return {"path": path, "seconds": time.process_time() - begin}
+        return {"path": None, "seconds": time.process_time() - begin}
+    took = time.process_time() - begin
+    path.law()
+    law = time.process_time() - begin - took
+    return {"path": path.points.tolist(), "seconds": took, "search": took - path.shortening, "law": law}
 
 
 class Peer:
@@ -88,7 +92,7 @@ def row(robot: str, scene: str, seed: int, peers: dict[str, Peer]) -> dict[str, 
     for name, answer in found.items():
         path = answer["path"]
         out[name] = {
-            "seconds": answer["seconds"],
+            **{key: answer[key] for key in ("seconds", "search", "law") if key in answer},
             "length": None if path is None else judge.length(path),
             "fault": "" if path is None else referee.fault(path),
         }
@@ -103,9 +107,20 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=19)
     parser.add_argument("--peers-python", default="")
     parser.add_argument("--core", type=int, default=0)
+    parser.add_argument("--constrained", action="store_true")
     parser.add_argument("--write", type=pathlib.Path)
     options = parser.parse_args()
     os.sched_setaffinity(0, {options.core})
+    if options.constrained:
+        begun, rows = stamp(), []
+        for kind in constrained.KINDS:
+            for seed in range(options.seeds):
+                rows.append(constrained.row(kind, seed, SECONDS))
+                print(json.dumps(rows[-1]), flush=True)
+        print(f"{constrained.table(rows)}\nload {os.getloadavg()[0]:.2f}")
+        if options.write:
+            options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")
+        return
     peers = {n: Peer(options.peers_python, n, options.core) for n in CONTENDERS[1:]} if options.peers_python else {}
     rows, begun = [], stamp()
     try:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-#: (seed, seconds) -> points of a path, None: none
-Plan = Callable[[int, float], list[list[float]] | None]
+#: (seed, seconds) -> (points of a path, None: none; processor time of the search alone [s])
+Plan = Callable[[int, float], tuple[list[list[float]] | None, float]]
 #: Step of collision checks along edges, the default of RoboPlan [rad]
 STEP = 0.05
 
@@ -54,7 +54,8 @@ def ompl_of(problem: dict[str, Any]) -> Plan:
         bounds.setHigh(k, problem["high"][k])
     space.setBounds(bounds)
 
-    def plan(seed: int, seconds: float) -> list[list[float]] | None:
+    def plan(seed: int, seconds: float) -> tuple[list[list[float]] | None, float]:
+        begin = time.process_time()
         information = base.SpaceInformation(space)
         information.setStateValidityChecker(is_valid)
         information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())
@@ -70,13 +71,11 @@ def ompl_of(problem: dict[str, Any]) -> Plan:
         planner = geometric.RRTConnect(information)
         planner.setProblemDefinition(definition)
         planner.setup()
-        if not planner.solve(seconds):
-            return None
-        path = definition.getSolutionPath()
-        if definition.hasApproximateSolution():
-            return None
+        if not planner.solve(seconds) or definition.hasApproximateSolution():
+            return None, time.process_time() - begin
+        path, searched = definition.getSolutionPath(), time.process_time() - begin
         geometric.PathSimplifier(information).simplifyMax(path)
-        return [[state[k] for k in range(n)] for state in path.getStates()]
+        return [[state[k] for k in range(n)] for state in path.getStates()], searched
 
     return plan
 
@@ -96,19 +95,21 @@ def roboplan_of(problem: dict[str, Any]) -> Plan:
         out[order] = values
         return core.JointConfiguration(list(names), out)
 
-    def plan(seed: int, seconds: float) -> list[list[float]] | None:
+    def plan(seed: int, seconds: float) -> tuple[list[list[float]] | None, float]:
         options.max_planning_time = seconds
         planner = rrt.RRT(scene, options)
         planner.setRngSeed(seed)
+        begin = time.process_time()
         try:
             path = planner.plan(configuration(problem["start"]), configuration(problem["goal"]))
         except RuntimeError:
-            return None
+            return None, time.process_time() - begin
+        searched = time.process_time() - begin
         shorter = core.PathShortcutter(
             scene, core.PathShortcuttingOptions(group_name="arm", max_step_size=STEP, seed=seed)
         )
         path = shorter.shortcut(path)
-        return [[float(x[k]) for k in order] for x in path.positions]
+        return [[float(x[k]) for k in order] for x in path.positions], searched
 
     return plan
 
@@ -133,9 +134,9 @@ def main() -> None:
         problem = json.loads(line)
         plan = MAKERS[sys.argv[1]](problem)
         begin = time.process_time()
-        path = plan(problem["seed"], problem["seconds"])
+        path, search = plan(problem["seed"], problem["seconds"])
         took = time.process_time() - begin
-        print(json.dumps({"path": path, "seconds": took}), file=answers, flush=True)
+        print(json.dumps({"path": path, "seconds": took, "search": search}), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -45,6 +45,12 @@ def ratios(rows: list[dict[str, Any]], peers: Sequence[str]) -> str:
         longer = statistics.median(r["wbc"]["length"] / r[name]["length"] for r in both) if both else float("nan")
         share = median["wbc"] / median[name]
         lines.append(f"{name}: {only} solved by it alone; time {share:.3f} of it; length {longer:.3f} of it")
+    if all("search" in r[c] for r in rows if fine(r, "wbc") for c in ("wbc", *peers)):
+        search = {c: statistics.median(r[c]["search"] for r in rows if "search" in r[c]) for c in ("wbc", *peers)}
+        parts = ", ".join(f"{1e3 * search[c]:.2f} ms by {c}" for c in search)
+        law = statistics.median(r["wbc"]["law"] for r in rows if "law" in r["wbc"])
+        proven = f"a law with rounded corners, proven: {1e3 * law:.1f} ms"
+        lines.append(f"search alone, without shortening: median {parts}; {proven}")
     best = []
     for r in rows:
         lengths = [r[name]["length"] for name in peers if fine(r, name)]

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.cli.test_commands import run as wbc_command
+from tests.formats.runs import ticks_and_reasons
 from tests.processes import processor_time
 from tests.repeats import ALL, MORE
 from wbc.log import load
@@ -32,7 +33,9 @@ def test_a_file_of_orders(tmp_path: Path) -> None:
     assert "tip | beta (changing), solved" in err
     assert len(log.read_text().splitlines()) == 51
     given = ("--rates", orders, "--mode", "M4", "--at", at, "--out", tmp_path / "run", "--backend", "vm")
-    assert run("spherical_4r", *given)[0] == 0
+    assert run("spherical_4r", *given, "--mcap")[0] == 0
+    assert ticks_and_reasons(tmp_path / "run" / "ticks.mcap")[0] == 50
+    assert run("spherical_4r", *given[:-4], "--mcap")[0] == 2
     assert {"log.csv", "log.npz", "report.html"} <= {file.name for file in (tmp_path / "run").iterdir()}
     columns, written = load(tmp_path / "run"), list(csv.DictReader(log.open()))
     assert columns.units["v.joint2"] == "rad/s"

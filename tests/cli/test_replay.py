@@ -22,7 +22,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a moving ball, a floor, and a swinging elbow."""
     place = tmp_path_factory.mktemp("run")
     ball = ["--sphere", "0.5,0.3,0.5,0.1,0,-0.1,0", "--floor", "-0.5", "--plane", "swing", "--swing", "0.2"]
-    assert run("track", "panda", *FAST, *ball, "--out", place)[0] == 0
+    code, _, err = run("track", "panda", *FAST, *ball, "--out", place)
+    assert code == 0, err
     return place
 
 

@@ -14,7 +14,9 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
+import wbc
 from tests.cli.test_commands import run
+from tests.formats.runs import ticks_and_reasons
 from wbc import style
 from wbc.robots import WalkerData
 from wbc.robots.walker_data import WALKER_DIGEST
@@ -46,7 +48,7 @@ SMALL = {
 @functools.cache
 def short_walk(folder: Path) -> tuple[int, str, str]:
     """One walk with all that it leaves, for all tests of this file; no slower film than needed."""
-    return run("walk", *SHORT, "--out", folder)
+    return run("walk", *SHORT, "--mcap", "--out", folder)
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +72,9 @@ def test_a_walk_leaves_its_folder(walked: Any) -> None:
     assert {f"{plot}.png" for plot in plots} <= names
     for text in ("arrived", "re-grasps", "WalkerData", "real-time factor", "external checker"):
         assert text in out
+    ticks, said = ticks_and_reasons(folder / "ticks.mcap")
+    assert ticks == len(wbc.Recording(folder / "ticks.npz").status) > 100
+    assert any(" hold " in text for text in said)
 
 
 def test_the_summary_is_that_of_the_log(walked: Any) -> None:

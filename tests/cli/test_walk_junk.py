@@ -20,7 +20,7 @@ JUNK = st.sampled_from((
     "nan", "inf", "-inf", "-1", "0", "1e400", "1,2,3,4", "13,9", "13,9,nan", ",", "[]", "/", "..", "~",
     "/dev/null", "/proc/self/mem", "hold", "{}", "=", "a=b", "3-1", "hand_radius=nan", "hand_radius=1e400",
     "hand_radius=[1]", "joint_rates=[]", "acceleration_time=0", "@", "@nan", "/@nan", ".@1e9", "keyboard",
-    "published", "two-ended", "arm", "truss", "module", "L2,6", "", " ", "9" * 400, "é\u2028", "\0", "a\0b",
+    "published", "arm", "truss", "module", "L2,6", "", " ", "9" * 400, "é\u2028", "\0", "a\0b",
     "x" * 300, "hold ", "rate 1 for 2", "poses /dev/null", "1 2", "rate 0,0,0,0,0,0 for inf",
     "rate nan,0,0,0,0,0 for 1", "hand_radius=" + "[" * 4000,
 ))  # fmt: skip
@@ -28,7 +28,7 @@ JUNK = st.sampled_from((
 MODES = {
     mode: [(f"--{field.name}", field.kind is bool) for field in fields_of(options) if not field.said.placed]
     for mode, options in {"path": walk.WalkPath, "drive": walk.DriveWalk, "arm": walk.WalkArm,
-                          "two-ended": walk.TwoEnded, "published": walk.Published, "resume": walk.Resume}.items()
+                          "published": walk.Published, "resume": walk.Resume}.items()
 }  # fmt: skip
 GIVEN = st.sampled_from(sorted(MODES)).flatmap(
     lambda mode: st.tuples(

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, machines, plan_climb
+from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
 from wbc.climb.along import BodyTrack, plan_along
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
@@ -17,6 +17,7 @@ from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
 from wbc.climb.resume import stance_in
 from wbc.climb.scene import of_structure
+from wbc.climb.scenes import draw, placed, size_of
 from wbc.climb.search import NoStancesError
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.walking import cylinder, remove_rows
@@ -86,6 +87,21 @@ def test_a_round_way_on_a_cylinder_keeps_its_distance(walker: Climber, scene: Cl
         np.testing.assert_allclose(track.twists[k], step, atol=1e-6)
     turned = plan_along(walker, scene, track)
     clean(ClimbLoop(turned, backend="vm").run(), walker, scene)
+
+
+@pytest.mark.parametrize(("name", "family"), [("hexapod", "stepping_stones"), ("three_pandas", "cylinder")])
+def test_other_limbs_go_along_a_way(name: str, family: str) -> None:
+    climber = machines.climber(name)
+    size = size_of(climber)
+    course = draw(family, size)
+    start = first_stance(climber, course.scene, placed(climber, course.start))
+    begin, end = (climber.body_pose(q) for q in (start.q, placed(climber, course.goal)))
+    ahead = end.translation - begin.translation
+    ahead *= 0.8 * size / np.linalg.norm(ahead)
+    track = BodyTrack((begin, pin.SE3(begin.rotation, begin.translation + ahead)), 0.05 * size)
+    plan = plan_along(climber, course.scene, track, start)
+    assert plan.moves
+    clean(ClimbLoop(plan, backend="vm").run(), climber, course.scene)
 
 
 def test_ways_without_footholds_are_refused(walker: Climber) -> None:

@@ -136,7 +136,14 @@ def test_a_planner_is_asked_from_the_stance_that_the_robot_is_in() -> None:
     assert [stance.contacts for stance in asked] == [(FREE_LIMB, 1, FREE_LIMB, 3, FREE_LIMB, 5)]
     assert len(run.plans) == 2
     assert run.log["kept"].all()
-    assert min(run.log.array("contact")[-1]) >= 0
+    # The log names footholds by their rows in the first plan's scene, whatever the second plan has left of it
+    assert run.scene is plan.scene
+    second = run.plans[1]
+    last = [second.start[k] if second.start[k] >= 0 else second.moves[[m.limb for m in second.moves].index(k)].lands
+            for k in range(6)]  # fmt: skip
+    rows = run.log.array("contact")[-1]
+    assert [run.scene.footholds[row].id for row in rows] == [second.scene.footholds[row].id for row in last]
+    assert check(run.log, plan.climber, run.scene).clean
     assert {cause for *_, cause in run.changes} >= {Cause.NEW_PLAN, Cause.AT_FOOTHOLD}
 
 
@@ -170,6 +177,8 @@ def test_a_foothold_that_breaks_off_frees_its_limb() -> None:
     assert abs(time - 0.05) < 1e-6
     assert change == ["limb2", LimbState.FREE, Cause.HOLD_LOST]
     assert run.plans[1].start[0] == len(plan.scene.footholds) - 1
+    assert [foothold.id for foothold in run.scene.footholds[len(plan.scene.footholds) :]] == ["spare"]
+    assert [run.scene.footholds[row].id for row in run.log.array("contact")[0]] == ["p0", "p1", "p2", "p3", "p4", "p5"]
 
 
 def test_the_reference_is_the_plan_at_its_knots_and_smooth_between() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import pathlib
 
@@ -9,6 +10,9 @@ import numpy as np
 import pytest
 
 import wbc.log
+from tests.formats.runs import ticks_and_reasons
+from wbc.cli.folders import recording
+from wbc.cli.output import RECORDED
 from wbc.climb import report
 from wbc.climb.loop import ClimbOutcome
 from wbc.climb.request import ClimbRequest
@@ -29,7 +33,13 @@ def test_a_climb_is_planned_carried_out_checked_and_written(tmp_path: pathlib.Pa
     ahead = [np.linalg.norm(one.pose.translation - start.translation - 0.5 * start.rotation[:, 0])
              for one in scene.footholds]  # fmt: skip
     goal = scene.footholds[int(np.argmin(ahead))].id
-    done = climb(ClimbRequest(goal=goal), backend="vm")
+    with contextlib.ExitStack() as stack:
+        begin = recording(stack, tmp_path, mcap=True)
+        assert begin is not None
+        done = climb(ClimbRequest(goal=goal), backend="vm", compiled=begin)
+    ticks, said = ticks_and_reasons(tmp_path / RECORDED[1])
+    assert ticks == len(done.run.log) - 1
+    assert any(" contact/" in text for text in said)
     assert done.run.outcome is ClimbOutcome.ARRIVED, done.run.reason
     assert done.report is not None
     assert done.report.clean, str(done.report)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
+from mcap.reader import make_reader
 
 import wbc
 from wbc.multibody import pin
@@ -12,6 +14,17 @@ from wbc.shapes import Sphere
 
 #: Robots of several kinds: fixed, floating (a quaternion in q), and with unbounded joints (two numbers each)
 ROBOTS = ("panda", "solo8", "kinova")
+
+
+def ticks_and_reasons(file: Path) -> tuple[int, list[str]]:
+    """How many ticks an MCAP file has, and its sentences why."""
+    ticks, said = 0, []
+    with file.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            ticks += channel.topic == "/tick"
+            if channel.topic == "/why":
+                said.append(str(json.loads(message.data)["message"]))
+    return ticks, said
 
 
 def recorded(folder: Path, seed: int, ticks: int = 40) -> Path:

@@ -21,7 +21,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 import wbc
 from tests.cli.test_commands import FAST, run
-from tests.formats.runs import recorded
+from tests.formats.runs import recorded, ticks_and_reasons
 from tests.refusals import assert_refused
 from tests.repeats import repeats
 from wbc.errors import RangeError, UnknownNameError
@@ -138,6 +138,10 @@ def test_a_dataset_of_lerobot_has_the_layout_of_its_version(tmp_path: Path) -> N
     assert np.allclose(data["timestamp"].to_numpy(), log["t"], atol=1e-6)
     stats = json.loads((folder / "meta/stats.json").read_text())
     assert np.allclose(stats["action"]["mean"], log.array("v").mean(0))
+    # The text of a task is pandas' index, which pyarrow makes from what is said of all columns
+    said = json.loads(pq.read_schema(folder / "meta/tasks.parquet").metadata[b"pandas"])
+    assert said["index_columns"] == ["task"]
+    assert {column["field_name"] for column in said["columns"]} == {"task_index", "task"}
     episode = pq.read_table(folder / "meta/episodes/chunk-000/file-000.parquet").to_pylist()[0]
     assert (episode["dataset_from_index"], episode["dataset_to_index"], episode["length"]) == (0, len(log), len(log))
 
@@ -221,7 +225,10 @@ def test_a_copy_is_followed_to_the_end(tmp_path: Path) -> None:
 
 
 def test_logs_of_other_recorders_are_runs(tmp_path: Path) -> None:
-    assert run("track", "panda", *FAST, "--out", tmp_path / "run", "--no-record", "--log", "npz")[0] == 0
+    code, _, err = run("track", "panda", *FAST, "--out", tmp_path / "run", "--mcap", "--log", "npz")
+    assert code == 0, err
+    assert ticks_and_reasons(tmp_path / "run" / "ticks.mcap")[0] == len(wbc.log.load(tmp_path / "run"))
+    (tmp_path / "run" / "ticks.npz").unlink()
     log, said = wbc.log.load(tmp_path / "run"), messages(convert(tmp_path / "run", "mcap", tmp_path / "x.mcap")[0])
     assert len(said["/tick"]) == len(log)
     first = {joint["name"]: joint["position"] for joint in said["/joint_states"][0]["joints"]}

@@ -97,6 +97,20 @@ def test_a_linkage_that_branches_is_named() -> None:
     assert "its loops leave" in str(point)
 
 
+def test_a_tick_that_gives_way_at_a_branch_names_the_linkage() -> None:
+    """Bars that lie in line and turn apart ask for what no velocity is."""
+    robot = limited(NAMED["parallelogram"], 20.0)
+    flat = robot.closed(robot.neutral + np.pi / 2.0 * np.array([1.0, -1.0, 1.0, 1.0]))
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller = stack.compile(backend="vm")
+    controller.reset(flat)
+    step = controller.step(flat, np.array([1.0, 0.5, -1.0, 2.0]))
+    assert step.status == "relaxed"
+    assert np.isfinite(step.v).all()
+    assert "The linkage of loop1, loop2 is at its dead point, where its loops leave tilt two ways" in repr(step)
+    assert "dead point" not in repr(controller.step(robot.neutral))
+
+
 def test_a_tree_has_none_and_bad_input_is_refused() -> None:
     robot = wbc.robots.load(NAMED["four_bar"])
     assert robot.with_loops().dead_points([0.0, 0.0, 0.0]) == ()

@@ -11,6 +11,9 @@ from tests.loops.mechanisms import NAMED
 from tests.loops.test_torques import DT, driven, linkage, moving
 from tests.repeats import covering, repeats
 from wbc.robot import Robot
+from wbc.stack.layout import Layout
+from wbc.stack.program import build
+from wbc.stack.tables import give_order, late_rows
 
 COMMANDS = ("velocity", "acceleration", "torque")
 #: Torques by accelerations: entries of mass matrices of the mechanisms, and forces in their loops, are below
@@ -50,3 +53,19 @@ def test_answers_of_mechanisms(name: str, command: str) -> None:
 @pytest.mark.parametrize("seed", range(repeats(3)))
 def test_answers_of_random_linkages(seed: int) -> None:
     compare(linkage(seed)[1].with_limits(acceleration=10.0), COMMANDS[seed % 3], seed, 12)
+
+
+@pytest.mark.parametrize("command", ["velocity", "torque"])
+def test_joints_of_one_loop_give_first(command: str) -> None:
+    """Balls of a delta's rods are moved by one loop each, its plate by all; its motors are what is left. Rows with
+    forces come after those of motions.
+    """
+    robot = driven("delta")
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture()).commanding(command)
+    layout = Layout(stack)
+    at = build(stack, layout).rows.sparsity_out("at")
+    names = [robot.dof_names[dof].split(".")[0].rstrip("012") for dof in give_order(stack, layout, at)]
+    assert names[:9] == ["ball"] * 9
+    assert names[12:] == ["motor"] * 3
+    late = late_rows(layout, at)
+    assert sum(late) == (len(robot.unactuated) if command == "torque" else 0)

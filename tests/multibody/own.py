@@ -5,9 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from tests.random_robots import Drawn, random_model
 from wbc.multibody import own
 from wbc.multibody.model import OF_COORDINATES, OF_DOFS
+
+
+def drawn_model(rng: np.random.Generator) -> pin.Model:
+    """All kinds of joints on all bases."""
+    base = (None, pin.JointModelFreeFlyer, pin.JointModelPlanar, pin.JointModelSpherical)[rng.integers(4)]
+    kinds = {"turning": 1.0, "aligned": 1.0, "endless": 1.0, "sliding": 1.0}
+    model = random_model(rng, Drawn(base, limbs=(1, 3), joints=(1, 4), kinds=kinds, turned=True))
+    model.armature = rng.uniform(0.0, 0.1, model.nv)
+    model.gravity = pin.Motion(rng.normal(size=3), np.zeros(3))
+    return model
 
 
 def own_pose(pose: Any) -> own.SE3:

@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.multibody.own import own_model, own_pose
-from tests.random_robots import Drawn, random_inertia, random_model, random_pose
+from tests.multibody.own import drawn_model, own_model, own_pose
+from tests.random_robots import random_inertia, random_pose
 from tests.repeats import repeats
 from tests.robots.random_urdf import REFUSED, RandomUrdf
 from wbc.multibody import own
@@ -33,16 +33,6 @@ def alike(ours: Any, theirs: Any, what: str = "") -> None:
     theirs = np.asarray(theirs)
     largest = max(1.0, float(np.abs(theirs).max(initial=0.0)))
     np.testing.assert_allclose(np.reshape(ours, theirs.shape), theirs, rtol=0.0, atol=ALIKE * largest, err_msg=what)
-
-
-def drawn_model(rng: np.random.Generator) -> pin.Model:
-    """All kinds of joints on all bases."""
-    base = (None, pin.JointModelFreeFlyer, pin.JointModelPlanar, pin.JointModelSpherical)[rng.integers(4)]
-    kinds = {"turning": 1.0, "aligned": 1.0, "endless": 1.0, "sliding": 1.0}
-    model = random_model(rng, Drawn(base, limbs=(1, 3), joints=(1, 4), kinds=kinds, turned=True))
-    model.armature = rng.uniform(0.0, 0.1, model.nv)
-    model.gravity = pin.Motion(rng.normal(size=3), np.zeros(3))
-    return model
 
 
 def near_turns(rng: np.random.Generator) -> np.ndarray:

@@ -12,7 +12,14 @@ from tests.project.layout import pyproject
 from wbc.extras import EXTRAS
 
 #: Modules whose distribution is called otherwise
-DISTRIBUTIONS = {"flint": "python-flint", "pxr": "usd-core", "py_trees": "py-trees", "yaml": "pyyaml", "zmq": "pyzmq"}
+DISTRIBUTIONS = {
+    "flint": "python-flint",
+    "pxr": "usd-core",
+    "py_trees": "py-trees",
+    "yaml": "pyyaml",
+    "zenoh": "eclipse-zenoh",
+    "zmq": "pyzmq",
+}
 #: What needs each extra; laws of motion need two packages, each for its own kind
 LEAST_TIME = "wbc.trajectory.time_optimal([[0.0], [1.0]], [1.0], [4.0])"
 JERK_LIMITED = "wbc.trajectory.online(1, 0.01, velocity=1.0, acceleration=1.0, jerk=1.0)"
@@ -36,6 +43,7 @@ USES = {
     "usd": "open('x.usda', 'w').close(); wbc.robots.load('x.usda')",
     "viewer": "wbc.viewer.show(controller)",
     "xacro": "open('x.xacro', 'w').close(); wbc.robots.load('x.xacro')",
+    "zenoh": "from wbc.formats import Ros2Plant; Ros2Plant(robot, zenoh='')",
     "zeromq": "from wbc.viewer.zeromq import ZeroMqEnd; ZeroMqEnd('tcp://127.0.0.1:0', '', 1.0)",
 }
 URDF = """<robot name="arm">

@@ -84,7 +84,6 @@ WALKING = {
     "planner": 3,
     "loop": 4,
     "modes": 5,
-    "two_ended": 5,
     "torque": 5,
     "run": 6,
     "report": 7,

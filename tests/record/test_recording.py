@@ -149,7 +149,7 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
         held = []
         for _ in range(recorder._chunk * 2 + 5):
             one.step(small.Q)
-            held.append(len(recorder._rows))
+            held.append(recorder._end // recorder._size)
         assert max(held) < recorder._chunk
     assert len(Recording(recorder.path)["q"]) == recorder.count == len(held)
 

@@ -13,7 +13,7 @@ import pytest
 
 import wbc.robots
 from tests.robots.files import example, joints
-from wbc.errors import RobotFileError
+from wbc.errors import RobotFileError, WbcError
 from wbc.robot import Recipe, Robot
 from wbc.robot.sources.files import example_data_folder, listed_data_folder
 
@@ -51,6 +51,38 @@ def test_rows_with_a_problem_are_listed_and_refused(name: str) -> None:
         wbc.robots.load(name)
     reason = {"ur3_xacro": "the robot has no name"}[name]
     assert reason in str(caught.value)
+
+
+def test_of_seventy_descriptions_the_one_that_does_not_load_has_no_link() -> None:
+    """69 URDF files and Cassie's SDF; beside them are four more SDF files of Cassie, and two of macros."""
+    assert len(TABLE) == 70
+    assert [recipe.file for name, recipe in TABLE.items() if name not in LOADABLE] == ["ur_description/urdf/ur3.urdf"]
+    assert not list(ElementTree.parse(example("ur_description/urdf/ur3.urdf")).getroot())
+    assert [recipe.file for recipe in TABLE.values() if not recipe.file.endswith(".urdf")] == [f"{CASSIE}_v2.sdf"]
+
+
+#: Files of the wheel that are no row -> why they do not load; "": they do
+CASSIE = "cassie_description/robots/cassie"
+OTHERS = {
+    f"{CASSIE}.sdf": "is of type 'gearbox'",
+    f"{CASSIE}_reduced.sdf": "no configuration was found that closes it",
+    f"{CASSIE}_simple.sdf": "no configuration was found that closes it",
+    f"{CASSIE}_wo_gearbox_spring.sdf": "",
+    "hector_description/robots/quadrotor_base.urdf.xacro": "the robot has no name",
+    "hector_description/robots/quadrotor_base.xacro": "cannot be expanded",
+}
+
+
+@pytest.mark.parametrize("file", OTHERS)
+def test_other_files_of_the_wheel_load_or_say_why(file: str) -> None:
+    folder = example_data_folder()
+    there = [path for kind in ("sdf", "xacro") for path in folder.rglob(f"*.{kind}")]
+    assert {str(path.relative_to(folder)) for path in there} == {*OTHERS, f"{CASSIE}_v2.sdf"}
+    if not OTHERS[file]:
+        assert wbc.robots.load(folder / file, shapes="none").nv > 0
+        return
+    with pytest.raises(WbcError, match=OTHERS[file]):
+        wbc.robots.load(folder / file, shapes="none")
 
 
 @pytest.mark.parametrize("name", LOADABLE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -51,8 +52,10 @@ def robot(name: str) -> Robot:
         for a, alpha, d in ((0.1, -1.5, 0.3), (0.4, 0.2, 0.05), (0.0, 1.6, 0.1), (0.1, -1.6, 0.3), (0.0, 1.5, 0.1)):
             rows.append(DHRow(a=a, alpha=alpha, d=d, lower=-2.8, upper=2.8, velocity=2.0))
         bare = from_dh(rows, name="rail")
-        for j in range(1, bare.model.njoints):  # Denavit-Hartenberg rows bring no masses
-            bare.model.inertias[j] = pin.Inertia(1.0 + j, np.array([0.1, 0.02 * j, 0.05]), 0.01 * np.eye(3))
+        heavy = pin.Model(bare.model)
+        for j in range(1, heavy.njoints):  # Denavit-Hartenberg rows bring no masses
+            heavy.inertias[j] = pin.Inertia(1.0 + j, np.array([0.1, 0.02 * j, 0.05]), 0.01 * np.eye(3))
+        bare = replace(bare, model=heavy)
     else:
         bare = wbc.robots.load(name, shapes="none")
     slow = np.where(np.isfinite(bare.limits.velocity), bare.limits.velocity, 1.0)

@@ -87,14 +87,18 @@ def test_limits_of_motion_give_way_and_wrenches_do_not() -> None:
 @pytest.mark.parametrize("speed", [2.0, 4.0])
 def test_states_beyond_limits_have_an_answer(speed: float) -> None:
     """Of these ticks 14 of 40 braked: wrenches cost so little that the search took rounding for a contradiction. At
-    twice the speed 8 did: its answers missed torques by 1e-3 N m, and no refinement went on from there.
+    twice the speed 8 did: its answers missed torques by 1e-3 N m, and no refinement went on from there. Of 4000 in all
+    9 still did: rows that depend on each other took turns in the set of the refinement, or a search ended with NaN.
     """
-    tick, rng = controller("talos").clone(), np.random.default_rng(5)
+    tick = controller("talos").clone()
     tick.policy, robot = Policy(chain=("cold",)), tick.stack.robot
-    for _ in range(20):
-        v = rng.standard_normal(robot.nv) * speed * np.where(np.arange(robot.nv) < 6, 0.3, 1.0)
-        tick.reset(robot.neutral)
-        assert tick.step(robot.neutral, v).status == "relaxed"
+    # seed 5 has rows that take turns; 45, 63 and 76 searches that end with NaN
+    for seed in (5, 45, 63, 76, *range(77, 76 + repeats(1))):
+        rng = np.random.default_rng(seed)
+        for k in range(20):
+            v = rng.standard_normal(robot.nv) * speed * np.where(np.arange(robot.nv) < 6, 0.3, 1.0)
+            tick.reset(robot.neutral)
+            assert tick.step(robot.neutral, v).status == "relaxed", (seed, k)
 
 
 @pytest.mark.parametrize(

@@ -227,7 +227,7 @@ def test_a_swing_that_is_not_clear_is_refused_while_the_body_can_stop_within_the
         walk._look_ahead(plan.regrasps[0])
     step = plan.regrasps[0]
     assert refused == ([] if lasts else [(f"{step.arm} from {step.source} to {step.target}", "something")])
-    assert all(one == (machine.tolerances.latch_time, lift) for one in lifts)
+    assert all(one == (machine.arm_data.latch_time, lift) for one in lifts)
     assert bool(lifts) is (lasts == 0.0)
 
 
@@ -245,7 +245,7 @@ def test_a_swing_is_foreseen_from_where_its_hand_is_lifted(
         when = caution.timing(swinging, walk._course(swinging)._replace(lifts=step.lift, stands=stands))
         opened = int(np.flatnonzero(when.clock > 0.0)[0])
         lifted = float(np.interp(step.lift, when.path_times, when.times)) if not stands else 0.0
-        assert when.times[opened] == pytest.approx(lifted + machine.tolerances.latch_time, abs=0.06)
+        assert when.times[opened] == pytest.approx(lifted + machine.arm_data.latch_time, abs=0.06)
         assert stands or when.path_times[opened] >= step.lift
 
 
@@ -260,7 +260,7 @@ def test_a_slow_hand_and_the_body_that_waits_for_it_keep_their_order(
     swinging = walk._next_swing(step)
     swinging.part = 0.6
     when = caution.timing(swinging, walk._course(swinging))
-    planned = np.clip(when.path_times - step.lift - machine.tolerances.latch_time, 0.0, swinging.law.duration)
+    planned = np.clip(when.path_times - step.lift - machine.arm_data.latch_time, 0.0, swinging.law.duration)
     assert np.abs(when.clock - planned).max() < 0.25
     swinging.state, left = "open", swinging.law.duration
     full = hand_pace(swinging, swinging.aim.position, True, left, 0.6, (1.0, 1.0))
@@ -458,7 +458,7 @@ def test_a_machine_forgets_the_holds_that_its_hands_have_left(
     machine: Walker, structure: Structure, stack: WalkStack, plan: Plan
 ) -> None:
     walk = Walk(machine, structure, plan, stack=stack)
-    place, near = structure.positions[walk.held[1]], machine.tolerances.exempt_distance
+    place, near = structure.positions[walk.held[1]], machine.arm_data.exempt_distance
     walk.machine.open(1)
     z = np.array([0.0, 0.0, 1.0])
     for before, now, kept in ((0.0, 0.9, 1), (1.2, 1.1, 1), (0.99, 1.01, 0)):

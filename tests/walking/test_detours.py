@@ -66,7 +66,7 @@ def test_over_a_wide_trench_hands_wait_where_they_go_with_the_body(machine: Walk
     np.testing.assert_allclose(ends(plan.path), ends(path), atol=1e-9)
     waits = [one for one in zip(plan.regrasps, plan.laws, strict=True) if one[0].curve >= len(ALTERNATIVES)]
     assert waits
-    latch, (_, radius, height) = machine.tolerances.latch_time, limb_of(machine).waiting[0]
+    latch, (_, radius, height) = machine.arm_data.latch_time, limb_of(machine).waiting[0]
     for step, law in waits:
         assert law.possible
         base = next(arm.base.homogeneous for arm in machine.arms if arm.name == step.arm)

@@ -66,7 +66,7 @@ def test_a_slow_walk_has_such_swings(plan: Plan) -> None:
 def test_joints_keep_to_their_rates_with_the_body_on_its_way(machine: Walker, plan: Plan) -> None:
     grips, names, used = plan.grips, [arm.name for arm in machine.arms], [0, 0, 0]
     assert grips is not None
-    kinematics, spacing, latch = ArmKinematics(machine.arm_data), plan.path.spacing, machine.tolerances.latch_time
+    kinematics, spacing, latch = ArmKinematics(machine.arm_data), plan.path.spacing, machine.arm_data.latch_time
     for step, law in zip(plan.regrasps, plan.laws, strict=True):
         arm = names.index(step.arm)
         used[arm] += 1

@@ -250,8 +250,8 @@ def test_a_plan_is_found_and_its_swings_are_clear(
         ends = floor.positions[[floor.index(step.source), floor.index(step.target)]]
         np.testing.assert_allclose(law.places[[0, -1]], ends, atol=1e-6)
         # On its way the hand is above the floor, and its joints, which follow it, keep to their rates
-        assert law.places[len(law.places) // 2, 2] > numeric.tolerances.lift_height
-        latch = numeric.tolerances.latch_time
+        assert law.places[len(law.places) // 2, 2] > numeric.arm_data.lift_height
+        latch = numeric.arm_data.latch_time
         times = np.linspace(0.0, law.duration, 60)
         samples = (step.lift + (step.land - step.lift) * (latch + times) / (law.duration + 2 * latch + 0.06)) / 0.05
         aims = [law.at(float(time)) for time in times]

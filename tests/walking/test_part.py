@@ -85,10 +85,10 @@ def test_a_full_disk_ends_the_writing_and_not_the_walk(
 ) -> None:
     put, left = FileWriter._put, iter(range(6))
 
-    def filling(writer: FileWriter, name: str, content: bytes) -> None:
+    def filling(writer: FileWriter, name: str, content: bytes, room: int = 0) -> None:
         if next(left, None) is None:
             raise OSError(errno.ENOSPC, "No space left on device")
-        put(writer, name, content)
+        put(writer, name, content, room)
 
     monkeypatch.setattr(FileWriter, "_put", filling)
     run = perform_walk(REQUEST, machine, stack=stack, folder=tmp_path)

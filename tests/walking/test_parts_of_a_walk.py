@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from tests.simulation.lagging import LaggingPlant
-from wbc.errors import ShapeError, UnknownNameError
+from wbc.errors import ShapeError
 from wbc.robots import Walker
 from wbc.simulation import PlantError, PlantState
 from wbc.walking import Structure
@@ -255,23 +255,3 @@ def test_what_has_not_come_to_rest_is_named_and_logged(machine: Walker, stack: W
     # It goes on as it did: the log does not claim that it stands
     assert run.log.v[-1] == pytest.approx(run.log.v[-2])
     assert run.log.v[-1, -1] > 0.1
-
-
-def test_a_two_ended_arm_goes_where_a_path_ends(machine: Walker) -> None:
-    from wbc.robots import walker
-    from wbc.walking.two_ended import TwoEndedWalk, grapple_row, plan_two_ended
-
-    arm, row = walker(two_ended=True), grapple_row(4)
-    walk = TwoEndedWalk(arm, row, plan_two_ended(arm, row, {"arm1": "1", "arm2": "2"}, "3"), dt=0.05, backend="vm")
-    with pytest.raises(UnknownNameError, match="hold"):
-        walk.go_to("9")
-    with pytest.raises(UnknownNameError, match="gait"):
-        walk.go_to("3", "gallop")
-    with pytest.raises(ShapeError, match="to"):
-        walk.go(np.zeros(2))
-    assert not walk.busy
-    place = row["4"].pose.translation
-    walk.go(BodyPath(np.array([pin.SE3(np.eye(3), place).homogeneous] * 2)))
-    assert walk.busy
-    nearest = drained(walk.replanner.rest()).path.poses[-1][:3, 3]
-    assert np.linalg.norm(nearest - place) < np.linalg.norm(walk.q[:3] - place)

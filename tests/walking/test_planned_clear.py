@@ -73,7 +73,7 @@ def test_no_instant_of_a_plan_touches(machine: Walker, structure: Structure) -> 
         move = Move(arm, plan.chain[arm][0], plan.chain[arm][1], lift, land, row.duration, row.delay, row.curve)
         found.append(Proof(swings).of_swing(move, law, [chain[0] for chain in plan.chain]))
     assert found[0] is not None
-    assert found[0].distance < machine.tolerances.clearance
+    assert found[0].distance < machine.arm_data.clearance
     assert found[1] is None
 
 

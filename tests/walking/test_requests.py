@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,12 @@ import numpy as np
 import pytest
 
 from wbc.errors import RangeError, ShapeError, StructureFileError, UnknownNameError, WbcError
+from wbc.robots import WalkerData, walker
+from wbc.walking import plane, save_structure
+from wbc.walking.log.folder import machine_made
 from wbc.walking.log.log import WalkLogError
-from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site, TwoEndedRequest
+from wbc.walking.planner import plan_walk
+from wbc.walking.run import ArmRequest, DriveRequest, GridPlace, PathRequest, ResumeRequest, Site
 from wbc.walking.run.records import record_of, request_of
 from wbc.walking.run.request import PublishedRequest, Request
 from wbc.walking.run.session import mode_of
@@ -25,8 +30,6 @@ REQUESTS = [
     DriveRequest(start="13,11", commands="keyboard"),
     DriveRequest("holds.csv", "hold 7", commands="rates.csv"),
     ArmRequest(arm="arm2", tasks=("hold 13,12", "rate 0,0,-0.05,0,0,0.1 for 2")),  # type: ignore[arg-type]
-    TwoEndedRequest(),
-    TwoEndedRequest(goal=(14.0, 0.0, 4.0), gait="inchworm"),
 ]
 
 
@@ -78,7 +81,6 @@ def test_what_is_no_record_is_refused(record: object) -> None:
 @pytest.mark.parametrize(
     ("make", "error", "match"),
     [
-        (lambda: PathRequest("grapples"), ShapeError, "no ends of its own"),
         (lambda: PathRequest("holds.csv"), StructureFileError, "holds.csv"),
         (lambda: PathRequest(start="13"), ShapeError, "T,A"),
         (lambda: PathRequest(points=("13,99",)), RangeError, r"place 2\.A"),
@@ -89,9 +91,6 @@ def test_what_is_no_record_is_refused(record: object) -> None:
         (lambda: PublishedRequest("plane"), RangeError, "cylinder"),
         (ArmRequest, RangeError, "do"),
         (lambda: ArmRequest(tasks=("jump",)), ShapeError, "hold ID"),
-        (lambda: TwoEndedRequest(start=("1",)), ShapeError, "two holds"),
-        (lambda: TwoEndedRequest(goal=(1.0, 2.0)), ShapeError, "to"),
-        (lambda: TwoEndedRequest(gait="gallop"), UnknownNameError, "gait"),
         (lambda: ResumeRequest("run", "late"), ShapeError, "time in s"),  # type: ignore[arg-type]
     ],
 )
@@ -100,14 +99,23 @@ def test_bad_requests_are_named(make: Any, error: type[WbcError], match: str) ->
         make()
 
 
-def test_a_goal_of_the_two_ended_arm_is_a_hold_or_a_place() -> None:
-    assert TwoEndedRequest(goal="4").to() == TwoEndedRequest(goal="4")
-    assert TwoEndedRequest().to(("14,0,4",)) == TwoEndedRequest(goal=(14.0, 0.0, 4.0))
-    for goals in (("9",), ("1,2",), ("3", "4")):
-        with pytest.raises((UnknownNameError, ShapeError)):
-            TwoEndedRequest().to(goals)
-    with pytest.raises(UnknownNameError, match="'9'"):
-        TwoEndedRequest(start=("1", "9")).to()
+def test_a_file_has_no_ends_of_its_own(tmp_path: Path) -> None:
+    with pytest.raises(ShapeError, match="no ends of its own"):
+        PathRequest(str(save_structure(plane(), tmp_path / "mine.csv")))
+
+
+def test_the_two_ended_arm_is_sent_to_climb() -> None:
+    arm, command = walker(two_ended=True), "wbc climb --robot two_ended"
+    refused: list[Callable[[], object]] = [
+        lambda: mode_of(PathRequest(), arm),
+        lambda: mode_of(DriveRequest(), arm),
+        lambda: plan_walk(arm, plane(), PathRequest("plane").path(WalkerData.read())),
+    ]
+    for ask in refused:
+        with pytest.raises(ShapeError, match=command):
+            ask()
+    with pytest.raises(WalkLogError, match=command):
+        machine_made({"two_ended": True, "arms": 2, "data": {}})
 
 
 def test_modes_refuse_what_they_do_not_do(machine: Any) -> None:
@@ -117,7 +125,5 @@ def test_modes_refuse_what_they_do_not_do(machine: Any) -> None:
         mode_of(PathRequest(), machine, commands=object())  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="request"):
         mode_of(PublishedRequest(), machine)
-    with pytest.raises(ShapeError, match="two-ended arm"):
-        mode_of(TwoEndedRequest(), machine)
     with pytest.raises(UnknownNameError, match="13,99"):
         mode_of(ArmRequest(tasks=("hold 13,99",)), machine)  # type: ignore[arg-type]

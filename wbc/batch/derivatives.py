@@ -19,7 +19,7 @@ _STEP = 1e-6
 _CHUNK = 2048
 #: What the multipliers' block of the system has on its diagonal, times the largest entry of H: rows that depend on
 #: each other leave it regular, and a correction takes the error away
-_REGULAR = 1e-10
+REGULAR = 1e-10
 
 Moves = Callable[[Array, int, float], None]
 
@@ -30,13 +30,16 @@ class Derivatives:
         H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
 
     for the rows S that hold v. The numbers' own derivatives are central differences in C.
+
+    Attributes:
+        size: numbers of a QP, see :meth:`assembled`.
     """
 
     def __init__(self, tick: NativeTick, context: Context) -> None:
         self._tick, self._context = tick, context
         self._many = tick.library_function("wbc_tick_qp_many", None, unlocked=True)
         memory = context.memory
-        self._base, self._size = memory["H"].start, memory["unusable"].start - memory["H"].start
+        self._base, self.size = memory["H"].start, memory["unusable"].start - memory["H"].start
 
     def twin(self) -> Derivatives:
         """Another one with a tick of its own, for another thread."""
@@ -65,7 +68,7 @@ class Derivatives:
         H, _, A, low, high = self.problems(before)
         holds = (force != 0.0) | (low == high)
         rows = np.concatenate([np.broadcast_to(np.eye(n), (len(x), n, n)), A], axis=1) * holds[:, :, None]
-        diagonal = np.where(holds, -_REGULAR / H.max(axis=(1, 2))[:, None], 1.0)
+        diagonal = np.where(holds, -REGULAR / H.max(axis=(1, 2))[:, None], 1.0)
         right = np.zeros((len(x), 2 * n + m, count))
         for k in range(count):
             ends = []
@@ -87,17 +90,21 @@ class Derivatives:
 
     def problems(self, inputs: Array) -> tuple[Array, Array, Array, Array, Array]:
         """H, g, A, lower and upper bounds of all."""
-        layout, memory = self._context.layout, self._context.memory
-        n, m, given = layout.variables, layout.general_rows, np.ascontiguousarray(inputs)
-        found = np.empty((len(given), self._size))
-        places = (ctypes.c_void_p(array.ctypes.data) for array in (given, found))
-        self._many(self._tick.pointer, ctypes.c_longlong(len(given)), *places)
+        layout, memory, found = self._context.layout, self._context.memory, self.assembled(inputs)
+        n, m = layout.variables, layout.general_rows
         H, g, A, low, high = (
             found[:, memory[name].start - self._base : memory[name].stop - self._base]
             for name in ("H", "g", "A", "low", "high")
         )
-        upper = np.triu(H.reshape(len(given), n, -1)[:, :, :n])
-        return upper + np.triu(upper, 1).transpose(0, 2, 1), g[:, :n], A.reshape(len(given), m, n), low, high
+        upper = np.triu(H.reshape(len(found), n, -1)[:, :, :n])
+        return upper + np.triu(upper, 1).transpose(0, 2, 1), g[:, :n], A.reshape(len(found), m, n), low, high
+
+    def assembled(self, inputs: Array) -> Array:
+        """The QPs as C has them, a row a robot."""
+        given, found = np.ascontiguousarray(inputs), np.empty((len(inputs), self.size))
+        places = (ctypes.c_void_p(array.ctypes.data) for array in (given, found))
+        self._many(self._tick.pointer, ctypes.c_longlong(len(given)), *places)
+        return found
 
     def _moves(self, name: str, value: str | None) -> tuple[Moves, int]:
         """What displaces the k-th entry of a value of all robots, and how many entries there are."""
@@ -167,27 +174,3 @@ def _solved(H: Array, rows: Array, diagonal: Array, right: Array) -> Array:
     rest = right - system @ x
     system[:, range(n, n + m), range(n, n + m)] = diagonal
     return np.asarray((x + np.linalg.solve(system, rest))[:, :n])
-
-
-def solved(H: Array, A: Array, holds: np.ndarray, right: Array) -> tuple[Array, Array]:
-    """y [n], and mu of the bounds and rows [n + m], of H y + C_S' mu = right, C_S y = 0, for each robot."""
-    count, n, m = H.shape[0], H.shape[1], A.shape[1]
-    bound, row = holds[:, :n], holds[:, n:]
-    free = ~bound
-    # A variable at its bound leaves the problem: its row and column are those of the identity
-    system = np.zeros((count, n + m, n + m))
-    system[:, :n, :n] = H * (free[:, :, None] & free[:, None, :])
-    system[:, range(n), range(n)] += bound
-    system[:, n:, :n] = A * (row[:, :, None] & free[:, None, :])
-    system[:, :n, n:] = system[:, n:, :n].transpose(0, 2, 1)
-    regular = np.where(row, -_REGULAR / H.max(axis=(1, 2))[:, None], 1.0) if m else np.zeros((count, 0))
-    system[:, range(n, n + m), range(n, n + m)] = regular
-    side = np.concatenate([right * free, np.zeros((count, m))], axis=1)[:, :, None]
-    x = np.linalg.solve(system, side)
-    if m:
-        exact = system.copy()
-        exact[:, range(n, n + m), range(n, n + m)] = np.where(row, 0.0, 1.0)
-        x = x + np.linalg.solve(system, side - exact @ x)
-    y, mu = x[:, :n, 0], x[:, n:, 0] * row
-    pull = right - (H @ y[:, :, None])[:, :, 0] - (A.transpose(0, 2, 1) @ mu[:, :, None])[:, :, 0]
-    return y, np.concatenate([pull * bound, mu], axis=1)

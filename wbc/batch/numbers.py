@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.multibody import pin
+from wbc.multibody import is_pose
 from wbc.robot import Robot
 from wbc.tasks import inputs
 from wbc.tasks.base import Input
@@ -89,7 +89,7 @@ def _poses(robot: Robot, field: str, declared: Input, value: Any, count: int) ->
     if not (isinstance(value, np.ndarray) and value.shape == (count, 4, 4)):
         pairs = isinstance(value, tuple) and len(value) == 2
         one = {"position": (3,), "orientation": (3, 3)}.get(declared.part, (4, 4))
-        single = isinstance(value, pin.SE3) or pairs or not hasattr(value, "__len__")
+        single = is_pose(value) or pairs or not hasattr(value, "__len__")
         if single or _shape(value) in ((4, 4), one):
             return np.broadcast_to(inputs.flat(robot, field, declared, value), (count, 12))
         if len(value) != count:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import pathlib
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -11,7 +12,8 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
-from wbc.batch.derivatives import Derivatives, solved
+from wbc.batch.derivatives import REGULAR, Derivatives
+from wbc.errors import SolverError
 from wbc.native.compiled_function import generated_library
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -21,20 +23,8 @@ from wbc.validation import Array
 
 #: What gradients are taken by, in the order in which they come
 PARTS = ("q", "v_last", "p", "weight")
-_DRIVER = """
-void pull_many(long long count, const double *inputs, const double *given, double *out) {
-    casadi_int iw[%(iw)d];
-    double w[%(w)d];
-    const double *arg[%(arg)d];
-    double *res[%(res)d];
-    for (long long k = 0; k < count; k++) {
-        arg[0] = inputs + k * %(inputs)d;
-        arg[1] = given + k * %(given)d;
-        res[0] = out + k * %(out)d;
-        pulled(arg, res, iw, w, 0);
-    }
-}
-"""
+#: What is solved in C, behind what CasADi generates
+_SOURCE = pathlib.Path(__file__).with_name("native") / "pull.h"
 
 
 def reason_against(context: Context) -> str:
@@ -64,21 +54,28 @@ class Pullback:
         self._each = [derivatives.twin() for _ in range(threads)]
         layout, memory = context.layout, context.memory
         n, m, b = layout.variables, layout.general_rows, layout.bound_blocks
-        self._sizes = [n, m, n, m, m, b * n, b * n]
-        function = _gradient(layout, memory, self._sizes, context)
-        numbers = {"iw": max(1, function.sz_iw()), "w": max(1, function.sz_w())}
-        numbers |= {"arg": function.sz_arg(), "res": function.sz_res()}
-        numbers |= {"inputs": function.size1_in(0), "given": function.size1_in(1), "out": function.size1_out(0)}
-        self._width, self._ends = numbers["out"], np.cumsum([0, *(_size(memory, name) for name in PARTS)])
+        function = _gradient(layout, memory, [n, m, n, m, m, b * n, b * n], context)
+        at = {name: memory[name].start for name in ("v", "owner_low", "owner_high")}
+        at |= {name: memory[name].start - memory["H"].start for name in ("H", "A", "low", "high")}
+        at["force"] = memory["multipliers"].start
+        macros: dict[str, float] = {f"{name.upper()}_AT": place for name, place in at.items()}
+        macros |= {"IW": max(1, function.sz_iw()), "W": max(1, function.sz_w()), "ARG": function.sz_arg()}
+        macros |= {"RES": function.sz_res(), "INPUTS": function.size1_in(0), "GIVEN": function.size1_in(1)}
+        macros |= {"N": n, "M": m, "BLOCKS": b, "H_WIDTH": _size(memory, "H") // n, "PROBLEM": derivatives.size}
+        macros |= {"REPORT": memory.report, "OUT": function.size1_out(0), "REGULAR": REGULAR}
+        self._width, self._ends = function.size1_out(0), np.cumsum([0, *(_size(memory, name) for name in PARTS)])
+        head = "#include <math.h>\n#include <string.h>\n"
+        tail = "".join(f"#define {name} {value}\n" for name, value in macros.items())
+        tail += _SOURCE.read_text(encoding="utf-8")
 
         def text() -> str:
             generator = ca.CodeGenerator("pulled.c", {"with_header": False})
             generator.add(function)
-            return str(generator.dump()) + _DRIVER % numbers
+            return f"{head}{generator.dump()}{tail}"
 
-        library = generated_library(f"{function.serialize()}{_DRIVER}", text)
+        library = generated_library(f"{function.serialize()}{tail}", text)
         self._pull = ctypes.CDLL(str(library)).pull_many
-        self._pull.restype = None
+        self._pull.restype = ctypes.c_longlong
 
     def require(self, values: Iterable[tuple[str, str]]) -> None:
         """Items and their values are those of the stack.
@@ -107,35 +104,16 @@ class Pullback:
         return {name: out[:, a:b] for name, a, b in zip(PARTS, self._ends, self._ends[1:], strict=False)}
 
     def _piece(self, weights: Array, reports: Array, inputs: Array, out: Array, where: slice, thread: int) -> None:
-        memory, layout = self._context.memory, self._context.layout
-        n, blocks = layout.variables, layout.bound_blocks
-        w, report, given = weights[where], reports[where], inputs[where].copy()
-        start = memory.report
+        memory = self._context.memory
+        given, start = inputs[where].copy(), memory.report
+        # Accelerations count from where the tick found them
         place = {name: slice(memory[name].start - start, memory[name].stop - start) for name in ("v_last", "v_in")}
         given[:, place["v_last"]] = given[:, place["v_in"]]
-        H, _, A, low, high = self._each[thread].problems(given)
-        x, force = report[:, memory["v"]], report[:, memory["multipliers"]]
-        holds = (force != 0.0) | (low == high)
-        y, mu = solved(H, A, holds, w)
-        upper = force > 0.0
-        of_bounds = np.zeros((2, len(w), n, blocks))
-        for side, (name, active) in enumerate((("owner_low", ~upper[:, :n]), ("owner_high", upper[:, :n]))):
-            owner = report[:, memory[name]].astype(np.intp)
-            robot, joint = np.nonzero(active & holds[:, :n] & (owner >= 0))
-            of_bounds[side, robot, joint, owner[robot, joint]] = mu[robot, joint]
-        rows = mu[:, n:]
-        numbers = np.concatenate(
-            [
-                *(x, force[:, n:], y, rows * ~upper[:, n:], rows * upper[:, n:]),
-                *(part.transpose(0, 2, 1).reshape(len(w), n * blocks) for part in of_bounds),
-            ],
-            axis=1,
-        )
-        found = np.empty((len(w), self._width))
-        self._pull(
-            ctypes.c_longlong(len(w)), *(ctypes.c_void_p(array.ctypes.data) for array in (given, numbers, found))
-        )
-        out[where] = found
+        problems = self._each[thread].assembled(given)
+        arrays = [given, problems, *(np.ascontiguousarray(rows[where]) for rows in (reports, weights)), out[where]]
+        places = (ctypes.c_void_p(array.ctypes.data) for array in arrays)
+        if (done := self._pull(ctypes.c_longlong(len(given)), *places)) < len(given):
+            raise SolverError("pull", int(done), "rows that hold leave the command of this robot open")
 
 
 def _size(memory: Memory, name: str) -> int:

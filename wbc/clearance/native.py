@@ -24,7 +24,7 @@ SOURCES = Path(__file__).parent / "native"
 _INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs", "depth", "aim")
 _ARRAYS = (
     *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
-    *("parent", "kind", "coordinate", "place", "axis", "pose", "deviation"),
+    *("parent", "kind", "coordinate", "place", "axis", "pose", "deviation", "drift"),
     *("body_frame", "body_place", "body_pose", "line", "world_line", "shape"),
     *("chain", "chain_length", "moved", "stamp"),
     *("first", "second", "stop_first", "stop_second", "required"),
@@ -52,7 +52,7 @@ class _SweepStruct(ctypes.Structure):
         *((name, ctypes.c_int) for name in _INTEGERS),
         *((name, ctypes.c_double) for name in ("tolerance", "far", "least")),
         *((name, ctypes.c_void_p) for name in _ARRAYS),
-        *((name, ctypes.c_int) for name in ("node", "stopped", "measured", "nodes")),
+        *((name, ctypes.c_int) for name in ("node", "stopped", "measured", "nodes", "even")),
     ]
 
 
@@ -93,8 +93,8 @@ class NativeSweep:
         self._hold(
             parent=[f.parent for f in tree], kind=[int(f.moves) for f in tree],
             coordinate=[f.coordinate for f in tree], place=scene.tree.places, axis=np.array(axes).reshape(-1, 5),
-            pose=np.zeros((frames, 12)), deviation=np.zeros((frames, 4)), body_frame=scene.frame,
-            body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12),
+            pose=np.zeros((frames, 12)), deviation=np.zeros((frames, 4)), drift=np.zeros((frames, 7)),
+            body_frame=scene.frame, body_place=np.array([place(pose) for pose in scene.place]).reshape(-1, 12),
             body_pose=np.zeros((bodies, 12)), line=scene.line, world_line=np.zeros((bodies, 6)), chain=chain,
             chain_length=[len(links) for links in scene.chain], moved=np.zeros((bodies, depth + 1, 2)),
             stamp=np.zeros(bodies, dtype=np.int32), first=scene.first, second=scene.second,
@@ -127,24 +127,6 @@ class NativeSweep:
         self._functions.wbc_sweep(self._at, len(chosen))
         return None if it.stopped < 0 else int(it.stopped)
 
-    def hold_still(self, scalars: int) -> None:
-        """Two knots with scalars of degree 1 between them, whose numbers another code writes: see :attr:`ends`."""
-        self._take(
-            Motion(
-                np.array([0.0, 1.0]),
-                np.zeros((1, scalars, 2)),
-                np.zeros((0, 2, 12)),
-                np.zeros(scalars),
-                np.zeros((0, 2)),
-            ),
-            (),
-        )
-        self.restart()
-
-    def restart(self) -> None:
-        """Pairs in the order in which they were given."""
-        self._chosen[:] = np.arange(len(self._chosen))
-
     def require(self, required: Array) -> None:
         """Other distances that the pairs keep [m], [pairs]."""
         self._arrays["required"][:] = required
@@ -153,11 +135,6 @@ class NativeSweep:
     def address(self) -> int:
         """Of the structure."""
         return ctypes.addressof(self._sweep)
-
-    @property
-    def ends(self) -> tuple[int, int]:
-        """Addresses of the scalars at both knots, scalars x 2, and of how far these are apart."""
-        return self._arrays["control"].ctypes.data, self._arrays["rate"].ctypes.data
 
     def at(self, pair: int, knots: float) -> Array:
         """Distance, nearest points and what counts of a pair of the last motion, [8]."""

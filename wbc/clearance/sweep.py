@@ -90,7 +90,8 @@ class Sweeper:
     With d the distance of two bodies in the middle of a piece of the motion, and m no less than the way of any of their
     points from there, d - m is a lower bound over the piece; where it is not enough, both halves are looked at
     (conservative advancement: Mirtich, Impulse-based dynamic simulation, 1996). m = sum_j |q_j - q_j(middle)| r_j along
-    the chain from the body to what carries both, with r_j the reach of the body about joint j, all in the middle.
+    the chain from the body to what carries both, with r_j the reach of the body about joint j, all in the middle; or,
+    within a piece between two knots, its bound of second order (``native/motion.h``), where that is less.
 
     Raises:
         CompileError: the C that does it was not compiled ahead, and there is no compiler, or it fails.

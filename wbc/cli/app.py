@@ -57,7 +57,6 @@ COMMANDS = {
             "path": "walk.WalkPath",
             "drive": "walk.DriveWalk",
             "arm": "walk.WalkArm",
-            "two-ended": "walk.TwoEnded",
             "published": "walk.Published",
             "resume": "walk.Resume",
             "check": "walk.CheckWalk",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from wbc.cli.output import RECORDED, Mcap
 from wbc.cli.scene import Backend, Force
 from wbc.climb.request import ClimbRequest
 
@@ -28,23 +30,25 @@ class ClimbTo:
     request: Annotated[ClimbRequest, "What it does"]
     backend: Backend = "auto"
     check: Annotated[bool, "Run the checker."] = True
+    mcap: Mcap = False
     pictures: Annotated[bool, "Draw picture and film."] = True
     out: Annotated[Path | None, "Run folder. Default: runs/climb-ROBOT-SCENE-TIME."] = None
     force: Force = False
 
     def run(self) -> int:
         from wbc.cli.console import progress_bar, say, tell
-        from wbc.cli.folders import filled, run_folder
+        from wbc.cli.folders import filled, recording, run_folder
         from wbc.climb import report
         from wbc.climb.loop import ClimbOutcome
         from wbc.climb.session import climb
 
         request = self.request
         name = f"climb-{Path(request.robot).stem}-{Path(request.scene).stem}"
-        folder = run_folder(self.out, name, report.WRITTEN, self.force, made=False)
+        folder = run_folder(self.out, name, (*report.WRITTEN, *RECORDED), self.force, made=False)
         with progress_bar() as bar:
             bar.add_task(f"{request.robot} on {request.scene}", total=None)
-            done = climb(request, self.check, self.backend)
+            with contextlib.ExitStack() as stack:
+                done = climb(request, self.check, self.backend, recording(stack, folder, self.mcap))
             figures = done.figures
             folder.mkdir(parents=True, exist_ok=True)
             with filled(folder, report.WRITTEN) as fresh:
@@ -58,6 +62,7 @@ class ClimbTo:
         violations = [] if done.report is None else done.report.violations
         for finding in violations:
             tell(str(finding))
+        written += [folder / name for name in RECORDED if (folder / name).is_file()]
         say(f"{folder}: {', '.join(file.name for file in written)}")
         if violations:
             return VIOLATED

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import datetime
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from wbc import validation
-from wbc.cli.console import OutputError
+from wbc.api import Controller
+from wbc.cli.console import OutputError, tell
+from wbc.cli.output import RECORDED
 
 
 def run_folder(
@@ -70,6 +72,40 @@ def filled(folder: Path, replaced: Sequence[str] = ()) -> Iterator[Path]:
             file.replace(folder / file.name)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
+
+
+def recording(stack: contextlib.ExitStack, folder: Path, mcap: bool) -> Callable[[Controller], None] | None:
+    """What is told of a controller before its first tick, so that it is recorded until ``stack`` ends; None: nothing.
+
+    Args:
+        folder: of the run. mcap: whether its ticks are recorded, and written as MCAP.
+    """
+
+    def begin(controller: Controller) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        stack.enter_context(with_mcap(controller, folder))
+
+    return begin if mcap else None
+
+
+@contextlib.contextmanager
+def with_mcap(controller: Controller, folder: Path) -> Iterator[None]:
+    """Record ticks into a folder, and write them as MCAP meanwhile; one that cannot be written to the end is told of:
+    the run is worth keeping all the same.
+
+    Raises:
+        MissingPackageError: the packages of the extra are not installed.
+    """
+    from wbc.formats import FormatError, recorded
+    from wbc.record.recording import RecordingError
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(recorded(controller, folder / RECORDED[0], overwrite=True))
+        yield
+        try:
+            stack.close()
+        except (FormatError, RecordingError) as error:
+            tell(str(error), "warning")
 
 
 def _new(name: str) -> Path:

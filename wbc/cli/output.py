@@ -8,6 +8,10 @@ from typing import Annotated, Literal
 
 from wbc.cli.scene import Backend
 
+#: What a recording of ticks is called in a run's folder, and its copy
+RECORDED = ("ticks.npz", "ticks.mcap")
+Mcap = Annotated[bool, "Record every tick, and write it as MCAP meanwhile: ticks.npz, ticks.mcap."]
+
 
 @dataclass(frozen=True)
 class TrackOutput:
@@ -17,6 +21,7 @@ class TrackOutput:
     force: Annotated[bool, "Write into a folder that has a run."] = False
     log: Annotated[Literal["parquet", "npz"], "Format of the log."] = "parquet"
     record: Annotated[bool, "Record the inputs of every tick, for `wbc replay`."] = True
+    mcap: Mcap = False
     plots: Annotated[bool, "Draw the plots, the picture and the page that plays the run."] = True
 
 
@@ -34,6 +39,7 @@ class WalkOutput(Where):
 
     backend: Backend = "auto"
     check: Annotated[bool, "Run the external checker."] = True
+    mcap: Mcap = False
     pictures: Annotated[bool, "Draw plots, stills, animation and the replay page."] = True
 
 

@@ -63,6 +63,7 @@ class RetargetClips:
     clip: Annotated[ClipOptions, "What the clips are"] = ClipOptions()
     format: Annotated[tuple[MotionFormat, ...], "Format besides npz; may be repeated."] = ()
     film: Annotated[bool, "Draw a film of each."] = True
+    support: Annotated[bool, "Say in how many frames contact forces and motors hold the robot at rest."] = False
     workers: Annotated[int | None, "Processes. Default: one a core, at most one a clip."] = None
     address: Annotated[str | None, "Scheduler of a Dask cluster, as tcp://HOST:8786."] = None
     out: Annotated[Path | None, "Folder of the clips' folders. Default: runs/retarget-ROBOT."] = None
@@ -126,7 +127,7 @@ class RetargetClips:
         if file is not None:
             validation.text_of("correspondence", file, CorrespondenceError)
         return [
-            ClipJob(clip, out / place, self.robot, loading, given, self.format, self.film, file)
+            ClipJob(clip, out / place, self.robot, loading, given, self.format, self.film, self.support, file)
             for clip, place in found
         ], out
 

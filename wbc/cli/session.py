@@ -11,8 +11,8 @@ from rich.progress import Progress
 
 from wbc.api import Controller
 from wbc.cli.console import progress_bar, show_figures, tell
-from wbc.cli.folders import filled, run_folder
-from wbc.cli.output import TrackOutput
+from wbc.cli.folders import filled, run_folder, with_mcap
+from wbc.cli.output import RECORDED, TrackOutput
 from wbc.extras import MissingPackageError
 from wbc.interrupts import interrupts
 from wbc.log import FORMATS, Log, save
@@ -26,7 +26,7 @@ from wbc.track.summary import Figure, save_summary, summarise
 
 INTERRUPTED = 130
 #: Inputs of every tick, in the run folder
-RECORDING = "ticks.npz"
+RECORDING = RECORDED[0]
 #: Ticks between two moves of the progress bar, so that the bar costs nothing
 STRIDE = 25
 
@@ -60,7 +60,7 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
     Raises:
         WbcError: bad input; nothing is written then but an empty folder.
     """
-    written = (*(f"log.{kind}" for kind in FORMATS), RECORDING, "summary.json", "report.html", "replay.html")
+    written = (*(f"log.{kind}" for kind in FORMATS), *RECORDED, "summary.json", "report.html", "replay.html")
     folder = run_folder(output.out, f"{plan.robot.name}-{plan.label}", written, output.force)
     stopper = Stopper()
     with progress_bar() as bar:
@@ -69,14 +69,19 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
         def tell_stage(text: str) -> None:
             bar.update(stage, description=text, total=None)
 
-        recording = folder / RECORDING if output.record else None
-        log = _tracked(plan, bar, stage, stopper, recording, plant)
+        recording = folder / RECORDING if output.record or output.mcap else None
+
+        def record(controller: Controller) -> contextlib.AbstractContextManager[object]:
+            if recording is None:
+                return contextlib.nullcontext()
+            return with_mcap(controller, folder) if output.mcap else controller.record(recording, overwrite=True)
+
+        log = _tracked(plan, bar, stage, stopper, record, plant)
         with stopper.listening():
             figures = summarise(log)
             with filled(folder) as fresh:
                 files = [save(log, fresh, output.log), save_summary(figures, fresh)]
-            if recording is not None:
-                files.append(recording)
+            files += [folder / name for name in RECORDED if (folder / name).is_file()]
             with filled(folder) as fresh:
                 if output.plots:
                     files += _drawn(plan, log, fresh, tell_stage)
@@ -89,18 +94,21 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
 
 
 def _tracked(
-    plan: PathRun, bar: Progress, stage: Any, stopper: Stopper, recording: Path | None, plant: Plant | None
+    plan: PathRun,
+    bar: Progress,
+    stage: Any,
+    stopper: Stopper,
+    record: Callable[[Controller], contextlib.AbstractContextManager[object]],
+    plant: Plant | None,
 ) -> Log:
     with contextlib.ExitStack() as stack:
 
         def compiled(controller: Controller) -> None:
             # From here on there is a log to write; a Ctrl-C while compiling ends the command at once
             stack.enter_context(stopper.listening())
-            if recording is not None:
-                recorder = controller.record(recording, overwrite=True)
-                # One that cannot be written to the end says so in the log; the run is worth keeping all the same
-                stack.enter_context(contextlib.suppress(RecordingError))
-                stack.enter_context(recorder)
+            # One that cannot be written to the end says so in the log; the run is worth keeping all the same
+            stack.enter_context(contextlib.suppress(RecordingError))
+            stack.enter_context(record(controller))
             bar.update(stage, description=f"{plan.robot.name}: {plan.label}", total=plan.ticks)
 
         def progress(ticks: int) -> None:

@@ -16,7 +16,6 @@ from wbc.walking.run.request import (
     PathRequest,
     PublishedRequest,
     ResumeRequest,
-    TwoEndedRequest,
 )
 from wbc.walking.torque.choice import PlantChoice
 
@@ -125,21 +124,6 @@ class WalkArm:
         from wbc.walking.run.session import mode_of
 
         return carried_out(mode_of(self.request, self.machine.walker()), self.output, self.plant)
-
-
-@dataclass(frozen=True)
-class TwoEnded:
-    """Walk end over end with an arm of two ends."""
-
-    request: Annotated[TwoEndedRequest, _WHAT]
-    set: Annotated[tuple[str, ...], "NAME=VALUE of the arm's data, in SI; may be repeated."] = ()
-    output: Writes = WALKED
-
-    def run(self) -> int:
-        from wbc.cli.walking import carried_out, two_ended_arm
-        from wbc.walking.run.session import mode_of
-
-        return carried_out(mode_of(self.request.to(), two_ended_arm(self.set)), self.output, PlantChoice())
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,12 @@ from typing import Any
 
 from wbc import validation
 from wbc.cli.console import OutputError, out, progress_bar, show_figures, tell
-from wbc.cli.folders import run_folder
-from wbc.cli.output import WalkOutput, Where
+from wbc.cli.folders import recording, run_folder
+from wbc.cli.output import RECORDED, WalkOutput, Where
 from wbc.cli.session import INTERRUPTED, Stopper
 from wbc.extras import MissingPackageError
 from wbc.published.three_arm_walker.on_request import perform_published, published_figures, save_published
-from wbc.robots import TwoEndedData, Walker, WalkerData, walker
+from wbc.robots import Walker, WalkerData, walker
 from wbc.robots.walker_data import data_changes, spaced_radius
 from wbc.terminal import LinesOfInput
 from wbc.viewer.runs import REPLAY
@@ -53,11 +54,6 @@ def body(arms: int, changes: Sequence[str] = ()) -> Walker:
     if "shoulder_radius" not in values:
         data = replace(data, shoulder_radius=spaced_radius(count, data.shoulder_radius))
     return walker(count, data=data)
-
-
-def two_ended_arm(changes: Sequence[str] = ()) -> Walker:
-    """The arm of two ends with fields of its data changed; errors as of :func:`body`."""
-    return walker(data=TwoEndedData.read(**data_changes(changes)), two_ended=True)
 
 
 class WalkLines(LinesOfInput):
@@ -105,12 +101,22 @@ def carried_out(
                 if plant.dynamic:
                     told("compiling the torques", None)
                     loop = plant.build(mode.walker, mode.structure, output.backend)
-                run = perform(mode, backend=output.backend, progress=told, stop=stopper, folder=folder, plant=loop)
+                with contextlib.ExitStack() as stack:
+                    run = perform(
+                        mode,
+                        backend=output.backend,
+                        progress=told,
+                        stop=stopper,
+                        folder=folder,
+                        plant=loop,
+                        compiled=recording(stack, folder, output.mcap),
+                    )
                 if least_time and run.plan is not None and run.plan.complete:
                     told("least time", None)
                     run = replace(run, more=(*run.more, least_time_figure(run.walker, run.plan)))
                 told("checking and writing", None)
                 files, report = save_run(run, folder, output.check)
+                files += [folder / name for name in RECORDED if (folder / name).is_file()]
                 missing = list[str]()
                 if output.pictures and not stopper():
                     files += save_pictures(run, folder, told, stopper)
@@ -162,7 +168,7 @@ def checked(folder: Path) -> int:
 
 def _folder(where: Where, name: str) -> Path:
     """The folder that was asked for, or a new one under ``runs``; made when the walk begins."""
-    return run_folder(where.out, f"walk-{Path(name).stem}", WRITTEN, where.force, made=False)
+    return run_folder(where.out, f"walk-{Path(name).stem}", (*WRITTEN, *RECORDED), where.force, made=False)
 
 
 def _ended(run: WalkRun, interrupted: bool) -> int:

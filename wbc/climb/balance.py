@@ -67,9 +67,21 @@ class Equilibrium:
         at = validation.real_array("q", q, (self.climber.robot.nq,))
         poses = self._poses(held, at)
         if motors:
-            return self._with_motors(held, at, poses, effort)
+            return self._with_motors(held, at, poses, effort, np.inf)
         places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
         return self.world.slack(places, self.climber.center_of_mass(at), poses)[0]
+
+    def driven(self, contacts: Sequence[int], q: Array, least: float, effort: float = 1.0) -> bool:
+        """Whether :meth:`margin` with motors is at least ``least``: without a program where the least forces show it.
+
+        Args:
+            contacts, q, effort: as of :meth:`margin`. least: in shares of the weight [1].
+
+        Raises:
+            ShapeError, RangeError: contacts that are none.
+        """
+        held = self._checked(contacts)
+        return self._with_motors(held, q, self._poses(held, q), effort, least) >= least
 
     def wrench_slacks(self, contacts: Sequence[int], q: Array, point: Array, wrenches: Array) -> tuple[Array, Array]:
         """Slacks of contacts, turned as in a configuration, for wrenches that they have to give, and their bounds: as
@@ -167,8 +179,10 @@ class Equilibrium:
         r = np.concatenate([-gravity * self.climber.mass / weight, np.zeros(3)])
         return G, r, A, np.concatenate([*slacks, []]), np.concatenate([*sides, []])
 
-    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array, effort: float) -> float:
-        """The slack with torques of motors within their efforts, which take no part in it."""
+    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array, effort: float, enough: float) -> float:
+        """The slack with torques of motors within their efforts, which take no part in it; ``enough``, where the least
+        forces have that.
+        """
         robot, weight = self.climber.robot, self.world.weight
         model, data = robot.model, robot.model.createData()
         center = self.climber.center_of_mass(q)
@@ -194,6 +208,8 @@ class Equilibrium:
         sides = np.vstack([np.hstack([A, s[:, None]]), np.hstack([torque, np.zeros((len(motors), 1))])])
         sides = np.vstack([sides, np.hstack([-torque, np.zeros((len(motors), 1))])])
         ends = np.concatenate([b, most - own[motors], most + own[motors]])
+        if enough < np.inf and (sides @ [*np.linalg.lstsq(G, r)[0], enough] <= ends).all():
+            return enough
         free = [(None, None)] * G.shape[1] + [(None, 1.0)]
         cost = np.concatenate([np.zeros(G.shape[1]), [-1.0]])
         answer = linprog(cost, sides, ends, np.hstack([G, np.zeros((6, 1))]), r, free, method="highs")

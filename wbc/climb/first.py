@@ -34,7 +34,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
     """
     given = StanceOptions() if options is None else options
     at = climber.robot.configuration("q", q)
-    world = ClimbWorld(climber, scene, None, given.limits, given.clearance, given.apart)
+    world = ClimbWorld(climber, scene, None, given.limits, given.clearance, given.apart, friction=given.friction)
     choices: list[list[tuple[float, int]]] = []
     for limb in range(len(climber.limbs)):
         pose = climber.contact_pose(at, limb)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,7 @@ def beyond_limits(robot: Robot, q: Array) -> tuple[str, float] | None:
     return (robot.dof_names[ends[worst]], float(beyond[worst])) if beyond[worst] > LIMIT_SLACK else None
 
 
+@functools.lru_cache(maxsize=16)
 def _rows(robot: Robot) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """First row in q of each degree of freedom after the base's, and which are of joints without end."""
     model = robot.model

@@ -88,7 +88,7 @@ def _three_pandas(name: str) -> Climber:
 
 def _talos(hands: bool) -> Callable[[str], Climber]:
     def make(name: str) -> Climber:
-        robot = ready(load("talos", shapes="fit", acceleration=HEAVY))
+        robot = ready(load("talos", shapes="convex", acceleration=HEAVY))
         sole = FlatFoot(SOLE, FRICTION)
         limbs = [ClimbLimb(robot.frames[f"{side}_foot"], sole, name=f"{side}_foot") for side in ("left", "right")]
         if hands:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 from weakref import WeakSet
 
@@ -13,16 +15,17 @@ import numpy as np
 from wbc import validation
 from wbc.clearance import Nearest
 from wbc.climb.balance import Equilibrium
-from wbc.climb.clear import Clearances
+from wbc.climb.clear import TOLERANCE, Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.joint_values import beyond_limits
-from wbc.climb.move_path import HeldError, MovePath, SwingShape, move_path
+from wbc.climb.move_path import BodyWay, HeldError, MovePath, SwingShape, held_way, move_path
 from wbc.climb.path_loads import LEAST, PathLoads
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene, reaches
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
+from wbc.climb.world import LEFT_OUT, ClimbWorld, CloseLinks
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.validation import Array
 
@@ -34,8 +37,16 @@ HIGHER = (1.0, 2.0, 0.5, 4.0)
 LEANS = (0.0, 0.8)
 #: Parts of a path in which the body moves: while limbs are lifted, at first, at last
 WINDOWS = ((0.2, 0.8), (0.1, 0.5), (0.5, 0.9))
+#: How often a body goes further off its straight way past what is in it, at most
+BOWS = 4
+#: How much further than it has to it goes each time [lifts]
+AWAY = 0.1
+#: How far off it goes at most [lifts]
+MOST_BOW = 6.0
 #: Instants of a move at which equilibrium is looked at where nothing weighs, and motors where something does
 INSTANTS = 12
+#: Of the margin asked for, the share that is kept where all limbs hold and the body shifts [1]
+SHIFTED = 0.5
 #: Into how many parts intervals of a path are divided for its proof, one after the other, while that stays open
 PARTS = (1, 2, 4)
 
@@ -47,11 +58,38 @@ class MoveError(InfeasibleError):
         move: row of the stance from which it goes.
         nearest: the two bodies that are nearer than they may be on the way that came furthest; None: there are none.
         standing: whether one of the two stances is itself impossible.
+        limbs: rows of limbs whose links are nearer than they may be, as far as that is known.
     """
 
     move: int = 0
     nearest: Nearest | None = None
     standing: bool = False
+    limbs: frozenset[int] = frozenset()
+
+
+class _TouchError(InfeasibleError):
+    """Links are nearer than they may be on the way.
+
+    Attributes:
+        limbs: rows of limbs whose links these are.
+    """
+
+    limbs: frozenset[int] = frozenset()
+
+
+def _touch_error(touch: CloseLinks, part: float) -> _TouchError:
+    """Of links at a part of the way."""
+    reason = f"are {1e3 * touch.lacks:.3f} mm nearer than they may be at {100.0 * part:.0f} % of the way"
+    error = _TouchError(touch.names, touch.lacks, reason)
+    error.limbs = touch.limbs
+    return error
+
+
+def _touched(touch: _TouchError, move: int) -> MoveError:
+    """The refusal of a move for links that are nearer than they may be."""
+    error = _refused(move, touch.value, str(touch), None)
+    error.limbs = touch.limbs
+    return error
 
 
 def _refused(move: int, value: object, reason: str, nearest: Nearest | None, standing: bool = False) -> MoveError:
@@ -78,7 +116,8 @@ class MotionOptions:
         lift: how far contacts are lifted off what they leave and land on [m]; 0: a sixteenth of the shortest limb.
         tries: random postures through which limbs go where nothing simpler is clear, at most.
         seed: of those.
-        margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight.
+        margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight; half of
+            it where the body shifts and no limb lifts.
         inertia: share of the slack of equilibrium at rest that accelerations may use, where something weighs [1].
         friction: share of the coefficients of friction on which equilibrium counts on the way [1].
         speeds: see :class:`MotionSpeeds`.
@@ -170,13 +209,18 @@ class Mover:
             if stance not in self.checked:
                 self._check(stance, which, row)
                 self.checked.add(stance)
-        refusals, unborne, stuck = list[tuple[float, float, MoveError]](), False, False
-        for shape in self._shapes(one, other):
+        refusals, known, unborne = list[tuple[float, float, MoveError]](), dict[BodyWay, Array | HeldError](), False
+        bow, stuck = self._bow(one, other, row, known)
+        look = None if self.closure.short else functools.partial(self._look, one, other)
+        for shape in self._shapes(one, other, bow):
             # Where the contacts do not bear the robot another swing changes nothing, another way of the body may
-            if unborne and shape.rise == 0.0:
+            if unborne and shape.bow == bow:
                 continue
             try:
-                path, stuck = self._path(one, other, shape, stuck)
+                path, stuck = self._path(one, other, replace(shape, yields=stuck), known, look)
+            except _TouchError as error:
+                refusals.append((1.0, -float(error.value), _touched(error, row)))
+                continue
             except InfeasibleError as error:
                 stuck = stuck or isinstance(error, HeldError)
                 refusals.append((0.0, 0.0, _refused(row, error.value, str(error), None)))
@@ -192,15 +236,81 @@ class Mover:
         # The way that came nearest to be one: what lacks equilibrium, then what lacks clearance, then what is none
         raise max(refusals, key=lambda entry: entry[:2])[2]
 
-    def _path(self, one: Stance, other: Stance, shape: SwingShape, stuck: bool) -> tuple[MovePath, bool]:
+    def _bow(
+        self, one: Stance, other: Stance, row: int, known: dict[BodyWay, Array | HeldError]
+    ) -> tuple[tuple[float, float, float], bool]:
+        """How far the body goes off its straight way so that it and limbs that hold are clear, whatever others do, and
+        whether it has to yield to limbs that hold.
+        """
+        if self.closure.short:
+            return (0.0, 0.0, 0.0), False
+        rise, stuck, refusals = self._rise(one, other), False, list[MoveError]()
+        for begin in (0.0 * rise, rise, -rise):
+            bow, count = begin, 0
+            while count <= BOWS and np.linalg.norm(bow) <= MOST_BOW * self.lift:
+                try:
+                    q = held_way(self.closure, one, other, SwingShape(self.lift, bow=_three(bow), yields=stuck), known)
+                except HeldError as error:
+                    refusals.append(_refused(row, error.value, str(error), None))
+                    if stuck:
+                        break
+                    stuck = True
+                    continue
+                touch = self._touch(one, other, q, left_out=True)
+                if touch is None:
+                    return _three(bow), stuck
+                s, count = touch.row / (len(q) - 1.0), count + 1
+                refusals.append(_touched(_touch_error(touch, s), row))
+                if touch.away is None or not 0.0 < s < 1.0:
+                    break
+                bow = bow + (touch.lacks + AWAY * self.lift) / (16.0 * (s * (1.0 - s)) ** 2) * touch.away
+        raise refusals[0]
+
+    def _rise(self, one: Stance, other: Stance) -> Array:
+        """A lift along the mean normal of what is held ``(3)`` [m]."""
+        held = [self.scene.normals[a] for a, b in zip(one.contacts, other.contacts, strict=True) if a == b != FREE_LIMB]
+        up = np.sum(held, axis=0) if held else np.zeros(3)
+        return np.asarray(self.lift * up / max(float(np.linalg.norm(up)), 1e-9))
+
+    def _touch(self, one: Stance, other: Stance, q: Array, left_out: bool = False) -> CloseLinks | None:
+        """The first of configurations in which links are nearer than they may be on any way through these, limbs in
+        the air left out or not; None: in none.
+        """
+        places = [
+            [int(np.searchsorted(self._world.hold, at)) if at != FREE_LIMB else at for at in stance.contacts]
+            for stance in (one, other)
+        ]
+        if left_out:
+            places = [[a if a == b else LEFT_OUT for a, b in zip(*places, strict=True)]] * 2
+        contacts = np.repeat(np.array(places, dtype=np.int32), [len(q) // 2, len(q) - len(q) // 2], axis=0)
+        return self._world.first_touch(contacts, self._world.states_of(q))
+
+    def _look(self, one: Stance, other: Stance, s: Array, q: Array) -> None:
+        """Refuses a path on which links touch at samples, before more is spent on it."""
+        if (touch := self._touch(one, other, q)) is not None:
+            raise _touch_error(touch, float(s[touch.row]))
+
+    @cached_property
+    def _world(self) -> ClimbWorld:
+        """The scene with what paths keep at least."""
+        given = self.options
+        return ClimbWorld(
+            self.climber, self.scene, clear=given.clearance, apart=given.apart, margin=0.0, spare=-TOLERANCE
+        )
+
+    def _path(
+        self, one: Stance, other: Stance, shape: SwingShape, known: dict[BodyWay, Array | HeldError],
+        look: Callable[[Array, Array], None] | None,
+    ) -> tuple[MovePath, bool]:  # fmt: skip
         """A path, and whether limbs that hold cannot follow the body's straight way: then it yields to them."""
-        if not stuck:
-            try:
-                return move_path(self.closure, one, other, shape, self._normals), False
-            except HeldError:
-                if self.closure.short:
-                    raise
-        return move_path(self.closure, one, other, replace(shape, yields=True), self._normals), True
+        try:
+            return move_path(self.closure, one, other, shape, self._normals, known=known, look=look), shape.yields
+        except HeldError:
+            if shape.yields or self.closure.short:
+                raise
+        return move_path(
+            self.closure, one, other, replace(shape, yields=True), self._normals, known=known, look=look
+        ), True
 
     @property
     def _normals(self) -> dict[int, Array]:
@@ -247,51 +357,63 @@ class Mover:
             # Second derivatives of a path are largest at its samples
             where = np.unique(np.concatenate([GRID, path.s]).round(9))
             loads = PathLoads(self.balance, path, held, where, self.options.inertia)
-            margins, needed = loads.at_rest, max(LEAST, self.options.margin)
+            # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
+            share = SHIFTED if one.contacts == other.contacts else 1.0
+            margins, needed = loads.at_rest, max(LEAST, share * self.options.margin)
         else:
             picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
             where, margins = path.s[picked], np.array([self.balance.margin(held, q) for q in path.q[picked]])
         least, part, what = float(margins.min()), 100.0 * where[int(np.argmin(margins))], "contacts that hold"
         if least >= needed and loads is not None and self.options.effort < np.inf:
-            margins, where = self._driven(held, path)
-            if margins.min() < needed:
-                least, part = float(margins.min()), 100.0 * where[int(np.argmin(margins))]
-                what = "motors of the limbs that hold"
+            undriven = self._undriven(held, path, needed)
+            if undriven is not None:
+                (least, part), what = undriven, "motors of the limbs that hold"
         if least < needed:
             text = f"the {what} do not bear the robot at {part:.0f} % of the way: they lack"
             return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, None
         return None, least, loads
 
-    def _driven(self, held: Sequence[int], path: MovePath) -> tuple[Array, Array]:
-        """Margins of equilibrium with motors along a path, and where on it these are."""
+    def _undriven(self, held: Sequence[int], path: MovePath, needed: float) -> tuple[float, float] | None:
+        """The first margin of equilibrium with motors that is less than needed, and where on the path [%]."""
         assert isinstance(self.balance, Equilibrium)
-        picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
         effort = self.options.effort
-        margins = [self.balance.margin(held, q, motors=True, effort=effort) for q in path.q[picked]]
-        return np.array(margins), path.s[picked]
+        for k in np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int)):
+            if not self.balance.driven(held, path.q[k], needed, effort):
+                return self.balance.margin(held, path.q[k], motors=True, effort=effort), 100.0 * float(path.s[k])
+        return None
 
-    def _shapes(self, one: Stance, other: Stance) -> Iterator[SwingShape]:
+    def _shapes(self, one: Stance, other: Stance, bow: tuple[float, float, float]) -> Iterator[SwingShape]:
         """From the simplest on."""
-        base = SwingShape(self.lift)
+        base = SwingShape(self.lift, bow=bow)
         swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
+        # A body that limbs with few joints take along seldom goes straight
+        short = bool(self.closure.short)
         yield base
         if swings:
+            if short:
+                yield from self._in_joints(base)
             for lean in LEANS:
                 yield from (replace(base, height=f * self.lift, lean=lean) for f in HIGHER if (f, lean) != (1.0, 0.0))
             for window in WINDOWS:
                 for lean in LEANS:
                     yield from (replace(base, height=f * self.lift, window=window, lean=lean) for f in HIGHER[:3])
-            for height in HIGHER[:3]:
-                for tuck in (0.0, 0.5, 1.0):
-                    shape = replace(base, height=height * self.lift, joints=True, tucked=tuck, window=WINDOWS[0])
-                    yield replace(shape, lean=LEANS[1])
-        for rise in (1.0, -1.0):
-            yield replace(base, rise=rise * self.lift)
+            if not short:
+                yield from self._in_joints(base)
+        for rise in (self._rise(one, other), -self._rise(one, other)):
+            yield replace(base, bow=_three(bow + rise))
         if swings:
             rng = np.random.default_rng(self.options.seed)
+            limbs = range(len(self.climber.limbs)) if short else swings
             for k in range(self.options.tries):
-                via = {limb: rng.uniform(*self._range(limb)) for limb in swings}
+                via = {limb: rng.uniform(*self._range(limb)) for limb in limbs}
                 yield replace(base, height=HIGHER[k % 3] * self.lift, lean=LEANS[k % 2], joints=True, via=via)
+
+    def _in_joints(self, base: SwingShape) -> Iterator[SwingShape]:
+        """Evenly in the joints between lifted postures."""
+        for height in HIGHER[:3]:
+            for tuck in (0.0, 0.5, 1.0):
+                shape = replace(base, height=height * self.lift, joints=True, tucked=tuck, window=WINDOWS[0])
+                yield replace(shape, lean=LEANS[1])
 
     def _range(self, limb: int) -> tuple[Array, Array]:
         """Of random angles: limits, or half a turn about those at rest."""
@@ -359,6 +481,11 @@ def _checked(climber: Climber, scene: ClimbScene, stances: StancePath) -> list[S
             if not FREE_LIMB <= row < len(scene.footholds):
                 raise RangeError(f"stances[{k}].contacts", row, f"expected rows from 0 to {len(scene.footholds) - 1}")
     return [Stance(tuple(s.contacts), climber.robot.configuration(f"stances[{k}].q", s.q)) for k, s in enumerate(path)]
+
+
+def _three(vector: Array) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _told(nearest: Nearest) -> str:

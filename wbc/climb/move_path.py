@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from wbc.climb.closure import CLOSED, HEAVY_BODY, LIGHT_BODY, Closure
+from wbc.climb.closure import CLOSED, FREE_BODY, HEAVY_BODY, LIGHT_BODY, Closure
 from wbc.climb.joint_values import beyond_limits, joint_values, with_joint_values
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import InfeasibleError
 from wbc.multibody import pin
 from wbc.rotations import exponential, matrices
+from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
 #: Share of a path in which a limb lifts, and in which it lands
@@ -38,6 +39,10 @@ class HeldError(InfeasibleError):
     """Contacts that hold cannot stay where they are on the way of the body."""
 
 
+#: Samples, window, bow and whether the body yields
+BodyWay = tuple[int, tuple[float, float], tuple[float, float, float], bool]
+
+
 @dataclass(frozen=True, eq=False)
 class SwingShape:
     """How limbs in the air go from lift to land.
@@ -51,7 +56,7 @@ class SwingShape:
         window: from where to where on the path the body moves [1].
         via: limb -> angles through which it goes in the middle; of paths in the joints.
         yields: the body yields to the limbs that hold, which go as evenly in their joints as they can.
-        rise: how far the body goes off the straight line in the middle, along the mean normal of what is held [m].
+        bow: how far the body goes off the straight line in the middle, in the world ``(3)`` [m].
     """
 
     height: float
@@ -61,7 +66,7 @@ class SwingShape:
     window: tuple[float, float] = (0.0, 1.0)
     via: Mapping[int, Array] = field(default_factory=dict)
     yields: bool = False
-    rise: float = 0.0
+    bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,24 +138,29 @@ class MovePath:
     def error(self) -> float:
         """Largest error of the held contacts half-way between samples [m, rad]."""
         middle = self.configurations(self.at((self.s[1:] + self.s[:-1]) / 2))
-        return max((self.closure.error(q, self.held) for q in middle), default=0.0)
+        return self.closure.error(middle, {k: np.tile(place(pose), (len(middle), 1)) for k, pose in self.held.items()})
 
 
 def move_path(
-    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
-) -> MovePath:
+    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array],
+    *, known: dict[BodyWay, Array | HeldError] | None = None, look: Callable[[Array, Array], None] | None = None,
+) -> MovePath:  # fmt: skip
     """The path from a stance to the next one: contacts that both have stay closed.
 
     Args:
         normals: row of a foothold -> outward normal in the world ``(3)``, of footholds that are left or landed on.
+        known: what limbs that hold did on ways of the body between these stances; what they do is added.
+        look: is called with s and q of the coarsest samples, and raises where there is no need for finer ones.
 
     Raises:
         InfeasibleError: held contacts cannot stay closed on the way, a joint has to jump, or it leaves its limits.
     """
     count = FEWEST
     while True:
-        moving = _Moving(closure, one, other, shape, normals)
+        moving = _Moving(closure, one, other, shape, normals, {} if known is None else known)
         path = moving.path(count)
+        if look is not None and count == FEWEST:
+            look(path.s, path.q)
         if path.error < HELD and moving.strayed(path) < STRAYED:
             return path
         count *= 2
@@ -161,26 +171,36 @@ def move_path(
             raise HeldError("held contacts", path.error, reason)
 
 
+def held_way(
+    closure: Closure, one: Stance, other: Stance, shape: SwingShape, known: dict[BodyWay, Array | HeldError]
+) -> Array:
+    """Configurations on the way of the body ``(samples, nq)``, in which limbs that hold do; others go evenly.
+
+    Raises:
+        HeldError: limbs that hold cannot follow.
+    """
+    return _Moving(closure, one, other, shape, {}, known).held_way(np.linspace(0.0, 1.0, FEWEST + 1))
+
+
 class _Moving:
     """What goes where on the way from one stance to the next."""
 
     def __init__(
-        self, closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
-    ) -> None:
-        self.closure, self.one, self.other, self.shape = closure, one, other, shape
+        self, closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array],
+        known: dict[BodyWay, Array | HeldError],
+    ) -> None:  # fmt: skip
+        self.closure, self.one, self.other, self.shape, self.known = closure, one, other, shape, known
         self.climber = closure.climber
         self.poses = closure.poses(one.q), closure.poses(other.q)
         pairs = list(zip(one.contacts, other.contacts, strict=True))
         self.held = {k: self.poses[0][k] for k, (a, b) in enumerate(pairs) if a == b != FREE_LIMB}
         self.swings = [k for k, (a, b) in enumerate(pairs) if a != b]
-        zero = np.zeros(3)
-        held = [normals[a] for a, b in pairs if a == b != FREE_LIMB]
-        up = np.sum(held, axis=0) if held else zero
         #: Steps of joints that limbs in the air are asked to make, from sample to sample [m, rad]
         self.even: Array | float = 0.0
-        self.rise = shape.rise * up / max(float(np.linalg.norm(up)), 1e-9)
         self.lifts = {
-            k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k])) for k in self.swings
+            k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k]))
+            for k in self.swings
+            if normals
         }
 
     def _lift(self, limb: int, end: int, row: int, normals: Mapping[int, Array]) -> Array:
@@ -200,14 +220,16 @@ class _Moving:
 
     def path(self, count: int) -> MovePath:
         s = np.linspace(0.0, 1.0, count + 1)
-        q = self._between(s)
-        held = {limb: np.tile(_row(pose), (len(s), 1)) for limb, pose in self.held.items()}
-        curves = {limb: np.array([_row(self._curve(limb, x)) for x in s]) for limb in self.swings}
-        if self.closure.short.intersection([*held, *curves]):
+        curves = {limb: self._curve(limb, s) for limb in self.swings}
+        if self.closure.short.intersection([*self.held, *curves]):
             # The body goes where limbs that hold with more rows than they have joints take it
-            self._close(s, q, held if self.shape.joints else held | curves, HEAVY_BODY)
+            q, held = self._between(s), self._places(s)
+            if self.shape.joints:
+                self._by_joints(s, q, curves, LIFTING, held)
+            else:
+                self._close(s, q, held | curves, HEAVY_BODY)
         else:
-            self._close(s, q, held, LIGHT_BODY if self.shape.yields else HEAVY_BODY)
+            q = self.held_way(s)
             if self.shape.joints:
                 self._by_joints(s, q, curves, LIFTING)
             else:
@@ -216,17 +238,31 @@ class _Moving:
         self._check(q, count)
         return MovePath(self.closure, self.held, s, q)
 
+    def held_way(self, s: Array) -> Array:
+        """Body and limbs that hold, which another swing does not change."""
+        shape = self.shape
+        key = len(s), shape.window, shape.bow, shape.yields
+        if key not in self.known:
+            try:
+                self.known[key] = q = self._between(s)
+                self._close(s, q, self._places(s), LIGHT_BODY if shape.yields else HEAVY_BODY)
+            except HeldError as error:
+                self.known[key] = error
+        known = self.known[key]
+        if isinstance(known, HeldError):
+            raise known
+        return known.copy()
+
+    def _places(self, s: Array) -> dict[int, Array]:
+        return {limb: np.tile(place(pose), (len(s), 1)) for limb, pose in self.held.items()}
+
     def strayed(self, path: MovePath) -> float:
         """How far limbs that lift or land are from their curves half-way between samples [m]."""
         middle = (path.s[1:] + path.s[:-1]) / 2
         chosen = middle[(middle < LIFTING) | (middle > 1.0 - LIFTING)] if self.swings else middle[:0]
-        if self.closure.short and self.shape.joints:
-            return 0.0
-        away = [0.0]
-        for s, q in zip(chosen, path.configurations(path.at(chosen)), strict=True):
-            poses = self.closure.poses(q)
-            away += [float(np.linalg.norm(self._curve(k, s).translation - poses[k].translation)) for k in self.swings]
-        return max(away)
+        curves = {limb: self._curve(limb, chosen) for limb in self.swings}
+        left = self.closure.bring(path.configurations(path.at(chosen)), curves, turned=False, steps=0)
+        return float(left.max(initial=0.0))
 
     def _body(self, s: Array) -> Array:
         """How far the body is."""
@@ -238,32 +274,31 @@ class _Moving:
 
     def _between(self, s: Array) -> Array:
         """Body on the straight line, joints evenly."""
-        model = self.climber.robot.model
-        first, last = (self.climber.body_pose(stance.q) for stance in (self.one, self.other))
-        turn = pin.log3(first.rotation.T @ last.rotation)
-        out = np.empty((len(s), model.nq))
-        for k, (x, b) in enumerate(zip(s, self._body(s), strict=True)):
-            joints = pin.interpolate(model, self.one.q, self.other.q, float(x))
-            bow = 16.0 * (b * (1.0 - b)) ** 2 * self.rise
-            position = (1.0 - b) * first.translation + b * last.translation + bow
-            out[k] = self.climber.with_body(joints, pin.SE3(first.rotation @ pin.exp3(b * turn), position))
+        robot, ends = self.climber.robot, (self.one.q, self.other.q)
+        first, last = (self.climber.body_pose(q) for q in ends)
+        turn, b = pin.log3(first.rotation.T @ last.rotation), self._body(s)[:, None]
+        joints = joint_values(robot, ends[0][None]) + s[:, None] * pin.difference(robot.model, *ends)[6:]
+        out = with_joint_values(robot, np.tile(ends[0], (len(s), 1)), joints)
+        bow = 16.0 * (b * (1.0 - b)) ** 2 * np.array(self.shape.bow)
+        positions = (1.0 - b) * first.translation + b * last.translation + bow
+        for q, rotation, position in zip(out, first.rotation @ exponential(b * turn), positions, strict=True):
+            q[:] = self.climber.with_body(q, pin.SE3(rotation, position))
         return out
 
-    def _curve(self, limb: int, s: float) -> pin.SE3:
-        """Contact pose of a limb in the air: straight up, over on a cubic that continues both, straight down."""
+    def _curve(self, limb: int, s: Array) -> Array:
+        """Contact poses of a limb in the air ``(n, 12)``: straight up, over on a cubic that continues both, straight
+        down.
+        """
         (start, end), (up, down) = (self.poses[0][limb], self.poses[1][limb]), self.lifts[limb]
-        at, to = start.translation + up, end.translation + down
-        turn = pin.log3(start.rotation.T @ end.rotation)
-        if s <= LIFTING:
-            x, position = 0.0, start.translation + up * (s / LIFTING)
-        elif s >= 1.0 - LIFTING:
-            x, position = 1.0, end.translation + down * ((1.0 - s) / LIFTING)
-        else:
-            span = 1.0 - 2.0 * LIFTING
-            x = (s - LIFTING) / span
-            position = _cubic(x, at, to, up * span / LIFTING, -down * span / LIFTING)
-        turned = start.rotation @ pin.exp3(x * x * (3.0 - 2.0 * x) * turn)
-        return pin.SE3(turned, position)
+        at, to, span = start.translation + up, end.translation + down, 1.0 - 2.0 * LIFTING
+        x = np.clip((s - LIFTING) / span, 0.0, 1.0)[:, None]
+        out = np.empty((len(s), 12))
+        out[:, 9:] = _cubic(x, at, to, up * span / LIFTING, -down * span / LIFTING)
+        out[:, 9:] += np.minimum(s / LIFTING - 1.0, 0.0)[:, None] * up
+        out[:, 9:] += np.minimum((1.0 - s) / LIFTING - 1.0, 0.0)[:, None] * down
+        turn = x * x * (3.0 - 2.0 * x) * pin.log3(start.rotation.T @ end.rotation)
+        out[:, :9] = (start.rotation @ exponential(turn)).reshape(-1, 9)
+        return out
 
     def _by_curves(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
         """Limbs in the air go on their curves. Where they cannot with their turns, as from branch to branch or past a
@@ -280,47 +315,54 @@ class _Moving:
             between = self._by_joints(s, q, curves, ALIGNED)
             self._close(s[between], q[between], {k: curve[between] for k, curve in curves.items()}, 0.0, turned=False)
 
-    def _by_joints(self, s: Array, q: Array, curves: Mapping[int, Array], share: float) -> slice:
+    def _by_joints(
+        self, s: Array, q: Array, curves: Mapping[int, Array], share: float, held: Mapping[int, Array] | None = None
+    ) -> slice:
         """Limbs in the air lift and land on their curves over a share of the path, and in between, which is returned,
-        go evenly in their joints.
+        go evenly in their joints. Where limbs that hold are given, these do so too, and the body goes along.
         """
         up, down = (int(k) for k in np.flatnonzero((s > share - 1e-9) & (s < 1.0 - share + 1e-9))[[0, -1]])
+        held, even = held or {}, [*self.swings, *(held or {})]
+        wanted, between = {**held, **curves}, slice(up + 1, down)
         for part in (slice(up + 1), slice(down, None)):
-            self._close(s[part], q[part], {limb: curve[part] for limb, curve in curves.items()}, 0.0)
-        for limb in self.swings:
-            angles = np.array([self.climber.angles(row, limb) for row in q])
-            slopes = (angles[up] - angles[up - 1]) * (down - up), (angles[down + 1] - angles[down]) * (down - up)
-            middle = (angles[up] + angles[down]) / 2
-            rest = self.climber.angles(self.climber.rest, limb)
-            via = self.shape.via.get(limb, middle + self.shape.tucked * (rest - middle))
-            for k in range(up, down + 1):
-                x = (k - up) / (down - up)
-                between = _cubic(x, angles[up], angles[down], *slopes)
-                at_middle = _cubic(0.5, angles[up], angles[down], *slopes)
-                if limb in self.shape.via or self.shape.tucked:
-                    between = between + 16.0 * (x * (1.0 - x)) ** 2 * (via - at_middle)
-                q[k] = self.climber.with_limb(q[k], limb, between)
+            ends = {limb: poses[part] for limb, poses in wanted.items()}
+            self._close(s[part], q[part], ends, HEAVY_BODY if held else 0.0)
+        x = np.linspace(0.0, 1.0, down - up + 1)[:, None]
+        for limb in even:
+            first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
+            slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
+            angles = _cubic(x, first[1], last[0], *slopes)
+            if limb in self.shape.via or self.shape.tucked:
+                middle, rest = (first[1] + last[0]) / 2, self.climber.angles(self.climber.rest, limb)
+                via = self.shape.via.get(limb, middle + self.shape.tucked * (rest - middle))
+                angles += 16.0 * (x * (1.0 - x)) ** 2 * (via - _cubic(0.5, first[1], last[0], *slopes))
+            self.closure.put(limb, q[up : down + 1], angles)
+        if held:
+            self._close(s[between], q[between], {k: poses[between] for k, poses in held.items()}, FREE_BODY)
         self.even = self._steps(q)
         self.even[:up], self.even[down:] = 0.0, 0.0
-        for limb in self.held:
+        for limb in set(self.held).difference(even):
             self.even[:, self.climber.joints(limb) - 6] = 0.0
-        return slice(up + 1, down)
+        return between
 
     def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float, turned: bool = True) -> None:
         """Brings contacts to poses in the world, ``(samples, 12)``, or to their positions only; the body as well, where
         limbs cannot follow.
         """
-        batched = turned and body < LIGHT_BODY
-        if batched and all(self.closure.followed(limb, q, poses) for limb, poses in wanted.items()):
+        reached = [self.closure.followed(k, q, p, turned) for k, p in wanted.items()] if body < LIGHT_BODY else [0]
+        if min(reached, default=len(s)) == len(s):
             return
-        for k in range(len(s)):
-            contacts = {limb: pin.SE3(p[k, :9].reshape(3, 3), p[k, 9:]) for limb, p in wanted.items()}
-            q[k], left = self.closure.closed(q[k], contacts, body, turned)
-            if left > 1e3 * CLOSED:
-                worst = max(contacts, key=lambda limb: self.closure.error(q[k], {limb: contacts[limb]}))
-                kind, name = InfeasibleError if body == 0.0 else HeldError, self.climber.limbs[worst].name
-                reason = f"is off by {left:.3g} m or rad at {100.0 * s[k]:.0f} % of the way to the next stance"
-                raise kind(f"contact of {name}", left, reason)
+        if body == 0.0 and not self.closure.short.intersection(wanted):
+            name, part = self.climber.limbs[list(wanted)[int(np.argmin(reached))]].name, 100.0 * s[min(reached)]
+            reason = f"is out of reach at {part:.0f} % of the way to the next stance"
+            raise InfeasibleError(f"contact of {name}", float(s[min(reached)]), reason)
+        left = self.closure.bring(q, wanted, body, turned)
+        for k in np.flatnonzero(left > 1e3 * CLOSED)[:1]:
+            at, size, here = float(s[k]), float(left[k]), slice(k, k + 1)
+            away = {limb: self.closure.error(q[here], {limb: poses[here]}) for limb, poses in wanted.items()}
+            kind, limb = InfeasibleError if body == 0.0 else HeldError, max(away, key=lambda limb: away[limb])
+            reason = f"is off by {size:.3g} m or rad at {100.0 * at:.0f} % of the way to the next stance"
+            raise kind(f"contact of {self.climber.limbs[limb].name}", size, reason)
 
     def _kind(self, dof: str) -> type[InfeasibleError]:
         """Of an error of a joint: whether it is one of a limb that holds."""
@@ -345,7 +387,7 @@ class _Moving:
             )
 
 
-def _cubic(x: float, a: Array, b: Array, slope: Array, last: Array) -> Array:
+def _cubic(x: Array | float, a: Array, b: Array, slope: Array, last: Array) -> Array:
     """The cubic from a to b over 0 .. 1 with these slopes at its ends."""
     return np.asarray(
         (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a
@@ -353,11 +395,6 @@ def _cubic(x: float, a: Array, b: Array, slope: Array, last: Array) -> Array:
         + x * (1.0 - x) ** 2 * slope
         - x**2 * (1.0 - x) * last
     )
-
-
-def _row(pose: pin.SE3) -> Array:
-    """Rotation row by row, then position."""
-    return np.concatenate([pose.rotation.ravel(), pose.translation])
 
 
 def _product(a: Array, b: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,11 +16,14 @@ from wbc.climb.let_go import joined, let_go
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.climb.search import AT_START, StanceOptions, find_stances
+from wbc.climb.search import AT_START, LateMove, StanceOptions, StanceWay
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.time_law import MotionSpeeds
 from wbc.errors import RangeError
 from wbc.validation import Array
+
+#: How often links of a limb at a foothold are in the way, or it cannot leave a stance, before such moves are dear
+BLAMED = 2
 
 
 @dataclass(frozen=True)
@@ -27,23 +31,23 @@ class ClimbOptions:
     """How a plan is made.
 
     Attributes:
-        stances, motion: of the search and of the motion; stances keep the clearances of both.
+        stances, motion: of the search and of the motion; stances keep clearances, margin and friction of both.
         again: how often stances are sought again without a move that has no motion, at most.
     """
 
     stances: StanceOptions = field(default_factory=StanceOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
-    again: int = 30
+    again: int = 80
 
     @classmethod
     def by_torques(cls) -> ClimbOptions:
-        """For a loop of torques: on the way a slack of 0.05 weights with three quarters of friction, 0.08 where limbs
-        lift and land, nine tenths of the joints' efforts and three tenths of their accelerations, as limbs of other
+        """For a loop of torques: with three quarters of friction a slack of 0.05 weights on the way, 0.06 where limbs
+        lift and land, three quarters of the joints' efforts and three tenths of their accelerations, as limbs of other
         masses than thought stray in proportion to these.
         """
         return cls(
-            StanceOptions(margin=0.08, effort=0.9),
-            MotionOptions(margin=0.05, effort=0.9, friction=0.75, speeds=MotionSpeeds(acceleration_share=0.3)),
+            StanceOptions(margin=0.06, effort=0.75, friction=0.75),
+            MotionOptions(margin=0.05, effort=0.75, friction=0.75, speeds=MotionSpeeds(acceleration_share=0.3)),
         )
 
 
@@ -64,26 +68,32 @@ def plan_climb(
     first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
     lifting, first = let_go(climber, scene, first, given.motion)
     equilibrium = Equilibrium(climber, scene, given.motion.friction)
-    forbidden, mover = set(given.stances.forbidden), Mover(climber, scene, given.motion, equilibrium)
+    mover = Mover(climber, scene, given.motion, equilibrium)
     sought = replace(
         given.stances,
         clearance=max(given.stances.clearance, given.motion.clearance),
         apart=max(given.stances.apart, given.motion.apart),
+        margin=max(given.stances.margin, given.motion.margin),
+        friction=min(given.stances.friction, given.motion.friction),
     )
+    blamed = Counter[LateMove]()
+    way = StanceWay(climber, scene, first, goal, sought)
     for tries in range(given.again + 1):
-        stances = find_stances(climber, scene, first, goal, replace(sought, forbidden=frozenset(forbidden)))
+        stances = way.found()
         try:
             plan = carry_out(climber, scene, stances, mover=mover)
             return plan if lifting is None else joined(lifting, plan)
         except MoveError as error:
             contacts = [tuple(stance.contacts) for stance in stances.stances]
-            # A body that cannot shift is kept from the move that it shifts for
-            ahead = next(
-                (row for row in range(error.move, len(contacts) - 1) if contacts[row] != contacts[row + 1]), None
-            )
+            moves = [row for row in range(len(contacts) - 1) if contacts[row] != contacts[row + 1]]
+            # A body that cannot shift is kept from the move that it shifts for, or at last from the one before
+            ahead = next((row for row in moves if row >= error.move), moves[-1] if moves else None)
             if ahead is None or tries == given.again:
                 raise
-            forbidden.add((contacts[ahead], contacts[ahead + 1]))
+            at, after = contacts[error.move], contacts[ahead + 1]
+            blamed.update(((), limb, at[limb]) for limb in error.limbs if at[limb] != FREE_LIMB)
+            blamed.update((at, limb, FREE_LIMB) for limb in range(len(at)) if at[limb] != after[limb])
+            way.forbid(ahead, [late for late, times in blamed.items() if times >= BLAMED])
     raise AssertionError
 
 

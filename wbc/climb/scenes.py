@@ -15,7 +15,7 @@ from wbc.climb.scene import ClimbScene, Foothold, SceneBody, reaches
 from wbc.climb.surfaces import FootholdRules, footholds_on, frame_on
 from wbc.multibody import pin
 from wbc.robot.recipe import segment_shape
-from wbc.shapes import Box, Convex
+from wbc.shapes import Box, Convex, HalfSpace
 from wbc.shapes.surfaces import between_rows
 from wbc.validation import Array
 
@@ -256,6 +256,13 @@ def _mesh(rng: np.random.Generator, size: float, density: float) -> ClimbCourse:
     return _along(footholds, {"ground": SceneBody(mesh)}, EARTH, 0.0, 4.0 * size)
 
 
+def _row(rng: np.random.Generator, size: float, density: float) -> ClimbCourse:
+    """Grips in a row, of one roll each: for arms that go end over end."""
+    along = np.cumsum(rng.uniform(0.37, 0.43, 6)) * size
+    footholds = [Foothold(str(k + 1), frame_on(x * X, Z), "plane", rolls=1) for k, x in enumerate(along)]
+    return _along(footholds, {"plane": SceneBody(HalfSpace())}, WEIGHTLESS, along[:2].mean(), along[-1])
+
+
 _FAMILIES: dict[str, Callable[[np.random.Generator, float, float], ClimbCourse]] = {
     "cylinder": _cylinder,
     "truss": _truss,
@@ -269,6 +276,7 @@ _FAMILIES: dict[str, Callable[[np.random.Generator, float, float], ClimbCourse]]
     "rebar": _rebar,
     "inside": _inside,
     "mesh": _mesh,
+    "row": _row,
 }
 
 

@@ -15,9 +15,9 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections import Counter, deque
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ from wbc.validation import Array
 ROUNDING = 1e-6
 #: Of a limb's length: how far a step goes, as the search guesses
 STRIDE = 0.5
+#: Of a limb's length: how far from where it is at rest a contact is as good
+COMFORTABLE = 0.25
 #: How much dearer the way that is left is than the steps so far
 WEIGHT = 2.5
 #: Squared distance of a foothold from where a limb is at rest from which on it is tried last [squared lengths of limb]
@@ -50,12 +52,18 @@ NEAR = 1.0
 DEAR = 6.0
 #: Other beginnings from which postures of refused moves are sought, once nothing else is left
 ATTEMPTS = 3
+#: What a move costs more whose like could not be made, once [steps]
+LATE = 8.0
 #: What a limb in the air costs [steps]
 IN_THE_AIR = 2.0
 #: How far a limb may be from its foothold at the start [m]
 AT_START = 1e-4
 #: Weight by which the body is drawn to the goal: beside those of contacts a hundredth, of rest ten thousand times
 DRAWN = 1e2
+
+
+#: Moves of a limb: to a foothold, () before it, or all those from a stance with contacts, -1 after it
+LateMove = tuple[tuple[int, ...], int, int]
 
 
 class NoStancesError(WbcError):
@@ -110,6 +118,7 @@ class StanceOptions:
         gait: sets of limbs, by name, that go at once where that can be.
         forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
         effort: share of the joints' efforts within which torques at rest stay [1]; inf: efforts do not count.
+        friction: share of the coefficients of friction that counts [1].
     """
 
     margin: float = 0.02
@@ -121,10 +130,12 @@ class StanceOptions:
     gait: tuple[tuple[str, ...], ...] = ()
     forbidden: frozenset[tuple[tuple[int, ...], tuple[int, ...]]] = frozenset()
     effort: float = np.inf
+    friction: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("margin", "limits", "clearance", "apart"):
             validation.scalar(f"StanceOptions.{name}", getattr(self, name), low=0.0)
+        validation.scalar("StanceOptions.friction", self.friction, low=0.0, high=1.0, open_low=True)
         if not self.effort > 0.0:
             raise RangeError("StanceOptions.effort", self.effort, "expected a share above 0")
         validation.integer("StanceOptions.moves", self.moves, 1)
@@ -147,6 +158,7 @@ class _Node:
     steps: int
     slack: float
     before: _Node | None = None
+    cost: float = 0.0
     lift: Array | None = None
     lifts: dict[bytes, tuple[tuple[PostureOutcome, Array, float, NDArray[np.int32], bool], int]] = field(
         default_factory=dict
@@ -166,18 +178,62 @@ def find_stances(
         NoStancesError: there is no such way, or none was found within the limits; why, in numbers. ShapeError,
             RangeError, UnknownNameError: start, goal or options that do not fit climber and scene.
     """
-    given = StanceOptions() if options is None else validation.instance("options", options, StanceOptions, "options")
-    places: Sequence[Any] = goal.places if isinstance(goal, Route) else [goal]
-    stances, margins = [start], [np.inf]
-    for target in places:
-        search = StanceSearch(climber, scene, stances[-1], target, given)
-        found = search.run()
-        stances += list(found.stances[1:])
-        margins[0] = min(margins[0], float(found.margins[0]))
-        margins += list(found.margins[1:])
-    if len(stances) == 1:
-        stances, margins = stances * 2, margins * 2
-    return StancePath(tuple(stances), np.array(margins))
+    return StanceWay(climber, scene, start, goal, options).found()
+
+
+class StanceWay:
+    """The way over stances that :func:`find_stances` gives, which is found again without moves that cannot be made.
+
+    What was seen on the way to other stances is kept for that.
+
+    Raises:
+        as :func:`find_stances`.
+    """
+
+    def __init__(
+        self, climber: Climber, scene: ClimbScene, start: Stance, goal: Goal, options: StanceOptions | None = None
+    ) -> None:
+        self._options = validation.instance("options", options or StanceOptions(), StanceOptions, "options")
+        self._climber, self._scene, self._start = climber, scene, start
+        self._places: Sequence[Any] = goal.places if isinstance(goal, Route) else [goal]
+        self._searches: list[StanceSearch] = []
+        self._legs: list[StancePath] = []
+
+    def found(self) -> StancePath:
+        """The way.
+
+        Raises:
+            NoStancesError: there is none, or none was found within the limits.
+        """
+        while len(self._legs) < len(self._places):
+            leg = len(self._legs)
+            if leg == len(self._searches):
+                start = self._legs[-1].stances[-1] if self._legs else self._start
+                target = self._places[leg]
+                self._searches.append(StanceSearch(self._climber, self._scene, start, target, self._options))
+            self._legs.append(self._searches[leg].run())
+        stances = [self._start, *itertools.chain.from_iterable(leg.stances[1:] for leg in self._legs)]
+        least = min(float(leg.margins[0]) for leg in self._legs)
+        margins = [least, *itertools.chain.from_iterable(leg.margins[1:] for leg in self._legs)]
+        if len(stances) == 1:
+            stances, margins = stances * 2, margins * 2
+        return StancePath(tuple(stances), np.array(margins))
+
+    def forbid(self, row: int, late: Iterable[LateMove] = ()) -> None:
+        """The move from a stance of the way to the next one cannot be made; the way is another one from there on.
+
+        Args:
+            late: moves that are dearer than they look, from now on.
+        """
+        leg = 0
+        while row >= len(self._legs[leg].stances) - 1:
+            row -= len(self._legs[leg].stances) - 1
+            leg += 1
+        before, after = (tuple(stance.contacts) for stance in self._legs[leg].stances[row : row + 2])
+        del self._legs[leg:], self._searches[leg + 1 :]
+        forbidden = self._options.forbidden | {(before, after)}
+        self._options = replace(self._options, forbidden=forbidden)
+        self._searches[leg].forbid(before, after, late)
 
 
 class StanceSearch:
@@ -196,71 +252,124 @@ class StanceSearch:
             if not FREE_LIMB <= row < len(scene.footholds):
                 raise RangeError("start.contacts", row, f"expected rows from 0 to {len(scene.footholds) - 1}, or -1")
         self.climber, self.scene, self.options, self.goal = climber, scene, options, goal
-        self.world = ClimbWorld(climber, scene, start, options.limits, options.clearance, options.apart)
+        kept = options.limits, options.clearance, options.apart
+        self.world = ClimbWorld(climber, scene, start, *kept, friction=options.friction)
         q = climber.robot.configuration("start.q", start.q)
         self.given = start
         self.first = _Node(self.world.contacts(self.world.start), self.world.state_of(q), 0, np.inf)
         self.tried: Counter[PostureOutcome] = Counter()
         self.seen = 0
+        self._known: dict[bytes, _Node] = {}
+        self._nearest = self.first
+        self._count = itertools.count()
+        self._queue: list[tuple[float, int, _Node, Iterator[tuple[float, NDArray[np.int32]]], NDArray[np.int32]]] = []
+        self._again: deque[tuple[_Node, NDArray[np.int32], int]] = deque()
+        self._late: set[LateMove] = set()
+        self._delayed: set[tuple[int, bytes]] = set()
+        #: Stances that are come to by a forbidden move, and other moves to known stances
+        self._removed: dict[int, _Node] = {}
+        self._other: defaultdict[bytes, list[tuple[float, _Node, NDArray[np.int32]]]] = defaultdict(list)
         self._names = [limb.name for limb in climber.limbs]
         #: Contacts are this far from the body's origin at rest [m]
         self._spread = float(np.linalg.norm(self.world.touch[:, 9:], axis=1).max())
         self._far, self._goal_body, self._limb = self._distances()
         self._sets = [tuple(climber.row(name) for name in names) for names in options.gait]
         counted = options.effort < np.inf and np.any(scene.gravity)
-        self._balance = Equilibrium(climber, scene) if counted else None
+        self._balance = Equilibrium(climber, scene, options.friction) if counted else None
 
     def run(self) -> StancePath:
-        """The way found, see :func:`find_stances`."""
-        first = self.first = self._checked_start()
-        known: dict[bytes, _Node] = {first.contacts.tobytes(): first}
-        count, until = itertools.count(), time.monotonic() + self.options.seconds
-        queue: list[tuple[float, int, _Node, Iterator[tuple[float, NDArray[np.int32]]], NDArray[np.int32]]] = []
-        again: deque[tuple[_Node, NDArray[np.int32], int]] = deque()
-        nearest, best = self._distance(first), first
-
-        def push(node: _Node, moves: Iterator[tuple[float, NDArray[np.int32]]]) -> None:
-            for cost, after in moves:
-                heapq.heappush(queue, (cost, next(count), node, moves, after))
-                return
-
-        if path := self._at_goal(first):
-            return path
-        self.seen = len(known)
-        if self._cannot_be():
-            raise self._refusal("goal", nearest, best)
-        push(first, self._moves(first))
-        while queue or again:
-            if queue:
-                _, _, node, moves, after = heapq.heappop(queue)
+        """The way found, see :func:`find_stances`; called again, one without the moves that were forbidden since."""
+        if not self._known:
+            first = self.first = self._nearest = self._checked_start()
+            self._known[first.contacts.tobytes()] = first
+            if path := self._at_goal(first):
+                return path
+            self.seen = 1
+            if self._cannot_be():
+                raise self._refusal("goal")
+            self._push(first, self._moves(first))
+        until, most = time.monotonic() + self.options.seconds, self.options.moves + sum(self.tried.values())
+        while self._queue or self._again:
+            if self._queue:
+                cost, _, node, moves, after = heapq.heappop(self._queue)
                 attempt = 0
-                push(node, moves)
             else:
                 # What was refused is looked at from other beginnings, once all else was
-                node, after, attempt = again.popleft()
-            if sum(self.tried.values()) >= self.options.moves or time.monotonic() > until:
-                self.seen = len(known)
-                raise self._refusal("limit", nearest, best)
-            if after.tobytes() in known or self._forbidden(node.contacts, after):
+                node, after, attempt = self._again.popleft()
+                cost, moves = node.cost, iter(())
+            if id(node) in self._removed:
+                continue
+            self._push(node, moves)
+            if sum(self.tried.values()) >= most or time.monotonic() > until:
+                raise self._refusal("limit")
+            if self._forbidden(node.contacts, after):
+                continue
+            if attempt == 0 and self._comes_late(node, after):
+                self._push(node, iter([(cost + LATE, after)]))
+                continue
+            if after.tobytes() in self._known:
+                self._other[after.tobytes()].append((cost, node, after))
                 continue
             stuck = len(node.stuck)
-            found = self._moved(node, after, attempt)
+            found = self._moved(node, after, attempt, cost)
             if len(node.stuck) < stuck:
-                push(node, self._moves(node))
+                self._push(node, self._moves(node))
             if found is None:
                 if attempt < ATTEMPTS:
-                    again.append((node, after, attempt + 1))
+                    self._again.append((node, after, attempt + 1))
                 continue
-            known[after.tobytes()] = found
-            if (away := self._distance(found)) < nearest:
-                nearest, best = away, found
+            self._known[after.tobytes()] = found
+            self.seen = len(self._known)
+            if self._distance(found) < self._distance(self._nearest):
+                self._nearest = found
             if path := self._at_goal(found):
                 return path
-            push(found, self._moves(found))
-        self.seen = len(known)
-        raise self._refusal("reach", nearest, best)
+            self._push(found, self._moves(found))
+        raise self._refusal("reach")
 
-    def _moved(self, node: _Node, after: NDArray[np.int32], attempt: int) -> _Node | None:
+    def _push(self, node: _Node, moves: Iterator[tuple[float, NDArray[np.int32]]]) -> None:
+        """The next of the moves from a stance."""
+        for cost, after in moves:
+            heapq.heappush(self._queue, (cost, next(self._count), node, moves, after))
+            return
+
+    def forbid(self, before: Sequence[int], after: Sequence[int], late: Iterable[LateMove] = ()) -> None:
+        """A move may not be, as rows of footholds: stances that were come to by it are sought by others.
+
+        Args:
+            late: moves that are dearer than they look, from now on.
+        """
+        self.options = replace(self.options, forbidden=self.options.forbidden | {(tuple(before), tuple(after))})
+        self._late.update(late)
+        lost = list[bytes]()
+        for key, node in self._known.items():
+            if node.before is None:
+                continue
+            delayed = self._comes_late(node.before, node.contacts)
+            if delayed or id(node.before) in self._removed or self._forbidden(node.before.contacts, node.contacts):
+                self._removed[id(node)] = node
+                lost.append(key)
+                if delayed:
+                    self._push(node.before, iter([(node.cost + LATE, node.contacts)]))
+        for key in lost:
+            del self._known[key]
+        for key in lost:
+            for cost, node, contacts in self._other.pop(key, ()):
+                self._push(node, iter([(cost, contacts)]))
+
+    def _comes_late(self, node: _Node, after: NDArray[np.int32]) -> bool:
+        """Whether a move is dearer than it looks; each is once."""
+        key = id(node), after.tobytes()
+        if not self._late or key in self._delayed:
+            return False
+        before, there = self._rows(node.contacts), self._rows(after)
+        moved = np.flatnonzero(node.contacts != after).tolist()
+        late = not self._late.isdisjoint(move for k in moved for move in (((), k, there[k]), (before, k, FREE_LIMB)))
+        if late:
+            self._delayed.add(key)
+        return late
+
+    def _moved(self, node: _Node, after: NDArray[np.int32], attempt: int, cost: float) -> _Node | None:
         """The stance after a move, if there is one."""
         kept = np.where(node.contacts == after, after, FREE_LIMB).astype(np.int32)
         key, margin = kept.tobytes(), self.options.margin
@@ -283,15 +392,14 @@ class StanceSearch:
         self.tried[how] += 1
         if how != PostureOutcome.STANDS:
             return None
-        return _Node(after, land, node.steps + 1, min(before, slack), node, lift if moves else None)
+        return _Node(after, land, node.steps + 1, min(before, slack), node, cost, lift if moves else None)
 
     def _driven(self, kept: NDArray[np.int32], state: Array) -> bool:
         """Whether motors hold a posture on contacts, with the margin asked for."""
         if self._balance is None:
             return True
-        q, effort = self.world.q_of(state), self.options.effort
-        slack = self._balance.margin(self._rows(kept), q, motors=True, effort=effort)
-        return slack >= self.options.margin - ROUNDING
+        q, least = self.world.q_of(state), self.options.margin - ROUNDING
+        return self._balance.driven(self._rows(kept), q, least, self.options.effort)
 
     def _moves(self, node: _Node) -> Iterator[tuple[float, NDArray[np.int32]]]:
         """Moves from a stance, with what they promise to cost, the least first; far ones come last."""
@@ -388,6 +496,11 @@ class StanceSearch:
             seeds[row] = 0.0
         ways = ways_over_footholds(scene.positions, seeds, world.length)[world.hold]
         far = np.tile(ways / (STRIDE * world.length), (len(self._names), 1))
+        if isinstance(goal, BodyPlace) and goal.rotation is not None:
+            # Where contacts are to be with the body at the goal
+            rests = goal.position + world.touch[:, 9:] @ goal.rotation.T
+            away = np.linalg.norm(world.places[:, 9:] - rests[:, None], axis=2)
+            far = np.maximum(far, (away - COMFORTABLE * world.length) / (STRIDE * world.length))
         if limb >= 0:
             others = np.arange(len(far)) != limb
             far[others] = np.maximum(far[others] - aside / (STRIDE * world.length), 0.0)
@@ -478,8 +591,9 @@ class StanceSearch:
         stances = [Stance(self._rows(contacts), self.world.q_of(state)) for contacts, state in rows]
         return StancePath((self.given, *stances[1:]), np.array(margins))
 
-    def _refusal(self, cause: str, nearest: float, best: _Node) -> NoStancesError:
-        tried = sum(self.tried.values())
+    def _refusal(self, cause: str) -> NoStancesError:
+        tried, best = sum(self.tried.values()), self._nearest
+        nearest = self._distance(best)
         parts = counted(self.tried)
         saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
         which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pathlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from wbc import robots, validation
+from wbc.api import Controller
 from wbc.climb import machines, scenes
 from wbc.climb.checker import CheckRules, ClimbReport, check
 from wbc.climb.climber import Climber, ClimbLimb
@@ -105,8 +107,16 @@ class ClimbDone:
         }  # fmt: skip
 
 
-def climb(request: ClimbRequest, checked: bool = True, backend: str = "auto") -> ClimbDone:
+def climb(
+    request: ClimbRequest,
+    checked: bool = True,
+    backend: str = "auto",
+    compiled: Callable[[Controller], None] | None = None,
+) -> ClimbDone:
     """Plan, carry out and check a climb.
+
+    Args:
+        compiled: called once when the controller is ready.
 
     Raises:
         What :func:`climber_of`, :func:`course_of`, the planner and the plant raise.
@@ -127,10 +137,12 @@ def climb(request: ClimbRequest, checked: bool = True, backend: str = "auto") ->
             CheckRules.by_torques(),
         )
     loop = ClimbLoop(source.first, plant, replan=source.replan, onward=source.onward, options=options, backend=backend)
+    if compiled is not None:
+        validation.called("compiled", compiled, loop.controller)
     begun = time.process_time()
     run = loop.run(source.most, source.before_tick)
     looping = time.process_time() - begun
-    report = check(run.log, climber, scene, rules) if checked else None
+    report = check(run.log, climber, run.scene, rules) if checked else None
     return ClimbDone(source.first, run, report, planning, looping)
 
 

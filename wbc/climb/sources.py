@@ -13,12 +13,14 @@ import wbc.log
 from wbc.climb import scenes
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.climber import Climber
+from wbc.climb.closure import Closure
 from wbc.climb.drive import ClimbDrive, standing_plan
 from wbc.climb.first import first_stance
-from wbc.climb.goal import BodyPlace
+from wbc.climb.goal import BodyPlace, LimbAt
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import ClimbLoop
 from wbc.climb.loop.loop import Onward, Replan
+from wbc.climb.motion import MoveError
 from wbc.climb.plan import ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.request import ClimbRequest
@@ -101,11 +103,17 @@ def _walked(
     request: ClimbRequest, climber: Climber, scene: ClimbScene, start: pin.SE3, goal: pin.SE3, *, stance: Stance | None,
     events: Callable[[ClimbLoop], None],
 ) -> PlanSource:  # fmt: skip
-    place = BodyPlace(climber.body_pose(scenes.placed(climber, goal)).translation)
     options = _options(request)
 
     def replan(now: ClimbScene, at: Stance) -> ContactPlan:
-        return plan_climb(climber, now, at, place, options)
+        goals = _goals(climber, now, goal)
+        for k, sought in enumerate(goals):
+            try:
+                return plan_climb(climber, now, at, sought, options)
+            except (NoStancesError, MoveError):
+                if k == len(goals) - 1:
+                    raise
+        raise AssertionError
 
     first = None
     if stance is None and request.speed > 0.0:
@@ -119,6 +127,16 @@ def _walked(
     if first is None:
         first = replan(scene, stance or _stands(request, climber, scene, start))
     return PlanSource(first, replan, None, events, 2.0 * float(first.times[-1]) + 10.0)
+
+
+def _goals(climber: Climber, scene: ClimbScene, goal: pin.SE3) -> list[BodyPlace | LimbAt]:
+    """The body over a frame; where limbs with few joints take it along, so that it seldom can be at a place of its own,
+    one of them at the foothold that is nearest to the frame.
+    """
+    if not Closure(climber).short:
+        return [BodyPlace(climber.body_pose(scenes.placed(climber, goal)).translation)]
+    nearest = int(np.argmin(np.linalg.norm(scene.positions - goal.translation, axis=1)))
+    return [LimbAt(limb.name, scene.footholds[nearest].id) for limb in climber.limbs]
 
 
 def _driven(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 
 import numpy as np
 
 from wbc import validation
+from wbc.climb.chain import library
 from wbc.climb.climber import Climber
 from wbc.climb.move_path import MovePath
 from wbc.climb.path_loads import PathLoads
@@ -193,43 +195,15 @@ def fastest(s: Array, a: Array, b: Array, squared: Array, sided: tuple[Array, Ar
     Args:
         a, b: ``(n, rows)``. squared: bounds ``(n)``. sided: c and d ``(n, rows)``, or none.
     """
-    span = np.diff(s)
+    count = 0
     if sided is not None:
-        a, b = np.concatenate([a, sided[0]], axis=1), np.concatenate([b, sided[1]], axis=1)
-    # At the end of an interval the square of the speed is x + 2 u span
-    inertia = np.concatenate([a[:-1], a[1:] + 2.0 * span[:, None] * b[1:]], axis=1)
-    bend = np.concatenate([b[:-1], b[1:]], axis=1)
-    both = np.ones(inertia.shape[1], dtype=bool)
-    if sided is not None:
-        both.reshape(2, -1)[:, -sided[0].shape[1] :] = False
-    size = np.abs(inertia)
-    none = size <= 1e-9 * size.max()
-    safe = np.where(none, 1.0, inertia)
-    width = np.where(none, np.inf, 1.0 / np.abs(safe))
-    above, below = (np.where(both | (part > 0.0), width, np.inf) for part in (inertia, -inertia))
-    lean = np.where(none, 0.0, bend / safe)
-    felt = np.where(both, np.abs(bend), bend)
-    most = np.minimum(squared[:-1], (1.0 / np.maximum(np.where(none, felt, 0.0), 1e-300)).min(axis=1))
-    for k in range(lean.shape[1]):
-        over = lean - lean[:, k : k + 1]
-        limit = np.where(over > 0.0, (above + below[:, k : k + 1]) / np.where(over > 0.0, over, 1.0), np.inf)
-        most = np.minimum(most, limit.min(axis=1))
-    high = np.zeros(len(s))
-    for k in range(len(span) - 1, -1, -1):
-        next_ = 1.0 / (2.0 * span[k])
-        stop, go = lean[k] - next_, next_ - lean[k]
-        limits = np.concatenate(
-            [
-                np.where(stop > 0.0, above[k] / np.where(stop > 0.0, stop, 1.0), np.inf),
-                np.where(go > 0.0, (high[k + 1] * next_ + below[k]) / np.where(go > 0.0, go, 1.0), np.inf),
-            ]
-        )
-        high[k] = min(float(most[k]), float(limits.min()))
-    x = np.zeros(len(s))
-    for k in range(len(span)):
-        up = float((above[k] - lean[k] * x[k]).min())
-        x[k + 1] = min(max(x[k] + 2.0 * span[k] * up, 0.0), high[k + 1])
-    x[-1] = 0.0
+        a, b, count = np.hstack([a, sided[0]]), np.hstack([b, sided[1]]), sided[0].shape[1]
+    given = [np.ascontiguousarray(part, dtype=np.float64) for part in (s, a, b, squared)]
+    x = np.empty(len(s))
+    if not library().wbc_fastest(
+        ctypes.c_long(len(s)), a.shape[1], count, *(ctypes.c_void_p(part.ctypes.data) for part in (*given, x))
+    ):
+        raise MemoryError(f"a law of {len(s)} points and {a.shape[1]} rows")
     return np.sqrt(x)
 
 

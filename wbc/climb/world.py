@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,14 @@ from wbc.climb.chain import library, limb_table
 from wbc.climb.clear import deepest, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
+from wbc.climb.joint_values import joint_values
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.errors import RangeError
 from wbc.geometry.kernel import ShapeTable, checked
 from wbc.multibody import pin
+from wbc.rotations import matrices
 from wbc.shapes import PlacedShape
 from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
@@ -31,6 +34,8 @@ from wbc.validation import Array
 TURNS = 12
 #: What postures keep more than motions have to [m]: between two postures links may come nearer
 SPARE = 1e-3
+#: Stands for the contact of a limb whose links do not count
+LEFT_OUT = -2
 #: Rows of a cone and singular values below this are none
 TINY = 1e-12
 
@@ -43,6 +48,21 @@ class PostureOutcome(IntEnum):
     NOT_BORNE = 2
     TOUCHES = 3
     BREAKS = 4
+
+
+class CloseLinks(NamedTuple):
+    """Links that are nearer than they may be.
+
+    Attributes:
+        row: of the state. names: of both. limbs: of which they are. lacks: how far they are to be further apart [m].
+        away: direction in which a link is to go from a body of the scene, in the world; None: these are two links.
+    """
+
+    row: int
+    names: str
+    limbs: frozenset[int]
+    lacks: float
+    away: Array | None
 
 
 class _ConeNumbers(ctypes.Structure):
@@ -132,7 +152,8 @@ class ClimbWorld:
     Args:
         start: a stance whose contacts count as places where they are.
         margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies and from each other
-            [m]; ``SPARE`` more, and from what tips hold that more than :class:`Clearances` says.
+            [m].
+        spare: how much more they keep, also from what tips hold, than :class:`Clearances` says [m].
         friction: share of the coefficients of friction that counts [1].
 
     Attributes:
@@ -142,7 +163,7 @@ class ClimbWorld:
 
     def __init__(
         self, climber: Climber, scene: ClimbScene, start: Stance | None = None, margin: float = LIMIT_MARGIN,
-        clear: float = 0.0, apart: float = 0.0, *, friction: float = 1.0,
+        clear: float = 0.0, apart: float = 0.0, *, friction: float = 1.0, spare: float = SPARE,
     ) -> None:  # fmt: skip
         self.climber, self.scene, self.margin = climber, scene, margin
         self.limbs = limb_table(climber, margin)
@@ -150,11 +171,14 @@ class ClimbWorld:
             library(), wbc_piece_size=_PieceNumbers, wbc_cone_size=_ConeNumbers, wbc_climb_size=_ClimbNumbers
         )
         self._code.wbc_slack.restype = ctypes.c_double
-        self._code.wbc_candidates.restype = self._code.wbc_first_touch.restype = ctypes.c_long
+        self._code.wbc_candidates.restype = ctypes.c_long
         counts = [len(rest) for rest in self.limbs.rest]
         self.offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         gravity = np.asarray(scene.gravity, dtype=np.float64)
         strength = float(np.linalg.norm(gravity))
+        if strength > 0.0 and not climber.mass > 0.0:
+            reason = f"{climber.name} has no masses, so nothing says what its limbs bear: expected 0, 0, 0"
+            raise RangeError("scene.gravity", gravity.tolist(), reason)
         self.weight = climber.mass * strength if strength > 0.0 else 1.0
         self.length = float(max(row.length for row in self.limbs.numbers))
         self.places, self.hold, turns, self.start = self._all_places(start)
@@ -162,8 +186,9 @@ class ClimbWorld:
         on_body = [names.index(h.on) if h.on in names else -1 for h in scene.footholds]
         on = np.array(on_body, dtype=np.int32)[self.hold]
         self._cones, self.cone_of = self._shapes_of_cones(turns, friction)
-        pieces, links, shapes, poses, pairs = self._bodies()
+        pieces, links, shapes, poses, pairs = self._bodies(spare)
         self.links, self.bodies = links, names
+        self._piece_limbs = [int(piece.limb) for piece in pieces]
         self._shape_table = ShapeTable(shapes)
         self._held: list[Any] = [on, pieces, poses, pairs]
         self.touch = self._at_rest()
@@ -171,7 +196,7 @@ class ClimbWorld:
         self.numbers = _ClimbNumbers(
             limbs=len(climber.limbs), footholds=len(self.places), pieces=len(links), bodies=len(names),
             pairs=len(pairs) // 2, weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
-            clear=clear + SPARE, apart=apart + SPARE, down=tuple(down), trunk=tuple(self.limbs.trunk),
+            clear=clear + spare, apart=apart + spare, down=tuple(down), trunk=tuple(self.limbs.trunk),
             limb=ctypes.addressof(self.limbs.numbers),
             offset=self.offsets.ctypes.data, foothold=self.places.ctypes.data,
             cone_of=self.cone_of.ctypes.data, cone=ctypes.addressof(self._cones), on=on.ctypes.data,
@@ -195,9 +220,16 @@ class ClimbWorld:
 
     def state_of(self, q: Array) -> Array:
         """Pose of the body and angles of all limbs, as one row."""
+        return np.asarray(self.states_of(np.asarray(q)[None])[0])
+
+    def states_of(self, q: Array) -> Array:
+        """Of configurations ``(n, nq)`` that follow each other, a row each."""
         climber = self.climber
-        angles = [climber.angles(q, limb) for limb in range(len(climber.limbs))]
-        return np.concatenate([place(climber.body_pose(q)), *angles])
+        root, values = climber.robot.model.jointPlacements[1], joint_values(climber.robot, q)
+        rotation = root.rotation @ matrices(q[:, 3:7])
+        position = q[:, :3] @ root.rotation.T + root.translation
+        angles = [values[:, climber.joints(limb) - 6] for limb in range(len(climber.limbs))]
+        return np.hstack([rotation.reshape(-1, 9), position, *angles])
 
     def q_of(self, state: Array) -> Array:
         """The configuration of such a row; joints of no limb are at rest."""
@@ -305,16 +337,52 @@ class ClimbWorld:
         )  # fmt: skip
         return PostureOutcome(how), out, float(slack[0]), which
 
-    def first_touch(self, contacts: NDArray[np.int32], states: Array) -> tuple[int, str] | None:
+    def pieces(self, limb: int, angles: Array) -> Array:
+        """Poses in the body's frame of the centres of a limb's shapes at some angles ``(n, pieces, 12)``."""
+        given = np.ascontiguousarray(angles)
+        out = np.empty((len(given), self._code.wbc_pieces_of(self._world, limb, ctypes.c_long(0), None, None), 12))
+        self._code.wbc_pieces_of(self._world, limb, ctypes.c_long(len(given)), _at(given), _at(out))
+        return out
+
+    def alone(
+        self, limb: int, pieces: Array, bodies: Array, contact: NDArray[np.int32], off: Array
+    ) -> NDArray[np.bool_]:  # fmt: skip
+        """At which instants a limb is too near to the scene, to the body or to itself ``(n)``.
+
+        Args:
+            pieces: of the limb, as of :meth:`pieces`. bodies: poses of the body ``(n, 12)``. contact: places ``(n)``
+                that it holds, comes from or goes to. off: how far from there its contact is ``(n)`` [m].
+        """
+        marks, work = np.zeros(len(pieces), dtype=np.bool_), np.empty((len(pieces), 13))
+        given = [np.ascontiguousarray(array) for array in (pieces, bodies, contact, off)]
+        self._code.wbc_mark_alone(
+            self._world, limb, *map(_at, given), ctypes.c_long(len(pieces)), _at(marks), _at(work)
+        )  # fmt: skip
+        return marks
+
+    def beside(self, one: int, pieces: Array, other: int, others: Array) -> NDArray[np.bool_]:
+        """At which instants two limbs are too near to each other ``(n)``, by the poses of their pieces."""
+        marks = np.zeros(len(pieces), dtype=np.bool_)
+        given = [np.ascontiguousarray(array) for array in (pieces, others)]
+        self._code.wbc_mark_limbs(
+            self._world, one, _at(given[0]), other, _at(given[1]), ctypes.c_long(len(pieces)), _at(marks)
+        )  # fmt: skip
+        return marks
+
+    def first_touch(self, contacts: NDArray[np.int32], states: Array) -> CloseLinks | None:
         """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may
-        be, and the names of what is; None: in none.
+        be; None: in none. Links of limbs whose contact is ``LEFT_OUT`` do not count.
         """
         contacts, states = np.ascontiguousarray(contacts, dtype=np.int32), np.ascontiguousarray(states)
-        which = np.zeros(4, dtype=np.int32)
+        which, lacks = np.zeros(4, dtype=np.int32), np.zeros(4)
         row = self._code.wbc_first_touch(
-            self._world, ctypes.c_long(len(states)), _at(contacts), _at(states), _at(which)
+            self._world, ctypes.c_long(len(states)), _at(contacts), _at(states), _at(which), _at(lacks)
         )
-        return None if row == len(states) else (int(row), self.touching(which))
+        if row == len(states):
+            return None
+        pieces = [which[0]] if which[1] >= 0 else [which[0], -1 - which[1]]
+        limbs = frozenset(self._piece_limbs[k] for k in pieces) - {-1}
+        return CloseLinks(int(row), self.touching(which), limbs, float(lacks[0]), lacks[1:] if which[1] >= 0 else None)
 
     def candidates(
         self, contacts: NDArray[np.int32], state: Array, least: float, most: float, guesses: bool = True
@@ -399,7 +467,7 @@ class ClimbWorld:
                 table[limb, turned] = FREE_LIMB
         return numbers, np.ascontiguousarray(table)
 
-    def _bodies(self) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
+    def _bodies(self, spare: float) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
         """Pieces of the robot with their links' names, all shapes, poses of the bodies, and pairs of pieces."""
         climber, model = self.climber, self.climber.robot.model
         data = model.createData()
@@ -409,7 +477,7 @@ class ClimbWorld:
             for limb, chain in enumerate(climber.chains)
             for joint, steps in zip(chain, self.limbs.steps_to[limb], strict=True)
         }
-        depths = {body.name: deepest(sink) - SPARE for tips in sunk_tips(climber) for body, sink in tips}
+        depths = {body.name: deepest(sink) - spare for tips in sunk_tips(climber) for body, sink in tips}
         names = [body.name for body in bodies_of(climber.robot)]
         found: list[tuple[int, int, pin.SE3]] = []
         links: list[str] = []

@@ -14,7 +14,7 @@ from wbc.controller.handles import Handles
 from wbc.controller.policy import Policy
 from wbc.controller.step import Step
 from wbc.errors import BusyError, PicklingError, RangeError, ShapeError, SolverError
-from wbc.multibody import pin
+from wbc.multibody import is_pose
 from wbc.qp.problem import QP
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
@@ -24,7 +24,6 @@ from wbc.validation import Array
 
 _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
-_SE3 = pin.SE3
 
 
 class CompiledStack(Handles):
@@ -85,7 +84,7 @@ class CompiledStack(Handles):
             else:
                 done = plan.cycle(q, *targets.values())
                 if done == REFUSED:
-                    done = plan.cycle(q, *[x.homogeneous if type(x) is _SE3 else x for x in targets.values()])
+                    done = plan.cycle(q, *[x.homogeneous if is_pose(x) else x for x in targets.values()])
                 if core.first and (isinstance(done, bytes) or done >= 0):
                     core.let_go(plan.slots)
             if isinstance(done, bytes):
@@ -152,10 +151,12 @@ class CompiledStack(Handles):
             plan = self._core.together.plan(values)
         if plan is not None:
             for value, place, shape in zip(values.values(), plan.places, plan.shapes):  # noqa: B905 (as many of each)
-                if type(value) is _SE3:
-                    place[:] = value.homogeneous.tobytes()
-                elif type(value) is _Array and value.dtype is _FLOAT and value.shape == shape:
+                if type(value) is _Array:
+                    if value.dtype is not _FLOAT or value.shape != shape:
+                        break
                     place[:] = value.tobytes()
+                elif is_pose(value):
+                    place[:] = value.homogeneous.tobytes()
                 else:
                     break
             else:

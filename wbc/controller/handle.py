@@ -11,7 +11,7 @@ import numpy as np
 from wbc import validation
 from wbc.controller.ramps import Ramps
 from wbc.errors import NotFiniteError, RangeError, UnknownNameError
-from wbc.multibody import pin
+from wbc.multibody import is_pose
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
@@ -24,7 +24,6 @@ from wbc.validation import LARGEST, Array
 _ARRAY = np.ndarray
 _FLOAT = np.dtype(np.float64)
 _MATRIX = (4, 4)
-_SE3 = pin.SE3
 #: Kind of a value that native code checks (``native/values.h``): any finite numbers
 NUMBERS = 0
 #: The same: the matrix of a pose
@@ -166,7 +165,7 @@ class Handle:
         slot = self._block.slots.get(name)
         if slot is not None:
             # Set every tick, so with as few calls as can be
-            numbers = value.homogeneous if type(value) is _SE3 else value
+            numbers = value if type(value) is _ARRAY or not is_pose(value) else value.homogeneous
             if type(numbers) is _ARRAY and numbers.dtype is _FLOAT:
                 if name in self._poses:
                     if numbers.shape == _MATRIX and self._owner.write_pose(slot, numbers):
@@ -366,36 +365,13 @@ class Handle:
         return f"<{type(self._block.entry.item).__name__} {self._block.entry.name!r}: {', '.join(self.names)}>"
 
 
-class ReadPose(pin.SE3):  # type: ignore[misc]
-    """A pose that was read from a controller; ``.copy()`` gives one that can be changed and set.
-
-    What is written into its parts would not reach the controller, so that they are read-only.
-    """
-
-    @property
-    def translation(self) -> Array:
-        """Read-only [3]."""
-        return _read_only(super().translation)
-
-    @property
-    def rotation(self) -> Array:
-        """Read-only [3, 3]."""
-        return _read_only(super().rotation)
-
-    def copy(self) -> pin.SE3:
-        """A pose of its own."""
-        return pin.SE3(self)
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
-
-
 def _as_written(slot: Slot, numbers: Array) -> Any:
     """An input's numbers as the user writes them."""
     kind = slot.input.kind
     if kind == "pose":
+        # Imported here: a pose is Pinocchio's, which a tick does without
+        from wbc.controller.read_pose import ReadPose
+
         return ReadPose(numbers[:9].reshape(3, 3, order="F"), numbers[9:])
     if kind == "rotation":
         return numbers.reshape(3, 3, order="F").copy()

@@ -290,6 +290,7 @@ class Step:
             text += ", binding: " + ", ".join(str(b) for b in self.binding)
         if self.relaxed:
             text += ", relaxed: " + ", ".join(str(s) for s in self.relaxed)
+            text += "".join(f"; {point}" for point in self.dead_points)
         return text + ")"
 
 

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.formats.conversion import FORMATS as FORMATS, RunCopy as RunCopy, convert as convert, follow as follow
+    from wbc.formats.conversion import (
+        FORMATS as FORMATS,
+        RunCopy as RunCopy,
+        convert as convert,
+        follow as follow,
+        recorded as recorded,
+    )
     from wbc.formats.errors import FormatError as FormatError
     from wbc.formats.motion import RecordedMotion as RecordedMotion, read_motion as read_motion
     from wbc.formats.played import PlayedPlant as PlayedPlant, answered as answered

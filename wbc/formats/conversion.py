@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
-from wbc import validation
+from wbc import extras, validation
+from wbc.api import Controller
 from wbc.errors import WbcError
 from wbc.formats.errors import FormatError
 from wbc.formats.lerobot import LeRobotSink
@@ -21,6 +25,7 @@ from wbc.formats.rerun_file import RerunSink
 from wbc.formats.run import RATE, Run, SeenTick, run_of
 from wbc.formats.tables import CsvSink, NpzSink
 from wbc.log import Log
+from wbc.record.recorder import Recorder
 
 #: Time between two looks at a file that is still written [s]
 LOOK = 0.02
@@ -48,6 +53,8 @@ FORMATS: dict[str, Callable[[pathlib.Path], Sink]] = {
     "lerobot": LeRobotSink,
     "foxglove": FoxgloveSink,
 }
+#: Format -> the extra that it needs
+NEEDED = {"mcap": "formats", "rrd": "rerun", "lerobot": "recordings", "foxglove": "foxglove"}
 
 
 def convert(
@@ -131,7 +138,7 @@ class RunCopy:
     def __init__(self, run: pathlib.Path, to: str, out: pathlib.Path) -> None:
         self.path = out
         command = [sys.executable, "-m", __name__, str(run), to, str(out)]
-        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     @property
     def running(self) -> bool:
@@ -139,7 +146,7 @@ class RunCopy:
         return self._process.poll() is None
 
     def close(self) -> None:
-        """Wait until all of the run, whose recorder is closed, is in the copy.
+        """Wait until all of the run that is written is in the copy.
 
         Raises:
             FormatError: it could not be written, and why.
@@ -168,8 +175,11 @@ def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | N
 
     Raises:
         UnknownNameError: no such format. FormatError: there is such a file.
+        MissingPackageError: its package is not installed.
     """
     validation.one_of("to", to, FORMATS)
+    if to in NEEDED:
+        extras.require(NEEDED[to], f"a run as {to}")
     path = validation.file_path("run", run)
     place = path.with_suffix(f".{to}") if out is None else pathlib.Path(out)
     if place.exists():
@@ -177,13 +187,47 @@ def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | N
     return RunCopy(path, to, place)
 
 
+@contextlib.contextmanager
+def recorded(
+    controller: Controller, run: str | os.PathLike[str], to: str = "mcap", *, overwrite: bool = False
+) -> Iterator[Recorder]:
+    """Record every tick of a controller, and beside the recording the same in another format while the loop runs.
+
+        with wbc.formats.recorded(controller, "ticks.npz"):         # and ticks.mcap
+            ...                                                     # step as usual: a loop, a program, a plant
+
+    Args:
+        run, overwrite: as of :meth:`wbc.Controller.record`. to: as of :func:`convert`.
+
+    Raises:
+        Those of :func:`follow` and :meth:`wbc.Controller.record`.
+    """
+    copy = validation.file_path("run", run).with_suffix(f".{validation.one_of('to', to, FORMATS)}")
+    if overwrite:
+        _remove(copy)
+    with controller.record(run, overwrite=overwrite) as recorder, follow(recorder.path, to, copy):
+        try:
+            yield recorder
+        finally:
+            recorder.close()
+
+
 def main(run: str, to: str, out: str) -> None:
     """What a process of :func:`follow` does."""
-    parent = os.getppid()
+    # Ctrl-C is of the loop, whose recording is then closed
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ended = threading.Event()
+
+    def listen() -> None:
+        # Until the loop closes the copy, or is gone
+        sys.stdin.read()
+        ended.set()
+
+    threading.Thread(target=listen, daemon=True).start()
 
     def wait() -> bool:
         # What was written between the last look and the end of the loop is read as well
-        running = os.getppid() == parent
+        running = not ended.is_set()
         time.sleep(LOOK)
         return running
 

@@ -26,59 +26,22 @@ WARNING = 3
 #: Level of foxglove.Log: all rows hold
 INFO = 2
 
-_NUMBER: dict[str, Any] = {"type": "number"}
-_TEXT: dict[str, Any] = {"type": "string"}
-_INTEGER: dict[str, Any] = {"type": "integer"}
-
-
-def _object(title: str = "", **properties: Any) -> dict[str, Any]:
-    return {"type": "object", "properties": properties} | ({"title": title} if title else {})
-
-
-def _many(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items}
-
-
-_TIME = _object(sec=_INTEGER, nsec=_INTEGER)
-_POINT = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object(position=_POINT, orientation=_TURN)
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_TRIANGLES = _object(pose=_POSE, points=_many(_POINT), color=_COLOUR, indices=_many(_INTEGER))
-_ARROW = _object(
-    pose=_POSE, shaft_length=_NUMBER, shaft_diameter=_NUMBER, head_length=_NUMBER, head_diameter=_NUMBER, color=_COLOUR
-)
-_ENTITY = _object(
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_TIME,
-    frame_locked={"type": "boolean"},
-    arrows=_many(_ARROW),
-    triangles=_many(_TRIANGLES),
-)
-#: Topic -> schema of its messages, all but that of ticks, which each run has of its own
-SCHEMAS = {
-    "/joint_states": _object(
-        "foxglove.JointStates",
-        timestamp=_TIME,
-        joints=_many(_object(name=_TEXT, position=_NUMBER, velocity=_NUMBER, acceleration=_NUMBER)),
-    ),
-    "/tf": _object(
-        "foxglove.FrameTransforms",
-        transforms=_many(
-            _object(timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_POINT, rotation=_TURN)
-        ),
-    ),
-    "/scene": _object("foxglove.SceneUpdate", deletions=_many(_object(id=_TEXT)), entities=_many(_ENTITY)),
-    "/why": _object("foxglove.Log", timestamp=_TIME, level=_INTEGER, message=_TEXT, name=_TEXT),
-}
 #: Group of columns -> field of a joint's state
 JOINT_PARTS = {"q": "position", "v": "velocity", "a": "acceleration"}
 #: Topic of ticks
 TICK = "/tick"
 #: Name of their schema
 TICK_SCHEMA = "wbc.Tick"
+
+
+def schema_of(example: Any, title: str = "") -> dict[str, Any]:
+    """The schema of messages such as an example, of which nothing is empty."""
+    if isinstance(example, dict):
+        made = {"type": "object", "properties": {key: schema_of(part) for key, part in example.items()}}
+        return made | ({"title": title} if title else {})
+    if isinstance(example, list):
+        return {"type": "array", "items": schema_of(example[0])}
+    return {"type": {bool: "boolean", int: "integer", float: "number", str: "string"}[type(example)]}
 
 
 class Message(NamedTuple):
@@ -118,7 +81,7 @@ class TickTree:
             node[path[-1]] = {**node[path[-1]], "": name} if isinstance(node.get(path[-1]), dict) else name
         self.names: list[str] = []
         self._units, self._make = units, list[tuple[str, Any]]()
-        self.schema = _object(TICK_SCHEMA, status=_TEXT)
+        self.schema = schema_of({"status": ""}, TICK_SCHEMA)
         for key, node in nodes.items():
             self.schema["properties"][key], shape = self._laid_out(node)
             self._make.append((key, shape))
@@ -128,15 +91,15 @@ class TickTree:
         if isinstance(node, str):
             self.names.append(node)
             unit = self._units[node]
-            return _NUMBER | ({"description": f"[{unit}]"} if unit else {}), len(self.names) - 1
+            return schema_of(0.0) | ({"description": f"[{unit}]"} if unit else {}), len(self.names) - 1
         if len(node) > NAMED and all(isinstance(child, str) for child in node.values()):
             begin = len(self.names)
             self.names += node.values()
             said = [f"{key} [{self._units[name]}]" if self._units[name] else key for key, name in node.items()]
-            return _many(_NUMBER) | {"description": ", ".join(said)}, slice(begin, len(self.names))
+            return schema_of([0.0]) | {"description": ", ".join(said)}, slice(begin, len(self.names))
         found = {key: self._laid_out(child) for key, child in node.items()}
         schemas = {key: schema for key, (schema, _) in found.items()}
-        return _object("", **schemas), {key: shape for key, (_, shape) in found.items()}
+        return {"type": "object", "properties": schemas}, {key: shape for key, (_, shape) in found.items()}
 
     def tick(self, numbers: list[float]) -> dict[str, Any]:
         """The message of a tick, from its numbers in the order of :attr:`names`."""
@@ -283,3 +246,22 @@ def _target(name: str, time: int) -> dict[str, Any]:
 def _entity(frame: str, name: str, time: int) -> dict[str, Any]:
     still = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True}
     return {"timestamp": stamp(time), "frame_id": frame, "id": name} | still
+
+
+def _schemas() -> dict[str, dict[str, Any]]:
+    """Those of examples that are made as messages are."""
+    pose, mesh = np.zeros(7), DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=int), (0, 0, 0))
+    moment = SeenTick(0.0, {"link": pose}, {"target": pose}, {}, why="why")
+    said = {message.topic: message.data for message in of_seen(moment)}
+    scene = {"deletions": [{"id": ""}], "entities": [_body("link", mesh, 0) | _target("target", 0)]}
+    state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
+    return {
+        "/joint_states": schema_of({"timestamp": stamp(0), "joints": [state]}, "foxglove.JointStates"),
+        "/tf": schema_of(said["/tf"], "foxglove.FrameTransforms"),
+        "/scene": schema_of(scene, "foxglove.SceneUpdate"),
+        "/why": schema_of(said["/why"], "foxglove.Log"),
+    }
+
+
+#: Topic -> schema of its messages, all but that of ticks, which each run has of its own
+SCHEMAS = _schemas()

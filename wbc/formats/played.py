@@ -103,13 +103,11 @@ def answered(
         rows.append(np.concatenate([[state.time, states.index(step.status)], state.q, state.v, step.command]))
         plant.advance(dt)
     table = np.array(rows)
-    names = [f"q.{k}" for k in range(robot.nq)] if robot.nq != robot.nv else [f"q.{n}" for n in robot.dof_names]
-    names += [f"{group}.{name}" for group in ("v", "command") for name in robot.dof_names]
+    units, each = robot.dof_units, "/s" if controller.stack.command == "velocity" else "/s^2"
+    own = robot.nq == robot.nv
+    names = {f"q.{name}": units[k] if own else "" for k, name in enumerate(robot.dof_names if own else range(robot.nq))}
+    names |= {f"v.{name}": f"{unit}/s" for name, unit in zip(robot.dof_names, units, strict=True)}
+    names |= {f"command.{name}": f"{unit}{each}" for name, unit in zip(robot.dof_names, units, strict=True)}
     columns = {"t": table[:, 0], "status": table[:, 1].astype(int)}
     columns |= {name: table[:, 2 + k] for k, name in enumerate(names)}
-    each = "/s" if controller.stack.command == "velocity" else "/s^2"
-    units = {"t": "s"} | {f"v.{n}": f"{u}/s" for n, u in zip(robot.dof_names, robot.dof_units, strict=True)}
-    units |= {f"command.{n}": f"{u}{each}" for n, u in zip(robot.dof_names, robot.dof_units, strict=True)}
-    if robot.nq == robot.nv:
-        units |= {f"q.{n}": u for n, u in zip(robot.dof_names, robot.dof_units, strict=True)}
-    return Log(columns, {name: units.get(name, "") for name in columns}, {"robot": robot.name, "dt": dt})
+    return Log(columns, {"t": "s", "status": ""} | names, {"robot": robot.name, "dt": dt})

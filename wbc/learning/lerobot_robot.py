@@ -16,7 +16,19 @@ from wbc.simulation import Connection, KinematicPlant, Plant
 POSITION = ".pos"
 
 
-class StackRobot:
+class Uncalibrated:
+    """What LeRobot asks of devices that are calibrated."""
+
+    is_calibrated = True
+
+    def calibrate(self) -> None:
+        """Nothing to do."""
+
+    def configure(self) -> None:
+        """Nothing to do."""
+
+
+class StackRobot(Uncalibrated):
     """Joints that go where an action says, as far as the stack's constraints let them: limits, obstacles, contacts.
 
     It has the methods of ``lerobot.robots.Robot``, without inheriting from it, so that LeRobot need not be installed;
@@ -67,17 +79,6 @@ class StackRobot:
     def is_connected(self) -> bool:
         """Between :meth:`connect` and :meth:`disconnect`."""
         return self._connection is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """A description needs no calibration."""
-        return True
-
-    def calibrate(self) -> None:
-        """Nothing to do."""
-
-    def configure(self) -> None:
-        """Nothing to do."""
 
     def connect(self, calibrate: bool = True) -> None:
         """Bring the robot to rest at its neutral configuration.
@@ -136,7 +137,7 @@ class StackRobot:
         return self._connection
 
 
-class StackTeleoperator:
+class StackTeleoperator(Uncalibrated):
     """A recorded motion as what leads a robot, with the methods of ``lerobot.teleoperators.Teleoperator``.
 
     Args:
@@ -146,11 +147,8 @@ class StackTeleoperator:
     name = "wbc_motion"
 
     def __init__(self, motion: RecordedMotion, clock: Callable[[], float] | None = None) -> None:
-        self.id, self._motion, self._clock = (
-            "motion",
-            validation.instance("motion", motion, RecordedMotion, "a RecordedMotion"),
-            clock,
-        )
+        self._motion = validation.instance("motion", motion, RecordedMotion, "a RecordedMotion")
+        self.id, self._clock = "motion", clock
         self._began: float | None = None
 
     @property
@@ -167,17 +165,6 @@ class StackTeleoperator:
     def is_connected(self) -> bool:
         """Between :meth:`connect` and :meth:`disconnect`."""
         return self._began is not None
-
-    @property
-    def is_calibrated(self) -> bool:
-        """There is nothing to calibrate."""
-        return True
-
-    def calibrate(self) -> None:
-        """Nothing to do."""
-
-    def configure(self) -> None:
-        """Nothing to do."""
 
     def connect(self, calibrate: bool = True) -> None:
         """Begin the motion."""

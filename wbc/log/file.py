@@ -39,6 +39,8 @@ _LOCAL = struct.Struct("<4s5H3L2H")
 _NPY = struct.Struct("<6sBBH")
 #: Length of the end of the directory [bytes]
 _END = 22
+#: Place for the heads of a chunk: of a member, and of an array [bytes]
+HEADS = 512
 
 
 class LogFileError(WbcError):
@@ -64,7 +66,7 @@ class LogWriter(Protocol):
     def table(self, name: str, values: np.ndarray) -> None:
         """Numbers that are no column, in place of the table of this name that came before."""
 
-    def write(self, numbers: bytes) -> None:
+    def write(self, numbers: bytes | memoryview) -> None:
         """Ticks, end to end, each a row of doubles."""
 
     def close(self) -> None:
@@ -95,6 +97,8 @@ class FileWriter:
         self._members: list[zipfile.ZipInfo] = []
         self._counts: dict[str, int] = {}
         self._width = 0
+        # A chunk as it is written, behind place for its heads: memory of its size is not asked of the system each time
+        self._chunk = bytearray()
 
     def begin(self, about: Mapping[str, Any], attached: Mapping[str, bytes]) -> None:
         """See :class:`LogWriter`."""
@@ -108,15 +112,30 @@ class FileWriter:
 
     def table(self, name: str, values: np.ndarray) -> None:
         """See :class:`LogWriter`."""
-        count = self._counts[name] = self._counts.get(name, -1) + 1
-        self._put(f"{name}.{count:06d}.npy", _header(values.dtype, values.shape) + values.tobytes())
+        self._put(self._next(name), _header(values.dtype, values.shape) + values.tobytes())
 
-    def write(self, numbers: bytes) -> None:
+    def write(self, numbers: bytes | memoryview) -> None:
         """See :class:`LogWriter`."""
         rows = np.frombuffer(numbers).reshape(-1, self._width)
         count, bits = len(rows), rows.view(np.uint64)
         varying = np.flatnonzero((bits != bits[0]).any(axis=0))
-        self.table("ticks", np.concatenate(([count, len(varying)], varying, rows[0], rows[:, varying].ravel())))
+        k = len(varying)
+        begin, size = 2 + k + self._width, 2 + k + self._width + count * k
+        if len(self._chunk) < HEADS + 8 * size:
+            self._chunk = bytearray(HEADS + 8 * size)
+        packed = np.frombuffer(self._chunk, count=size, offset=HEADS)
+        packed[:2], packed[2 : 2 + k], packed[2 + k : begin] = (count, k), varying, rows[0]
+        # Another mode than this one copies twice
+        np.take(rows, varying, axis=1, out=packed[begin:].reshape(count, k), mode="clip")
+        head = _header(packed.dtype, packed.shape)
+        place = HEADS - len(head)
+        self._chunk[place:HEADS] = head
+        self._put(self._next("ticks"), memoryview(self._chunk)[place : HEADS + 8 * size], place)
+
+    def _next(self, name: str) -> str:
+        """The member of a table that comes now."""
+        count = self._counts[name] = self._counts.get(name, -1) + 1
+        return f"{name}.{count:06d}.npy"
 
     def close(self) -> None:
         """Write the directory."""
@@ -129,12 +148,17 @@ class FileWriter:
         with contextlib.suppress(OSError):
             self._file.close()
 
-    def _put(self, name: str, content: bytes) -> None:
+    def _put(self, name: str, content: bytes | memoryview, place: int = 0) -> None:
+        """A member; ``place``: where in the chunk's memory it is, behind place for its head."""
         member = zipfile.ZipInfo(name)
         member.CRC, member.file_size = zlib.crc32(content), len(content)
         member.compress_size, member.header_offset = len(content), self._file.tell()
+        head = member.FileHeader(zip64=False)
+        if place:
+            self._chunk[place - len(head) : place] = head
+            content = memoryview(self._chunk)[place - len(head) : place + len(content)]
+        data = content if place else head + content
         # By one write: a program that is killed leaves it whole or not at all, and a loop waits for no other
-        data = member.FileHeader(zip64=False) + content
         if self._file.write(data) != len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         self._members.append(member)

@@ -97,7 +97,12 @@ def _write(folder: pathlib.Path, name: str, columns: dict[str, Any]) -> None:
     table = pa.table(columns)
     if name == "meta/tasks.parquet":
         # The text is the index of a table of pandas, as LeRobot looks tasks up by it
-        said = {"index_columns": ["task"], "columns": [], "column_indexes": [], "pandas_version": "2.0.0"}
+        kinds = {"task_index": ("int64", "int64"), "task": ("unicode", "object")}
+        columns_said = [
+            {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": plain, "metadata": None}
+            for name, (kind, plain) in kinds.items()
+        ]
+        said = {"index_columns": ["task"], "columns": columns_said, "column_indexes": [], "pandas_version": "2.0.0"}
         table = table.replace_schema_metadata({"pandas": json.dumps(said)})
     pq.write_table(table, place)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -46,13 +46,15 @@ class SE3(LikePinocchio):
 
     def __init__(self, first: Any = None, translation: Any = None) -> None:
         if first is None:
-            first, translation = np.eye(3), np.zeros(3)
-        elif isinstance(first, SE3):
+            # A state has one for each joint and frame
+            self._rotation, self._translation = np.eye(3), np.zeros(3)
+            return
+        if isinstance(first, SE3):
             first, translation = first._rotation, first._translation
         elif isinstance(first, Quaternion):
             first = first.matrix()
         elif translation is None:
-            whole = vector(first, 16).reshape(4, 4)
+            whole = vector(getattr(first, "homogeneous", first), 16).reshape(4, 4)
             first, translation = whole[:3, :3], whole[:3, 3]
         self._rotation = vector(first, 9).reshape(3, 3)
         self._translation = vector(translation, 3)
@@ -133,6 +135,9 @@ class SE3(LikePinocchio):
         if isinstance(other, Inertia):
             turned = self._rotation @ other.inertia @ self._rotation.T
             return Inertia(other.mass, self._rotation @ other.lever + self._translation, turned)
+        if hasattr(other, "homogeneous"):
+            # Pinocchio's
+            return self * SE3(other)
         return self._rotation @ vector(other, 3) + self._translation
 
     def actInv(self, other: Any) -> Any:
@@ -141,6 +146,12 @@ class SE3(LikePinocchio):
             back = self._rotation.T
             return _pose(back @ other._rotation, back @ (other._translation - self._translation))
         return self.inverse().act(other)
+
+    @overload
+    def __mul__(self, other: SE3) -> SE3: ...
+
+    @overload
+    def __mul__(self, other: Any) -> Any: ...
 
     def __mul__(self, other: Any) -> Any:
         if isinstance(other, SE3):

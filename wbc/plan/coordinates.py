@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.clearance import Tree
 from wbc.errors import UnsupportedJointError
+from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.joint_steps import JointKind, joint_steps
 from wbc.validation import Array
@@ -91,7 +92,7 @@ class PlanningCoordinates:
         units = tuple(robot.dof_units[dofs[k]] for k in own)
         return cls(
             robot,
-            Tree(tuple(frames), names, (), tree.links),
+            _about_z(Tree(tuple(frames), names, (), tree.links)),
             names,
             units,
             tuple(dofs[k] for k in own),
@@ -167,3 +168,22 @@ class PlanningCoordinates:
             ends = sorted((side[dofs[place]] - offset) / ratio for side in (lower, upper))
             low[leader], high[leader] = max(low[leader], ends[0]), min(high[leader], ends[1])
         return low, high
+
+
+def _about_z(tree: Tree) -> Tree:
+    """The same tree with frames turned so that all joints turn about z or shift along it."""
+    turns = [_turn_to(frame.axis) if frame.moves in (1, 2) else pin.SE3.Identity() for frame in tree.frames]
+    frames = []
+    for turn, frame in zip(turns, tree.frames, strict=True):
+        place = frame.place * turn if frame.parent < 0 else turns[frame.parent].inverse() * frame.place * turn
+        frames.append(replace(frame, place=place, axis=(0.0, 0.0, 1.0)))
+    links = {name: (k, pose if k < 0 else turns[k].inverse() * pose) for name, (k, pose) in tree.links.items()}
+    return replace(tree, frames=tuple(frames), links=links)
+
+
+def _turn_to(axis: tuple[float, float, float]) -> pin.SE3:
+    """A turn that leads z to an axis."""
+    z = np.array(axis) / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), np.zeros(3))

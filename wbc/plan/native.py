@@ -26,7 +26,13 @@ POINTS = 20_000
 #: What :meth:`NativePlanner.grow` ends with when the trees are full
 FULL = -1
 #: Numbers of a ``drift_t`` of ``native/plan.h``
-_DRIFT = 9
+_DRIFT = 10
+#: Pairs that are looked at together
+LANES = 8
+#: and numbers of each
+_LANE = 16
+#: Pairs that were too near last and are looked at first
+RECENT = 3
 
 
 class _KeptRows(ctypes.Structure):
@@ -44,10 +50,12 @@ class _PlanStruct(ctypes.Structure):
     """``plan_t`` of ``native/plan.h``."""
 
     _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("sweep", "drifts", "drifted", "balls", "normals")),
+        *((name, ctypes.c_void_p) for name in ("sweep", "drifts", "gone", "radius", "balls", "normals")),
         *((name, ctypes.c_double) for name in ("half", "open")),
-        *((n, ctypes.c_void_p) for n in ("control", "rate", "low", "high", "sample_low", "sample_high", "weight")),
-        *((name, ctypes.c_int) for name in ("n", "pairs", "capacity", "seeds")),
+        *((name, ctypes.c_void_p) for name in ("lanes", "first_block", "block_pairs", "loose_pairs")),
+        ("recent", ctypes.c_int * RECENT),
+        *((name, ctypes.c_void_p) for name in ("x", "y", "low", "high", "sample_low", "sample_high", "weight")),
+        *((name, ctypes.c_int) for name in ("n", "pairs", "loose", "capacity", "seeds")),
         ("count", ctypes.c_int * 2),
         *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "longest")),
         ("random", ctypes.c_ulonglong),
@@ -71,8 +79,9 @@ def library() -> ctypes.PyDLL:
     found = checked(load_library(kernel(_SOURCES / "plan.c", SWEEP, HEADERS)), wbc_plan_size=_PlanStruct)
     place, number = ctypes.c_void_p, ctypes.c_int
     kinds: dict[str, Sequence[object]] = {
-        "free": (place,), "margin": (place,), "edge": (place, place), "project": (place,), "broken": (place,),
-        "reach": (place,), "draw": (place,), "root": (number, place), "grow": (number,), "path": (place, number),
+        "prepare": (), "free": (place,), "margin": (place,), "edge": (place, place), "project": (place,),
+        "broken": (place,), "reach": (place,), "draw": (place,), "root": (number, place),
+        "away": (place, ctypes.c_double), "grow": (number,), "path": (place, number),
         "shorten": (place, number, number, number, number, place, number), "length": (place, number),
     }  # fmt: skip
     for name, arguments in kinds.items():
@@ -117,15 +126,19 @@ class NativePlanner:
         swept = scene.swept()
         self._required = swept.required.copy()
         self._sweep = sweep = NativeSweep(swept)
-        sweep.hold_still(n)
         it.sweep, it.pairs = sweep.address, len(scene.pairs)
-        it.control, it.rate = sweep.ends
         bodies, pairs = len(scene.bodies), len(scene.pairs)
         depth = max([1, *(len(chain) for chain in swept.chain)])
-        self._drifts, self._drifted = np.zeros((bodies, depth + 1, _DRIFT)), np.zeros(bodies, dtype=np.int32)
-        self._balls, self._normals = np.zeros((bodies, 4)), np.zeros((pairs, 3))
-        for name in ("drifts", "drifted", "balls", "normals"):
-            setattr(it, name, getattr(self, f"_{name}").ctypes.data)
+        blocks = pairs // LANES + bodies + 1
+        self._normals = np.zeros((pairs, 3))
+        self._arrays: dict[str, Array] = {
+            "drifts": np.zeros((bodies, depth + 1, _DRIFT)), "gone": np.zeros(len(coordinates.tree.frames)),
+            "radius": np.zeros(bodies), "balls": np.zeros((bodies, 4)), "normals": self._normals,
+            "lanes": np.zeros((blocks, _LANE, LANES)), "first_block": np.zeros(bodies + 1, dtype=np.int32),
+            "block_pairs": np.zeros((blocks, LANES), dtype=np.int32), "loose_pairs": np.zeros(pairs, dtype=np.int32),
+        }  # fmt: skip
+        for name, array in self._arrays.items():
+            setattr(it, name, array.ctypes.data)
         self.at = ctypes.c_void_p(ctypes.addressof(it))
         self.pad(0.0)
 
@@ -153,6 +166,7 @@ class NativePlanner:
         self._sweep.require(self._required + pad)
         # Proven is what is required without the pad
         self._struct.open = pad
+        self._call.wbc_plan_prepare(self.at)
 
     def set(self, **numbers: float) -> None:
         """Numbers of ``native/plan.h``: range, step, tolerance, drift, longest."""
@@ -166,7 +180,7 @@ class NativePlanner:
         it.longest = np.inf
         # What was learnt before must not change what is found now
         self._normals[:] = 0.0
-        self._sweep.restart()
+        it.recent[:] = [-1] * RECENT
         it.random = (seed * 0x9E3779B97F4A7C15 + 0x1234567) & (2**64 - 1) or 1
 
     def root(self, tree: int, x: Array) -> None:
@@ -181,6 +195,14 @@ class NativePlanner:
         """The least distance of a pair at x, less what it keeps [m]; infinite where there is no pair."""
         own = self._call.wbc_plan_margin(self.at, np.ascontiguousarray(x).ctypes.data)
         return float(own + self._struct.open - OPEN)
+
+    def away(self, x: Array, room: float) -> Array:
+        """A configuration near x that has ``room`` [m] on all sides, and is reached from it straight; x where it has
+        that room, or where there is none.
+        """
+        out = np.array(x, dtype=np.float64)
+        self._call.wbc_plan_away(self.at, out.ctypes.data, room - self._struct.open)
+        return x if (out == x).all() else out
 
     def edge(self, x: Array, y: Array) -> bool:
         """Whether what is straight between two free configurations is free."""

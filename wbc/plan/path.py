@@ -46,6 +46,7 @@ class PlannedPath:
         points: [points, n], straight between them; with equality rows so near to each other that these are met.
         length: sum of their distances [rad, or characteristic lengths].
         seconds: what planning took [s].
+        shortening: processor time that went into making paths shorter [s].
         nodes: of the two trees of the last search.
     """
 
@@ -55,6 +56,7 @@ class PlannedPath:
     points: Array = field(repr=False)
     length: float
     seconds: float
+    shortening: float
     nodes: tuple[int, int]
 
     @property

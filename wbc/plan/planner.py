@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -31,12 +31,12 @@ SLICE = 50
 #: Distances are kept longer by this while a path is searched [m], less where the start or the goal is nearer; after
 #: every search that ends without a path a quarter of it
 PAD = 2e-3
-#: and no less than this [m]
+#: and no less than this [m]. Where start or goal have less than twice the first, an edge leads to more room
 LEAST_PAD = 1e-5
 #: Samples of the first search; one that ends without a path is followed by one of twice as many
 FIRST = 2000
 #: Length of the longest edges against the diagonal of the space
-RANGE = 0.12
+RANGE = 0.07
 #: and against that in one search after the other: some spaces want short ones, some long ones
 RANGES = (1.0, 0.5, 2.0)
 #: Descents to configurations that meet a target
@@ -44,11 +44,7 @@ DESCENTS = 100
 #: Of the cuts, the share by which every path is shortened; the shortest one then has all of them
 CANDIDATE = 4
 #: Rounds at most in which corners of the shortest path are pulled in and cut off
-ROUNDS = 6
-#: How far from a configuration without room one is sought that has [rad, or characteristic lengths]
-AWAY = (0.02, 0.05, 0.1, 0.2, 0.4)
-#: and how often
-TRIES = 20
+ROUNDS = 3
 #: Goals of one target at most: those nearest to the start
 BRANCHES = 4
 #: Goals nearer to each other than this are one [rad, or characteristic lengths]
@@ -150,6 +146,7 @@ class MotionPlanner(Handles):
         self._rows: dict[tuple[Any, ...], PlanningRows] = {}
         self._native: NativePlanner | None = None
         self._switches: tuple[bool, ...] = ()
+        self._places = PlanningScene.places_of(self._core)
 
     def plan(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> PlannedPath:
         """A path from a configuration to a goal, on which every hard row of the stack holds.
@@ -177,6 +174,7 @@ class MotionPlanner(Handles):
             points=points,
             length=search.native.length(points),
             seconds=perf_counter() - search.begin,
+            shortening=search.shortening,
             nodes=search.nodes,
         )
 
@@ -198,15 +196,23 @@ class MotionPlanner(Handles):
     ) -> tuple[_Search, tuple[Goal, ...]]:
         chosen = replace(PlanningOptions() if options is None else options, **changes)
         q = self.stack.robot.configuration("q0", q0)
-        self._core.begin(q, np.zeros(self.stack.robot.nv))
-        self._core.take_first(q)
         goals = goals_of(self._core, goal)
+        # Of tasks that count for nothing no value is taken
+        named = {name for target in goals if isinstance(target, TargetGoal) for name in target.names}
+        idle = {entry.name for entry in self.stack.tasks} - named - set(self.kept)
+        self._core.initialise({slot: name for slot, name in self._core.first.items() if name not in idle}, q)
+        self._core.waiting = {}
         # What is compiled once for many queries is no part of the time of one
         native = self.native(q)
         for target in goals:
             if isinstance(target, TargetGoal):
                 native.prepare(self.rows(target.names))
-        return _Search(self, q, chosen), goals
+        return _Search(self, q, chosen, native), goals
+
+    @property
+    def values(self) -> Array:
+        """All run-time values, as :meth:`rows` take them."""
+        return self._core.tick.p
 
     def scene(self) -> PlanningScene:
         """The bodies that are kept apart, at the present run-time values."""
@@ -227,9 +233,9 @@ class MotionPlanner(Handles):
     def native(self, q: Array) -> NativePlanner:
         """What is kept of the scene and the rows; made again where their run-time values have changed."""
         switches = tuple(handle.enabled for handle in self._core.handles.values())
-        key = PlanningScene.key_of(self._core)
+        key = PlanningScene.key_of(self._core, self._places)
         if self._native is None or self._native.scene.key != key or switches != self._switches:
-            scene = PlanningScene.of(self._core, self.coordinates)
+            scene = PlanningScene.of(self._core, self.coordinates, key)
             self._native = NativePlanner(scene, self.rows(), self._core.tick.p, self._limits)
             self._switches = switches
         self._native.low[:], self._native.high[:] = self._limits
@@ -257,10 +263,10 @@ class MotionPlanner(Handles):
 class _Search:
     """One query."""
 
-    def __init__(self, planner: MotionPlanner, q: Array, options: PlanningOptions) -> None:
+    def __init__(self, planner: MotionPlanner, q: Array, options: PlanningOptions, native: NativePlanner) -> None:
         self.planner, self.options, self.begin = planner, options, perf_counter()
         self.end = self.begin + options.seconds
-        self.native = planner.native(q)
+        self.native, self.rows = native, planner.rows()
         self.native.pad(LEAST_PAD)
         self.native.begin(options.seed)
         self.native.set(step=options.step)
@@ -269,13 +275,13 @@ class _Search:
         #: near start and goals, with room on all sides
         self.first, self.last = self.start, list[Array]()
         self.nodes = (0, 0)
-        self.pad = PAD
+        self.pad, self.shortening = PAD, 0.0
 
     def check_start(self) -> None:
         """Refuse a start that breaks a constraint."""
         if reason := self.fault(self.start):
             raise InfeasibleError("q0", *reason)
-        self.first = self._away(self.start)
+        self.first = self.native.away(self.start, 2.0 * PAD)
 
     def fault(self, x: Array) -> tuple[float, str] | None:
         """(by how much, which constraint) x breaks most; None: none."""
@@ -287,7 +293,7 @@ class _Search:
             what = f"{coordinates.names[worst]} is beyond its limit of {limit:.4g} {coordinates.units[worst]}"
             return float(x[worst]), what
         x[:] = np.clip(x, native.low, native.high)
-        rows = self.planner.rows()
+        rows = self.rows
         if rows.count:
             values = np.asarray(rows.function(x, self.planner._core.tick.p)[0]).ravel()
             off = np.concatenate([np.abs(values[: rows.equalities]), -values[rows.equalities :]])
@@ -323,34 +329,9 @@ class _Search:
                 faults += self._descend(goal)
         if not self.goals:
             raise InfeasibleError("goal", *faults[0])
-        self.last = [self._away(x) for x in self.goals]
+        self.last = [self.native.away(x, 2.0 * PAD) for x in self.goals]
         room = min(self.native.margin(self.first), max(map(self.native.margin, self.last)))
         self.pad = max(LEAST_PAD, min(PAD, 0.5 * (room + OPEN)))
-
-    def _away(self, x: Array) -> Array:
-        """A configuration near x that has room on all sides, and is reached from it straight; x where it has room, or
-        where there is none: what leads off a contact is looked at closely, and only once.
-        """
-        native = self.native
-        if native.margin(x) + OPEN >= 2.0 * PAD:
-            return x
-        best, most = x, native.margin(x)
-        for radius in AWAY:
-            for _ in range(TRIES):
-                share = (
-                    2.0
-                    * (native.drawn() - native.sample_low)
-                    / np.maximum(native.sample_high - native.sample_low, 1e-12)
-                )
-                y = np.clip(x + radius * (share - 1.0) * self.planner.coordinates.scale, native.low, native.high)
-                if native.rows and (projected := native.projected(y)) is not None:
-                    y = projected
-                margin = native.margin(y)
-                if margin > most and native.free(y) and native.edge(x, y):
-                    best, most = y, margin
-            if most + OPEN >= 2.0 * PAD:
-                break
-        return best
 
     def _widen(self, x: Array) -> None:
         """Samples of coordinates without limits are drawn about start and goals."""
@@ -427,7 +408,13 @@ class _Search:
                 return points
         if best is None:
             raise self._nothing()
-        return native.shortened(best, options.cuts, ROUNDS)
+        return self._shortened(best, options.cuts, ROUNDS)
+
+    def _shortened(self, points: Array, cuts: int, rounds: int) -> Array:
+        begin = process_time()
+        points = self.native.shortened(points, cuts, rounds)
+        self.shortening += process_time() - begin
+        return points
 
     def _one(self, attempt: int, samples: int, shortest: float) -> Array | None:
         """A path of one search, made shorter."""
@@ -454,7 +441,7 @@ class _Search:
             return None
         points = native.path()
         ends = [float(np.abs(points[-1] - self.last[k]).max()) for k in roots]
-        points = native.shortened(points, options.cuts // CANDIDATE, 0)
+        points = self._shortened(points, options.cuts // CANDIDATE, 0)
         return self._ended(points, roots[int(np.argmin(ends))])
 
     def _ended(self, points: Array, goal: int) -> Array:

@@ -36,7 +36,7 @@ class PlanningScene:
     sweepers: dict[str, Sweeper] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, core: Core, coordinates: PlanningCoordinates) -> PlanningScene:
+    def of(cls, core: Core, coordinates: PlanningCoordinates, key: bytes = b"") -> PlanningScene:
         """That of a stack's obstacles and self-collisions which are enabled, at their present run-time values."""
         bodies: dict[str, SweptBody] = {}
         pairs: list[Pair] = []
@@ -69,19 +69,23 @@ class PlanningScene:
                 name = f"{link}[{number}]"
                 bodies.setdefault(name, SweptBody(name, placed.shape, link, placed.placement))
                 pairs += [Pair(name, part, margin) for part in parts]
-        return cls(coordinates, tuple(bodies.values()), tuple(pairs), cls.key_of(core))
+        return cls(coordinates, tuple(bodies.values()), tuple(pairs), key)
 
     @staticmethod
-    def key_of(core: Core) -> bytes:
-        """The run-time values that a scene is made of."""
-        out = []
+    def key_of(core: Core, places: Array) -> bytes:
+        """The run-time values at ``places`` that a scene is made of."""
+        return bytes(core.tick.p[places].tobytes())
+
+    @staticmethod
+    def places_of(core: Core) -> Array:
+        """Where these stand among all run-time values."""
+        spans = [np.zeros(0, dtype=int)]
         for entry in core.stack.constraints:
             if isinstance(entry.item, MeasuredApart):
                 slots = core.layout.blocks[entry.name].slots
-                out += [core.tick.p[slots[n].span].tobytes() for n in ("pose", "margin") if n in slots]
-                out.append(b"1" if core.handles[entry.name].enabled else b"0")
-                out.append(core.frame_pose(entry.name).homogeneous.tobytes())
-        return b"".join(out)
+                spans += [np.r_[slots[n].span] for n in ("pose", "margin") if n in slots]
+                spans += [np.r_[core.layout.blocks[entry.frame].slots["pose"].span]] if entry.frame else []
+        return np.concatenate(spans)
 
     def swept(self) -> SweptScene:
         """The scene, of which a proof may leave :data:`OPEN`."""

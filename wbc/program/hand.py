@@ -10,7 +10,6 @@ from wbc import validation
 from wbc.api import Controller
 from wbc.multibody import pin
 from wbc.tasks import EndEffector
-from wbc.tasks.frames import frame_pose
 from wbc.trajectory import online
 from wbc.validation import Array
 
@@ -158,8 +157,8 @@ class ProgramHand:
 
     def pose(self) -> pin.SE3:
         """Of the hand in its reference frame, measured; a moving one stands where the controller was told last."""
-        item, base = self._item, frame_pose(self._robot, self._item.relative_to, self._q)
-        pose = base.actInv(frame_pose(self._robot, item.frame, self._q))
+        item = self._item
+        pose = self._robot.pose(self._q, item.frame, item.relative_to)
         if self._frame is not None:
             pose = pin.SE3(self._frame.pose).actInv(pose)
         # What the item does not command stands still

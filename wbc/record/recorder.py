@@ -89,9 +89,10 @@ class Recorder:
         text = about(controller) | {"sizes": sizes, "not_pickled": problem}
         self._writer: LogWriter | None = FileWriter(self.path, overwrite, RecordingError)
         self._writer.begin(text, {} if pickled is None else {"stack.pickle": pickled})
-        ticks = CHUNK // (8 * sum(sizes.values()))
-        self._chunk, self._process = max(FEWEST, min(MOST, ticks)), os.getpid()
-        self._rows: list[bytes] = []
+        self._size = 8 * sum(sizes.values())
+        self._chunk, self._process = max(FEWEST, min(MOST, CHUNK // self._size)), os.getpid()
+        # Ticks that are not written yet, in memory that is kept: what asks the system for more waits where it is short
+        self._memory, self._end = memoryview(bytearray(self._chunk * self._size)), 0
         #: resets of the controller before the last tick that was recorded whole
         self._seen = UNKNOWN
         self._problem: OSError | None = None
@@ -127,15 +128,15 @@ class Recorder:
             # a fork has a copy of the controller, but the file is its parent's
             self._writer.abandon()
             self._detach()
-        elif self._rows:
+        elif self._end:
             try:
-                self._writer.write(b"".join(self._rows))
+                self._writer.write(self._memory[: self._end])
             except OSError as error:
-                self.count -= len(self._rows)
+                self.count -= self._end // self._size
                 self._fail(error)
                 self._writer.abandon()
                 self._detach()
-            self._rows.clear()
+            self._end = 0
 
     def _leave(self) -> None:
         """At the end of a process that did not close; what could not be written is in the log already."""
@@ -177,10 +178,13 @@ def _recorded(recorder: Recorder) -> int:
         # found again from other rows, which are sensed inputs, and from no active set
         resets = recorder._core.resets
         given = b"".join((given[: recorder._place.start], recorder._values, given[recorder._place.stop :]))
-    recorder._rows.append(b"".join((given, WARM if resets == seen else COLD, recorder._command, *recorder._told)))
+    row = b"".join((given, WARM if resets == seen else COLD, recorder._command, *recorder._told))
+    end = recorder._end + recorder._size
+    recorder._memory[recorder._end : end] = row
+    recorder._end = end
     recorder._seen = resets
     recorder.count += 1
-    if len(recorder._rows) >= recorder._chunk:
+    if end == len(recorder._memory):
         recorder.flush()
     return flag
 

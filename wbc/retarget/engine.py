@@ -18,10 +18,10 @@ from wbc.multibody import pin
 from wbc.retarget.clip import Array
 from wbc.retarget.options import RetargetOptions
 from wbc.retarget.plan import MotionPlan, balanced, logarithms
-from wbc.retarget.robot_body import RobotBody
+from wbc.retarget.robot_body import RobotBody, with_frame
 from wbc.robot import Robot
 from wbc.rotations import exponential
-from wbc.shapes import HalfSpace, PlacedShape, Sphere
+from wbc.shapes import Convex, HalfSpace, PlacedShape
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Values
 from wbc.tick.outcome import Status
@@ -40,8 +40,15 @@ CLOSEST = 10
 NEIGHBOURS = 3
 #: Random configurations of which pairs of links that can touch are found
 PAIR_SAMPLES = 2000
-#: Radius of the balls that keep a sole's corners above the ground [m]
-CORNER = 1e-3
+#: Corners of the hull of a link besides feet and hands, at most: more than have rows of their own, so that they are
+#: measured before a tick, which is faster
+LINK_CORNERS = 96
+#: Fewer do where they are within this of it [m]
+NEAR_ENOUGH = 1e-5
+#: Half the thickness of what is drawn as a plane [m]
+THIN = 2e-4
+#: Links besides feet that have rows of the ground at a time
+NEAREST = 8
 #: The ground's rows begin this far below it, so that they say nothing of feet that are held on it [m]
 DEPTH = 2e-4
 #: What a foot that goes below the ground costs, see docs/soft.md
@@ -56,6 +63,12 @@ AGAIN = 3
 MATTERS = 1.5e-5
 #: What a held contact moves by within a tick and more is no second order [m]
 FORESEEN = 1e-3
+#: Distance from a sole's middle at which its turns are counted [m]
+LEVER = 0.12
+#: A foot is held from where it is this near to its place [m]
+FOOT_ENGAGED = 1e-2
+#: A hand, which its task draws less [m]
+HAND_ENGAGED = 3e-2
 #: Ticks that bring the robot to the first frame
 SETTLING = 400
 #: The first frame is reached when no joint moves faster [rad/s]
@@ -136,61 +149,48 @@ class Engine:
             self._add_limb(stack, name, gain, led)
         stack.add(tasks.Posture(start="neutral", gain=1.0), name="posture", weight=weights.posture)
         stack.add(tasks.JointLimits(shortest_dt=dt), name="limits")
-        self._ends = list(dict.fromkeys(body.limbs)) if free else []
-        for name in self._ends:
-            ground = tasks.Obstacle(HalfSpace(), links=(body.limbs[name].end,), pose=_below(DEPTH))
+        feet = [name for name in body.limbs if self.is_foot(name)]
+        for name in feet:
+            ground = tasks.Obstacle(HalfSpace(), links=(body.limbs[name].end,), pose=_below(DEPTH), closest=1)
             stack.add(ground, name=f"{name} above ground", soft=GROUND_PRICE)
         if options.clearance is not None:
             clear = tasks.SelfCollision(margin=options.clearance, closest=CLOSEST, method="sensed")
             stack.add(clear, name="clearance", soft=CLEARANCE_PRICE)
-        links = tuple(link for link in self._links if not self._ends or link not in self._soles())
+        links = (*self._links, *(limb.end for name, limb in body.limbs.items() if name not in feet))
         if free and links:
-            ground = tasks.Obstacle(HalfSpace(), links=links, pose=_below(0.0))
+            ground = tasks.Obstacle(HalfSpace(), links=links, pose=_below(DEPTH), closest=NEAREST)
             stack.add(ground, name="above ground", soft=GROUND_PRICE)
         self.stack = stack
         self.controller: Controller = stack.compile()
-        for name in self._ends:
-            self.controller[f"{name} above ground"].rate = GROUND_RATE / dt
+        for item in (*(f"{name} above ground" for name in feet), *(["above ground"] if free and links else [])):
+            self.controller[item].rate = GROUND_RATE / dt
         self._group = InputGroup(core_of(self.controller), [(c.item, c.name, None) for c in self.columns])
         self._held: dict[str, bool] = {}
         self._items = {column.item for column in self.columns}
 
     def _shaped(self, robot: Robot) -> Robot:
-        """The robot with balls at its soles' corners, and where clearances are asked for with shapes on all links."""
-        self._links: list[str] = []
+        """The robot with balls around what it may touch the ground with, and where clearances are asked for with shapes
+        on all links.
+        """
         pairs = robot.self_pairs
-        between = self._between(robot)
-        if between and self.options.clearance is None:
-            robot = robots.fit_shapes(robot, between)
-            self._links = [link for link in between if link in robot.shapes]
         if self.options.clearance is not None:
             robot = robots.fit_shapes(robot)
-            self._links = list(robot.shapes)
             found = robots.find_self_pairs(robot, samples=PAIR_SAMPLES).kept
             pairs = tuple(pair for pair in found if _joints_between(robot, *pair) > NEIGHBOURS)
-        corners = {}
-        for limb in self.body.limbs.values():
-            radius = limb.radius or CORNER
-            lift = np.array([0.0, 0.0, CORNER if limb.contact == "flat" else 0.0])
-            corners[limb.end] = [PlacedShape(Sphere(radius), pin.SE3(np.eye(3), c + lift)) for c in limb.corners]
-        return robot.with_shapes({**robot.shapes, **corners}).with_self_pairs(pairs)
+        ends = self.body.limbs.values()
+        shapes = {limb.end: [_solid(limb.surface)] for limb in ends}
+        last = {limb.joints[-1] for limb in ends}
+        self._links: list[str] = []
+        for joint, balls in self.body.balls.items() if robot.base != "fixed" else ():
+            if joint not in last:
+                frame = f"retarget_ground_{joint}"
+                robot = with_frame(robot, frame, joint, pin.SE3.Identity())
+                shapes[frame] = [_solid(balls.corners(LINK_CORNERS, NEAR_ENOUGH))]
+                self._links.append(frame)
+        return robot.with_shapes({**robot.shapes, **shapes}).with_self_pairs(pairs)
 
-    def _between(self, robot: Robot) -> list[str]:
-        """Links that may be on the ground besides feet and hands: from knees and elbows to them."""
-        model, limbs = robot.model, self.body.limbs.values()
-        if robot.base == "fixed" or not self.body.plan.upright:
-            return []
-        middles = [int(model.frames[model.getFrameId(limb.middle)].parentJoint) for limb in limbs]
-        joints = {j for limb, k in zip(limbs, middles, strict=True) for j in limb.joints[limb.joints.index(k) : -1]}
-        return [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY and int(f.parentJoint) in joints]
-
-    def _soles(self) -> set[str]:
-        """Links that carry a sole or a hand, whose contact frames say what is above the ground."""
-        model = self.robot.model
-        last = {self.body.limbs[name].joints[-1] for name in self._ends}
-        return {str(frame.name) for frame in model.frames if int(frame.parentJoint) in last}
-
-    def _feet(self, name: str) -> bool:
+    def is_foot(self, name: str) -> bool:
+        """Whether a limb walks."""
         free = self.robot.base != "fixed"
         return free and (name.endswith("leg") or not self.body.plan.upright)
 
@@ -201,7 +201,7 @@ class Engine:
                 tasks.EndEffector(limb.middle, "position", gain=gain), name=f"{name} middle", weight=weights.middle
             )
             led(f"{name} middle", ("target", 3), ("feedforward", 3))
-        if self._feet(name):
+        if self.is_foot(name):
             if limb.contact == "flat":
                 six = (weights.foot,) * 3 + (weights.sole,) * 3
                 stack.add(tasks.EndEffector(limb.end, weights=six, gain=gain), name=name)
@@ -234,11 +234,11 @@ class Engine:
             parts["chest", "target"], parts["chest", "feedforward"] = _columns(plan.chest), _turn_rate(plan.chest, dt)
         if self._head and plan.head is not None:
             parts["head", "target"], parts["head", "feedforward"] = _columns(plan.head), _turn_rate(plan.head, dt)
-        if self.options.balance and self._ends:
+        if self.options.balance and self.robot.base != "fixed":
             over = balanced(plan)
             parts["balance", "target"], parts["balance", "feedforward"] = over, _rate(over, dt)
         for name in self._limbs:
-            limb, flat = plan.limbs[name], self.body.limbs[name].contact == "flat" and self._feet(name)
+            limb, flat = plan.limbs[name], self.body.limbs[name].contact == "flat" and self.is_foot(name)
             for item, values in ((f"{name} middle", limb.middle), (f"{name} wrist", limb.wrist), (name, limb.end)):
                 if item in self._items:
                     parts[item, "target"], parts[item, "feedforward"] = values, _rate(values, dt)
@@ -257,7 +257,7 @@ class Engine:
         """Bring the robot to the first frame, with the velocity with which the clip goes on; its configuration."""
         robot, controller = self.robot, self.controller
         q = robot.neutral.copy()
-        if self._ends:
+        if robot.base != "fixed":
             now = self.body.robot.pose(q, self.body.pelvis)
             target = pin.SE3(plan.turn[0], plan.pelvis[0])
             root = robot.model.joints[1]
@@ -299,7 +299,8 @@ class Engine:
             if self.options.hold and self.robot.base != "fixed" and self._held.get(name) != on:
                 self.controller[f"{name} stands"].enabled = on
                 # A foot that is held is where it was asked for; rows of the ground would say the same again
-                self.controller[f"{name} above ground"].enabled = not on
+                if self.is_foot(name) and self.body.limbs[name].contact == "flat":
+                    self.controller[f"{name} above ground"].enabled = not on
                 self._held[name] = on
 
     def tick(self, q: Array, row: Array) -> Step:
@@ -319,21 +320,28 @@ class Engine:
         out[0] = q
         model, dt = self.robot.model, self.dt
         held = np.array([plan.limbs[name].held for name in self._limbs]).T
-        changes = np.flatnonzero(np.concatenate([[True], (held[1:] != held[:-1]).any(axis=1)]))
-        changing = set(changes.tolist())
+        changing = set(np.flatnonzero(np.concatenate([[True], (held[1:] != held[:-1]).any(axis=1)])).tolist())
+        #: limb -> the first tick in which it may be held again
+        not_before = dict.fromkeys(self._limbs, 0)
+        waiting: list[str] = []
         gave: list[tuple[int, tuple[str, ...]]] = []
         v = np.array(self.controller.last_command)
         write, step_of, solved = self._group.write, self.controller.step, Status.SOLVED
         losses = _Losses(self, plan, rows)
         for k in range(plan.ticks - 1):
-            if k in changing:
-                self._hold(dict(zip(self._limbs, (bool(x) for x in held[k]), strict=True)))
+            if k in changing or waiting:
+                asked = [name for name, on in zip(self._limbs, held[k], strict=True) if on]
+                waiting = [name for name in asked if not self._held.get(name)]
+                there = losses.near([name for name in waiting if k >= not_before[name]], q, k)
+                self._hold({name: name in asked and (name in there or name not in waiting) for name in self._limbs})
+                waiting = [name for name in waiting if name not in there]
             write(rows[k])
             step = step_of(q)
             if step.status is not solved and (landing := self._landing(plan, k)):
                 # Feet that come to stand give way before those that stand
                 self._hold(dict.fromkeys(landing, False))
-                changing.add(k + AGAIN)
+                not_before |= dict.fromkeys(landing, k + AGAIN)
+                waiting += landing
                 step = step_of(q, v)
             if step.status is not solved:
                 gave.append((k, tuple(dict.fromkeys(slack.item for slack in step.relaxed)) or (str(step.status),)))
@@ -365,6 +373,14 @@ class Engine:
         return [name for name, on in self._held.items() if on and tick > 0 and not plan.limbs[name].stands[first]]
 
 
+def _solid(corners: Array) -> PlacedShape:
+    """The hull of some corners in a link's frame; what is flat gets a thickness."""
+    if len(corners) < 4 or np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] < THIN:
+        sides = np.array([[x, y, z] for x in (-THIN, THIN) for y in (-THIN, THIN) for z in (-THIN, THIN)])
+        corners = (corners[:, None] + sides).reshape(-1, 3)
+    return PlacedShape(Convex(corners), pin.SE3.Identity())
+
+
 def _joints_between(robot: Robot, first: str, second: str) -> int:
     """How many joints lie on the way from one link to another."""
     model = robot.model
@@ -383,13 +399,17 @@ def _below(depth: float) -> pin.SE3:
 
 
 class _Losses:
-    """Held contacts move at second order within a tick; their targets make up for what is foreseen of it."""
+    """Held contacts move at second order within a tick; their targets make up for what is foreseen of it.
+
+    Errors are of position, and of a sole's rotation about its ankle's axes times :data:`LEVER` [m].
+    """
 
     def __init__(self, engine: Engine, plan: MotionPlan, rows: Array) -> None:
         model = engine.robot.model
         self._model, self._data, self._rows = model, model.createData(), rows
-        #: limb -> its frame, its targets, and where its hold's position is in a row
-        self._places: dict[str, tuple[int, Array, slice]] = {}
+        #: limb -> its frame, its targets, and where its hold begins in a row
+        self._places: dict[str, tuple[int, Array, Array | None, int]] = {}
+        self._engaged: dict[str, float] = {}
         #: limb -> how far it was off before, and what its target makes up for now
         self._before: dict[str, Array] = {}
         self._made_up: dict[str, Array] = {}
@@ -401,8 +421,10 @@ class _Losses:
         for column in engine.columns:
             if column.item.endswith(" stands"):
                 name = column.item.removesuffix(" stands")
+                limb, flat = plan.limbs[name], engine.body.limbs[name].contact == "flat"
                 frame = int(model.getFrameId(engine.body.limbs[name].end))
-                self._places[name] = frame, plan.limbs[name].end, slice(at + 9, at + 12)
+                self._engaged[name] = FOOT_ENGAGED if engine.is_foot(name) else HAND_ENGAGED
+                self._places[name] = frame, limb.end, limb.rotation if flat else None, at
             at += column.size
 
     def look(self, q: Array, tick: int, held: dict[str, bool]) -> bool:
@@ -412,24 +434,47 @@ class _Losses:
             return False
         pin.forwardKinematics(self._model, self._data, q)
         worst = 0.0
-        for name, (frame, targets, _) in self._places.items():
+        for name in self._places:
             if held.get(name):
-                place = pin.updateFramePlacement(self._model, self._data, frame).translation
-                self._errors[name] = error = place - targets[tick]
+                self._errors[name] = error = self._error(name, tick)
                 missed = self._missed(name, error)
                 size = float(missed @ missed)
                 worst = max(worst, size if size < FORESEEN**2 else 0.0)
         return worst > MATTERS**2
 
+    def near(self, names: list[str], q: Array, tick: int) -> list[str]:
+        """Those of some limbs whose contacts are so near to their targets that they can be held from here on."""
+        if names:
+            pin.forwardKinematics(self._model, self._data, q)
+        return [name for name in names if float(np.linalg.norm(self._error(name, tick))) < self._engaged[name]]
+
+    def _error(self, name: str, tick: int) -> Array:
+        frame, targets, rotations, _ = self._places[name]
+        pose = pin.updateFramePlacement(self._model, self._data, frame)
+        error = np.zeros(6)
+        error[:3] = pose.translation - targets[tick]
+        if rotations is not None:
+            error[3:] = LEVER * pin.log3(pose.rotation @ rotations[tick].T)
+        return error
+
     def _missed(self, name: str, error: Array) -> Array:
         before = self._before.get(name)
-        return np.zeros(3) if before is None else np.asarray(error - (1.0 - HOLD_GAIN) * before)
+        return np.zeros(6) if before is None else np.asarray(error - (1.0 - HOLD_GAIN) * before)
+
+    def _make_up(self, name: str, tick: int, lost: Array) -> None:
+        """Move a target against what is lost."""
+        _, _, rotations, at = self._places[name]
+        row = self._rows[tick]
+        row[at + 9 : at + 12] -= lost[:3] / HOLD_GAIN
+        if rotations is not None:
+            turned = pin.exp3(-lost[3:] / (LEVER * HOLD_GAIN)) @ row[at : at + 9].reshape(3, 3).T
+            row[at : at + 9] = turned.T.ravel()
 
     def correct(self, tick: int) -> None:
         """Have the same tick make up for what it lost."""
         for name, error in self._errors.items():
             missed = self._missed(name, error)
-            self._rows[tick, self._places[name][2]] -= missed / HOLD_GAIN
+            self._make_up(name, tick, missed)
             self._made_up[name] = self._made_up.get(name, 0.0) + missed
 
     def learn(self, tick: int) -> None:
@@ -442,8 +487,8 @@ class _Losses:
                 loss = self._missed(name, error) + self._made_up.get(name, 0.0)
                 ahead = 2.0 * loss - self._lost.get(name, loss)
                 self._lost[name] = loss
-                ahead = ahead if float(ahead @ ahead) < FORESEEN**2 else np.zeros(3)
-                self._rows[tick, self._places[name][2]] -= ahead / HOLD_GAIN
+                ahead = ahead if float(ahead @ ahead) < FORESEEN**2 else np.zeros(6)
+                self._make_up(name, tick, ahead)
                 self._made_up[name] = ahead
             self._before[name] = error
 

@@ -8,19 +8,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from wbc.multibody import pin
+from wbc.retarget.solids import surface_points
 from wbc.robot import Robot
-from wbc.track.scene import link_meshes
 from wbc.validation import Array
 
 #: A limit counts as kept up to this much beyond it, as a share of the limit and in rad or m
 TOLERANCE = 1e-6
 #: Points of a foot this near to its lowest one are its sole [m]
 SOLE_HEIGHT = 0.01
-#: Changes of a velocity from frame to frame beyond this are jumps [rad/s, m/s]
-JUMP = 10.0
+#: A joint that accelerates more from frame to frame jumps [rad/s^2, m/s^2]
+JUMP = 500.0
 
 
 def motion_figures(
@@ -42,10 +41,10 @@ def motion_figures(
 
     Returns:
         ``frames``, ``rate``; ``position_breaches``, ``velocity_breaches``, ``acceleration_breaches``: frames in which a
-        joint is beyond its limit, the base left out; ``jumps``: frames after which a joint's velocity changes by more
-        than :data:`JUMP`; ``fastest`` and ``quickest``: largest velocity and acceleration as shares of their limits;
-        ``penetration``: deepest point below the ground [m]; ``penetration_frames``: with more than 1 mm of it;
-        ``slide``: largest motion along the ground of a point of a sole while it stands [m]; ``slides``: by foot.
+        joint is beyond its limit, the base left out; ``jumps``: frames at which a joint's acceleration, from frame to
+        frame, is beyond :data:`JUMP`; ``fastest`` and ``quickest``: largest velocity and acceleration as shares of
+        their limits; ``penetration``: deepest point below the ground [m]; ``penetration_frames``: with more than 1 mm
+        of it; ``slide``: largest motion along the ground of a point of a sole while it stands [m]; ``slides``: by foot.
     """
     model, first = robot.model, robot.base_nv
     steps = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(q)]).reshape(-1, robot.nv)
@@ -67,7 +66,7 @@ def motion_figures(
         part = np.abs(moves) / np.where(limit > 0.0, limit, np.inf)
         out[f"{name}_breaches"] = int((part > 1.0 + TOLERANCE).any(axis=1).sum()) if part.size else 0
         out[share] = float(part.max()) if part.size else 0.0
-    jumps = np.abs(np.diff(velocity, axis=0)) > JUMP
+    jumps = np.abs(acceleration) > JUMP
     out["jumps"] = int(jumps.any(axis=1).sum())
     feet = {frame: stands for frame, stands in stance.items() if frame in robot.frame_names}
     out |= _touching(robot, q, feet, ground, balls)
@@ -98,19 +97,6 @@ def _touching(
     if ground is not None and surfaces:
         depth = np.maximum(0.0, ground - lowest)
         out |= {"penetration": float(depth.max()), "penetration_frames": int((depth > 1e-3).sum())}
-    return out
-
-
-def surface_points(robot: Robot) -> dict[str, Array]:
-    """Corners of the convex hulls of links, in their frames: no other point of a link is ever lowest [m]."""
-    out: dict[str, Array] = {}
-    for link, triangles in link_meshes(robot):
-        corners = np.unique(triangles.reshape(-1, 3), axis=0)
-        try:
-            hull = corners[ConvexHull(corners).vertices] if len(corners) > 4 else corners
-        except QhullError:
-            hull = corners
-        out[link] = np.concatenate([out[link], hull]) if link in out else hull
     return out
 
 

@@ -37,6 +37,7 @@ class ClipJob:
         robot: name or file. loading: options of :func:`~wbc.retarget.load_clip`.
         options: fields of ``RetargetOptions`` that are not at their defaults.
         formats: of the motion, besides npz. film: whether one is drawn.
+        support: whether the report says in how many frames contacts and motors hold the robot at rest.
         correspondence: file of :meth:`~wbc.retarget.Correspondence.save` that corrects what is found.
     """
 
@@ -47,14 +48,17 @@ class ClipJob:
     options: Mapping[str, Any] = field(default_factory=dict)
     formats: tuple[str, ...] = ()
     film: bool = True
+    support: bool = False
     correspondence: pathlib.Path | None = None
 
     @property
     def asked(self) -> dict[str, Any]:
         """What a finished clip must have been asked for to be left as it is: plain data."""
-        plain = {"robot": self.robot, "loading": dict(self.loading), "options": dict(self.options)}
+        plain: dict[str, Any] = {"robot": self.robot, "loading": dict(self.loading), "options": dict(self.options)}
         if self.correspondence is not None:
             plain["correspondence"] = self.correspondence.read_text(encoding="utf-8")
+        if self.support:
+            plain["support"] = True
         text = json.dumps({**plain, "formats": list(self.formats)}, default=str, sort_keys=True)
         return dict(json.loads(text))
 
@@ -163,7 +167,7 @@ def retarget_job(job: ClipJob) -> ClipDone:
         motion = retargeter.run(clip)
         seconds = time.perf_counter() - start
         with _fresh(job.folder) as fresh:
-            figures = write_report(motion, fresh, job.formats, seconds=seconds, film=job.film)
+            figures = write_report(motion, fresh, job.formats, seconds=seconds, film=job.film, support=job.support)
             retargeter.correspondence(clip.skeleton).save(fresh / "correspondence.yaml")
             figures |= {"asked": job.asked, "stack_made": first}
             (fresh / DONE).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")

@@ -17,11 +17,11 @@ from wbc.retarget.plan import (
     BLEND,
     LimbPlan,
     MotionPlan,
-    flat_place,
     logarithms,
     lowering,
     minimum_jerk,
     raised,
+    standing_place,
 )
 from wbc.retarget.stances import FAST, HAND_HEIGHT, LEVEL, SLOW
 from wbc.rotations import exponential
@@ -134,9 +134,9 @@ class LiveRetargeter:
         robot, state = self._match.body.limbs[name], self._limbs[name]
         end, rotation = raised(robot, limb)
         flat = rotation is not None and robot.contact == "flat"
-        stands = state.stands and not (flat and float(limb.rotation[0, 2, 2]) < 0.8)  # type: ignore[index]
+        stands = state.stands
         if stands and state.share >= 1.0:
-            state.place, state.heading = flat_place(robot, limb, end, rotation if flat else None, 0, 1)
+            state.place, state.heading = standing_place(robot, limb, 0, 1)
         step = 1.0 / (BLEND * self.rate)
         state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
         share = float(minimum_jerk(np.array(state.share)))

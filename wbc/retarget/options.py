@@ -55,7 +55,7 @@ class RetargetOptions:
     rate: float | None = None
     tick_rate: float = 60.0
     scale: float | None = None
-    acceleration: float = 500.0
+    acceleration: float = 480.0
     velocity: float = 20.0
     base_velocity: float = 20.0
     base_acceleration: float = 5000.0

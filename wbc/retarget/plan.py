@@ -22,7 +22,9 @@ SHARE = 0.4
 GROUND = 0.03
 #: A foot in the air is this high or so, where the skeleton's would be on the ground or below [m]
 CLEAR = 0.006
-#: A foot is flat where its sole is tilted by less than the angle of this cosine
+#: Cosine of turns beyond which the axis is no more read off the skew part [1]
+NEARLY_TURNED = -0.99
+#: A foot stands flat where its sole is tilted by less than the angle of this cosine
 SOLE_LEVEL = 0.8
 #: Most of a leg's length that a standing leg has between hip and ankle
 STRETCH = 0.985
@@ -97,7 +99,13 @@ def turns_resampled(rotations: Array, rate: float, times: Array) -> Array:
 
 def logarithms(rotations: Array) -> Array:
     """Rotation vectors [n, 3] of rotations [n, 3, 3]."""
-    return np.asarray(Rotation.from_matrix(rotations).as_rotvec())
+    cosines = 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    if (cosines < NEARLY_TURNED).any():
+        return np.asarray(Rotation.from_matrix(rotations).as_rotvec())
+    skew = 0.5 * (rotations - np.swapaxes(rotations, 1, 2))
+    axes = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
+    sines = np.sqrt(np.sum(axes**2, axis=1))
+    return np.asarray(axes * (np.arctan2(sines, cosines) / np.maximum(sines, 1e-12))[:, None])
 
 
 def minimum_jerk(share: Array) -> Array:
@@ -134,13 +142,8 @@ def _limb_resampled(limb: LimbPlaces, rate: float, times: Array) -> LimbPlaces:
 def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float) -> LimbPlan:
     """A limb's targets with its stances at rest."""
     end, rotation = raised(robot, limb)
-    stands = stands.copy()
-    if rotation is not None and robot.contact == "flat":
-        for a, b in intervals(stands):
-            # A foot that stands on its toes is not held flat
-            stands[a:b] &= float(np.median(rotation[a:b, 2, 2])) > SOLE_LEVEL
     raw, raw_rotation = end.copy(), None if rotation is None else rotation.copy()
-    stances = [(a, b, *flat_place(robot, limb, raw, rotation, a, b)) for a, b in intervals(stands)]
+    stances = [(a, b, *standing_place(robot, limb, a, b)) for a, b in intervals(stands)]
     held = stands.copy()
     count = len(stands)
     for number, (a, b, place, heading) in enumerate(stances):
@@ -170,11 +173,15 @@ def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float) -> 
 def raised(robot: RobotLimb, limb: LimbPlaces) -> tuple[Array, Array | None]:
     """Positions and rotations of a limb's contact frame, clear of the ground."""
     end, rotation = limb.end.copy(), None if limb.rotation is None else limb.rotation.copy()
-    heights = end[:, 2] - robot.radius
-    if rotation is not None and robot.contact == "flat":
-        heights = (np.einsum("tij,kj->tki", rotation, robot.corners)[..., 2] + end[:, None, 2]).min(axis=1)
-    end[:, 2] += _lift(heights)
+    end[:, 2] += _lift(_lowest(robot, end, rotation))
     return end, rotation
+
+
+def _lowest(robot: RobotLimb, end: Array, rotation: Array | None) -> Array:
+    """Height of the lowest point of a foot, or of a hand's ball [ticks] [m]."""
+    if rotation is None or robot.contact != "flat":
+        return np.asarray(end[:, 2] - robot.radius)
+    return np.asarray((rotation[:, 2] @ robot.surface.T).min(axis=1) + end[:, 2])
 
 
 def _lift(heights: Array) -> Array:
@@ -182,21 +189,30 @@ def _lift(heights: Array) -> Array:
     return np.asarray(0.5 * (np.sqrt((heights - CLEAR) ** 2 + CLEAR**2) - (heights - CLEAR)))
 
 
-def flat_place(
-    robot: RobotLimb, limb: LimbPlaces, raw: Array, rotation: Array | None, a: int, b: int
-) -> tuple[Array, Array | None]:
-    """Where a stance stands, of all of its ticks, and the heading of a flat foot."""
-    place = np.median(raw[a:b], axis=0)
-    height = float(np.linalg.norm(robot.places[2] - robot.places[3])) if robot.contact == "flat" else robot.radius
-    level = float(np.median(limb.wrist[a:b, 2])) - height if robot.contact == "flat" else place[2] - height
-    level = 0.0 if level < GROUND else level
-    place[2] = level + (0.0 if robot.contact == "flat" else robot.radius)
-    if rotation is None:
+def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[Array, Array | None]:
+    """Where a stance stands, of all of its ticks, and the rotation of a foot: level, or on its toes or heel as it is in
+    the mean.
+    """
+    ends, rotation = limb.end[a:b], limb.rotation[a:b] if limb.rotation is not None else None
+    place = np.median(ends, axis=0)
+    if robot.contact != "flat" or rotation is None:
+        level = float(place[2]) - robot.radius
+        place[2] = robot.radius + (0.0 if level < GROUND else level)
         return place, None
-    forward = rotation[a:b, :, 0].mean(axis=0)
-    yaw = float(np.arctan2(forward[1], forward[0]))
-    heading = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
-    return place, heading
+    if float(np.median(rotation[:, 2, 2])) > SOLE_LEVEL:
+        forward = rotation[:, :, 0].mean(axis=0)
+        yaw = float(np.arctan2(forward[1], forward[0]))
+        standing = exponential(np.array([[0.0, 0.0, yaw]]))[0]
+        level = float(np.median(limb.wrist[a:b, 2])) - float(np.linalg.norm(robot.places[2] - robot.places[3]))
+        lowest = np.zeros(3)
+    else:
+        standing = np.asarray(Rotation.from_matrix(rotation).mean().as_matrix())
+        lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
+        level = float(np.median(_lowest(robot, ends, rotation)))
+    # The lowest point of the sole stands where it is in the mean
+    place = np.median(ends + rotation @ lowest, axis=0) - standing @ lowest
+    place[2] = (0.0 if level < GROUND else level) - float(standing[2] @ lowest)
+    return place, standing
 
 
 def balanced(plan: MotionPlan) -> Array:
@@ -220,7 +236,8 @@ def lowering(body: RobotBody, pelvis: Array, turn: Array, limbs: dict[str, LimbP
             continue
         hip = pelvis + turn @ ((robot.base - body.places[0]) @ body.axes)
         up = np.array([0.0, 0.0, float(np.linalg.norm(robot.places[2] - robot.places[3]))])
-        ankle = plan.end + (up if robot.contact == "flat" else 0.0)
+        flat = robot.contact == "flat" and plan.rotation is not None
+        ankle = plan.end + (plan.rotation @ up if flat and plan.rotation is not None else 0.0)
         across = np.linalg.norm((hip - ankle)[:, :2], axis=1)
         reach = STRETCH * sum(robot.lengths)
         most = np.sqrt(np.maximum(reach**2 - across**2, (0.2 * reach) ** 2))

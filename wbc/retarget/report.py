@@ -13,7 +13,6 @@ from PIL import Image, ImageDraw
 
 from wbc import extras
 from wbc.multibody import pin
-from wbc.retarget.figures import motion_figures
 from wbc.retarget.outputs.writing import MOTION_FORMATS, write_motion
 from wbc.shapes import Box
 from wbc.track import render
@@ -60,13 +59,15 @@ def write_report(
     *,
     seconds: float | None = None,
     film: bool = True,
+    support: bool = False,
 ) -> dict[str, Any]:
     """Write a clip's folder, which is there; returns the figures that ``report.json`` holds.
 
     Args:
         formats: more formats of the motion, keys of :data:`~wbc.retarget.outputs.MOTION_FORMATS`.
         seconds: time that retargeting took, with the making of its stack where that is new [s].
-        film: whether a film is drawn, and put on the page.
+        film: whether a film is drawn, and put on the page. support: whether :func:`~wbc.retarget.held` looks for forces
+            of contacts and torques of motors that hold the robot at rest; not for a robot whose base is fixed.
 
     Raises:
         UnknownNameError: no such format. ClipFileError: a file cannot be written.
@@ -76,16 +77,17 @@ def write_report(
         if kind != "npz":
             write_motion(motion, folder / f"motion-{kind}{MOTION_FORMATS.get(kind, '')}", kind)
     figures: dict[str, Any] = {"clip": motion.clip.name, "robot": motion.robot.name}
-    limbs = {limb: motion.body.limbs[limb] for limb in motion.stance}
-    feet = {limbs[limb].end: stands for limb, stands in motion.stance.items()}
-    ground = None if motion.robot.base == "fixed" else 0.0
-    balls = {limb.end for limb in limbs.values() if limb.radius > 0.0}
-    figures |= motion_figures(motion.robot, motion.rate, motion.q, feet, ground=ground, balls=balls)
+    figures |= motion.errors.figures
     if seconds is not None:
         figures |= {"seconds": seconds, "frames_a_second": len(motion.q) / max(seconds, 1e-9)}
     points = motion.errors.points
     figures["error"] = motion.errors.mean
     figures["errors"] = {name: {"mean": float(far.mean()), "largest": float(far.max())} for name, far in points.items()}
+    if support and motion.robot.base != "fixed":
+        from wbc.retarget.held import held
+
+        at_rest = held(motion)
+        figures |= {"held_at_rest": at_rest.share, "support": str(at_rest)}
     figures["given_up"] = [str(entry) for entry in motion.given_up]
     figures["notes"] = list(motion.notes)
     lines = text_lines(figures)
@@ -118,6 +120,7 @@ def text_lines(figures: Mapping[str, Any]) -> list[str]:
     lines.append(f"key points from their targets: {1e3 * figures['error']:.3g} mm in the mean")
     for name, far in figures["errors"].items():
         lines.append(f"  {name}: {1e3 * far['mean']:.3g} mm, {1e3 * far['largest']:.3g} mm at most")
+    lines += [figures["support"]] if "support" in figures else []
     lines += [f"gave way: {entry}" for entry in figures["given_up"]] or ["gave way: nothing"]
     return lines + [f"note: {note}" for note in figures["notes"]]
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from wbc.multibody import pin
 from wbc.retarget.clip import Array, Clip
+from wbc.retarget.figures import motion_figures
 from wbc.retarget.plan import MotionPlan
 from wbc.retarget.robot_body import RobotBody
-from wbc.retarget.stances import Marks, intervals
+from wbc.retarget.stances import Marks
 from wbc.robot import Robot
-
-#: Limits are kept to this share, which is what rounding leaves
-ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,19 +40,11 @@ class MotionErrors:
 
     Attributes:
         points: key point -> distance from its target at each frame [frames] [m].
-        slide: limb -> how far its contact moves in a stance at most [m].
-        penetration: how far a foot or a hand is below the ground at most [m].
-        position, velocity, acceleration: how many numbers are beyond their limits.
-        jumps: at how many frames a joint turns by more than its limit of velocity allows from frame to frame.
+        figures: of :func:`~wbc.retarget.motion_figures`.
     """
 
     points: dict[str, Array]
-    slide: dict[str, float]
-    penetration: float
-    position: int
-    velocity: int
-    acceleration: int
-    jumps: int
+    figures: dict[str, Any]
 
     @property
     def mean(self) -> float:
@@ -62,13 +52,13 @@ class MotionErrors:
         return float(np.mean([values.mean() for values in self.points.values()]))
 
     def __str__(self) -> str:
-        worst = max(self.points, key=lambda name: float(self.points[name].max()))
+        worst, figures = max(self.points, key=lambda name: float(self.points[name].max())), self.figures
+        beyond = ", ".join(f"{what} {figures[f'{what}_breaches']}" for what in ("position", "velocity", "acceleration"))
         return (
             f"key points {1e3 * self.mean:.1f} mm in the mean, "
-            f"{worst} {1e3 * self.points[worst].max():.0f} mm at most; "
-            f"slide {1e3 * max(self.slide.values(), default=0.0):.3f} mm, penetration {1e3 * self.penetration:.3f} mm; "
-            f"beyond limits: position {self.position}, velocity {self.velocity}, acceleration {self.acceleration}; "
-            f"jumps {self.jumps}"
+            f"{worst} {1e3 * self.points[worst].max():.0f} mm at most; slide {1e3 * figures['slide']:.3f} mm, "
+            f"penetration {1e3 * figures.get('penetration', 0.0):.3f} mm; frames beyond limits: {beyond}; "
+            f"jumps {figures['jumps']}"
         )
 
 
@@ -101,21 +91,35 @@ class Retargeted:
     every: int
     all_q: Array
 
-    @property
-    def v(self) -> Array:
-        """Velocities from frame to frame [frames - 1, nv]."""
-        return rates(self.robot, self.q, 1.0 / self.rate)
-
     @cached_property
     def errors(self) -> MotionErrors:
         """See :class:`MotionErrors`."""
-        return measured(self)
+        limbs = {limb: self.body.limbs[limb] for limb in self.stance}
+        figures = motion_figures(
+            self.robot, self.rate, self.q, {limbs[limb].end: stands for limb, stands in self.stance.items()},
+            ground=None if self.robot.base == "fixed" else 0.0,
+            balls={limb.end for limb in limbs.values() if limb.radius > 0.0},
+        )  # fmt: skip
+        return MotionErrors(self._far(), figures)
 
-
-def rates(robot: Robot, q: Array, dt: float) -> Array:
-    """Velocities that lead from each configuration to the next one [frames - 1, nv]."""
-    pairs = itertools.pairwise(q)
-    return np.array([pin.difference(robot.model, a, b) for a, b in pairs]).reshape(-1, robot.nv) / dt
+    def _far(self) -> dict[str, Array]:
+        """Distances of key points from their targets at the frames [m]."""
+        body, plan = self.body, self.plan
+        targets: dict[str, tuple[str, Array]] = {}
+        if self.robot.base != "fixed":
+            targets["pelvis"] = (body.pelvis, plan.pelvis)
+        for name, limb in plan.limbs.items():
+            own = body.limbs[name]
+            if body.plan.upright and own.middle:
+                targets[f"{name} middle"] = (own.middle, limb.middle)
+            if own.wrist and name.endswith("arm"):
+                targets[f"{name} wrist"] = (own.wrist, limb.wrist)
+            targets[name] = (own.end, limb.end)
+        _, positions = frame_poses(self.robot, tuple(frame for frame, _ in targets.values()), self.q)
+        return {
+            name: np.linalg.norm(positions[:, i] - target[:: self.every], axis=1)
+            for i, (name, (_, target)) in enumerate(targets.items())
+        }
 
 
 def frame_poses(robot: Robot, names: tuple[str, ...], q: Array) -> tuple[Array, Array]:
@@ -129,47 +133,3 @@ def frame_poses(robot: Robot, names: tuple[str, ...], q: Array) -> tuple[Array, 
             pose = pin.updateFramePlacement(model, data, number)
             rotations[k, i], positions[k, i] = pose.rotation, pose.translation
     return rotations, positions
-
-
-def measured(motion: Retargeted) -> MotionErrors:
-    """Measure a motion against its plan, the ground and the robot's limits."""
-    body, robot, plan, every = motion.body, motion.robot, motion.plan, motion.every
-    targets: dict[str, tuple[str, Array]] = {}
-    if robot.base != "fixed":
-        targets["pelvis"] = (body.pelvis, plan.pelvis)
-    for name, limb in plan.limbs.items():
-        own = body.limbs[name]
-        if body.plan.upright and own.middle:
-            targets[f"{name} middle"] = (own.middle, limb.middle)
-        if own.wrist and name.endswith("arm"):
-            targets[f"{name} wrist"] = (own.wrist, limb.wrist)
-        targets[name] = (own.end, limb.end)
-    rotations, positions = frame_poses(robot, tuple(frame for frame, _ in targets.values()), motion.q)
-    points = {
-        name: np.linalg.norm(positions[:, i] - target[::every], axis=1)
-        for i, (name, (_, target)) in enumerate(targets.items())
-    }
-    slide, lowest = {}, 0.0
-    names = list(targets)
-    for name in plan.limbs:
-        place = positions[:, names.index(name)]
-        runs = intervals(motion.stance[name])
-        slide[name] = max((float(np.linalg.norm(place[a:b] - place[a], axis=1).max()) for a, b in runs), default=0.0)
-        if robot.base != "fixed":
-            low = np.einsum("tij,kj->tki", rotations[:, names.index(name)], body.limbs[name].corners)[..., 2]
-            heights = (low + place[:, None, 2]).min(axis=1) - body.limbs[name].radius
-            lowest = min(lowest, float(heights.min()))
-    v = rates(robot, motion.all_q, plan.dt)
-    a = np.diff(v, axis=0) / plan.dt
-    limits, index = robot.limits, robot.position_index
-    known = index >= 0
-    turned = motion.q[:, index[known]]
-    low, high = limits.position_lower[known], limits.position_upper[known]
-    outside = (turned < low - ROUNDING) | (turned > high + ROUNDING)
-    fast = np.abs(v) > limits.velocity * (1.0 + ROUNDING)
-    far = np.abs(motion.v) > limits.velocity * (1.0 + ROUNDING)
-    return MotionErrors(
-        points=points, slide=slide, penetration=-lowest, position=int(outside.sum()), velocity=int(fast.sum()),
-        acceleration=int((np.abs(a) > limits.acceleration * (1.0 + ROUNDING) + ROUNDING).sum()),
-        jumps=int(far.any(axis=1).sum()),
-    )  # fmt: skip

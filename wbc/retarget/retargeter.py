@@ -114,7 +114,7 @@ class Retargeter:
         all_q, gave = engine.run(plan)
         offsets = _offsets(engine.robot, self.body, plan, all_q)
         landed = _landed(engine.robot, plan, offsets)
-        given_up = (*_gave_way(gave, dt), *_not_served(plan, offsets, landed, marks, clip.rate))
+        given_up = (*_gave_way(gave, dt), *_not_served(plan, offsets, landed))
         return Retargeted(
             robot=engine.robot, rate=rate, time=times[::every], q=all_q[::every],
             stance={name: marks_[::every] for name, marks_ in landed.items()},
@@ -192,14 +192,19 @@ def _check(clip: Clip, skeleton: Skeleton | None) -> None:
 
 
 def _offsets(robot: Robot, body: RobotBody, plan: MotionPlan, q: Array) -> dict[str, tuple[Array, Array]]:
-    """Limb -> distances of its contact, and of its wrist or its contact, from their targets [ticks] [m]."""
+    """Limb -> distances of its contact, a sole's at the corner that is farthest off, and of its wrist or its contact,
+    from their targets [ticks] [m].
+    """
     frames = {name: (body.limbs[name].end, body.limbs[name].wrist) for name in plan.limbs}
     names = tuple(dict.fromkeys(frame for pair in frames.values() for frame in pair if frame))
-    _, positions = frame_poses(robot, names, q)
+    rotations, positions = frame_poses(robot, names, q)
     out = {}
     for name, (end, wrist) in frames.items():
-        limb = plan.limbs[name]
-        own = np.linalg.norm(positions[:, names.index(end)] - limb.end, axis=1)
+        limb, k = plan.limbs[name], names.index(end)
+        away = (positions[:, k] - limb.end)[:, None]
+        if limb.rotation is not None and body.limbs[name].contact == "flat":
+            away = away + body.limbs[name].corners @ np.swapaxes(rotations[:, k] - limb.rotation, 1, 2)
+        own = np.linalg.norm(away, axis=2).max(axis=1)
         hand = wrist and name.endswith("arm") and body.plan.upright
         out[name] = own, np.linalg.norm(positions[:, names.index(wrist)] - limb.wrist, axis=1) if hand else own
     return out
@@ -237,19 +242,14 @@ def _not_served(
     plan: MotionPlan,
     offsets: dict[str, tuple[Array, Array]],
     landed: dict[str, Marks],
-    marks: dict[str, Marks],
-    rate: float,
 ) -> list[GivenUp]:
     """Contacts that come late or are not held, and limbs far from their targets."""
     dt, out = plan.dt, list[GivenUp]()
-    frame = np.rint(np.arange(plan.ticks) * dt * rate).astype(int)
     for name, limb in plan.limbs.items():
         for a, b in intervals(limb.stands):
             late = int(np.argmax(landed[name][a:b])) if landed[name][a:b].any() else b - a
             if late * dt > LATE:
                 out.append(GivenUp(name, a * dt, (a + late) * dt, "comes to stand later than the skeleton"))
-        toes = marks[name][np.clip(frame, 0, len(marks[name]) - 1)] & ~limb.stands
-        out += [GivenUp(name, a * dt, b * dt, "stands on its toes or heel: not held") for a, b in _joined(toes, dt)]
         for a, b in _joined(offsets[name][1] > FAR, dt):
             if (b - a) * dt > LONG:
                 out.append(GivenUp(name, a * dt, b * dt, f"is more than {FAR} m from its target: out of reach"))

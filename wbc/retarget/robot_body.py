@@ -13,6 +13,8 @@ from wbc.retarget.clip import Array
 from wbc.retarget.solids import LinkBalls, balls_of_joints
 from wbc.robot import Robot
 
+#: Balls no farther from each other are at one place [m]: descriptions are rounded to less
+SAME_PLACE = 1e-4
 #: Cosine of the angle by which right and left may be off a coordinate axis: rest poses of robots are not symmetric
 STRAIGHT = 0.9
 #: Angles to which each joint is turned to see what it changes [rad]
@@ -39,6 +41,12 @@ LONGEST = 0.6
 TIP = 0.02
 #: Length of a last link of which nothing is known, as share of the bone before it
 HAND = 0.25
+#: A point foot's ball is no larger than this many times that of its collision body [1]
+BALL = 1.4
+#: Corners of the hull of a limb's end, at most
+CORNERS = 96
+#: Fewer do where they are within this of it [m]
+EXACT = 1e-5
 #: Where a sole begins and ends before the ankle and beside it, of which no body is known [m]
 GUESSED_SOLE = ((-0.04, 0.10), (-0.03, 0.03))
 
@@ -61,6 +69,7 @@ class RobotLimb:
         places: base, middle, wrist, end [4, 3].
         contact: flat or point. radius: of the ball; 0 of a flat foot [m].
         corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
+        surface: corners of the hull of what the end is made of, in the contact frame [corners, 3] [m].
         guessed: the description says nothing of the foot's or hand's size.
     """
 
@@ -73,6 +82,7 @@ class RobotLimb:
     contact: Contact
     radius: float
     corners: Array
+    surface: Array
     guessed: bool
 
     @property
@@ -93,7 +103,7 @@ class RobotBody:
         places: of the two at rest [2, 3]. waist: where the axes between them meet; None where one link is both.
         head: frame of the head, with the body's axes at rest; "" without a neck.
         height: of the pelvis above the ground where the robot stands as at rest [m].
-        balls: what each limb's end is made of, by the limb's name, in the frame of its last joint.
+        balls: what links are made of, by the number of the joint that carries them, in its frame.
     """
 
     robot: Robot
@@ -105,7 +115,7 @@ class RobotBody:
     waist: Array | None
     head: str
     height: float
-    balls: dict[str, LinkBalls]
+    balls: dict[int, LinkBalls]
 
     @property
     def axes(self) -> Array:
@@ -113,8 +123,12 @@ class RobotBody:
         return self.plan.axes
 
 
-def joint_tree(robot: Robot) -> tuple[PointTree, pin.Data]:
-    """Joints at ``robot.neutral``, with one more point at the end of each last link."""
+def joint_tree(robot: Robot, balls: dict[int, LinkBalls] | None = None) -> tuple[PointTree, pin.Data]:
+    """Joints at ``robot.neutral``, with one more point at the end of each last link.
+
+    Args:
+        balls: of :func:`~wbc.retarget.solids.balls_of_joints`; None: looked for here.
+    """
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, robot.neutral)
     pin.updateFramePlacements(model, data)
@@ -125,7 +139,7 @@ def joint_tree(robot: Robot) -> tuple[PointTree, pin.Data]:
     if robot.base != "fixed":
         # The world is no part of a body that moves in it
         points[0] = points[1].copy()
-    carried = balls_of_joints(robot, [j for j in range(1, model.njoints) if j not in parents])
+    carried = balls_of_joints(robot) if balls is None else balls
     for joint in range(1, model.njoints):
         if joint not in parents[: model.njoints]:
             names.append(f"{names[joint]} end")
@@ -144,7 +158,7 @@ def _tip(robot: Robot, data: pin.Data, joint: int, parents: list[int], balls: Li
     if float(np.linalg.norm(back)) < 1e-9 and before > 0:
         back = here - np.array(data.oMi[int(parents[before])].translation)
     if balls is not None:
-        candidates.append(own.act(balls.centers.mean(axis=0)))
+        candidates.append(own.act(balls.middle))
     most = max(LONGEST * _chain_length(data, parents, joint), 0.05)
     candidates = [point for point in candidates if float(np.linalg.norm(point - here)) < most]
     far = max(candidates, key=lambda point: float(np.linalg.norm(point - here)), default=here)
@@ -166,7 +180,8 @@ def body_of(robot: Robot) -> RobotBody:
     Raises:
         BodyError: it has no pair of limbs.
     """
-    tree, data = joint_tree(robot)
+    balls = balls_of_joints(robot)
+    tree, data = joint_tree(robot, balls)
     fixed = robot.base == "fixed"
     plan = find_body(tree, field="robot", arms=fixed, straight=STRAIGHT)
     if robot.base not in ("fixed", "floating"):
@@ -175,15 +190,13 @@ def body_of(robot: Robot) -> RobotBody:
     if not fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
     count = robot.model.njoints
-    leaves = {name: chain[-2] if chain[-1] >= count else chain[-1] for name, chain in plan.limbs.items()}
-    balls = balls_of_joints(robot, set(leaves.values()))
     limbs: dict[str, RobotLimb] = {}
     new = robot
     for name in plan.limbs:
         limb, placed = _limb(name, robot, data, plan, balls)
         limbs[name] = limb
         for frame, (joint, placement) in placed.items():
-            new = _with_frame(new, frame, joint, placement)
+            new = with_frame(new, frame, joint, placement)
     kinds = ("leg", "arm") if not fixed else ("arm", "arm")
     pelvis = _middle(limbs, kinds[0])
     chest = _middle(limbs, kinds[1]) if f"left_{kinds[1]}" in limbs else pelvis
@@ -191,7 +204,7 @@ def body_of(robot: Robot) -> RobotBody:
     if plan.head and plan.upright:
         carriers["head"] = (max(joint for joint in plan.head if joint < count), tree.points[plan.head[0]])
     for name, (joint, place) in carriers.items():
-        new = _with_frame(new, f"retarget_{name}", joint, data.oMi[joint].actInv(pin.SE3(plan.axes, place)))
+        new = with_frame(new, f"retarget_{name}", joint, data.oMi[joint].actInv(pin.SE3(plan.axes, place)))
     waist = None
     if plan.chest != plan.pelvis:
         between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < count]
@@ -205,11 +218,11 @@ def body_of(robot: Robot) -> RobotBody:
         robot=new, plan=plan, limbs=limbs, pelvis="retarget_pelvis", chest="retarget_chest",
         places=np.array([pelvis, chest]), waist=waist, head="retarget_head" if "head" in carriers else "",
         height=float(pelvis @ up) - lowest,
-        balls={name: balls[limb.joints[-1]] for name, limb in limbs.items() if limb.joints[-1] in balls},
+        balls=balls,
     )  # fmt: skip
 
 
-def _with_frame(robot: Robot, name: str, joint: int, placement: pin.SE3) -> Robot:
+def with_frame(robot: Robot, name: str, joint: int, placement: pin.SE3) -> Robot:
     """The robot with a frame at a placement in a joint's own; names of joints may be those of links elsewhere."""
     if joint == 0:
         return robot.with_frame(name, "world", placement)
@@ -262,13 +275,24 @@ def _limb(
     wrist = _wrist(robot, data, joints, middle, tip)
     ankle = points[wrist] if wrist else tip
     own = balls.get(joints[-1])
-    if own is not None and float(np.linalg.norm(own.centers.mean(axis=0))) > size:
+    if own is not None and float(np.linalg.norm(own.middle)) > size:
         own = None
     end, contact, radius, corners, guessed = _end(data.oMi[joints[-1]], own, plan.axes, ankle, tip, size, foot=foot)
+    around = (
+        LinkBalls(corners, np.full(len(corners), radius))
+        if own is None
+        else own.moved(end.actInv(data.oMi[joints[-1]]))
+    )
+    surface = around.corners(CORNERS, EXACT)
+    if foot and contact == "point" and radius > 0.0:
+        # Its ball covers what is drawn of the foot, beyond the ball's middle as seen from the knee
+        far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
+        radius = float(np.clip(np.linalg.norm(far, axis=1).max(initial=radius), radius, BALL * radius))
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
     limb = RobotLimb(
         joints=joints, base=base, middle=f"{frame}_middle", wrist=f"{frame}_wrist" if wrist else "", end=frame,
-        places=places, contact=contact, radius=radius, corners=corners, guessed=guessed,
+        places=places, contact=contact, radius=radius, corners=corners, surface=surface,
+        guessed=guessed,
     )  # fmt: skip
     placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
     if wrist:
@@ -325,17 +349,23 @@ def _end(
         lower, upper = (sole - round_).min(axis=0) - place[:2], (sole + round_).max(axis=0) - place[:2]
         corners = np.array([[x, y, 0.0] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])])
         return pin.SE3(axes, axes @ place), "flat", 0.0, corners, False
-    center, radius = _ball(centers, balls.radii, tip, foot)
+    if not foot:
+        # A hand is a ball as wide as it is, neither as long nor as thick
+        middle = LinkBalls(local, balls.radii).middle
+        half = (np.abs(local - middle) + balls.radii[:, None]).max(axis=0)
+        return pin.SE3(axes, axes @ middle), "point", float(np.median(half)), np.zeros((1, 3)), False
+    center, radius = _ball(centers, balls.radii, tip)
     return pin.SE3(axes, center), "point", radius, np.zeros((1, 3)), False
 
 
-def _ball(centers: Array, radii: Array, tip: Array, foot: bool) -> tuple[Array, float]:
-    """Centre and radius of the ball at the end of a limb: that of a point foot, or one around a hand."""
-    if not foot:
-        middle = centers.mean(axis=0)
-        return middle, float(np.quantile(np.linalg.norm(centers - middle, axis=1) + radii, 0.5))
-    nearest = int(np.argmin(np.linalg.norm(centers - tip, axis=1)))
-    if radii[nearest] > 0.0:
+def _ball(centers: Array, radii: Array, tip: Array) -> tuple[Array, float]:
+    """Centre and radius of the ball at the end of a point foot."""
+    if (radii > 0.0).any():
+        balls = np.flatnonzero(radii > 0.0)
+        away = np.linalg.norm(centers[balls] - tip, axis=1)
+        # Of several at one place, as of a shin that ends in a foot, the largest
+        nearest = balls[away < away.min() + SAME_PLACE]
+        nearest = nearest[int(np.argmax(radii[nearest]))]
         return centers[nearest], float(radii[nearest])
     # Corners of a mesh: the ball through those near the tip
     near = centers[np.linalg.norm(centers - tip, axis=1) < max(0.03, 1.5 * np.linalg.norm(centers - tip, axis=1).min())]

@@ -1,32 +1,33 @@
-"""What a link touches the ground with: balls and corners of its collision bodies."""
+"""What links touch the ground with: balls and corners of their collision bodies, and of what is drawn of them."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from wbc.errors import WbcError
-from wbc.multibody import pin
+from wbc.multibody import pin, to_pin
 from wbc.retarget.clip import Array
 from wbc.robot import Robot
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid, bodies_of
-from wbc.robot.geometry.meshes import Mesh, hull_mesh
+from wbc.robot.geometry.meshes import Mesh
 from wbc.shapes import Capsule, Sphere
+from wbc.track.scene import link_meshes
 
 log = logging.getLogger("wbc")
 
 #: Corners about the rim of a cylinder
 RIM = 16
-#: So many corners are kept as they are, of more only those of their hull
-FEW_CORNERS = 32
+#: Directions in which hulls are compared [1]
+DIRECTIONS = 600
 
 
 @dataclass(frozen=True)
 class LinkBalls:
-    """LinkBalls whose hull is what a link touches with; corners of meshes have the radius 0.
+    """Balls whose hull is what a link touches with; corners of meshes have the radius 0.
 
     Attributes:
         centers: in the frame of the joint that carries them [balls, 3] [m]. radii: [balls] [m].
@@ -40,17 +41,44 @@ class LinkBalls:
         heights = self.centers @ np.asarray(pose.rotation)[2] + float(pose.translation[2]) - self.radii
         return float(heights.min())
 
+    @property
+    def middle(self) -> Array:
+        """Of the box around them."""
+        return np.asarray(
+            0.5 * ((self.centers - self.radii[:, None]).min(axis=0) + (self.centers + self.radii[:, None]).max(axis=0))
+        )
 
-def balls_of_joints(robot: Robot, joints: Collection[int]) -> dict[int, LinkBalls]:
-    """LinkBalls by number of the joint that carries them, of the links' shapes and of collision bodies in the file."""
+    def moved(self, placement: pin.SE3) -> LinkBalls:
+        """The same in another frame, in which this one is placed so."""
+        return LinkBalls(self.centers @ np.asarray(placement.rotation).T + placement.translation, self.radii)
+
+    def corners(self, count: int, exact: float) -> Array:
+        """At most ``count`` points whose hull is that of the balls; fewer where they are within ``exact`` of it [m]."""
+        # Evenly over the sphere: along a spiral by the golden angle
+        rank = np.arange(DIRECTIONS) + 0.5
+        z, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (3.0 - np.sqrt(5.0)) * rank
+        across = np.sqrt(1.0 - z * z)
+        ways = np.stack([across * np.cos(turn), across * np.sin(turn), z])
+        reach = self.centers @ ways + self.radii[:, None]
+        far = reach.argmax(axis=0)
+        points = self.centers[far] + ways.T * self.radii[far, None]
+        own, lacking = points @ ways, np.full(DIRECTIONS, np.inf)
+        chosen: list[int] = []
+        while len(chosen) < count and float(lacking.max()) > exact:
+            chosen.append(int(np.argmax(lacking)))
+            lacking = reach.max(axis=0) - own[chosen].max(axis=0)
+        return np.asarray(np.unique(points[chosen], axis=0))
+
+
+def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
+    """Balls of links' shapes, collision bodies and what is drawn, by number of the joint that carries them."""
     model = robot.model
     frames = {str(frame.name): frame for frame in model.frames}
-    links = {name for name, frame in frames.items() if int(frame.parentJoint) in joints}
     found: dict[int, list[tuple[Array, Array]]] = {}
 
     def add(link: str, placement: pin.SE3, centers: Array, radii: Array) -> None:
         frame = frames.get(link)
-        if frame is not None and int(frame.parentJoint) in joints and len(centers):
+        if frame is not None and int(frame.parentJoint) > 0 and len(centers):
             pose = np.asarray((frame.placement * placement).homogeneous)
             found.setdefault(int(frame.parentJoint), []).append((centers @ pose[:3, :3].T + pose[:3, 3], radii))
 
@@ -64,28 +92,42 @@ def balls_of_joints(robot: Robot, joints: Collection[int]) -> dict[int, LinkBall
     except WbcError:
         bodies = []
     for body in bodies:
-        if body.link not in links or (robot.shapes.get(body.link) and not body.mesh):
+        if robot.shapes.get(body.link) and not body.mesh:
             continue
         try:
             centers, radii = _balls(body.read())
         except WbcError as error:
             log.info("%s", error)
             continue
-        add(body.link, body.placement, centers, radii)
+        add(body.link, to_pin(body.placement), centers, radii)
+    for link, corners in surface_points(robot).items():
+        add(link, pin.SE3.Identity(), corners, np.zeros(len(corners)))
     return {
         joint: _hull(np.concatenate([centers for centers, _ in parts]), np.concatenate([radii for _, radii in parts]))
         for joint, parts in found.items()
     }
 
 
+def surface_points(robot: Robot) -> dict[str, Array]:
+    """Corners of the convex hulls of what is drawn of links, in their frames: no other point is ever lowest [m]."""
+    corners: dict[str, list[Array]] = {}
+    for link, triangles in link_meshes(robot):
+        corners.setdefault(link, []).append(triangles.reshape(-1, 3))
+    return {link: _hull_corners(np.unique(np.concatenate(parts), axis=0)) for link, parts in corners.items()}
+
+
+def _hull_corners(points: Array) -> Array:
+    try:
+        return np.asarray(points[ConvexHull(points).vertices] if len(points) > 4 else points)
+    except QhullError:
+        return points
+
+
 def _hull(centers: Array, radii: Array) -> LinkBalls:
     """The same hull of fewer balls."""
-    corners = np.flatnonzero(radii == 0.0)
-    if len(corners) <= FEW_CORNERS:
-        return LinkBalls(centers, radii)
-    outer = np.unique(hull_mesh(centers[corners]).triangles)
-    kept = np.append(corners[outer] if len(outer) else corners, np.flatnonzero(radii > 0.0))
-    return LinkBalls(centers[kept], radii[kept])
+    corners = _hull_corners(np.unique(centers[radii == 0.0], axis=0))
+    round_ = radii > 0.0
+    return LinkBalls(np.concatenate([corners, centers[round_]]), np.append(np.zeros(len(corners)), radii[round_]))
 
 
 def _balls(body: Raw) -> tuple[Array, Array]:

@@ -11,13 +11,13 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import BoundsError, RangeError, ShapeError, UnsupportedJointError
-from wbc.multibody import pin
+from wbc.multibody import algebra, pin
 from wbc.robot.frames import make_frames_unique
 from wbc.robot.limits import Limits
 from wbc.robot.loops import AnyLoop, JointCurve, LoopError
 from wbc.robot.rebuilt import without_joints
 from wbc.robot.recipe import Recipe, expand
-from wbc.robot.robot import Coupling, Robot
+from wbc.robot.robot import Coupling, Robot, changed
 from wbc.robot.sources.description import Description, Mimic, finite_or_unlimited
 from wbc.symbolic.joints import symbolic_joint
 from wbc.validation import Array
@@ -175,7 +175,7 @@ def _with_accelerations(robot: Robot, values: Mapping[str, float], source: str) 
         if len(known) < len(robot.joint_names):
             note += "; none known for the other joints: unlimited"
         robot = robot.with_limits(acceleration=known)
-    return replace(robot, notes={**robot.notes, "acceleration": note})
+    return changed(robot, notes={**robot.notes, "acceleration": note})
 
 
 def resolve_mimics(mimics: tuple[Mimic, ...], model: pin.Model) -> tuple[tuple[Mimic, ...], dict[str, float]]:
@@ -226,7 +226,7 @@ def neutral_configuration(
     for name, number in recipe.neutral.items():
         validation.one_of("neutral", name, _moving(model))
         values[name] = validation.real_array(f"neutral[{name!r}]", number).reshape(-1)
-    q = with_values(model, pin.neutral(model), values)
+    q = with_values(model, algebra(model).neutral(model), values)
     lower, upper = _ranges(model, mimics)
     moved = []
     for j in range(1, model.njoints):
@@ -289,7 +289,7 @@ def with_values(model: pin.Model, q: Array, values: Mapping[str, Array]) -> Arra
         if len(value) != nq:
             raise ShapeError(f"neutral[{name!r}]", value, f"expected {nq} numbers")
         out[start : start + nq] = value
-    return np.asarray(pin.normalize(model, out), dtype=np.float64)
+    return np.asarray(algebra(model).normalize(model, out), dtype=np.float64)
 
 
 def _locked(
@@ -332,7 +332,7 @@ def _reduced(model: pin.Model, q: Array, locked: list[str]) -> tuple[pin.Model, 
     """(model without the locked joints, its part of q, frames renamed to make their names unique)."""
     start = {str(model.names[j]): int(model.idx_qs[j]) for j in range(1, model.njoints)}
     indices = [model.getJointId(name) for name in locked]
-    reduced = without_joints(model, indices, q) if locked else pin.Model(model)
+    reduced = without_joints(model, indices, q) if locked else algebra(model).Model(model)
     renamed = make_frames_unique(reduced)
     parts = []
     for j in range(1, reduced.njoints):
@@ -415,9 +415,9 @@ def override_limits(robot: Robot, changes: Mapping[str, Any]) -> Robot:
     given = {key: value for key, value in changes.items() if value is not None}
     if not given:
         return robot
-    changed = robot.with_limits(**given)
-    notes = dict(changed.notes)
+    limited = robot.with_limits(**given)
+    notes = dict(limited.notes)
     for key in given:
         words = key.split("_")[0]
         notes[words] = f"{key} given by the caller" if words == "position" else "given by the caller"
-    return replace(changed, notes=notes)
+    return changed(limited, notes=notes)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError
 from wbc.multibody import pin
 from wbc.robot.pairs.collision_pairs import find_self_pairs
-from wbc.robot.robot import Robot, checked_robot
+from wbc.robot.robot import Robot, changed, checked_robot
 from wbc.shapes import PlacedShape, Solid
 from wbc.symbolic.kinematics import WORLD, frame_index
 
@@ -51,23 +50,26 @@ def carry(
     if name in robot.frame_names:
         raise DuplicateNameError("name", name, "a frame of this name exists")
     placed = PlacedShape(shape, pin.SE3.Identity())
-    own = _inertia(shape, mass) if inertia is None else validation.instance("inertia", inertia, pin.Inertia, "inertia")
+    weighs = (
+        _inertia(shape, mass) if inertia is None else validation.instance("inertia", inertia, pin.Inertia, "inertia")
+    )
     out = robot.with_frame(name, frame, placement)
-    index = frame_index(out.model, name)
-    joint, local = int(out.model.frames[index].parentJoint), out.model.frames[index].placement
-    out.model.appendBodyToJoint(joint, own, local)
-    shaped = out.with_shapes({**robot.shapes, name: (placed,)})
+    model = pin.Model(out.model)
+    at = model.frames[frame_index(model, name)]
+    joint = int(at.parentJoint)
+    model.appendBodyToJoint(joint, weighs, at.placement)
+    shaped = changed(out, model=model).with_shapes({**robot.shapes, name: (placed,)})
     if robot.self_pairs is None:
         return shaped
     found = find_self_pairs(shaped, samples=0).kept
     fixed = {link for link in shaped.shapes if frame_joint(shaped, link) == joint}
     new = [pair for pair in found if name in pair and not set(pair) <= fixed]
-    return replace(shaped, self_pairs=(*robot.self_pairs, *new))
+    return changed(shaped, self_pairs=(*robot.self_pairs, *new))
 
 
 def frame_joint(robot: Robot, frame: str) -> int:
     """The joint that moves a frame; 0: none."""
-    return int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
+    return int(robot.tree.frames[frame_index(robot.tree, frame)].parentJoint)
 
 
 def _inertia(shape: Solid, mass: float) -> pin.Inertia:

@@ -7,29 +7,24 @@ import os
 import pathlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError
-from wbc.multibody import pin
+from wbc.multibody import algebra, is_model
 from wbc.robot.assembly import assemble, override_limits
-from wbc.robot.geometry.link_shapes import description_shapes, fit_shapes
-from wbc.robot.pairs.collision_pairs import find_self_pairs
-from wbc.robot.pairs.link_pairs import shaped_links
-from wbc.robot.pairs.pairs_file import read_self_pairs
 from wbc.robot.recipe import Recipe
-from wbc.robot.robot import Robot
+from wbc.robot.robot import Robot, changed
 from wbc.robot.sources.description import Description, with_base
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder, read_xml
-from wbc.robot.sources.mjmodel import compiled, is_mjmodel, read_mjmodel
-from wbc.robot.sources.sdf import read_sdf
-from wbc.robot.sources.srdf import Srdf, read_srdf
+from wbc.robot.sources.kinds import USD, XACRO, is_mjmodel
 from wbc.robot.sources.urdf import read_urdf
-from wbc.robot.sources.usd import SUFFIXES, converted
-from wbc.robot.sources.xacro import SUFFIX, expanded
+
+if TYPE_CHECKING:
+    from wbc.robot.sources.srdf import Srdf
 
 log = logging.getLogger("wbc")
 
@@ -47,28 +42,46 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
         RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
     """
     if is_mjmodel(source):
+        # Imported here, as the other readers: a robot needs one of them
+        from wbc.robot.sources.mjmodel import read_mjmodel
+
         return read_mjmodel(source, base)
-    if isinstance(source, pin.Model):
-        model, kind = with_base(pin.Model(source), base)
+    if is_model(source):
+        model, kind = with_base(algebra(source).Model(source), base)
         return Description(model, kind)
     if isinstance(source, (str, os.PathLike)):
         path = pathlib.Path(source)
-        if path.suffix.lower() in (SUFFIX, *SUFFIXES) and path.is_file():
-            if recipe.arguments and path.suffix.lower() != SUFFIX:
-                raise RobotFileError("arguments", dict(recipe.arguments), "only xacro files take arguments")
-            path = expanded(path, recipe.arguments) if path.suffix.lower() == SUFFIX else converted(path)
+        if path.suffix.lower() in (XACRO, *USD) and path.is_file():
+            path = _as_read(path, recipe)
         _, tree = read_xml(path)
         if tree.tag == "robot":
             return read_urdf(path, tree, base, recipe.mimic_leaders)
         if tree.tag == "mujoco":
+            from wbc.robot.sources.mjmodel import compiled, read_mjmodel
+
             return read_mjmodel(compiled(path), base, str(path))
         if tree.tag == "sdf":
+            from wbc.robot.sources.sdf import read_sdf
+
             return read_sdf(path, tree, base)
         raise RobotFileError("robot", str(path), f"neither URDF, SDF nor MJCF: the root element is <{tree.tag}>")
     if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
         return read_dh(source, base)
     expected = "expected a name, a path, a pin.Model, a mujoco.MjModel or a sequence of DHRow"
     raise ShapeError("robot", source, expected)
+
+
+def _as_read(path: pathlib.Path, recipe: Recipe) -> pathlib.Path:
+    """The URDF or SDF file, in the cache, that a xacro or USD file is made into."""
+    if path.suffix.lower() == XACRO:
+        from wbc.robot.sources.xacro import expanded
+
+        return expanded(path, recipe.arguments)
+    if recipe.arguments:
+        raise RobotFileError("arguments", dict(recipe.arguments), "only xacro files take arguments")
+    from wbc.robot.sources.usd import converted
+
+    return converted(path)
 
 
 def build(
@@ -98,6 +111,8 @@ def finish(
     """The robot of a description: states, joints, limits, shapes."""
     states, geometry = dict(description.states), description.geometry
     if recipe.srdf:
+        from wbc.robot.sources.srdf import read_srdf
+
         srdf = read_srdf(example_data_folder() / recipe.srdf)
         description = _with_rotors(description, srdf)
         states |= srdf.states() if recipe.state else {}
@@ -106,11 +121,13 @@ def finish(
     robot = override_limits(assemble(description, recipe, states), limits)
     if shapes == "none" or not (robot.source or recipe.shapes or geometry is not None):
         return robot
+    if shapes == "auto" and recipe.shapes:
+        return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
+    from wbc.robot.geometry.link_shapes import description_shapes, fit_shapes
+
     if shapes in _FITTED:
         fitted = fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs, geometry=geometry)
         return _with_pairs(fitted, recipe)
-    if shapes == "auto" and recipe.shapes:
-        return _with_pairs(_table_shapes(robot, recipe), recipe, recipe.pairs)
     described = description_shapes(robot, package_dirs, exact=shapes == "exact", geometry=geometry)
     return _with_pairs(described, recipe)
 
@@ -123,7 +140,7 @@ def _with_rotors(description: Description, srdf: Srdf) -> Description:
     Raises:
         RobotFileError: a bad rotor, or one of a joint with several degrees of freedom.
     """
-    model, notes, rotors = pin.Model(description.model), dict(description.notes), srdf.rotors()
+    model, notes, rotors = algebra(description.model).Model(description.model), dict(description.notes), srdf.rotors()
     here = [name for name in rotors if model.existJointName(name)]
     several = [name for name in here if model.nvs[model.getJointId(name)] != 1]
     if several:
@@ -154,13 +171,16 @@ def _table_shapes(robot: Robot, recipe: Recipe) -> Robot:
         shapes.setdefault(shape.link, []).append(shape.placed())
     largest = max(shape.excess for shape in recipe.shapes)
     note = f"{len(recipe.shapes)} shapes on {len(shapes)} links from the table, largest excess {largest:.4g} m"
-    return replace(robot.with_shapes(shapes), notes={**robot.notes, "shapes": note})
+    return changed(robot.with_shapes(shapes), notes={**robot.notes, "shapes": note})
 
 
 def _with_pairs(robot: Robot, recipe: Recipe, file: str = "") -> Robot:
     """The robot with the pairs of links that must not touch: from a file, else what is known without sampling."""
-    if len(shaped_links(robot)) < 2:
+    if sum(map(bool, robot.shapes.values())) < 2:
         return robot
+    from wbc.robot.pairs.collision_pairs import find_self_pairs
+    from wbc.robot.pairs.pairs_file import read_self_pairs
+
     if file:
         found = read_self_pairs(file, robot)
     else:
@@ -170,14 +190,14 @@ def _with_pairs(robot: Robot, recipe: Recipe, file: str = "") -> Robot:
     touching = [" and ".join(pair.links) for pair in found.pairs if pair.reason == "neutral"]
     if touching:
         note += f"; not watched, as they touch in the neutral configuration: {', '.join(touching)}"
-    return replace(robot.with_self_pairs(found.kept), notes={**robot.notes, "self_pairs": note})
+    return changed(robot.with_self_pairs(found.kept), notes={**robot.notes, "self_pairs": note})
 
 
 def looks_like_path(text: str) -> bool:
     """Whether a string that is no known robot name is meant as a path."""
     path = pathlib.Path(text)
     return (
-        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".sdf", SUFFIX, *SUFFIXES)
+        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".sdf", XACRO, *USD)
         or len(path.parts) > 1
         or validation.exists("robot", text)
     )

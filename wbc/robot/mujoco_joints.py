@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError, UnsupportedJointError
-from wbc.multibody import pin
+from wbc.multibody import pin, to_pin
 from wbc.robot.robot import Robot, checked_robot
-from wbc.robot.sources.mjmodel import is_mjmodel
+from wbc.robot.sources.kinds import is_mjmodel
 from wbc.robot.sources.mjnames import SIZES, MjNames, names_of, pose_of
 from wbc.rotations import TO_MUJOCO, TO_PINOCCHIO
 from wbc.validation import Array
@@ -65,9 +65,11 @@ class MujocoJoints:
         # Numbers that are copied, all at once; then what differs
         plain = [(at, start, nq) for at, _, start, _, nq, _ in self._places if nq != 2]
         self._from_qpos, self._to_q = (_spans([(one[k], one[2]) for one in plain]) for k in (0, 1))
+        for start, nq in ((start, nq) for _, start, nq in plain if nq in (4, 7)):
+            row = int(np.flatnonzero(self._to_q == start + nq - 4)[0])
+            self._from_qpos[row : row + 4] = self._from_qpos[row : row + 4][TO_PINOCCHIO]
         pairs = [(dof, column, nv) for _, dof, _, column, _, nv in self._places]
         self._from_qvel, self._to_v = (_spans([(one[k], one[2]) for one in pairs]) for k in (0, 1))
-        self._turned = [start + nq - 4 for _, start, nq in plain if nq in (4, 7)]
         self._endless = [(at, start) for at, _, start, _, nq, _ in self._places if nq == 2]
         self._free = [(at, column) for at, _, _, column, nq, _ in self._places if nq == 7]
         self._compare(model, names)
@@ -104,7 +106,7 @@ class MujocoJoints:
             if b in moved or not pinocchio.existFrame(name, pin.FrameType.BODY):
                 continue
             index = pinocchio.getFrameId(name, pin.FrameType.BODY)
-            ours, theirs = where.oMf[index].copy(), pose_of(data.xpos[b], data.xquat[b])
+            ours, theirs = where.oMf[index].copy(), to_pin(pose_of(data.xpos[b], data.xquat[b]))
             first = first or (ours, theirs)
             gap = np.abs(pin.log6(first[0].actInv(ours).actInv(first[1].actInv(theirs))).vector).max()
             if gap > SAME_PLACE * max(1.0, float(np.linalg.norm(ours.translation))):
@@ -140,8 +142,6 @@ class MujocoJoints:
         """
         here, q = self._checked("qpos", qpos, 0), np.empty(self._robot.nq)
         q[self._to_q] = here[self._from_qpos]
-        for turn in self._turned:
-            q[turn : turn + 4] = q[turn : turn + 4][TO_PINOCCHIO]
         for at, start in self._endless:
             q[start : start + 2] = np.cos(here[at]), np.sin(here[at])
         return q

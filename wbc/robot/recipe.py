@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 
@@ -116,6 +116,6 @@ def segment_shape(a: Array, b: Array, radius: float, excess: float) -> PlacedSha
     span = b - a
     length = float(np.linalg.norm(span))
     if length == 0.0:
-        return PlacedShape(Sphere(radius), pin.SE3(np.eye(3), np.array(a, dtype=float)), excess)
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), span / length).matrix()
-    return PlacedShape(Capsule(radius, length), pin.SE3(turn, (a + b) / 2), excess)
+        return PlacedShape(Sphere(radius), own.SE3(np.eye(3), np.array(a, dtype=float)), excess)
+    turn = own.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), span / length).matrix()
+    return PlacedShape(Capsule(radius, length), own.SE3(turn, (a + b) / 2), excess)

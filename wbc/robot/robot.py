@@ -1,4 +1,4 @@
-"""The robot: a ``pin.Model`` with limits, named frames, link shapes and couplings. Immutable."""
+"""The robot: a model with limits, named frames, link shapes and couplings. Immutable."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from wbc import pickling, validation
-from wbc.errors import DuplicateNameError, RangeError, RotationError, ShapeError, UnsupportedJointError
-from wbc.multibody import pin
+from wbc.errors import DuplicateNameError, RangeError, RobotFileError, RotationError, ShapeError, UnsupportedJointError
+from wbc.multibody import CONVERTED, algebra, in_pinocchio, own, pin, to_pin
 from wbc.robot.dead_points import DeadPoint, DeadPointSearch
 from wbc.robot.limits import Limits
 from wbc.robot.loops import AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows
@@ -56,13 +56,15 @@ class Coupling:
     offset: float = 0.0
 
 
+@in_pinocchio("model")
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A robot model and what the description says about it.
 
     Attributes:
         name: short name, as ``wbc.robots.load`` takes it.
-        model: the Pinocchio model. Not to be changed; added frames are in it.
+        model: the model as Pinocchio's, which is imported when this is first read; where it is not installed, the
+            package's own. Not to be changed; added frames are in it.
         limits: see :class:`Limits`.
         base: ``fixed``, ``floating`` (free flyer), ``planar`` (x, y, yaw) or ``differential`` (planar,
             no sideways velocity).
@@ -104,7 +106,7 @@ class Robot:
             for dof in getattr(self, name):
                 if not 0 <= dof < self.nv:
                     raise RangeError(f"robot.{name}", dof, f"expected an index into v, 0 to {self.nv - 1}")
-        neutral = self.neutral if np.size(self.neutral) else pin.neutral(self.model)
+        neutral = self.neutral if np.size(self.neutral) else algebra(self.tree).neutral(self.tree)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
 
     def __repr__(self) -> str:
@@ -117,14 +119,26 @@ class Robot:
         pickling.restore(self, state, {f.name for f in fields(self)})
 
     @property
+    def tree(self) -> Any:
+        """The model as it was read or given: this package's own of a robot that was read, by which it is declared and
+        solved; not to be changed.
+        """
+        return vars(self)["model"]
+
+    def copied_tree(self) -> tuple[Any, Any]:
+        """(a model of its own with the same contents, the library whose model it is)."""
+        library = algebra(self.tree)
+        return library.Model(self.tree), library
+
+    @property
     def nq(self) -> int:
         """Numbers in a configuration."""
-        return int(self.model.nq)
+        return int(self.tree.nq)
 
     @property
     def nv(self) -> int:
         """Degrees of freedom (numbers in a velocity)."""
-        return int(self.model.nv)
+        return int(self.tree.nv)
 
     @property
     def base_nv(self) -> int:
@@ -152,26 +166,26 @@ class Robot:
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
         """Names of all frames, ``"world"`` first."""
-        seen = dict.fromkeys([WORLD] + [str(f.name) for f in self.model.frames])
+        seen = dict.fromkeys([WORLD] + [str(f.name) for f in self.tree.frames])
         return tuple(seen)
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the moving joints, the base joint included."""
-        return tuple(str(n) for n in list(self.model.names)[1:])
+        return tuple(str(n) for n in list(self.tree.names)[1:])
 
     @cached_property
     def dof_names(self) -> tuple[str, ...]:
         """One label a degree of freedom: the joint's name, with a suffix where a joint has several."""
         suffixes = {6: ("x", "y", "z", "rx", "ry", "rz"), 3: ("x", "y", "yaw")}
         out: list[str] = []
-        for j in range(1, self.model.njoints):
-            name, nv = str(self.model.names[j]), int(self.model.nvs[j])
+        for j in range(1, self.tree.njoints):
+            name, nv = str(self.tree.names[j]), int(self.tree.nvs[j])
             if nv == 1:
                 out.append(name)
                 continue
             labels = suffixes.get(nv, tuple(str(i) for i in range(nv)))
-            if "Spherical" in self.model.joints[j].shortname():
+            if "Spherical" in self.tree.joints[j].shortname():
                 labels = ("rx", "ry", "rz")
             out += [f"{name}.{label}" for label in labels]
         return tuple(out)
@@ -180,12 +194,13 @@ class Robot:
     def dof_units(self) -> tuple[str, ...]:
         """``"rad"`` or ``"m"`` for each degree of freedom."""
         units: list[str] = []
-        data = self.model.createData()
-        pin.computeJointJacobians(self.model, data, self.neutral)
-        for j in range(1, self.model.njoints):
+        tree, library = self.tree, algebra(self.tree)
+        data = tree.createData()
+        library.computeJointJacobians(tree, data, self.neutral)
+        for j in range(1, self.tree.njoints):
             # Pinocchio gives a single column without its second dimension
-            jacobian = pin.getJointJacobian(self.model, data, j, pin.LOCAL).reshape(6, self.nv)
-            start, nv = int(self.model.idx_vs[j]), int(self.model.nvs[j])
+            jacobian = library.getJointJacobian(tree, data, j, library.LOCAL).reshape(6, self.nv)
+            start, nv = int(self.tree.idx_vs[j]), int(self.tree.nvs[j])
             for column in jacobian[:, start : start + nv].T:
                 units.append("rad" if np.abs(column[3:]).max() > 1e-9 else "m")
         return tuple(units)
@@ -194,11 +209,11 @@ class Robot:
     def position_index(self) -> Array:
         """Per degree of freedom, the index in q of the coordinate that it is the rate of, or -1."""
         out = np.full(self.nv, -1, dtype=int)
-        for j in range(1, self.model.njoints):
-            nq, nv = int(self.model.nqs[j]), int(self.model.nvs[j])
+        for j in range(1, self.tree.njoints):
+            nq, nv = int(self.tree.nqs[j]), int(self.tree.nvs[j])
             if nq == nv:
                 for k in range(nv):
-                    out[int(self.model.idx_vs[j]) + k] = int(self.model.idx_qs[j]) + k
+                    out[int(self.tree.idx_vs[j]) + k] = int(self.tree.idx_qs[j]) + k
         return out
 
     @cached_property
@@ -208,10 +223,10 @@ class Robot:
         A metre of error costs as much as 1 / length radians. It scales with the robot, so a model in
         millimetres gets the same answers. 1 for a robot whose joints all share one origin.
         """
-        reach = np.zeros(self.model.njoints)
-        for j in range(1, self.model.njoints):
-            parent = int(self.model.parents[j])
-            step = float(np.linalg.norm(self.model.jointPlacements[j].translation)) if parent > 0 else 0.0
+        reach = np.zeros(self.tree.njoints)
+        for j in range(1, self.tree.njoints):
+            parent = int(self.tree.parents[j])
+            step = float(np.linalg.norm(self.tree.jointPlacements[j].translation)) if parent > 0 else 0.0
             reach[j] = reach[parent] + step
         longest = float(reach.max()) if len(reach) else 0.0
         return longest if longest > 0.0 else 1.0
@@ -227,9 +242,9 @@ class Robot:
             UnknownNameError: no such joint.
         """
         validation.one_of(field_name, joint, self.joint_names)
-        j = int(self.model.getJointId(joint))
-        start = int(self.model.idx_vs[j])
-        return slice(start, start + int(self.model.nvs[j]))
+        j = int(self.tree.getJointId(joint))
+        start = int(self.tree.idx_vs[j])
+        return slice(start, start + int(self.tree.nvs[j]))
 
     def configuration(self, field_name: str, q: Any) -> Array:
         """A checked float64 copy of a configuration; quaternions and unit circles must have unit length.
@@ -238,11 +253,24 @@ class Robot:
             ShapeError, NotFiniteError, RotationError: it is none.
         """
         out = validation.real_array(field_name, q, (self.nq,))
-        if not pin.isNormalized(self.model, out, validation.ROTATION_TOLERANCE):
+        if not self._is_normalized(out):
             raise RotationError(field_name, q, "a quaternion or (cos, sin) pair is not of unit length")
         if self.base == "floating" and np.array_equal(out[3:7], MUJOCO_UPRIGHT):
             log.warning("%s: the base is upside down; quaternions are x, y, z, w, MuJoCo's w, x, y, z", field_name)
         return out
+
+    def _is_normalized(self, q: Array) -> bool:
+        if not isinstance(self.tree, own.Model):
+            return bool(pin.isNormalized(self.tree, q, validation.ROTATION_TOLERANCE))
+        return all(
+            joint.unit_error(q[joint.idx_q : joint.idx_q + joint.nq]) <= validation.ROTATION_TOLERANCE
+            for joint in self._turning
+        )
+
+    @cached_property
+    def _turning(self) -> tuple[own.JointModel, ...]:
+        """Joints with numbers that must be of unit length."""
+        return tuple(joint for joint in self.tree.joints if joint.nq != joint.nv)
 
     def pose(self, q: Any, frame: str, relative_to: str = WORLD) -> pin.SE3:
         """Pose of a frame in another one, or in the world, at a configuration.
@@ -377,7 +405,7 @@ class Robot:
     @cached_property
     def _straight(self) -> tuple[int, ...] | None:
         """Shape of configurations where q (+) v dt is their sum; None where it is not."""
-        joints = [(int(joint.nq), int(joint.nv)) for joint in list(self.model.joints)[1:]]
+        joints = [(int(joint.nq), int(joint.nv)) for joint in list(self.tree.joints)[1:]]
         return (self.nq,) if not self.loops and set(joints) <= {(1, 1)} else None
 
     def difference(self, a: Any, b: Any) -> Array:
@@ -463,16 +491,17 @@ class Robot:
         if name in self.frame_names:
             raise DuplicateNameError("frame", name, "a frame of this name exists")
         self.check_frame("parent", parent)
-        local = validation.pose("placement", placement) if placement is not None else pin.SE3.Identity()
-        model = pin.Model(self.model)
+        local = validation.own_pose("placement", placement) if placement is not None else None
+        model, library = self.copied_tree()
+        local = library.SE3.Identity() if local is None else library.SE3(local.rotation, local.translation)
         if parent == WORLD:
-            model.addFrame(pin.Frame(name, 0, 0, local, pin.FrameType.OP_FRAME))
+            model.addFrame(library.Frame(name, 0, 0, local, library.FrameType.OP_FRAME))
         else:
             index = frame_index(model, parent)
             above = model.frames[index]
-            kind = pin.FrameType.OP_FRAME
-            model.addFrame(pin.Frame(name, above.parentJoint, index, above.placement * local, kind))
-        return replace(self, model=model)
+            kind = library.FrameType.OP_FRAME
+            model.addFrame(library.Frame(name, above.parentJoint, index, above.placement * local, kind))
+        return changed(self, model=model)
 
     def with_actuated(self, joints: Sequence[str]) -> Robot:
         """A copy of which motors drive these joints, and no others: the others move with what carries them, by loops or
@@ -489,7 +518,7 @@ class Robot:
             driven |= set(range(dofs.start, dofs.stop))
         driven |= {one.leader for one in self.couplings if one.follower in driven}
         driven |= {*range(self.base_nv), *self.locked_dofs, *(one.follower for one in self.couplings)}
-        return replace(self, passive=tuple(dof for dof in range(self.nv) if dof not in driven))
+        return changed(self, passive=tuple(dof for dof in range(self.nv) if dof not in driven))
 
     def with_loops(self, *loops: AnyLoop, actuated: Sequence[str] | None = None) -> Robot:
         """A copy whose mechanism has these closed loops, in place of those it had; none: an open tree.
@@ -514,7 +543,7 @@ class Robot:
         names = [loop.name for loop in loops]
         if twice := next((name for name in names if names.count(name) > 1), None):
             raise DuplicateNameError("loops", twice, "two loops have this name")
-        bare = replace(self if actuated is None else self.with_actuated(actuated), loops=LoopRows())
+        bare = changed(self if actuated is None else self.with_actuated(actuated), loops=LoopRows())
         if not loops:
             return bare
         closing, rng = replace(bare, loops=LoopRows(loops))._closing, np.random.default_rng(0)
@@ -577,7 +606,7 @@ class Robot:
             validation.one_of("joints", name, self.joint_names)
             still.append(JointCurve(f"given {name}", name, None, (validation.scalar(f"joints[{name!r}]", value),)))
         searches = validation.integer("count", count, low=1)
-        given, rng = replace(self, loops=LoopRows((*self.loops.loops, *still)))._closing, np.random.default_rng(seed)
+        given, rng = changed(self, loops=LoopRows((*self.loops.loops, *still)))._closing, np.random.default_rng(seed)
         found, turn = list[Array](), np.where(np.array(self.dof_units) == "rad", 2.0 * np.pi, np.inf)
         for start in itertools.chain([self.neutral], (self._drawn(rng) for _ in range(searches - 1))):
             q, opened = given.close(start)
@@ -588,7 +617,7 @@ class Robot:
 
     @cached_property
     def _closing(self) -> Closing:
-        joints = {int(self.model.idx_vs[j]): str(self.model.names[j]) for j in range(1, self.model.njoints)}
+        joints = {int(self.tree.idx_vs[j]): str(self.tree.names[j]) for j in range(1, self.tree.njoints)}
         coupled = [
             JointCurve(f"coupling {joints[c.follower]}", joints[c.follower], joints[c.leader], (c.offset, c.ratio))
             for c in self.couplings
@@ -602,7 +631,9 @@ class Robot:
         Raises:
             ShapeError, NotFiniteError, RotationError: no pose.
         """
-        model, away = pin.Model(self.model), validation.pose("pose", pose).inverse()
+        model, library = self.copied_tree()
+        there = validation.own_pose("pose", pose)
+        away = library.SE3(there.rotation, there.translation).inverse()
         for j in range(1, model.njoints):
             if int(model.parents[j]) == 0:
                 model.jointPlacements[j] = away * model.jointPlacements[j]
@@ -610,8 +641,8 @@ class Robot:
             if int(frame.parentJoint) == 0:
                 frame.placement = away * frame.placement
         turned = (away.rotation @ part for part in (model.gravity.linear, model.gravity.angular))
-        model.gravity, model.inertias[0] = pin.Motion(*turned), away.act(model.inertias[0])
-        return replace(self, model=model)
+        model.gravity, model.inertias[0] = library.Motion(*turned), away.act(model.inertias[0])
+        return changed(self, model=model)
 
     def with_limits(self, **changes: Any) -> Robot:
         """A copy with overridden limits.
@@ -630,7 +661,7 @@ class Robot:
         for name, change in changes.items():
             validation.one_of("limit", name, [f.name for f in fields(Limits)])
             arrays[name] = self._spread(name, change)
-        return replace(self, limits=replace(self.limits, **arrays))
+        return changed(self, limits=replace(self.limits, **arrays))
 
     def _spread(self, limit: str, change: Any) -> Array:
         """One limit array of nv numbers out of what a user may write for it."""
@@ -678,7 +709,7 @@ class Robot:
             for shape in new[frame]:
                 validation.instance(f"shapes[{frame}]", shape, PlacedShape, "a PlacedShape")
         same = {k for k, v in new.items() if v} == {k for k, v in self.shapes.items() if v}
-        return replace(self, shapes=new, self_pairs=self.self_pairs if same else None)
+        return changed(self, shapes=new, self_pairs=self.self_pairs if same else None)
 
     def with_self_pairs(self, pairs: Sequence[tuple[str, str]] | None) -> Robot:
         """A copy with other pairs of links that must not touch each other.
@@ -688,7 +719,7 @@ class Robot:
             ShapeError: not pairs of names.
         """
         if pairs is None:
-            return replace(self, self_pairs=None)
+            return changed(self, self_pairs=None)
         chosen: list[tuple[str, str]] = []
         for pair in validation.items("self_pairs", pairs, "pairs of link names"):
             links = validation.strings("self_pairs", pair)
@@ -697,14 +728,14 @@ class Robot:
             chosen.append((links[0], links[1]))
         for link in dict.fromkeys(link for pair in chosen for link in pair):
             self.check_frame("self_pairs", link)
-        return replace(self, self_pairs=tuple(chosen))
+        return changed(self, self_pairs=tuple(chosen))
 
     @cached_property
     def fingerprint(self) -> str:
         """Hash of everything about the model that compiled code depends on."""
         h = hashlib.sha256()
         # Pinocchio's own text holds what Python cannot reach: axes of some joint types, pitches, mimic ratios, armature
-        h.update(self.model.saveToString().encode())
+        h.update(self.tree.saveToString().encode())
         for array in (
             self.limits.position_lower,
             self.limits.position_upper,
@@ -720,7 +751,7 @@ class Robot:
         h.update(repr(self.passive).encode() if self.passive else b"")
         for frame, shapes in sorted(self.shapes.items()):
             for s in shapes:
-                h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.placement.homogeneous.tobytes())
+                h.update(f"{frame} {s.shape} {s.excess!r}".encode() + s.place.homogeneous.tobytes())
         return h.hexdigest()
 
 
@@ -728,6 +759,28 @@ def checked_robot(robot: Any) -> Robot:
     """The robot that a user hands in.
 
     Raises:
-        ShapeError: something else.
+        ShapeError: something else. RobotFileError: ``robot.model`` was changed in place.
     """
-    return validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
+    return _as_read(validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load"))
+
+
+def _as_read(robot: Robot) -> Robot:
+    """The robot, whose model is what it was.
+
+    Raises:
+        RobotFileError: ``robot.model`` was changed in place.
+    """
+    handed_out = vars(robot).get(f"model{CONVERTED}")
+    if isinstance(robot.tree, own.Model) and handed_out is not None and handed_out != to_pin(robot.tree):
+        reason = "it was changed in place, which the robot does not see: use dataclasses.replace(robot, model=changed)"
+        raise RobotFileError("robot.model", robot.name, reason)
+    return robot
+
+
+def changed(robot: Robot, **changes: Any) -> Robot:
+    """``dataclasses.replace`` with the model as it was given, which costs no import of Pinocchio.
+
+    Raises:
+        RobotFileError: ``robot.model`` was changed in place.
+    """
+    return replace(_as_read(robot), **{"model": robot.tree, **changes})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.multibody import pin
+from wbc.multibody import algebra, pin
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -30,7 +30,10 @@ def joint_range(robot: Robot) -> tuple[Array, Array]:
 
 def configuration(robot: Robot, step: Array) -> Array:
     """The configuration a ``step`` [nv] away from the neutral one, followers of mimic joints where they belong."""
-    q = np.array(pin.integrate(robot.model, robot.neutral, step))
+    return _within(robot, np.array(pin.integrate(robot.model, robot.neutral, step)))
+
+
+def _within(robot: Robot, q: Array) -> Array:
     for coupling in robot.couplings:
         follower, leader = (int(robot.position_index[k]) for k in (coupling.follower, coupling.leader))
         limits = robot.limits
@@ -48,11 +51,15 @@ def draw(robot: Robot, count: int, rng: np.random.Generator) -> Array:
 
 def joint_poses(robot: Robot, steps: Array, joints: list[int]) -> tuple[Array, Array]:
     """(rotations [n x joints x 3 x 3], positions [n x joints x 3]) of some joints at each step from neutral."""
-    data = robot.model.createData()
+    # For the neutral configuration alone Pinocchio is not imported
+    still = not np.any(steps)
+    model = robot.tree if still else robot.model
+    library, data = algebra(model), model.createData()
     poses = [data.oMi[joint] for joint in joints]  # references: looking them up costs more than the kinematics
     out = np.empty((len(steps), len(joints), 4, 4))
     for n, step in enumerate(steps):
-        pin.forwardKinematics(robot.model, data, configuration(robot, step))
+        q = _within(robot, robot.neutral.copy()) if still else configuration(robot, step)
+        library.forwardKinematics(model, data, q)
         for k, pose in enumerate(poses):
             out[n, k] = pose.homogeneous
     return out[:, :, :3, :3], out[:, :, :3, 3]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc import validation
+from wbc import pickling, validation
 from wbc.errors import ShapeError
-from wbc.multibody import pin
+from wbc.multibody import in_pinocchio, own, pin
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -155,6 +155,7 @@ def names_of_shapes() -> list[str]:
     return [kind.__name__ for kind in (*Solid.__subclasses__(), HalfSpace)]
 
 
+@in_pinocchio("placement")
 @dataclass(frozen=True, eq=False)
 class PlacedShape:
     """A shape fixed to a link frame.
@@ -175,17 +176,26 @@ class PlacedShape:
     def __post_init__(self) -> None:
         if not isinstance(self.shape, Shape):
             raise ShapeError("PlacedShape.shape", self.shape, "this is no shape", names_of_shapes())
-        object.__setattr__(self, "placement", validation.pose("PlacedShape.placement", self.placement))
+        object.__setattr__(self, "placement", validation.own_pose("PlacedShape.placement", self.place))
         object.__setattr__(self, "excess", validation.scalar("PlacedShape.excess", self.excess, low=0.0, unit="m"))
+
+    def __getstate__(self) -> dict[str, object]:
+        return pickling.declared(self)
+
+    @property
+    def place(self) -> own.SE3:
+        """:attr:`placement` as this package's own pose."""
+        placed: own.SE3 = vars(self)["placement"]
+        return placed
 
     def capsule(self) -> tuple[Array, Array, float]:
         """(end, end, radius) of a capsule in the link's frame that contains the shape [m]."""
         a, b, radius = self.shape.capsule()
-        return self.placement * a, self.placement * b, radius
+        return self.place * a, self.place * b, radius
 
     def ends(self) -> tuple[Array, Array]:
         """The two ends of the shape's core segment in the link's frame [m]; equal for all but a capsule."""
         half = self.shape.sizes[2] if self.shape.is_round else 0.0
-        axis = np.array(self.placement.rotation[:, 2])
-        center = np.array(self.placement.translation)
+        axis = np.array(self.place.rotation[:, 2])
+        center = np.array(self.place.translation)
         return center - half * axis, center + half * axis

@@ -19,7 +19,7 @@ from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import Motors, PlantMotors
 from wbc.simulation.mujoco_model import HARD, SOFT, mujoco_spec
 from wbc.simulation.mujoco_plant import MujocoPlant, SavedMujocoState
-from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
+from wbc.simulation.plant import GripKind, PlantState
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -120,13 +120,15 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
             if drive.rubs:
                 torque = torque - drive.friction(v)
             q = self._joints.q(self.data.qpos) if self._balance.falls else None
-            MujocoPlant.apply(self, Command(CommandKind.TORQUE, torque))
-            self._slide(h)
+            self._torques(torque)
+            if state.slips:
+                self._slide(h)
             for name in list(state.off):
                 self._close(name)
-            super().advance(h)
+            self._step(self._model, self.data)
             if q is not None:
                 state.fallen += self._balance.by_gravity(q, h)
+        self._check()
 
     def grasp(self, frame: str, pose: pin.SE3, kind: GripKind = GripKind.POSE) -> None:
         """A frame is held at a pose of the world.

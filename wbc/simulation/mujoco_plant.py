@@ -139,15 +139,24 @@ class MujocoPlant:
             values = pin.difference(self._robot.model, pin.neutral(self._robot.model), values)
         self.data.ctrl[actuators] = scale * values[dofs]
 
+    def _torques(self, values: Array) -> None:
+        """Write torques ``[nv]``, checked before, to the motors."""
+        actuators, dofs, scale = self._actuators[CommandKind.TORQUE]
+        self.data.ctrl[actuators] = scale * values[dofs]
+
     def advance(self, dt: float) -> None:
         """Let whole time steps of the model go by [s].
 
         Raises:
             PlantError: the simulation has blown up. MuJoCo itself would put the robot back where its model begins.
         """
-        warnings = self.data.warning
         for _ in range(round(dt / self.time_step)):
             self._step(self._model, self.data)
+        self._check()
+
+    def _check(self) -> None:
+        """Refuses a simulation that has blown up."""
+        warnings = self.data.warning
         if any(warnings[kind].number for kind in self._blown):
             raise PlantError("plant", float(self.data.time), "the simulation has blown up")
 

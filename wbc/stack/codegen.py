@@ -20,7 +20,9 @@ from wbc.stack.tables import (
     brakes,
     force_scales,
     gain_table,
+    give_order,
     kept_rows,
+    late_rows,
     left_free,
     margin_table,
     rate_table,
@@ -96,6 +98,8 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
         _table("int", "a_start", a_start),
         _table("int", "a_end", a_end),
         _table("int", "a_col", a_col),
+        _table("int", "give_order", give_order(stack, layout, at)),
+        _table("int", "late_row", late_rows(layout, at)),
         _table("int", "row_order", orders),
         _table("int", "bound_sequence", sequence),
         _table("int", "unit_start", [u[0] for u in units]),
@@ -164,7 +168,7 @@ def _levels(stack: Declaration, layout: Layout) -> list[str]:
 
 def unit_groups(stack: Declaration) -> list[tuple[int, int]]:
     """(start, size) of the coordinates in q that must have unit length: quaternions and (cos, sin) pairs."""
-    model = stack.robot.model
+    model = stack.robot.tree
     groups: list[tuple[int, int]] = []
 
     def visit(joint: Any, start: int) -> None:
@@ -249,6 +253,6 @@ def _blocks(start: np.ndarray, col: np.ndarray) -> list[str]:
 
 def motion(stack: Declaration) -> ca.Function:
     """From one configuration to the next: ``move(q, v, dt)`` is q (+) v dt, for ticks that follow each other in C."""
-    kinematics, dt = Kinematics(stack.robot.model), ca.SX.sym("dt")
+    kinematics, dt = Kinematics(stack.robot.tree), ca.SX.sym("dt")
     later = kinematics.integrate(kinematics.q, kinematics.v * dt)
     return ca.Function("move", [kinematics.q, kinematics.v, dt], [ca.densify(later)], ["q", "v", "dt"], ["later"])

@@ -21,8 +21,9 @@ from wbc.errors import (
     ShapeError,
     UnknownNameError,
 )
-from wbc.multibody import pin
+from wbc.multibody import algebra
 from wbc.robot import Robot
+from wbc.robot.robot import checked_robot
 from wbc.stack.commands import COMMANDS
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
@@ -121,9 +122,7 @@ class Declaration:
         length: float | None = None,
         calm: bool = True,
     ) -> None:
-        if not isinstance(robot, Robot):
-            raise ShapeError("robot", robot, "expected a wbc Robot, see wbc.robots.load")
-        self._robot = robot
+        self._robot = checked_robot(robot)
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         self._damping = validation.scalar("damping", damping, low=LEAST_DAMPING, high=1.0)
         chosen = robot.characteristic_length if length is None else length
@@ -410,18 +409,18 @@ class Declaration:
 
 def _no_torques(robot: Robot) -> str:
     """Why motors cannot move a robot as a stack asks, "" where they can."""
-    model, data = robot.model, robot.model.createData()
-    weight = pin.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
-    if pin.computeTotalMass(model) <= 0.0:
+    model, data, library = robot.tree, robot.tree.createData(), algebra(robot.tree)
+    weight = library.computeTotalMass(model) * float(np.linalg.norm(model.gravity.linear))
+    if library.computeTotalMass(model) <= 0.0:
         return f"the moving links of {robot.name!r} have no mass"
     # A floating or planar joint has several degrees of freedom; others that are locked have motors to hold them
     names = [robot.dof_names[k] for k in robot.locked_dofs if k >= robot.base_nv]
     if undriven := [name for name in names if name not in robot.joint_names]:
         return f"nothing drives {', '.join(undriven)} of {robot.name!r}: lock the joint"
-    borne = np.abs(pin.computeGeneralizedGravity(model, data, robot.neutral)[: robot.base_nv])
+    borne = np.abs(library.computeGeneralizedGravity(model, data, robot.neutral)[: robot.base_nv])
     if robot.base == "planar" and borne.max() > PLUMB * weight:
         return f"nothing holds the planar base of {robot.name!r} against {borne.max():.6g} N of its weight"
-    moments = np.linalg.eigvalsh(pin.crba(model, data, robot.neutral))
+    moments = np.linalg.eigvalsh(library.crba(model, data, robot.neutral))
     if moments[0] < -SEMIDEFINITE * moments[-1]:
         bodies = [np.linalg.eigvalsh(body.inertia)[0] for body in model.inertias]
         worst = 1 + int(np.argmin(bodies[1:]))

@@ -36,7 +36,7 @@ class Balls:
     @classmethod
     def of(cls, stack: Declaration, layout: Layout) -> Balls:
         """Those of a stack."""
-        model, out = stack.robot.model, []
+        model, out = stack.robot.tree, []
         for block in layout.of_form("margins"):
             assert isinstance(block.entry.item, Constraint)
             rows = block.entry.item.ball_rows(stack.robot)

@@ -40,7 +40,8 @@ SIZES = (
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING", "FAR")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
 INT_TABLES = (
-    "j_start", "j_col", "a_start", "a_end", "a_col", "row_order", "bound_sequence", "unit_start", "unit_size",
+    "j_start", "j_col", "a_start", "a_end", "a_col", "give_order", "late_row", "row_order", "bound_sequence",
+    "unit_start", "unit_size",
     "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
     "slewed_at", "slewed_dof", "level_start", "row_level", "ball_pose", "ball_velocity", "ball_margin", "ball_rate",
     "ball_row", "ball_first", "row_segment", "segment_row", "sensed_row", "sensed_count", "sensed_distance",

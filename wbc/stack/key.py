@@ -13,7 +13,7 @@ import sys
 import casadi as ca
 import numpy as np
 
-from wbc.multibody import pin
+from wbc.multibody import algebra
 from wbc.stack.declaration import Declaration, inner_items
 
 #: Everything that runs when a program is built: all parts that this one imports, and what those import. A test compares
@@ -44,7 +44,7 @@ def key(stack: Declaration, version: str, toolchain: str) -> str:
     values and not in it. Of an item that is not this package's own, the file that its class stands in is in the hash,
     but not what that file imports.
     """
-    versions = [ca.CasadiMeta.version(), pin.__version__, np.__version__, version, toolchain]
+    versions = [ca.CasadiMeta.version(), algebra(stack.robot.tree).__version__, np.__version__, version, toolchain]
     classes = {base for entry in stack.entries for item in inner_items(entry.item) for base in type(item).__mro__}
     items = sorted({_source(base) for base in classes})
     text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)

@@ -122,7 +122,7 @@ def _kinematics_of(robot: Robot) -> Kinematics:
     """The same for all stacks of a robot, as they ask for the same frames."""
     known = _KNOWN.get(robot)
     if known is None:
-        known = _KNOWN[robot] = Kinematics(robot.model)
+        known = _KNOWN[robot] = Kinematics(robot.tree)
     return known
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
+import casadi as ca
 import numpy as np
 
 from wbc.stack.declaration import Declaration
@@ -97,6 +100,32 @@ def taken_out(stack: Declaration, layout: Layout) -> int:
     """Equality rows that every tick of a robot with loops has: they are taken out of its QP; 0 without loops."""
     blocks = layout.of_form("rows") if stack.robot.loops else ()
     return sum(len(block.rows) for block in blocks if isinstance(block.entry.item, (Mechanism, Unactuated)))
+
+
+def late_rows(layout: Layout, at: ca.Sparsity) -> list[int]:
+    """1 for general rows that have forces beside accelerations.
+
+    Args:
+        at: entries of the rows, transposed [variables, general rows].
+    """
+    late = {row for variable, row in zip(*at.get_triplet(), strict=True) if variable >= layout.nv}
+    return [int(row in late) for row in range(layout.general_rows)]
+
+
+def give_order(stack: Declaration, layout: Layout, at: ca.Sparsity) -> list[int]:
+    """Degrees of freedom in the order in which rows that are taken out give them: those without motors and of few rows
+    first, so that loops keep to their own joints and motors are left.
+
+    Args:
+        at: as of :func:`late_rows`.
+    """
+    if not taken_out(stack, layout):
+        return list(range(layout.nv))
+    spans = [block.span for block in layout.of_form("rows") if isinstance(block.entry.item, Mechanism)]
+    own = {row for span in spans for row in range(span.start, span.stop)}
+    counts = Counter(variable for variable, row in zip(*at.get_triplet(), strict=True) if row in own)
+    passive = set(stack.robot.passive)
+    return sorted(range(layout.nv), key=lambda dof: (dof not in passive, counts[dof], dof))
 
 
 def brakes(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray]:

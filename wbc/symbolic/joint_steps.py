@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wbc.errors import UnsupportedJointError
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.symbolic.joint_maps import AXES, Vector
 from wbc.symbolic.joints import SUPPORTED, follower_of, motion_at
 
@@ -45,12 +45,12 @@ class JointStep:
     numbers: Vector
 
 
-def place(pose: pin.SE3) -> Vector:
+def place(pose: own.SE3) -> Vector:
     """Twelve numbers of a pose: rotation row by row, then position."""
     return np.concatenate([np.asarray(pose.rotation).ravel(), pose.translation])
 
 
-def joint_steps(model: pin.Model, joint: int) -> list[JointStep]:
+def joint_steps(model: own.Model, joint: int) -> list[JointStep]:
     """What joint number ``joint`` does after its placement.
 
     Raises:

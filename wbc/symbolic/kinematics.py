@@ -14,7 +14,7 @@ from functools import cached_property
 import casadi as ca
 
 from wbc.errors import UnknownNameError
-from wbc.multibody import pin
+from wbc.multibody import algebra, own
 from wbc.symbolic import kernels, rotations as rot
 from wbc.symbolic.joints import SymbolicJoint, mimic_joint, symbolic_joint
 
@@ -50,22 +50,16 @@ class Pose:
 
 
 #: Which frame a name means where a description gives it to several, first come first served.
-_FRAME_TYPES = (
-    pin.FrameType.BODY,
-    pin.FrameType.JOINT,
-    pin.FrameType.FIXED_JOINT,
-    pin.FrameType.OP_FRAME,
-    pin.FrameType.SENSOR,
-)
+_FRAME_TYPES = ("BODY", "JOINT", "FIXED_JOINT", "OP_FRAME", "SENSOR")
 
 
-def frame_index(model: pin.Model, name: str) -> int:
+def frame_index(model: own.Model, name: str) -> int:
     """Number of a named frame; of a link and a joint of one name, the link (ANYmal C names both ``LF_HAA``).
 
     Raises:
         UnknownNameError: no frame of that name.
     """
-    for kind in _FRAME_TYPES:
+    for kind in (getattr(algebra(model).FrameType, word) for word in _FRAME_TYPES):
         if model.existFrame(name, kind):
             return int(model.getFrameId(name, kind))
     raise UnknownNameError("frame", name, [f.name for f in model.frames])
@@ -74,7 +68,7 @@ def frame_index(model: pin.Model, name: str) -> int:
 class Kinematics:
     """Expressions of one model in one configuration symbol ``q`` (nq) and velocity symbol ``v`` (nv)."""
 
-    def __init__(self, model: pin.Model) -> None:
+    def __init__(self, model: own.Model) -> None:
         self.model = model
         self.nq, self.nv = int(model.nq), int(model.nv)
         self.njoints = int(model.njoints)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.multibody import pin
+from wbc.multibody import algebra
 from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 
@@ -52,7 +52,7 @@ class TaylorJacobian:
             terms.append(ca.vec(ca.jacobian(terms[-1], s)))
         at_rest = [ca.substitute(term, s, ca.SX.zeros(n, 1)) for term in terms]
         self._terms = SingleState(ca.Function("terms", [q, symbols], at_rest))
-        self.latch(pin.neutral(self._model), np.zeros(self._count))
+        self.latch(algebra(self._model).neutral(self._model), np.zeros(self._count))
 
     def latch(self, q: Vector, parameters: Sequence[float] | Vector = ()) -> None:
         """Expand about a configuration, and keep the parameters.
@@ -71,7 +71,7 @@ class TaylorJacobian:
         """J [rows, nv] at a configuration, by the terms of the order, or exactly."""
         if self.order is None:
             return self._exact(q, self.parameters)[0]
-        s = pin.difference(self._model, self.q0, q)
+        s = algebra(self._model).difference(self._model, self.q0, q)
         J: Vector = self.terms[0].copy()
         if self.order > 0:
             J += self.terms[1] @ s

@@ -9,7 +9,6 @@ from wbc import lazy
 if TYPE_CHECKING:
     from wbc.errors import StructureFileError as StructureFileError
     from wbc.walking.arms.puma import ArmKinematics as ArmKinematics
-    from wbc.walking.arms.two_ended import TwoEndedKinematics as TwoEndedKinematics
     from wbc.walking.holds.built_in import (
         cylinder as cylinder,
         module as module,

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-import wbc
 from tests.walking.trials.second_checker import second_check
 from tests.walking.trials.structures import FAMILIES, PITCH, random_structure
 from tests.walking.trials.torque_trials import NECK, Record, torque, violations, walker_of
@@ -31,10 +30,9 @@ from wbc.walking.planner.objective import Objective
 from wbc.walking.planner.plan import HoldLost, NoPlanError
 from wbc.walking.report.folder import rules_of, save_run
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Site, TwoEndedRequest, arm_task
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Site, arm_task
 from wbc.walking.run.resume_mode import ResumeRequest
 from wbc.walking.run.session import WalkRun, mode_of, perform_walk
-from wbc.walking.two_ended import grapple_row
 
 #: What is walked on where a part has no structure of its own; on the grid of the cylinder between which T and A
 GROUNDS = ("cylinder", "plane", "truss", "module")
@@ -43,16 +41,8 @@ ROUND, ALONG = (4.0, 21.0), (6.0, 19.0)
 APART, MARGIN, MISSING = (0.9, 2.2), 0.8, 0.4
 #: Arms of the walkers on random structures, seed by seed in turn
 ARMS = (3, 3, 3, 4, 3, 3, 6, 3, 5, 3)
-#: Arms of those of other parts, drawn with equal chances, and what else is drawn where it has the mode
-LIMBS, TWO_ENDED = (2, 3, 4, 5, 6), "two-ended"
-DRAWN = {
-    "velocity": LIMBS,
-    "arm": LIMBS,
-    "resume": (*LIMBS, TWO_ENDED),
-    "vanish": (*LIMBS, TWO_ENDED),
-}
-#: Holds of the two-ended arm: least and largest distance of neighbours [m]
-GRAPPLES, PITCHES = 7, (2.0, 5.0)
+#: Arms of those of other parts, drawn with equal chances, and the parts in which they are
+LIMBS, DRAWN = (2, 3, 4, 5, 6), ("velocity", "arm", "resume", "vanish")
 #: Tasks of a hand: how many at most, how far from the base of the arm its holds are [m], largest rates [m/s, rad/s] and
 #: how long each [s]; and how fast it leaves its hold first [m/s]
 TASKS, REACH, HAND_RATES, SECONDS = 3, 1.7, np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2]), (0.3, 2.0)
@@ -122,7 +112,7 @@ def arm(name: str, walker: Walker, folder: Path) -> Record:
 def resume(name: str, walker: Walker, folder: Path) -> Record:
     """A walk that goes on from a random instant of its log; ``SEED``."""
     rng = np.random.default_rng([2, int(name)])
-    first = perform_walk(_request(rng, walker, folder), walker)
+    first = perform_walk(_path(rng, walker), walker)
     if first.log is None:
         return kept(first, folder)
     save_run(first, folder, check=False)
@@ -133,10 +123,9 @@ def resume(name: str, walker: Walker, folder: Path) -> Record:
 
 
 def vanish(name: str, walker: Walker, folder: Path) -> Record:
-    """A walk on which holds vanish that are held, or that a hand is on its way to, but no goal; ``SEED``."""
+    """A walk on which holds vanish that are held, or that a hand is on its way to; ``SEED``."""
     rng = np.random.default_rng([3, int(name)])
-    request = _request(rng, walker, folder)
-    mode, goal = mode_of(request, walker), request.goal if isinstance(request, TwoEndedRequest) else ""
+    mode = mode_of(_path(rng, walker), walker)
     structure = mode.structure
     try:
         plan = mode.plan()
@@ -154,7 +143,6 @@ def vanish(name: str, walker: Walker, folder: Path) -> Record:
             # Not so many that the body would fall
             some = list(walk.held.values()) if len(walk.held) > walker.min_holds else []
             some += [walk.swinging.hold] if walk.swinging is not None else []
-            some = [hold for hold in some if walk.structure.ids[hold] != goal]
             walk.vanish([walk.structure.ids[int(rng.choice(some))]] if some else [])
 
     try:
@@ -212,14 +200,13 @@ def names(part: str, count: int) -> list[str]:
     return [f"{families[k % 7]} {k // 7}" if part == "structures" else str(k) for k in seeds]
 
 
-def limbs(part: str, name: str) -> int | str:
-    """How many arms the body of a trial has, or :data:`TWO_ENDED`; under torques the trial draws its own."""
+def limbs(part: str, name: str) -> int:
+    """How many arms the body of a trial has; under torques the trial draws its own."""
     if part == "structures":
         return ARMS[int(name.split()[1]) % len(ARMS)]
     if part not in DRAWN:
         return 3
-    drawn = DRAWN[part]
-    return drawn[int(np.random.default_rng([5, list(DRAWN).index(part), int(name)]).integers(len(drawn)))]
+    return LIMBS[int(np.random.default_rng([5, DRAWN.index(part), int(name)]).integers(len(LIMBS)))]
 
 
 def tried(part: str, name: str, folder: Path) -> Record:
@@ -229,8 +216,7 @@ def tried(part: str, name: str, folder: Path) -> Record:
     try:
         arms = limbs(part, name)
         out |= {"arms": arms} if part != "torque" else {}
-        walker = wbc.robots.walker(two_ended=True) if arms == TWO_ENDED else walker_of(int(arms))
-        out |= PARTS[part](name, walker, folder)
+        out |= PARTS[part](name, walker_of(arms), folder)
     except WbcError as error:
         out |= {"outcome": "error", "reason": f"{type(error).__name__}: {error}"}
     except Exception as error:  # noqa: BLE001 (an error of a trial is what the benchmark looks for)
@@ -240,18 +226,6 @@ def tried(part: str, name: str, folder: Path) -> Record:
             "reason": f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})",
         }
     return {"trial": name, **out}
-
-
-def _request(rng: np.random.Generator, walker: Walker, folder: Path) -> PathRequest | TwoEndedRequest:
-    """A way of a body with arms, or of the two-ended arm over holds of which a file is left in the folder."""
-    if not walker.two_ended:
-        return _path(rng, walker)
-    row, ids = grapple_row(GRAPPLES, float(rng.uniform(*PITCHES))), [str(k + 1) for k in range(GRAPPLES)]
-    file = save_structure(row, folder / "grapples.csv")
-    first = int(rng.integers(GRAPPLES - 1))
-    goal = ids[int(rng.choice([k for k in range(GRAPPLES) if k not in (first, first + 1)]))]
-    start = (ids[first], ids[first + 1])
-    return TwoEndedRequest(Site(str(file)), start if rng.random() < 0.5 else start[::-1], goal)
 
 
 def _rate(twist: Array, seconds: float) -> str:

@@ -3,6 +3,7 @@
 #define WBC_DISTANCE_H
 
 #include "motion.h"
+#include "segment_box.h"
 #include "segments.h"
 
 /* Lengths are metres: what counts as touching, as equal, as near contact */
@@ -22,10 +23,37 @@ static void distance_of_round(const double *one, double ra, const double *other,
     out->gap = length - ra - rb;
 }
 
+/* A capsule or ball i and a box j; 0 where the core of the one goes through the other */
+static int distance_of_box(const sweep_t *s, int i, int j, answer_t *out) {
+    const double *pose = s->body_pose + 12 * j, *ends = s->world_line + 6 * i, radius = s->line[8 * i + 6];
+    double d[3], local[6], span[3], n[3], t;
+    for (int e = 0; e < 2; e++) {
+        minus3(ends + 3 * e, pose + 9, d);
+        turn_back(pose, d, local + 3 * e);
+    }
+    const double core = segment_box(local, local + 3, s->shape[j].size, &t, n);
+    if (!(core > HOW.trust)) return 0;
+    turn(pose, n, out->normal);
+    for (int k = 0; k < 3; k++) out->normal[k] = -out->normal[k];
+    minus3(ends + 3, ends, span);
+    along3(ends, t, span, out->point);
+    along3(out->point, radius, out->normal, out->point);
+    out->gap = core - radius - s->shape[j].size[4];
+    return 1;
+}
+
+static int is_box(const shape_t *a) { return a->kind == SUM && a->size[3] == 0.0; }
+
 static void distance_of(const sweep_t *s, int i, int j, answer_t *out) {
-    if (is_round(s->shape + i) && is_round(s->shape + j))
+    const int round_i = is_round(s->shape + i), round_j = is_round(s->shape + j);
+    if (round_i && round_j)
         distance_of_round(s->world_line + 6 * i, s->line[8 * i + 6], s->world_line + 6 * j, s->line[8 * j + 6], out);
-    else
+    else if (round_i && is_box(s->shape + j) && distance_of_box(s, i, j, out))
+        return;
+    else if (round_j && is_box(s->shape + i) && distance_of_box(s, j, i, out)) {
+        along3(out->point, out->gap, out->normal, out->point);
+        for (int k = 0; k < 3; k++) out->normal[k] = -out->normal[k];
+    } else
         measure_shapes(&HOW, s->shape + i, s->body_pose + 12 * i, s->shape + j, s->body_pose + 12 * j, out);
 }
 

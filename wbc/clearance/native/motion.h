@@ -21,6 +21,16 @@ static double bernstein(const double *c, int degree, double s) {
     return b[0];
 }
 
+/* Change within half a piece at the rate of its middle, and by how much a scalar may stray from that: h^2 |q''| / 2 */
+static double even_part(const sweep_t *s, const piece_t *p, int c, double *stray) {
+    const double *b = s->control + (p->i * s->scalars + c) * (s->degree + 1), half = 0.5 * (p->high - p->low);
+    double rates[8], bend = 0.0;
+    for (int k = 0; k < s->degree; k++) rates[k] = s->degree * (b[k + 1] - b[k]);
+    for (int k = 0; k + 1 < s->degree; k++) bend = fmax(bend, fabs(rates[k + 1] - rates[k]));
+    *stray = 0.5 * half * half * (s->degree - 1) * bend;
+    return half * bernstein(rates, s->degree - 1, 0.5 * (p->low + p->high));
+}
+
 /* Value in the middle, and by how much it may deviate */
 static double scalar_at(const sweep_t *s, const piece_t *p, int c, double *off) {
     const int m = s->scalars, middle = (p->i + p->j) / 2;
@@ -33,8 +43,8 @@ static double scalar_at(const sweep_t *s, const piece_t *p, int c, double *off) 
     return bernstein(s->control + (p->i * m + c) * (s->degree + 1), s->degree, 0.5 * (p->low + p->high));
 }
 
-/* Pose of a free frame in the middle; shift and angle by which it may deviate */
-static void free_at(const sweep_t *s, const piece_t *p, int f, double *pose, double *off) {
+/* Pose of a free frame in the middle; shift and angle by which it may deviate; its even shift and turn within half a piece */
+static void free_at(const sweep_t *s, const piece_t *p, int f, double *pose, double *off, double *even) {
     const int middle = whole(p) ? (p->i + p->j) / 2 : p->i;
     const double *from = s->free_pose + 12 * (f * s->knots + middle);
     if (whole(p)) {
@@ -55,21 +65,25 @@ static void free_at(const sweep_t *s, const piece_t *p, int f, double *pose, dou
     along3(from + 9, part, shift, pose + 9);
     off[0] = half * sqrt(dot3(shift, shift));
     off[1] = half * angle;
+    turn(from, turn_, even + 3);
+    for (int k = 0; k < 3; k++) even[k] = half * shift[k], even[3 + k] *= half;
 }
 
 /* All frames in the middle of a piece */
 static void place_frames(sweep_t *s, const piece_t *p) {
     static const double still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    s->even = s->drift && !whole(p);
     for (int f = 0; f < s->frames; f++) {
-        double *pose = s->pose + 12 * f, *off = s->deviation + 4 * f, here[12], R[9];
+        double *pose = s->pose + 12 * f, *off = s->deviation + 4 * f, *drift = s->drift + 7 * f, here[12], R[9];
         const double *axis = s->axis + 5 * f;
         compose(s->parent[f] < 0 ? still : s->pose + 12 * s->parent[f], s->place + 12 * f, here);
         memset(off, 0, 4 * sizeof *off);
         if (s->kind[f] == FREE) {
-            double moved[12];
+            double moved[12], even[6] = {0};
             const double *slack = s->free_slack + 2 * s->coordinate[f];
-            free_at(s, p, s->coordinate[f], moved, off);
+            free_at(s, p, s->coordinate[f], moved, off, even);
             compose(here, moved, pose);
+            if (s->even) turn(here, even, drift), turn(here, even + 3, drift + 3), drift[6] = 0.0;
             for (int k = 0; k < 2; k++) off[2 + k] = slack[k], off[k] += slack[k];
             continue;
         }
@@ -86,6 +100,13 @@ static void place_frames(sweep_t *s, const piece_t *p) {
             double shift[3];
             turn(here, axis, shift);
             along3(here + 9, q, shift, pose + 9);
+        }
+        if (s->even) {
+            double stray, way = axis[3] * even_part(s, p, s->coordinate[f], &stray), along[3];
+            turn(pose, axis, along);
+            memset(drift, 0, 6 * sizeof *drift);
+            for (int k = 0; k < 3; k++) drift[3 * turning + k] = way * along[k];
+            drift[6] = fabs(axis[3]) * stray;
         }
     }
 }
@@ -109,7 +130,14 @@ static double gone(double shift, double angle, double reach) { return shift + fm
  *
  * Joints are taken to where they are from the last to the first: what is before a joint is then still in the middle. With g the
  * rigid motion about the axis there, a point x of the middle that is at y so far gets to g(y), and |g(y) - x| is no more than
- * |g(y) - g(x)| + |g(x) - x| = |y - x| + the way of x about the axis. The ball of a capsule has no turn: its core counts. */
+ * |g(y) - g(x)| + |g(x) - x| = |y - x| + the way of x about the axis. The ball of a capsule has no turn: its core counts.
+ *
+ * Within half a piece between two knots the motion of x is linear but for what scalars stray, times their reach r, and
+ *
+ *     1/2 sum_j o_j r_j (o_j + 2 sum_i o_i),     i: the turning joints that carry joint j, which goes by o_j
+ *
+ * with r_j as large as joints beyond j may make it (1 where j shifts). So of a link that rests, as one that holds something while
+ * all others move, little is left. */
 static void place_body(sweep_t *s, int b) {
     static const double still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const double *frame = s->body_frame[b] < 0 ? still : s->pose + 12 * s->body_frame[b], *line = s->line + 8 * b;
@@ -120,9 +148,10 @@ static void place_body(sweep_t *s, int b) {
         for (int k = 0; k < 3; k++) ends[3 * e + k] += frame[9 + k];
     }
     moved[0] = moved[1] = 0.0;
+    double even[2][3] = {{0}}, turned[3] = {0}, carried = 0.0, bent = 0.0;
     for (int k = 0; k < s->chain_length[b]; k++, moved += 2) {
         const int f = s->chain[s->depth * b + k];
-        const double *off = s->deviation + 4 * f;
+        const double *off = s->deviation + 4 * f, *drift = s->drift + 7 * f;
         if (off[0] == 0.0 && off[1] == 0.0 && off[2] == 0.0 && off[3] == 0.0) {
             moved[2] = moved[0], moved[3] = moved[1];
             continue;
@@ -130,6 +159,19 @@ static void place_body(sweep_t *s, int b) {
         reach_ = farthest_from(s->pose + 12 * f, s->kind[f] == FREE ? 0 : s->axis + 5 * f, ends, line[7]);
         moved[2] = moved[0] + gone(off[0], off[1], reach_);
         moved[3] = moved[1] + gone(off[2], off[3], reach_);
+        if (!s->even) continue;
+        const double far = reach_ + moved[0], by = off[1] * far;
+        bent += off[1] * (0.5 * by + carried) + drift[6] * (s->kind[f] == TURNING ? reach_ : 1.0);
+        carried += by + off[0];
+        for (int e = 0; e < 2; e++) {
+            double arm[3], way[3];
+            minus3(ends + 3 * e, s->pose + 12 * f + 9, arm);
+            cross3(drift + 3, arm, way);
+            for (int i = 0; i < 3; i++) even[e][i] += drift[i] + way[i];
+        }
+        for (int i = 0; i < 3; i++) turned[i] += drift[3 + i];
+        const double linear = sqrt(fmax(dot3(even[0], even[0]), dot3(even[1], even[1]))) + line[7] * sqrt(dot3(turned, turned));
+        moved[2] = fmin(moved[2], linear + bent + moved[3]);
     }
     s->stamp[b] = s->node;
 }

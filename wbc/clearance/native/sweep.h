@@ -28,6 +28,8 @@ typedef struct {
     const double *axis;  /* axis, scale, offset: 5 each */
     double *pose;        /* 12 each, in the world */
     double *deviation;   /* 4 each: shift and turn by which a frame may deviate, and the slack in them */
+    double *drift;       /* 7 each, within half a piece between two knots: shift and turn of a frame along the world's axes as far as
+                            they are even, and by how much its scalar may stray from that */
     /* bodies */
     const int *body_frame; /* -1: the world */
     const double *body_place;
@@ -47,8 +49,8 @@ typedef struct {
     const double *exempt_point; /* point on the one, point on the other, radius, depth: 8 each */
     double *low, *high, *when;
     int *chosen, *list;
-    /* the node at hand */
-    int node, stopped, measured, nodes;
+    /* the node at hand; `even`: whether `drift` says something */
+    int node, stopped, measured, nodes, even;
 } sweep_t;
 
 #endif

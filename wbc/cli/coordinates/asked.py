@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from wbc.cli.coordinates.modes import ArmName, ModeName
+from wbc.cli.output import Mcap
 from wbc.cli.scene import Backend, RobotName
 
 
@@ -54,5 +55,6 @@ class DriveAsked:
     log: Annotated[Path | None, "Write what happened to this CSV file, after Ctrl-C, too."] = None
     teach: Annotated[Path | None, "Write the orders to this CSV file, which --rates carries out again."] = None
     out: Annotated[Path | None, "A folder for log.csv, report.html and replay.html, after Ctrl-C, too."] = None
+    mcap: Mcap = False
     force: Annotated[bool, "Write into a folder that has a run."] = False
     backend: Backend = "auto"

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from wbc.cli.console import err, say, tell
 from wbc.cli.coordinates.asked import DriveAsked
-from wbc.cli.folders import filled, run_folder
+from wbc.cli.folders import filled, recording, run_folder
+from wbc.cli.output import RECORDED
 from wbc.cli.scene import configuration
 from wbc.cli.session import INTERRUPTED
 from wbc.coordinates import parts
@@ -33,7 +34,9 @@ def driven(asked: DriveAsked) -> int:
     """Drives, from the first configuration until the orders end; the exit code."""
     if asked.keys == (asked.rates is not None):
         raise RangeError("rates", asked.rates, "give either --rates FILE or --keys")
-    folder = None if asked.out is None else run_folder(asked.out, "drive", WRITTEN, asked.force)
+    if asked.mcap and asked.out is None:
+        raise RangeError("mcap", True, "it goes into the folder of --out")
+    folder = None if asked.out is None else run_folder(asked.out, "drive", (*WRITTEN, *RECORDED), asked.force)
     machine = _standing(asked.robot)
     given = configuration(parts(machine).robot, "at", asked.at) if asked.at else None
     source = RateFile(asked.rates) if asked.rates is not None else None
@@ -48,7 +51,9 @@ def driven(asked: DriveAsked) -> int:
         tell(f"warning: {warning}")
     found = SessionLog()
     try:
-        with _Line(session, found) as line:
+        with contextlib.ExitStack() as stack, _Line(session, found) as line:
+            if folder is not None and (record := recording(stack, folder, asked.mcap)) is not None:
+                record(session.control.controller)
             if source is not None:
                 run_session(session, source, q, realtime=asked.realtime, progress=line.told, log=found)
             else:
@@ -82,7 +87,7 @@ def _pages(found: SessionLog, session: Teleoperation, folder: Path) -> list[str]
         with contextlib.suppress(ViewerError, MissingPackageError):
             save_motion(session.robot, found.time, found.q, fresh / REPLAY)
         save_report(session, found, fresh)
-    return [name for name in WRITTEN if (folder / name).is_file()]
+    return [name for name in (*WRITTEN, *RECORDED) if (folder / name).is_file()]
 
 
 def _standing(name: str) -> str | Robot:

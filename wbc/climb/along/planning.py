@@ -29,11 +29,11 @@ from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
 
-#: How many times slower than asked a way is planned, and with how many postures of a limb at a foothold, one after the
-#: other
-TRIED = ((1.0, 1), (1.0, 2), (1.2, 1), (1.5, 2), (2.0, 2), (4.0, 2))
+#: How many times slower than asked a way is planned, with how many postures of a limb at a foothold, and how many
+#: standings the search keeps of each number of swings, one after the other
+TRIED = ((1.0, 1, 8), (1.0, 2, 8), (1.0, 1, 40), (1.0, 2, 40), (1.2, 1, 40), (1.5, 2, 40), (2.0, 2, 40), (4.0, 2, 40))
 #: A contact rises by this share of the shortest limb's reach
-RISE = 1.0 / 28.0
+RISE = 1.0 / 20.0
 #: Time between knots where the way is slow [s]
 SLOW = 0.055
 #: How far a start may be from the beginning of the way [m, rad]
@@ -50,13 +50,13 @@ class AlongOptions:
         motion: clearances, lift, and shares of the joints' limits.
         margin: least slack of equilibrium of the limbs that stay, in shares of the weight.
         limits: distance from limits of joints [m, rad].
-        moves: how many standings are looked at for each speed, at most.
+        moves: how many standings are looked at for each speed and width of the search, about.
     """
 
     motion: MotionOptions = field(default_factory=MotionOptions)
     margin: float = 0.02
     limits: float = LIMIT_MARGIN
-    moves: int = 1500
+    moves: int = 3000
 
     def __post_init__(self) -> None:
         validation.instance("AlongOptions.motion", self.motion, MotionOptions, "MotionOptions")
@@ -93,17 +93,21 @@ def plan_along(
     clearances = Clearances(climber, scene, motion.clearance, motion.apart)
     first = None if start is None else _begun(climber, track, start)
     furthest, said = 0.0, ""
-    for slower, postures in TRIED:
-        slow = replace(track, speed=track.speed / slower, turn_rate=track.turn_rate / slower)
-        table = SpanTable(world, slow, postures)
-        rows = None if first is None else _rows(table, world, first)
-        search = AlongSearch(table, Swings(table, limits), given.margin, given.moves)
+    searches = dict[tuple[float, int], tuple[AlongSearch, tuple[int, ...] | None]]()
+    for slower, postures, width in TRIED:
+        if (slower, postures) not in searches:
+            slow = replace(track, speed=track.speed / slower, turn_rate=track.turn_rate / slower)
+            table = SpanTable(world, slow, postures)
+            rows = None if first is None else _rows(table, world, first)
+            searches[slower, postures] = AlongSearch(table, Swings(table, limits), given.margin, given.moves), rows
+        search, rows = searches[slower, postures]
         for _ in range(AGAIN):
-            last = search.run(rows)
+            last = search.run(rows, width)
             if last is None:
                 break
-            plan = _TimedWay(climber, scene, search, last, motion, slower)
-            if plan.proven(clearances):
+            values = _values(search, chain := last.chain)
+            plan = None if values is None else _TimedWay(search, chain, values, motion, slower)
+            if plan is not None and plan.proven(clearances):
                 return plan.contact_plan()
         part = search.furthest / search.end
         if part >= furthest:
@@ -153,25 +157,41 @@ def _denser(x: Array, speed: Array, span: Array) -> tuple[tuple[Array, Array, ND
     return (np.concatenate(times), np.concatenate(places), np.array(knot)), np.concatenate(rates)
 
 
+def _values(search: AlongSearch, chain: list[Standing]) -> Array | None:
+    """Numbers of the joints at all instants ``(n, nv - 6)``; None: a limb cannot go so, which the search is told."""
+    climber = search.world.climber
+    out = np.tile(joint_values(climber.robot, climber.rest[None])[0], (search.end + 1, 1))
+    for limb in range(len(climber.limbs)):
+        columns, now, row = climber.joints(limb) - 6, 0, chain[0].rows[limb]
+        for standing in [*chain[1:], None]:
+            if standing is not None and standing.limb != limb:
+                continue
+            last = search.end if standing is None else standing.lift
+            out[now : last + 1, columns] = search.table.held(limb, row, now, last)
+            if np.isnan(out[now : last + 1, columns]).any():
+                search.table.cut(limb, row)
+                return None
+            if standing is None:
+                break
+            angles = search.swung(standing)
+            if angles is None:
+                return None
+            out[standing.lift : standing.now + 1, columns] = angles
+            row, now = standing.rows[limb], standing.now
+    for coupling in climber.robot.couplings:
+        out[:, coupling.follower - 6] = coupling.ratio * out[:, coupling.leader - 6] + coupling.offset
+    return out
+
+
 class _TimedWay:
     """The motion of a way that was found."""
 
     def __init__(
-        self,
-        climber: Climber,
-        scene: ClimbScene,
-        search: AlongSearch,
-        last: Standing,
-        motion: MotionOptions,
-        slower: float,
-    ) -> None:
-        self.climber, self.scene, self.search, self.motion = climber, scene, search, motion
-        chain = [last]
-        while chain[-1].before is not None:
-            chain.append(chain[-1].before)
-        self.chain = chain[::-1]
+        self, search: AlongSearch, chain: list[Standing], values: Array, motion: MotionOptions, slower: float
+    ) -> None:  # fmt: skip
+        self.climber = climber = search.world.climber
+        self.search, self.chain = search, chain
         track, robot = search.table.track, climber.robot
-        values = self._values()
         h = float(track.instants[1])
         slopes = np.gradient(values, h, axis=0)
         second = np.zeros_like(values)
@@ -201,27 +221,6 @@ class _TimedWay:
         self.q = with_joint_values(robot, q, np.asarray(curve(at[1])))
         self.v = np.hstack([twists, np.asarray(curve(at[1], 1))]) * rate[:, None]
 
-    def _values(self) -> Array:
-        """Numbers of the joints at all instants ``(n, nv - 6)``."""
-        climber, search = self.climber, self.search
-        rest = climber.rest
-        count = search.end + 1
-        out = np.tile(joint_values(climber.robot, rest[None])[0], (count, 1))
-        for limb in range(len(climber.limbs)):
-            rows, now = climber.joints(limb) - 6, 0
-            row = self.chain[0].rows[limb]
-            for standing in [*self.chain[1:], None]:
-                if standing is not None and standing.limb != limb:
-                    continue
-                last = self.search.end if standing is None else standing.lift
-                out[now : last + 1, rows] = search.table.held(limb, row, now, last)
-                if standing is not None and standing.swing is not None:
-                    out[standing.lift : standing.now + 1, rows] = standing.swing.angles
-                    row, now = standing.rows[limb], standing.now
-        for coupling in climber.robot.couplings:
-            out[:, coupling.follower - 6] = coupling.ratio * out[:, coupling.leader - 6] + coupling.offset
-        return out
-
     def proven(self, clearances: Clearances) -> bool:
         """Whether links are proven clear all the way; if not, the search is told what may not be."""
         for before, standing in itertools.pairwise([*self.chain, None]):
@@ -238,8 +237,7 @@ class _TimedWay:
             if standing is None or near.time < self.times[self._knot[standing.lift]]:
                 self.search.barred.add(before.rows)
             else:
-                rows = before.rows[standing.limb], standing.rows[standing.limb]
-                self.search.forbidden.add((standing.limb, rows, standing.lift))
+                self.search.forbidden.add(standing.swing[:3])
             return False
         return True
 
@@ -255,4 +253,4 @@ class _TimedWay:
             lift, land = (float(self.times[self._knot[k]]) for k in (standing.lift, standing.now))
             moves.append(ContactMove(limb, leaves, lands, lift, land))
         start = self._footholds(self.chain[0].rows)
-        return ContactPlan(self.climber, self.scene, start, moves, self.times, self.q, self.v, None)
+        return ContactPlan(self.climber, self.search.world.scene, start, moves, self.times, self.q, self.v, None)

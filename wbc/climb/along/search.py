@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.climb.along.spans import SpanTable
-from wbc.climb.along.swings import Swings
+from wbc.climb.along.swings import SwingKey, Swings
+from wbc.climb.along.touches import Touches
 from wbc.climb.first import cheapest_first
 from wbc.climb.stance import FREE_LIMB
 from wbc.validation import Array
 
-#: Standings that are kept of each number of swings, where few do not lead there, more; and whether joints may go evenly
-#: where no contact goes straight over
-WIDTHS = ((6, False), (24, False), (24, True))
 #: How many times more are looked at
 MORE_LOOKED_AT = 10
 #: First stances that are tried at most
@@ -29,35 +27,16 @@ SHORT = 1.05
 LONGER = 3
 #: How many times longer each time at most
 LONGEST = 1.5
-#: Instants between those at which links are looked at while all limbs hold
-LOOKS = 8
-#: The same while a limb swings
-SWING_LOOKS = 2
+#: Instants between those at which swings are looked at
+LOOKS = 3
 #: Instants for which a limb is in the air at most, as the search guesses how many swings are left
 FLIGHT = 40
 #: How many instants before its span begins a limb lifts, as the search guesses at first
 EARLY = 30
-#: Part of a swing in which a limb counts as being at what it leaves or comes to
-NEAR = 0.3
 #: What time until limbs have to lift is worth, as a part of the way's, beside a swing
 ROOM = 1.0
 #: What time that has passed costs beside that
 PASSED = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Swing:
-    """A limb leaves a span and comes to another.
-
-    Attributes:
-        limb: which. rows: of its spans. lift, land: instants. angles: from lift to land ``(n, k)``.
-    """
-
-    limb: int
-    rows: tuple[int, int]
-    lift: int
-    land: int
-    angles: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +46,7 @@ class Standing:
     Attributes:
         rows: of the spans of the limbs. now: instant.
         before: from which it came. limb: that swings; -1 at the beginning. lift: when.
-        swing: once it was looked at. until: instant to which all can hold, links being clear.
+        until: instant to which all can hold, links being clear. straight: whether the limb went straight over.
     """
 
     rows: tuple[int, ...]
@@ -75,13 +54,27 @@ class Standing:
     before: Standing | None = None
     limb: int = -1
     lift: int = 0
-    swing: Swing | None = None
     until: int = 0
+    straight: bool = False
+
+    @property
+    def chain(self) -> list[Standing]:
+        """All from the first on."""
+        out = [self]
+        while out[-1].before is not None:
+            out.append(out[-1].before)
+        return out[::-1]
+
+    @property
+    def swing(self) -> SwingKey:
+        """That led here."""
+        assert self.before is not None
+        return self.limb, (self.before.rows[self.limb], self.rows[self.limb]), self.straight, self.lift, self.now
 
 
 class AlongSearch:
     """A beam over standings, swing by swing: by the swings that each limb needs at least were it alone, and by the time
-    that is left until limbs have to lift.
+    that is left until limbs have to lift. Swings, and which limbs touch, are known limb by limb and pair by pair.
 
     Args:
         table: spans of all limbs. swings: of them. margin: least slack of equilibrium of limbs that hold.
@@ -96,41 +89,33 @@ class AlongSearch:
         self.table, self.world, self.swings = table, table.world, swings
         self.margin, self.most = margin, most
         self.end = len(table.track.instants) - 1
-        self._evenly = False
         self.looked, self.furthest, self.outcomes = 0, 0, Counter[str]()
-        #: Swings that may not be, as (limb, rows, lift): no motion was found for them
-        self.forbidden = set[tuple[int, tuple[int, int], int]]()
+        #: Swings that may not be, as (limb, rows, straight): their motion was not proven clear
+        self.forbidden = set[tuple[int, tuple[int, int], bool]]()
         #: Spans of all limbs that may not be at once: links are not proven clear
         self.barred = set[tuple[int, ...]]()
-        self._ends = [table.coarse[spans.last] for spans in table.limbs]
-        self._begins = [table.coarse[spans.first] for spans in table.limbs]
+        self._begins, self._ends = table.begins, table.ends
         self._left = [self._alone(limb) for limb in range(len(table.limbs))]
         self._borne: dict[bytes, bool] = {}
-        #: What is known already to wider beams: to which instant links are clear from one on, and whether in a swing
-        self._until: dict[tuple[tuple[int, ...], int], int] = {}
-        self._passed: dict[tuple[tuple[int, ...], int, tuple[int, int], int, int, bool], bool] = {}
+        self._touches = Touches(table)
+        self._swung: dict[SwingKey, tuple[float, NDArray[np.int32], Array]] = {}
 
-    def run(self, start: tuple[int, ...] | None) -> Standing | None:
-        """The last standing of the way found; None: there is none, or none within the limit.
+    def run(self, start: tuple[int, ...] | None, width: int) -> Standing | None:
+        """The last standing of the way found, swing by swing by the most promising standings; None: there is none, or
+        none within the limit.
 
         Args:
-            start: spans of the limbs at the beginning; None: any.
+            start: spans of the limbs at the beginning; None: any. width: standings that are kept of each number of
+                swings, at most.
         """
-        for width, self._evenly in WIDTHS:
-            if (last := self._beam(start, width)) is not None:
-                return last
-        return None
-
-    def _beam(self, start: tuple[int, ...] | None, width: int) -> Standing | None:
-        """Swing by swing the most promising standings, so many at most."""
-        known = dict[tuple[int, ...], int]()
+        known, end = dict[tuple[int, ...], int](), self.looked + self.most
         some = self._accepted(self._starts() if start is None else iter([Standing(start, 0)]), width, known)
         while some:
             for standing in some:
                 self.furthest = max(self.furthest, standing.until)
                 if standing.until >= self.end:
                     return standing
-            if self.looked >= self.most:
+            if self.looked >= end:
                 return None
             next_ = [(self._cost(after), k, after) for one in some for k, after in enumerate(self._after(one))]
             next_.sort(key=lambda entry: entry[:2])
@@ -198,7 +183,7 @@ class AlongSearch:
         # At first it is at rest, and a limb may lift at once
         soonest, coarse = standing.now + (standing.before is not None), self.table.coarse
         for limb, row in enumerate(standing.rows):
-            spans, others = self.table.limbs[limb], min(end for k, end in enumerate(ends) if k != limb)
+            spans, others = self.table.limbs[limb], self._touches.until(standing.rows, standing.now, limb)
             begins, lasts = self._begins[limb], self._ends[limb]
             latest = min(ends[limb], standing.until)
             lift = np.minimum(np.maximum(soonest, begins - EARLY), latest)
@@ -218,8 +203,6 @@ class AlongSearch:
                 lands = np.maximum(lifts + takes, begins[able])
                 lifts = np.minimum(np.maximum(soonest, lands - takes), latest)
             for k in np.flatnonzero((lands < others) & (lands < lasts[able])).tolist():
-                if (limb, (row, int(able[k])), int(lifts[k])) in self.forbidden:
-                    continue
                 rows = (*standing.rows[:limb], int(able[k]), *standing.rows[limb + 1 :])
                 yield Standing(rows, int(lands[k]), standing, limb, int(lifts[k]))
 
@@ -228,41 +211,70 @@ class AlongSearch:
         before, limb, lift = standing.before, standing.limb, standing.lift
         if before is None:
             return self._held(standing) if self._bears(standing.rows, -1, 0) else None
-        rows = before.rows[limb], standing.rows[limb]
-        others = [int(self._ends[k][row]) for k, row in enumerate(before.rows) if k != limb]
-        latest = min(*others, int(self._ends[limb][rows[1]])) - 1
         if not self._bears(before.rows, limb, lift) or not self._bears(before.rows, limb, standing.now):
             self.outcomes["not borne"] += 1
             return None
-        for straight in (True, False) if self._evenly else (True,):
-            swing = self._swing(limb, rows, lift, standing.now, latest, straight)
-            if swing is None:
+        others = self._touches.until(before.rows, before.now, limb)
+        latest = min(others, int(self._ends[limb][standing.rows[limb]])) - 1
+        why = ""
+        for straight in (False, True):
+            if (limb, (before.rows[limb], standing.rows[limb]), straight) in self.forbidden:
                 continue
-            key = before.rows, limb, rows, swing.lift, swing.land, straight
-            if key not in self._passed:
-                self._passed[key] = self._clear(before, swing)
-            if self._passed[key]:
-                return self._held(replace(standing, now=swing.land, swing=swing))
-            self.outcomes["links touch"] += 1
+            swinging = self._long_enough(replace(standing, straight=straight), latest)
+            if isinstance(swinging, str):
+                why = why or swinging
+                continue
+            if self._touches.clear(swinging.swing, *self._swing(swinging.swing)[1:], before.rows):
+                return self._held(swinging)
+            why = why or "links touch"
+        self.outcomes[why or "no swing"] += 1
         return None
 
-    def _swing(
-        self, limb: int, rows: tuple[int, int], lift: int, land: int, latest: int, straight: bool
-    ) -> Swing | None:
-        """The swing, as long as its joints need; None where there is none."""
+    def _long_enough(self, standing: Standing, latest: int) -> Standing | str:
+        """With the landing that its swing's joints need; or why there is none."""
         for _ in range(LONGER):
-            angles = self.swings.swung(limb, rows, lift, land, straight)
-            if angles is None:
-                self.outcomes["no swing"] += 1
-                return None
-            used = self.swings.used(limb, angles)
+            used = self._swing(standing.swing)[0]
             if used <= SHORT:
-                return Swing(limb, rows, lift, land, angles)
-            land = lift + int(np.ceil((land - lift) * min(used, LONGEST)))
+                return standing
+            if used == np.inf:
+                return "no swing"
+            land = standing.lift + int(np.ceil((standing.now - standing.lift) * min(used, LONGEST)))
             if land > latest:
                 break
-        self.outcomes["too slow"] += 1
+            standing = replace(standing, now=land)
+        return "too slow"
+
+    def _swing(self, key: SwingKey) -> tuple[float, NDArray[np.int32], Array]:
+        """As :meth:`Swings.swung`, at some instants."""
+        if key not in self._swung:
+            limb, rows, _, lift, land = key
+            ends = np.vstack([self._ended(limb, rows[0], lift, -1), self._ended(limb, rows[1], land, 1)])
+            self._swung[key] = self.swings.swung(key, ends, min(land - lift, max(6, (land - lift) // LOOKS)))
+        return self._swung[key]
+
+    def swung(self, standing: Standing) -> Array | None:
+        """The angles of its swing at all instants ``(n, k)``; None where there is none, which is kept in mind."""
+        limb, rows, straight, lift, land = standing.swing
+        begun = self.table.held(limb, rows[0], max(lift - 1, 0), lift)
+        done = self.table.held(limb, rows[1], land, min(land + 1, self.end))
+        # A span that begins or ends there has no rate
+        rates = [np.nan_to_num(some[-1] - some[0]) for some in (begun, done)]
+        ends = np.array([begun[-1], rates[0], done[0], rates[1]])
+        if np.isnan(ends[2]).any():
+            self.table.cut(limb, rows[1])
+            return None
+        used, _, angles = self.swings.swung(standing.swing, ends, land - lift)
+        if used < np.inf:
+            return angles
+        self.forbidden.add((limb, rows, straight))
         return None
+
+    def _ended(self, limb: int, row: int, instant: int, way: int) -> Array:
+        """Angles of a span at an instant, and their rates there by the instant before or after ``(2, k)``."""
+        begin, angles = self.table.near(limb, row)
+        k = instant - begin
+        beside = min(max(k + way, 0), len(angles) - 1)
+        return np.array([angles[k], way * (angles[beside] - angles[k])])
 
     def _bears(self, rows: tuple[int, ...], swinging: int, instant: int) -> bool:
         """Whether the limbs that stay bear the robot."""
@@ -272,20 +284,21 @@ class AlongSearch:
         weightless = bool(self.world.numbers.weightless)
         key = np.array([*contacts, 0 if weightless else instant]).tobytes()
         if key not in self._borne:
-            state = self.states(rows, np.array([instant]))[0]
-            known = bool(weightless or np.isfinite(state).all())
-            center = np.zeros(3) if weightless or not known else self.world.center(state)
-            self._borne[key] = known and self.world.slack(contacts, center)[0] >= self.margin
+            state = self._state(rows, instant)
+            center = np.zeros(3) if weightless or state is None else self.world.center(state)
+            self._borne[key] = state is not None and self.world.slack(contacts, center)[0] >= self.margin
         return self._borne[key]
 
-    def states(self, rows: tuple[int, ...], instants: NDArray[np.intp]) -> Array:
-        """Of :class:`ClimbWorld` while all hold ``(n, ...)``, NaN where they do not."""
+    def _state(self, rows: tuple[int, ...], instant: int) -> Array | None:
+        """Of :class:`ClimbWorld` while all hold; None where they do not."""
         offsets = self.world.offsets
-        out = np.empty((len(instants), 12 + offsets[-1]))
-        out[:, :12] = self.table.track.places[instants]
+        out = np.empty(12 + offsets[-1])
+        out[:12] = self.table.track.places[instant]
         for limb, row in enumerate(rows):
-            some = self.table.held(limb, row, int(instants[0]), int(instants[-1]))
-            out[:, 12 + offsets[limb] : 12 + offsets[limb + 1]] = some[instants - instants[0]]
+            begin, angles = self.table.near(limb, row)
+            if not 0 <= instant - begin < len(angles):
+                return None
+            out[12 + offsets[limb] : 12 + offsets[limb + 1]] = angles[instant - begin]
         return out
 
     def places(self, rows: tuple[int, ...]) -> list[int]:
@@ -294,39 +307,8 @@ class AlongSearch:
 
     def _held(self, standing: Standing) -> Standing | None:
         """With the instant to which all can hold; None where links touch at once."""
-        if standing.rows in self.barred:
-            return None
-        key = standing.rows, standing.now
-        if key not in self._until:
-            self._until[key] = self._clear_until(*key)
-        if self._until[key] < 0:
+        until = -1 if standing.rows in self.barred else self._touches.until(standing.rows, standing.now)
+        if until < standing.now:
             self.outcomes["links touch"] += 1
             return None
-        return replace(standing, until=self._until[key])
-
-    def _clear_until(self, rows: tuple[int, ...], now: int) -> int:
-        """The instant to which links are clear while all hold; -1: not at once."""
-        ends = min(int(self._ends[limb][row]) for limb, row in enumerate(rows))
-        instants = np.unique(np.append(np.arange(now, ends, LOOKS), ends))
-        states = self.states(rows, instants)
-        states = states[np.isfinite(states).all(axis=1).cumprod().astype(bool)]
-        if not len(states):
-            return -1
-        contacts = np.tile(np.array(self.places(rows), dtype=np.int32), (len(states), 1))
-        touch = self.world.first_touch(contacts, states)
-        last = len(states) - 1 if touch is None else touch[0] - 1
-        return int(instants[last]) if last >= 0 else -1
-
-    def _clear(self, before: Standing, swing: Swing) -> bool:
-        """Whether links are clear while a limb swings."""
-        offsets, limb = self.world.offsets, swing.limb
-        instants = np.arange(swing.lift, swing.land + 1)
-        states = self.states(before.rows, instants)
-        states[:, 12 + offsets[limb] : 12 + offsets[limb + 1]] = swing.angles
-        if not np.isfinite(states).all():
-            return False
-        contacts = np.tile(np.array(self.places(before.rows), dtype=np.int32), (len(instants), 1))
-        near = max(1, int(NEAR * len(instants)))
-        contacts[near : len(instants) - near, limb] = FREE_LIMB
-        contacts[len(instants) - near :, limb] = self.table.limbs[limb].place[swing.rows[1]]
-        return self.world.first_touch(contacts[::SWING_LOOKS], states[::SWING_LOOKS]) is None
+        return replace(standing, until=until)

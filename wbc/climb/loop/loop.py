@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from wbc.climb.loop.records import WRENCH, ClimbRecorder
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.loop.stack import climb_stack
 from wbc.climb.plan import ContactMove, ContactPlan
-from wbc.climb.scene import ClimbScene
+from wbc.climb.scene import ClimbScene, Foothold
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.controller import core_of
 from wbc.controller.handle import InputGroup
@@ -36,6 +36,10 @@ Replan = Callable[[ClimbScene, Stance], ContactPlan]
 Onward = Callable[[ClimbScene, Stance], ContactPlan | None]
 #: Time in which the plan comes to a stop, or goes on again, where a limb is late [s]
 STOPPING = 0.2
+#: How far the body may be from the plan, by torques, before that slows down: from half of this on [m]
+LAG = 8e-3
+#: Least rate at which a plan goes on for a body that is off it [1]
+SLOWEST = 0.1
 #: Rates with which a robot is at rest [m/s, rad/s]
 STILL = 5e-3
 #: Gain of all that follows the plan by velocities, and of closed contacts, times the period
@@ -61,13 +65,16 @@ class ClimbRun:
 
     Attributes:
         outcome: how it ended. reason: why, where it did not arrive.
-        log: of the start and of every tick. plans: carried out one after another; the last one may be unfinished.
+        log: of the start and of every tick, its contacts rows of the footholds of ``scene``.
+        scene: of the first plan, with the footholds that came later after its own.
+        plans: carried out one after another; the last one may be unfinished.
         changes: (time [s], limb, state, cause) of every change of a limb's state.
     """
 
     outcome: ClimbOutcome
     reason: str
     log: Log
+    scene: ClimbScene
     plans: tuple[ContactPlan, ...]
     changes: tuple[tuple[float, str, LimbState, Cause], ...]
 
@@ -122,6 +129,7 @@ class ClimbLoop:
         self._planned = self.robot.model.createData()
         self._changes: list[tuple[float, str, LimbState, Cause]] = []
         self._plans: list[ContactPlan] = []
+        self._footholds: dict[str, Foothold] = {}
         self._recorder = ClimbRecorder(plan, self._torques, self.dt)
         self._outcome: ClimbOutcome | None = None
         self._reason, self._scene = "", plan.scene
@@ -141,7 +149,7 @@ class ClimbLoop:
         # Where it stands before the first tick, in which limbs may lift
         motion = self._state.q, self._state.v, np.zeros(self.robot.nv)
         none = np.zeros(len(WRENCH) * len(self._limbs)) if self._torques else None
-        self._recorder.add((self.time, 0.0), motion, self._held, self._states, True, none)
+        self._recorder.add((self.time, 0.0), motion, self._logged(), self._states, True, none)
 
     # ------------------------------------------------------------------ what users do
 
@@ -167,7 +175,10 @@ class ClimbLoop:
     def result(self) -> ClimbRun:
         """What was done so far; a run that has not ended is out of time."""
         outcome = self._outcome or ClimbOutcome.OUT_OF_TIME
-        return ClimbRun(outcome, self._reason, self._recorder.log(), tuple(self._plans), tuple(self._changes))
+        scene = self._plans[0].scene
+        if len(self._footholds) > len(scene.footholds):
+            scene = replace(scene, footholds=list(self._footholds.values()))
+        return ClimbRun(outcome, self._reason, self._recorder.log(), scene, tuple(self._plans), tuple(self._changes))
 
     def see(self, scene: ClimbScene) -> None:
         """What the scene is from now on: footholds may have gone or come, and bodies appeared.
@@ -259,7 +270,7 @@ class ClimbLoop:
         dt = self.dt
         if self._turns and all(limb.state in STANDING for limb in self._limbs):
             self._needs, self._turns = self._needs or self._turns, ""
-        aimed = 0.0 if self._needs or self._waiting else 1.0
+        aimed = 0.0 if self._needs or self._waiting else self._followed()
         if self._rate != aimed:
             self._rate += min(max(aimed - self._rate, -dt / STOPPING), dt / STOPPING)
         if self._needs and self._rate <= 0.0 and np.abs(self._state.v).max() < STILL:
@@ -282,9 +293,16 @@ class ClimbLoop:
             command, wrenches = step.v, None
         state = self._state = self._connection.drive(command)
         motion = state.q, state.v, command
-        self._recorder.add((state.time, ahead), motion, self._held, self._states, step.status == "solved", wrenches)
+        self._recorder.add((state.time, ahead), motion, self._logged(), self._states, step.status == "solved", wrenches)
         if ahead >= self._reference.end and all(limb.coming is None for limb in self._limbs):
             self._go_on()
+
+    def _followed(self) -> float:
+        """At which rate the plan goes on for a body that is off it [1]: motors at their limits catch up meanwhile."""
+        if not self._torques:
+            return 1.0
+        x, y, z = (self._state.q[:3] - self._q[:3]).tolist()
+        return min(max(1.5 - sqrt(x * x + y * y + z * z) / LAG, SLOWEST), 1.0)
 
     def _write(self, q_next: Array) -> None:
         """The reference of this tick, and of the limbs in the air."""
@@ -365,6 +383,10 @@ class ClimbLoop:
     def _begin(self, plan: ContactPlan) -> None:
         """A plan, from where the robot is."""
         self._plans.append(plan)
+        for foothold in plan.scene.footholds:
+            self._footholds.setdefault(foothold.id, foothold)
+        rows = {name: row for row, name in enumerate(self._footholds)}
+        self._log_rows = [rows[foothold.id] for foothold in plan.scene.footholds]
         reference = self._reference = PlanReference(plan, self.robot)
         ordered = sorted(plan.moves, key=lambda move: move.lift)
         for row, limb in enumerate(self._limbs):
@@ -373,6 +395,10 @@ class ClimbLoop:
         self._path_time, self._rate = 0.0, 1.0
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._look()
+
+    def _logged(self) -> list[int]:
+        """Contacts as the log has them: rows of the footholds of all plans, those of the first plan first."""
+        return [self._log_rows[row] if row >= 0 else row for row in self._held]
 
     def _go_on(self) -> None:
         """A plan is done: what comes after it, if anything does."""

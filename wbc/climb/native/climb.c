@@ -1,6 +1,10 @@
 /* What the planner of climbing asks for many times. */
+#include "close.h"
 #include "moves.h"
 #include "spans.h"
+#include "swings.h"
+#include "time_law.h"
+#include "touch.h"
 
 long long wbc_step_size(void) { return (long long)sizeof(step_t); }
 long long wbc_limb_size(void) { return (long long)sizeof(limb_t); }
@@ -19,6 +23,10 @@ void wbc_touches(const limb_t *l, long n, const double *angle, double *out) {
 void wbc_postures(const limb_t *l, long n, const double *wanted, const double *seed, int most, double *out, int *count) {
     for (long k = 0; k < n; k++)
         count[k] = postures(l, wanted + 12 * k, seed ? seed + k * l->angles : 0, most, out + (size_t)k * most * l->angles);
+}
+
+long wbc_reach_each(const limb_t *l, long n, const double *wanted, int rows, double *angle) {
+    return reach_each(l, n, wanted, rows, angle);
 }
 
 long long wbc_piece_size(void) { return (long long)sizeof(piece_t); }
@@ -60,7 +68,7 @@ int wbc_stand(climb_t *c, const int *contact, const int *bears, double wanted, c
     double from[12 + MOST_LIMBS * MOST_ANGLES];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     int how = posture(c, contact, &wish, state, state + 12, numbers, which);
-    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, from, from + 12, state, state + 12, numbers, which);
+    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, 1, from, from + 12, state, state + 12, numbers, which);
     return how;
 }
 
@@ -144,24 +152,64 @@ void wbc_center(const climb_t *c, const double *state, double *center) {
     place_all(c, state, state + 12, placed, center);
 }
 
-/* As follow_contact, forwards */
-int wbc_follow(const limb_t *l, int count, const double *wanted, const double *step, double *angle) {
-    return follow_contact(l, count, wanted, 12, step, angle);
-}
-
 int wbc_hold_spans(const limb_t *l, int count, const double *wanted, int at, const double *start, int tries, int most,
                    const double *step, double *angles, int *first, int *last) {
     return hold_spans(l, count, wanted, at, start, tries, most, step, angles, first, last);
 }
 
-/* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there */
-long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state, int *which) {
+/* As swing */
+double wbc_swing(const limb_t *l, int count, int parts, const double *body, const double *from, const double *onto,
+                 const double *ends, double over, int straight, const double *most, double *angle, int *at) {
+    return swing(l, count, parts, body, from, onto, ends, over, straight, most, angle, at);
+}
+
+/* As pieces_of */
+int wbc_pieces_of(const climb_t *c, int limb, long n, const double *angle, double *out) {
+    return pieces_of(c, limb, n, angle, out);
+}
+
+/* As mark_alone; `work`: 13 n numbers */
+void wbc_mark_alone(const climb_t *c, int limb, const double *pieces, const double *base, const int *contact, const double *off,
+                    long n, char *mark, double *work) {
+    mark_alone(c, limb, pieces, base, contact, off, n, mark, work);
+}
+
+/* As mark_limbs */
+void wbc_mark_limbs(const climb_t *c, int one, const double *pieces, int other, const double *others, long n, char *mark) {
+    mark_limbs(c, one, pieces, other, others, 0, n, mark);
+}
+
+int wbc_fastest(long n, int rows, int sided, const double *s, const double *a, const double *b, const double *squared, double *x) {
+    return fastest_law(n, rows, sided, s, a, b, squared, x);
+}
+
+/* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there, `lacks`: by
+ * how much, and the direction in which the first of them has to go */
+long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state, int *which, double *lacks) {
     placed_t placed[MOST_LIMBS];
-    double center[3];
+    double center[3], value[MOST_VARIABLES];
+    int column[MOST_VARIABLES], count = 6;
+    const int start[MOST_LIMBS] = {0};
     for (long k = 0; k < n; k++) {
         const double *at = state + k * (12 + c->offset[c->limbs]);
         place_all(c, at, at + 12, placed, center);
-        if (link_clearance(c, contact + k * c->limbs, at, placed, which) < 0.0) return k;
+        if ((lacks[0] = -link_clearance(c, contact + k * c->limbs, at, placed, which)) <= 0.0) continue;
+        avoiding(c, contact + k * c->limbs, which, at, placed, start, value, column, &count);
+        copy3(value, lacks + 1);
+        return k;
     }
     return n;
+}
+
+/* Of n states of a body and its limbs' angles the contacts of some limbs at poses in the world, 12 each: closed in at most `steps`
+ * steps of `close_once`; the largest errors that are left */
+void wbc_close(const limb_t *limbs, const int *offset, int size, int contacts, const int *which, const double *wanted, int turned,
+               double body, double enough, int steps, long n, double *state, double *left) {
+    for (long k = 0; k < n; k++) {
+        double *at = state + k * size;
+        for (int step = 0; step <= steps; step++) {
+            left[k] = close_once(limbs, offset, contacts, which, wanted + k * contacts * 12, turned, body, step < steps ? enough : 1e300, at);
+            if (!(left[k] >= enough) || !(left[k] < 1e3)) break;
+        }
+    }
 }

@@ -6,6 +6,10 @@
 
 /* Poses between two postures at which limbs that hold are followed */
 #define BETWEEN 4
+/* From this attempt on links may touch on the way of the body, which may then not be straight */
+#define LAST_ATTEMPT 3
+/* How far limbs that lift or land are to reach over their contact, but in that attempt [lengths of the limb] */
+#define RISEN 0.03
 /* Farther from its even way no angle may have to go [rad, m] */
 #define JUMP 1.0
 /* How much lower and higher the body begins in other attempts [lengths of the robot] */
@@ -106,28 +110,34 @@ static int follow_whole(const climb_t *c, const int *contact, const double *base
 }
 
 /* Follows limbs that hold while the body goes from one posture to another, whose angles become what is come to; the slack and
- * clearance there, on contacts `at_last`, are looked at again where these differ */
-static int follow(climb_t *c, const int *contact, const int *at_last, const wish_t *wish, const double *base, const double *angle,
-                  const double *to, double *reached, double *slack, int *which) {
-    double pose[12], now[MOST_ANGLES], center[3];
+ * clearance there, on contacts `at_last`, are looked at again where these differ. `clear`: whether links of the body and of limbs
+ * that hold are to be clear on the way */
+static int follow(climb_t *c, const int *contact, const int *at_last, const wish_t *wish, int clear, const double *base,
+                  const double *angle, const double *to, double *reached, double *slack, int *which) {
+    double pose[BETWEEN][12], now[MOST_ANGLES], center[3], way[BETWEEN][MOST_LIMBS * MOST_ANGLES];
     placed_t placed[MOST_LIMBS];
-    int other = 0;
+    int other = 0, held[MOST_LIMBS];
     if (yields(c, contact)) return follow_whole(c, contact, base, angle, to, reached);
+    for (int k = 1; k < BETWEEN; k++) pose_between(base, to, (double)k / BETWEEN, pose[k]), memset(way[k], 0, sizeof way[k]);
     for (int l = 0; l < c->limbs; l++) {
+        held[l] = contact[l] < 0 ? LEFT_OUT : contact[l];
         if (contact[l] < 0) continue;
         const limb_t *limb = c->limb + l;
         double *end = reached + c->offset[l];
         memcpy(now, angle + c->offset[l], (size_t)limb->angles * sizeof *now);
         for (int k = 1; k <= BETWEEN; k++) {
-            const double part = (double)k / BETWEEN;
-            pose_between(base, to, part, pose);
             /* Limbs with angles to spare are led to where they end */
             if (limb->angles > limb->rows)
                 for (int i = 0; i < limb->angles; i++) now[i] += (end[i] - now[i]) / (BETWEEN - k + 1);
-            if (!reach_from(limb, k < BETWEEN ? pose : to, c->foothold + 12 * contact[l], now)) return BREAKS;
+            if (!reach_from(limb, k < BETWEEN ? pose[k] : to, c->foothold + 12 * contact[l], now)) return BREAKS;
+            if (k < BETWEEN) memcpy(way[k] + c->offset[l], now, (size_t)limb->angles * sizeof *now);
         }
         for (int i = 0; i < limb->angles; i++) other |= fabs(end[i] - now[i]) > 1e-3;
         memcpy(end, now, (size_t)limb->angles * sizeof *now);
+    }
+    for (int k = 1; k < BETWEEN && clear; k++) {
+        place_all(c, pose[k], way[k], placed, center);
+        if (link_clearance(c, held, pose[k], placed, which) < 0.0) return TOUCHES;
     }
     if (!other) return STANDS;
     place_all(c, to, reached, placed, center);
@@ -135,6 +145,20 @@ static int follow(climb_t *c, const int *contact, const int *at_last, const wish
     for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
     if (*slack < wish->slack) return NOT_BORNE;
     return link_clearance(c, at_last, to, placed, which) >= 0.0 ? STANDS : TOUCHES;
+}
+
+/* Whether limbs that are not kept can rise off their contacts with the body as it is, or take it along */
+static int can_rise(const climb_t *c, const int *contact, const int *kept, const double *base, const double *angle) {
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0 || contact[l] == kept[l] || c->limb[l].angles < c->limb[l].rows) continue;
+        double wanted[12], now[MOST_ANGLES];
+        const double *at = c->foothold + 12 * contact[l], normal[3] = {at[2], at[5], at[8]};
+        memcpy(wanted, at, sizeof wanted);
+        along3(at + 9, RISEN * c->limb[l].length, normal, wanted + 9);
+        memcpy(now, angle + c->offset[l], (size_t)c->limb[l].angles * sizeof *now);
+        if (!reach_from(c->limb + l, base, wanted, now)) return 0;
+    }
+    return 1;
 }
 
 /* Another beginning than the present state: the body as guessed and lower or higher, all limbs as from rest; in place */
@@ -162,13 +186,14 @@ static int lift_off(climb_t *c, const int *contact, const int *kept, double want
     place_all(c, state, state + 12, placed, center);
     *moves = 0;
     *slack = slack_of(c, wish.support[0], center, wanted);
-    if (*slack >= wanted) return STANDS;
+    if (*slack >= wanted) return attempt == LAST_ATTEMPT || can_rise(c, contact, kept, state, state + 12) ? STANDS : NOT_REACHED;
     if (*slack == -INFINITY) return NOT_BORNE;
     *moves = 1;
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     if (attempt) begin_anew(c, contact, touch, attempt, state);
     int how = posture(c, contact, &wish, state, state + 12, slack, which);
-    return how == STANDS ? follow(c, contact, contact, &wish, from, from + 12, state, state + 12, slack, which) : how;
+    if (how == STANDS && attempt < LAST_ATTEMPT && !can_rise(c, contact, kept, state, state + 12)) return NOT_REACHED;
+    return how == STANDS ? follow(c, contact, contact, &wish, attempt < LAST_ATTEMPT, from, from + 12, state, state + 12, slack, which) : how;
 }
 
 /* From there, the posture at which limbs hold again or are at rest in the air; in place */
@@ -188,7 +213,8 @@ static int land_on(climb_t *c, const int *next, const int *kept, double wanted, 
     }
     if (attempt) begin_anew(c, next, touch, attempt, state);
     int how = posture(c, next, &wish, state, state + 12, slack, which);
-    return how == STANDS ? follow(c, kept, next, &wish, from, from + 12, state, state + 12, slack, which) : how;
+    if (how == STANDS && attempt < LAST_ATTEMPT && !can_rise(c, next, kept, state, state + 12)) return NOT_REACHED;
+    return how == STANDS ? follow(c, kept, next, &wish, attempt < LAST_ATTEMPT, from, from + 12, state, state + 12, slack, which) : how;
 }
 
 #endif

@@ -18,7 +18,9 @@
 
 /* Pairs that are kept apart in one posture, and what they are led beyond [lengths of the robot] */
 #define AVOIDED 6
-#define ASIDE 2e-3
+#define ASIDE 1e-2
+/* How much clearer of bodies postures are than they have to be, where that can be [lengths of the robot] */
+#define CLEARER 7e-3
 
 /* What is wanted: the slack of each of some supports, and the body at a pose by weights of place and turn */
 typedef struct {
@@ -232,6 +234,13 @@ static int tighten(const climb_t *c, const int *contact, double *base, double *a
     return 0;
 }
 
+/* Whether a pair is kept apart already, or there is no place for one more */
+static int is_avoided(const wish_t *wish, const int *which) {
+    int known = wish->avoided == AVOIDED;
+    for (int k = 0; k < wish->avoided && !known; k++) known = !memcmp(wish->avoid[k], which, sizeof wish->avoid[k]);
+    return known;
+}
+
 /* Finds a posture from the given one on, in place. `slack`: the least over the supports [1]; `which`: as of clearance */
 static int posture(climb_t *c, const int *contact, const wish_t *given, double *base, double *angle, double *slack, int *which) {
     placed_t placed[MOST_LIMBS];
@@ -250,12 +259,18 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
         how = NOT_BORNE;
         if (*slack == -INFINITY) return how;
         if (*slack < wish->slack) continue;
-        if (link_clearance(c, contact, base, placed, which) >= 0.0) return STANDS;
+        const double clear = c->clear;
+        c->clear += CLEARER * c->length;
+        const double far = link_clearance(c, contact, base, placed, which);
+        c->clear = clear;
+        if (far >= 0.0) return STANDS;
         how = TOUCHES;
-        int known = wish->avoided == AVOIDED;
-        for (int k = 0; k < wish->avoided && !known; k++) known = !memcmp(wish->avoid[k], which, sizeof wish->avoid[k]);
-        /* A pair that touches in spite of its row gets one more look */
-        if (known && look >= LOOKS / 2) return how;
+        int known = is_avoided(wish, which);
+        if (known || look >= LOOKS / 2) {
+            if (link_clearance(c, contact, base, placed, which) >= 0.0) return STANDS;
+            /* A pair that touches in spite of its row gets one more look */
+            if ((known = is_avoided(wish, which)) && look >= LOOKS / 2) return how;
+        }
         if (!known) memcpy(wish->avoid[wish->avoided++], which, sizeof wish->avoid[0]);
     }
     return how;

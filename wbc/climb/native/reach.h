@@ -70,6 +70,27 @@ static int reach_from(const limb_t *l, const double *base, const double *wanted,
     return 0;
 }
 
+/* Brings a contact to each of n wanted poses in the body's frame, from the angles of each or else from those that the one before
+ * came to, in place; `rows`: of the pose that count at most. How many were reached, the first ones */
+static long reach_each(const limb_t *l, long n, const double *wanted, int rows, double *angle) {
+    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const size_t size = (size_t)l->angles * sizeof *angle;
+    limb_t part = *l;
+    double now[MOST_ANGLES];
+    if (rows < part.rows) part.rows = rows;
+    for (long k = 0; k < n; k++) {
+        double *at = angle + k * l->angles;
+        memcpy(now, at, size);
+        if (!reach_from(&part, here, wanted + 12 * k, now)) {
+            if (!k) return 0;
+            memcpy(now, at - l->angles, size);
+            if (!reach_from(&part, here, wanted + 12 * k, now)) return k;
+        }
+        memcpy(at, now, size);
+    }
+    return n;
+}
+
 /* Numbers of the `TRIES` samples nearest to a wanted pose in the body's frame, nearest first; how many */
 static int nearest_samples(const limb_t *l, const double *wanted, int *out) {
     double score[TRIES];

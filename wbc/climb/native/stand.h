@@ -7,6 +7,8 @@
 #include "measure.h"
 #include "reach.h"
 
+/* Stands for the contact of a limb that does not count */
+#define LEFT_OUT -2
 /* Bounds on the slack that are kept of a set of contacts */
 #define BOUNDS 12
 
@@ -184,8 +186,12 @@ static double kept_distance(const climb_t *c, const int *contact, int piece, int
     return p->tip && contact[p->limb] >= 0 && c->on[contact[p->limb]] == other ? -p->depth : c->clear;
 }
 
+static int left_out(const climb_t *c, const int *contact, int piece) {
+    return c->piece[piece].limb >= 0 && contact[c->piece[piece].limb] == LEFT_OUT;
+}
+
 /* Shortest distance less what is kept [m] of links from bodies and each other, up to a positive one. `which`: piece, and body or
- * -1 - piece */
+ * -1 - piece; links of limbs that are left out do not count */
 static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     double pose[c->pieces ? c->pieces : 1][12], least = INFINITY;
@@ -193,6 +199,7 @@ static double link_clearance(climb_t *c, const int *contact, const double *base,
     for (int k = 0; k < c->pieces + c->pairs; k++) {
         const int own = k >= c->pieces;
         const int i = own ? c->pair[2 * (k - c->pieces)] : k;
+        if (left_out(c, contact, i) || (own && left_out(c, contact, c->pair[2 * (k - c->pieces) + 1]))) continue;
         const shape_t *a = c->shape + c->piece[i].shape;
         for (int j = 0; j < (own ? 1 : c->bodies); j++) {
             const int other = own ? c->pair[2 * (k - c->pieces) + 1] : j;

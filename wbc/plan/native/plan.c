@@ -3,6 +3,9 @@
 
 long long wbc_plan_size(void) { return (long long)sizeof(plan_t); }
 
+/* After the bodies or what they keep have changed */
+void wbc_plan_prepare(plan_t *p) { prepare(p); }
+
 /* 1: free; 0: not */
 int wbc_plan_free(plan_t *p, const double *x) { return is_free(p, x); }
 
@@ -36,6 +39,26 @@ void wbc_plan_draw(plan_t *p, double *x) {
 int wbc_plan_root(plan_t *p, int tree, const double *x) {
     if (tree) p->seeds++;
     return add(p, tree, x, -1);
+}
+
+/* From x to a configuration near it with `room` on all sides, which is reached from it straight: how far it may be [rad, m], and
+ * how often it is tried; x where it has that room, or where there is none */
+void wbc_plan_away(plan_t *p, double *x, double room) {
+    const int n = p->n;
+    int pair;
+    double best[n], y[n], most = least_margin(p, x, &pair);
+    copy_x(p, x, best);
+    for (double radius = 0.02; radius < 0.5 && most < room; radius *= 2.0)
+        for (int again = 0; again < 20; again++) {
+            for (int k = 0; k < n; k++) {
+                const double off = radius * (2.0 * uniform(p) - 1.0) / sqrt(p->weight[k]);
+                y[k] = fmin(fmax(x[k] + off, p->low[k]), p->high[k]);
+            }
+            if (has_rows(p) && !project(p, &p->path, y)) continue;
+            const double margin = least_margin(p, y, &pair);
+            if (margin > most && is_free(p, y) && edge(p, x, y)) copy_x(p, y, best), most = margin;
+        }
+    copy_x(p, best, x);
 }
 
 int wbc_plan_grow(plan_t *p, int samples) { return grow(p, samples); }

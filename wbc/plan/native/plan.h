@@ -5,6 +5,9 @@
 
 #include "sweep.c"
 
+/* So many pairs that were too near last are looked at first */
+#define RECENT 3
+
 /* Straight-line code of rows, as CasADi writes it: (x, p) -> (values, their derivatives by x, column by column) */
 typedef int (*rows_function)(const double **in, double **out, long long *iw, double *w, int memory);
 
@@ -17,24 +20,31 @@ typedef struct {
     long long *iw;
 } kept_rows_t;
 
-/* How a body drifts within half a piece of a motion, see proof.h */
+/* How the first joints of its chain move a body within half a piece of a motion: a screw; turns; how far points go at most, and
+ * the sums of the bound in proof.h */
 typedef struct {
-    double angular[3], linear[3], turned, reached, bent;
+    double angular[3], linear[3], turned, off, reached, bent;
 } drift_t;
 
 typedef struct {
     sweep_t *sweep;
     drift_t *drifts;  /* bodies x (depth + 1) */
-    int *drifted;     /* bodies: the node that theirs are of; -1: it stands in the world */
+    double *gone;     /* frames: how far joints go within half a piece */
+    double *radius;   /* bodies: of the ball about each */
     double *balls;    /* bodies x 4: about each, its centre and radius */
     double *normals;  /* pairs x 3: the directions that parted them last, or 0 */
     double half;      /* half of the piece at hand */
     double open;      /* what a proof may leave open of what is required [m] */
-    double *control, *rate; /* of the sweep: two ends, scalars x 2, and how far apart they are */
+    /* pairs of a body that moves and a solid in the world, LANES at a time: pose, half sides of the box about the solid, and what
+     * is required; then all other pairs */
+    double *lanes;
+    int *first_block, *block_pairs, *loose_pairs;
+    int recent[RECENT];
+    const double *x, *y; /* ends of the motion at hand */
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
     const double *weight;                   /* n: squares of what a coordinate counts */
-    int n, pairs, capacity, seeds, count[2];
+    int n, pairs, loose, capacity, seeds, count[2];
     double range;     /* an edge is no longer */
     double step;      /* of edges with rows: between two projections */
     double tolerance; /* of equalities at a configuration */

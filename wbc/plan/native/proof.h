@@ -10,40 +10,14 @@
 #ifndef WBC_PROOF_H
 #define WBC_PROOF_H
 
-#include "plan.h"
+#include "places.h"
 
+/* Edges are looked at, before they are proven, at places no farther apart than this [rad, or characteristic lengths] */
+#define PROBED 0.5
 /* Pieces are not halved more often */
 #define PIECES 40
 /* Beyond so large a turn the linear part says nothing [rad] */
 #define TURNED 1.5
-
-/* What the joints from a body's on do to it within half a piece: as a screw, and the sums of the bound above */
-static void place_drift(plan_t *p, int b) {
-    const sweep_t *s = p->sweep;
-    const double *moved = s->moved + 2 * (s->depth + 1) * b;
-    drift_t *d = p->drifts + (s->depth + 1) * b;
-    memset(d, 0, sizeof *d);
-    for (int k = 0; k < s->chain_length[b]; k++, d++) {
-        const int f = s->chain[s->depth * b + k], turning = s->kind[f] == TURNING, c = s->coordinate[f];
-        const double *axis = s->axis + 5 * f, *pose = s->pose + 12 * f, off = s->deviation[4 * f + turning];
-        const double way = axis[3] * (p->control[2 * c + 1] - p->control[2 * c]) * p->half, far = moved[2 * k + 2] - moved[2 * k];
-        double a[3], u[3];
-        turn(pose, axis, a);
-        d[1] = d[0];
-        if (turning) {
-            cross3(pose + 9, a, u);
-            along3(d->angular, way, a, d[1].angular);
-            along3(d->linear, way, u, d[1].linear);
-        } else {
-            along3(d->linear, way, a, d[1].linear);
-        }
-        const double reached = turning ? far + off * moved[2 * k] : far;
-        d[1].reached += reached;
-        d[1].turned += turning * off;
-        d[1].bent += reached * (turning * off - 2.0 * d[1].turned);
-    }
-    p->drifted[b] = s->node;
-}
 
 /* No point of a body is farther along n, at any instant of the piece; the first `stop` joints of its chain move it */
 static double top(plan_t *p, int b, int stop, const double *n) {
@@ -52,7 +26,6 @@ static double top(plan_t *p, int b, int stop, const double *n) {
     const double *pose = s->body_pose + 12 * b, *ends = s->world_line + 6 * b, *line = s->line + 8 * b;
     double local[3], rate[2] = {0.0, 0.0}, bend = 0.0, side = 0.0;
     if (stop && p->half > 0.0) {
-        if (p->drifted[b] != s->node) place_drift(p, b);
         const drift_t *d = p->drifts + (s->depth + 1) * b + stop;
         double across[3];
         if (d->turned > TURNED) return INFINITY;
@@ -83,31 +56,32 @@ static double parted_any(plan_t *p, int k) {
     return dot3(down, W + 9) - top(p, other, other == i ? s->stop_first[k] : s->stop_second[k], down);
 }
 
-/* A body and the ball about it at the middle of the piece */
-static void stand(plan_t *p, int b) {
-    sweep_t *s = p->sweep;
-    if (s->stamp[b] == s->node || (s->body_frame[b] < 0 && p->drifted[b] < 0)) return;
-    double span[3], *ball = p->balls + 4 * b;
-    const double *ends = s->world_line + 6 * b;
-    place_body(s, b);
-    minus3(ends + 3, ends, span);
-    along3(ends, 0.5, span, ball);
-    ball[3] = endless(s->shape[b].kind) ? INFINITY : 0.5 * sqrt(dot3(span, span)) + s->line[8 * b + 6];
-    if (s->body_frame[b] < 0) p->drifted[b] = -1;
+/* A bound from below of the distance of body j from the ball about body i */
+static double from_ball(const plan_t *p, int i, int j) {
+    const sweep_t *s = p->sweep;
+    const double *ball = p->balls + 4 * i, *other = p->balls + 4 * j, *pose = s->body_pose + 12 * j;
+    double d[3], x[3], off[3];
+    if (is_round(s->shape + j) || !is_box(s->shape + j)) {
+        minus3(ball, other, d);
+        return sqrt(dot3(d, d)) - other[3] - ball[3];
+    }
+    minus3(ball, pose + 9, d);
+    turn_back(pose, d, x);
+    beyond_box(x, s->shape[j].size, off);
+    return sqrt(dot3(off, off)) - s->shape[j].size[4] - ball[3];
 }
 
-/* One pair over one piece: 1 where both halves must be looked at */
-static int examine(plan_t *p, int k, int last) {
+/* One pair over one piece: 1 where both halves must be looked at; `near`: the balls say nothing */
+static int examine(plan_t *p, int k, int last, int near) {
     sweep_t *s = p->sweep;
     const int i = s->first[k], j = s->second[k];
     stand(p, i);
     stand(p, j);
-    const double *a = s->moved + 2 * ((s->depth + 1) * i + s->stop_first[k]);
-    const double *b = s->moved + 2 * ((s->depth + 1) * j + s->stop_second[k]), off = a[0] + b[0], required = s->required[k];
-    const double *one = p->balls + 4 * i, *other = p->balls + 4 * j, reach_ = one[3] + other[3] + off + required;
-    double *n = p->normals + 3 * k, d[3];
-    minus3(one, other, d);
-    if (reach_ < INFINITY ? reach_ <= 0.0 || dot3(d, d) >= reach_ * reach_ : bound_of(s, i, j) - off >= required) return 0;
+    const double off = off_of(p, i, s->stop_first[k]) + off_of(p, j, s->stop_second[k]), required = s->required[k];
+    const int bounded = p->radius[i] < INFINITY && p->radius[j] < INFINITY;
+    double *n = p->normals + 3 * k;
+    if (!near && bounded && (is_round(s->shape + j) ? from_ball(p, j, i) : from_ball(p, i, j)) - off >= required) return 0;
+    if (!bounded && bound_of(s, i, j) - off >= required) return 0;
     if (dot3(n, n) > 0.0 && parted_any(p, k) >= required) return 0;
     answer_t found;
     distance_of(s, i, j, &found);
@@ -120,49 +94,70 @@ static int examine(plan_t *p, int k, int last) {
     return !(last || off <= p->open || found.gap - off >= required - p->open || parted_any(p, k) >= required - p->open);
 }
 
+/* One piece, and both halves of it where that is not enough; `count` pairs, or -1: all of them */
 static void halve(plan_t *p, double low, double high, const int *pairs, int count, int depth, int *room) {
     sweep_t *s = p->sweep;
-    const piece_t piece = {0, 1, low, high};
+    const int whole = count < 0;
     int left = 0;
-    s->node++;
-    p->half = 0.5 * (high - low);
-    place_frames(s, &piece);
+    place_joints(p, 0.5 * (low + high), 0.5 * (high - low));
+    /* What was too near before is first */
+    for (int k = 0; whole && low == high && k < RECENT && s->stopped < 0; k++)
+        if (p->recent[k] >= 0) examine(p, p->recent[k], 1, 0);
+    if (whole && s->stopped < 0) count = near_pairs(p, room), pairs = room;
     for (int k = 0; k < count && s->stopped < 0; k++)
-        if (examine(p, pairs[k], depth >= PIECES)) room[left++] = pairs[k];
+        if (examine(p, pairs[k], depth >= PIECES, whole)) room[left++] = pairs[k];
     if (!left || s->stopped >= 0) return;
     halve(p, low, 0.5 * (low + high), room, left, depth + 1, room + left);
     if (s->stopped < 0) halve(p, 0.5 * (low + high), high, room, left, depth + 1, room + left);
 }
 
-/* Straight from x to y, which may be x; where a pair is too near it is looked at first the next time */
-static int clear(plan_t *p, const double *x, const double *y) {
-    sweep_t *s = p->sweep;
-    if (!p->pairs) return 1;
-    for (int k = 0; k < p->n; k++) {
-        p->control[2 * k] = x[k], p->control[2 * k + 1] = y[k];
-        p->rate[k] = fabs(y[k] - x[k]);
-    }
-    s->stopped = -1;
-    halve(p, 0.0, x == y ? 0.0 : 1.0, s->chosen, p->pairs, 0, s->list);
-    if (s->stopped < 0) return 1;
-    for (int k = 0; k < p->pairs; k++)
-        if (s->chosen[k] == s->stopped) {
-            memmove(s->chosen + 1, s->chosen, k * sizeof *s->chosen);
-            s->chosen[0] = s->stopped;
-            break;
-        }
+/* A pair that was too near is looked at first the next time */
+static int remembered(plan_t *p) {
+    const int stopped = p->sweep->stopped;
+    if (stopped < 0) return 1;
+    int k = 0;
+    while (k < RECENT - 1 && p->recent[k] != stopped) k++;
+    memmove(p->recent + 1, p->recent, k * sizeof *p->recent);
+    p->recent[0] = stopped;
     return 0;
 }
+
+/* Whether nothing is too near at places between x and y: far from each other first, since what is in a body is so seen
+ * soonest */
+static int probed(plan_t *p, const double *x, const double *y) {
+    sweep_t *s = p->sweep;
+    if (!p->pairs) return 1;
+    const double length = metric(p, x, y);
+    p->x = x, p->y = y;
+    s->stopped = -1;
+    for (int parts = 1; length > parts * PROBED && s->stopped < 0; parts *= 2)
+        for (int k = 1; k < 2 * parts && s->stopped < 0; k += 2)
+            halve(p, 0.5 * k / parts, 0.5 * k / parts, 0, -1, 0, s->list);
+    return remembered(p);
+}
+
+/* Straight from x to y, which may be x */
+static int proven(plan_t *p, const double *x, const double *y) {
+    sweep_t *s = p->sweep;
+    if (!p->pairs) return 1;
+    const double length = metric(p, x, y);
+    int parts = 1;
+    while (parts * PROBED < length) parts *= 2;
+    p->x = x, p->y = y;
+    s->stopped = -1;
+    if (x == y) halve(p, 0.0, 0.0, 0, -1, 0, s->list);
+    for (int k = 0; k < parts && x != y && s->stopped < 0; k++) halve(p, (double)k / parts, (k + 1.0) / parts, 0, -1, 0, s->list);
+    return remembered(p);
+}
+
+static int clear(plan_t *p, const double *x, const double *y) { return (x == y || probed(p, x, y)) && proven(p, x, y); }
 
 /* The least distance of all pairs at x, less what each keeps; which pair it is */
 static double least_margin(plan_t *p, const double *x, int *pair) {
     sweep_t *s = p->sweep;
-    const piece_t piece = {0, 1, 0.0, 0.0};
     double least = INFINITY;
-    for (int k = 0; k < p->n; k++) p->control[2 * k] = p->control[2 * k + 1] = x[k], p->rate[k] = 0.0;
-    s->node++;
-    p->half = 0.0;
-    place_frames(s, &piece);
+    p->x = p->y = x;
+    place_joints(p, 0.0, 0.0);
     for (int k = 0; k < p->pairs; k++) {
         const int i = s->first[k], j = s->second[k];
         answer_t found;

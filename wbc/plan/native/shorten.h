@@ -8,6 +8,8 @@
 #define GAIN 1e-4
 /* Cuts end after so many that gained nothing */
 #define IDLE 15
+/* Corners are pulled in by no less than this share */
+#define PULLED 0.05
 
 static double length_of(const plan_t *p, const double *x, int count) {
     double sum = 0.0;
@@ -78,7 +80,7 @@ static int pull(plan_t *p, double *x, int points, int k) {
     if (sqrt(square) > (1.0 - GAIN) * now) return points;
     share = square > 0.0 ? fmin(fmax(share / square, 0.1), 0.9) : 0.5;
     along_x(p, before, after, share, line);
-    for (double t = 1.0; t > 0.05; t *= 0.5) {
+    for (double t = 1.0; t > PULLED; t *= 0.5) {
         along_x(p, here, line, t, to);
         if (stepped && !project(p, &p->path, to)) continue;
         if (metric(p, before, to) + metric(p, to, after) > (1.0 - GAIN) * now) continue;

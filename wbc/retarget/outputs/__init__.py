@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.retarget.outputs.motion import JointColumns as JointColumns, RobotMotion as RobotMotion
+    from wbc.retarget.outputs.motion import JointColumns as JointColumns
     from wbc.retarget.outputs.writing import (
         MOTION_FORMATS as MOTION_FORMATS,
         write_lerobot as write_lerobot,

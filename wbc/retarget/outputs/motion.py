@@ -2,42 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.multibody import pin
-from wbc.robot import Robot
 from wbc.rotations import quaternion
 from wbc.validation import Array
 
-
-class RobotMotion(Protocol):
-    """What is written of a retargeted clip."""
-
-    @property
-    def robot(self) -> Robot:
-        """Whose motion it is."""
-
-    @property
-    def rate(self) -> float:
-        """Frames a second [Hz]."""
-
-    @property
-    def time(self) -> Array:
-        """Of the frames [s]."""
-
-    @property
-    def q(self) -> Array:
-        """Configurations [frames, nq]."""
-
-    @property
-    def stance(self) -> Mapping[str, NDArray[np.bool_]]:
-        """Foot or hand -> whether it stands [frames]."""
+if TYPE_CHECKING:
+    from wbc.retarget.retargeted import Retargeted
 
 
 @dataclass(frozen=True)
@@ -58,7 +35,7 @@ class JointColumns:
     positions: Array
 
     @classmethod
-    def of(cls, motion: RobotMotion) -> JointColumns:
+    def of(cls, motion: Retargeted) -> JointColumns:
         """Those of a motion."""
         robot, q = motion.robot, validation.ordinary_array("motion.q", motion.q)
         model, first = robot.model, 1 if robot.base == "fixed" else 2

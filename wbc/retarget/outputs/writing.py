@@ -17,10 +17,12 @@ from wbc import extras, validation
 from wbc.errors import ClipFileError, RangeError, ShapeError
 from wbc.log import Log
 from wbc.log.lerobot import write_lerobot_dataset
-from wbc.retarget.outputs.motion import JointColumns, RobotMotion
+from wbc.retarget.outputs.motion import JointColumns
 
 if TYPE_CHECKING:
     import mujoco
+
+    from wbc.retarget.retargeted import Retargeted
 
 #: Format -> suffix of its file
 MOTION_FORMATS = {
@@ -31,7 +33,7 @@ ROOT = ("root.x", "root.y", "root.z", "root.qx", "root.qy", "root.qz", "root.qw"
 
 
 def write_motion(
-    motion: RobotMotion,
+    motion: Retargeted,
     file: str | os.PathLike[str],
     kind: str = "npz",
     *,
@@ -77,7 +79,7 @@ def write_motion(
     return path
 
 
-def log_of(motion: RobotMotion) -> Log:
+def log_of(motion: Retargeted) -> Log:
     """The motion as a log: columns ``t``, ``q.*`` and ``stance.*``."""
     robot = motion.robot
     dofs = {int(index): dof for dof, index in enumerate(robot.position_index) if index >= 0}
@@ -91,7 +93,7 @@ def log_of(motion: RobotMotion) -> Log:
     return Log(columns, units, {"robot": robot.name, "rate": motion.rate, "kind": "retargeted"})
 
 
-def _write_npz(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -> None:
+def _write_npz(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
     stances = {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
     arrays: dict[str, Any] = {
         "q": motion.q, "time": motion.time, "rate": np.array(motion.rate), "robot": np.array(motion.robot.name),
@@ -102,7 +104,7 @@ def _write_npz(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -
         np.savez_compressed(stream, allow_pickle=False, **arrays)
 
 
-def _write_csv(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -> None:
+def _write_csv(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(["time", *ROOT, *columns.names])
@@ -110,12 +112,12 @@ def _write_csv(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -
         writer.writerows([[repr(number) for number in row] for row in table.tolist()])
 
 
-def _write_plain(_motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -> None:
+def _write_plain(_motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
     table = np.column_stack((columns.root_position, columns.root_quaternion, columns.positions))
     np.savetxt(file, table, fmt="%.9g", delimiter=",")
 
 
-def _write_gmr(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -> None:
+def _write_gmr(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
     whole = round(motion.rate)
     about = {
         "fps": whole if abs(whole - motion.rate) < 1e-6 else motion.rate,
@@ -126,7 +128,7 @@ def _write_gmr(motion: RobotMotion, columns: JointColumns, file: pathlib.Path) -
         pickle.dump(about, stream)
 
 
-def _write_keyframes(motion: RobotMotion, file: pathlib.Path, model: mujoco.MjModel | None) -> None:
+def _write_keyframes(motion: Retargeted, file: pathlib.Path, model: mujoco.MjModel | None) -> None:
     extras.require("mujoco", "MuJoCo's keyframes")
     from wbc.robot.mujoco_joints import MujocoJoints
     from wbc.simulation import mujoco_model
@@ -142,7 +144,7 @@ def _write_keyframes(motion: RobotMotion, file: pathlib.Path, model: mujoco.MjMo
     file.write_text("\n".join([*lines, "  </keyframe>", "</mujoco>", ""]), encoding="utf-8")
 
 
-_WRITERS: dict[str, Callable[[RobotMotion, JointColumns, pathlib.Path], None]] = {
+_WRITERS: dict[str, Callable[[Retargeted, JointColumns, pathlib.Path], None]] = {
     "npz": _write_npz,
     "csv": _write_csv,
     "csv-plain": _write_plain,
@@ -151,7 +153,7 @@ _WRITERS: dict[str, Callable[[RobotMotion, JointColumns, pathlib.Path], None]] =
 
 
 def write_lerobot(
-    motions: Sequence[RobotMotion], folder: str | os.PathLike[str], tasks: Sequence[str] | None = None
+    motions: Sequence[Retargeted], folder: str | os.PathLike[str], tasks: Sequence[str] | None = None
 ) -> pathlib.Path:
     """A LeRobot dataset of which each motion is an episode; returns the folder.
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
-from wbc.multibody import pin
+from wbc.multibody import own, pin
 from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml
-from wbc.robot.sources.mjmodel import compiled, is_mjmodel
-from wbc.robot.sources.mjnames import names_of, pose_of
+from wbc.robot.sources.kinds import is_mjmodel
 from wbc.shapes import Capsule, HeightMap, Sphere
 from wbc.validation import Array
 
@@ -61,7 +60,7 @@ class CollisionBody:
 
     link: str
     mesh: bool
-    placement: pin.SE3
+    placement: own.SE3
     read: Callable[[], Raw]
 
 
@@ -80,6 +79,8 @@ def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: Any = No
     path = pathlib.Path(robot.source)
     _, tree = read_xml(path)
     if tree.tag == "mujoco":
+        from wbc.robot.sources.mjmodel import compiled
+
         return _mujoco_bodies(robot, compiled(path))
     folders = [
         validation.file_path("package_dirs", folder)
@@ -122,7 +123,7 @@ def _urdf_body(
             return read_mesh(file, _numbers(shape.get("scale", "1 1 1"), link))
         raise RobotFileError("geometry", shape.tag, "neither sphere, capsule, cylinder, box nor mesh")
 
-    return CollisionBody(link, shape.tag == "mesh", pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), read)
+    return CollisionBody(link, shape.tag == "mesh", own.SE3(own.rpy.rpyToMatrix(rpy), xyz), read)
 
 
 def _numbers(text: str, link: str) -> Array:
@@ -157,7 +158,7 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
     bodies = []
     for item in geometry.geometryObjects:
         frame = model.frames[item.parentFrame]
-        local = frame.placement.inverse() * item.placement
+        local = own.SE3(frame.placement.inverse() * item.placement)
         mesh = isinstance(item.geometry, (coal.BVHModelBase, coal.ConvexBase))
         bodies.append(CollisionBody(str(frame.name), mesh, local, partial(raw_of, item.geometry)))
     return bodies
@@ -165,12 +166,14 @@ def _geometry_bodies(model: pin.Model, geometry: pin.GeometryModel) -> list[Coll
 
 def _mujoco_bodies(robot: Robot, model: Any) -> list[CollisionBody]:
     """Geoms of a compiled model that can touch something, on links of the robot that move or do not."""
+    from wbc.robot.sources.mjnames import names_of, pose_of
+
     bodies, names = [], names_of(model).bodies
     pairs = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     for g in range(model.ngeom):
         link = names[int(model.geom_bodyid[g])]
         touches = model.geom_contype[g] or model.geom_conaffinity[g] or g in pairs
-        if touches and robot.model.existFrame(link):
+        if touches and robot.tree.existFrame(link):
             placement, mesh = pose_of(model.geom_pos[g], model.geom_quat[g]), int(model.geom_type[g]) == _MESH
             bodies.append(CollisionBody(link, mesh, placement, partial(_from_geom, model, g)))
     return bodies

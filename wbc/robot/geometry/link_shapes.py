@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +14,8 @@ from wbc.robot.geometry.bodies import CollisionBody, bodies_of
 from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
 from wbc.robot.geometry.meshes import Mesh, read_mesh
 from wbc.robot.geometry.styles import Style
-from wbc.robot.robot import Robot
-from wbc.robot.sources.mjmodel import is_mjmodel
+from wbc.robot.robot import Robot, changed
+from wbc.robot.sources.kinds import is_mjmodel
 from wbc.shapes import PlacedShape
 
 if TYPE_CHECKING:
@@ -165,4 +164,4 @@ def _counted(shapes: dict[str, tuple[PlacedShape, ...]], words: str) -> str:
 
 
 def _with(robot: Robot, shapes: dict[str, tuple[PlacedShape, ...]], sentences: list[str]) -> Robot:
-    return replace(robot.with_shapes(shapes), notes={**robot.notes, "shapes": "; ".join(sentences)})
+    return changed(robot.with_shapes(shapes), notes={**robot.notes, "shapes": "; ".join(sentences)})

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
 from wbc.robot.geometry.convex_parts import parts_of
 from wbc.robot.geometry.covering import cover
@@ -53,7 +53,7 @@ class Style:
                 raise RangeError("count", self.count, "convex parts are as many as the mesh has")
         validation.scalar("tolerance", self.tolerance, low=0.0, unit="m")
 
-    def shapes(self, raw: Raw, placement: pin.SE3) -> tuple[tuple[PlacedShape, ...], tuple[str, ...]]:
+    def shapes(self, raw: Raw, placement: own.SE3) -> tuple[tuple[PlacedShape, ...], tuple[str, ...]]:
         """(shapes of a body in its link's frame, remarks about components without volume).
 
         Together the shapes contain the body. Spheres, capsules and height maps stay themselves.
@@ -67,7 +67,7 @@ class Style:
             return tuple(PlacedShape(part, placement) for part in found.parts), found.remarks
         return self._fitted(raw, placement), ()
 
-    def _fitted(self, raw: Raw, placement: pin.SE3) -> tuple[PlacedShape, ...]:
+    def _fitted(self, raw: Raw, placement: own.SE3) -> tuple[PlacedShape, ...]:
         if isinstance(raw, (Sphere, Capsule, HeightMap)):
             return (PlacedShape(raw, placement),)
         count = COUNTS[self.kind] if self.count is None else self.count
@@ -88,7 +88,7 @@ def _worst(shapes: tuple[PlacedShape, ...]) -> float:
 
 
 def _covered(
-    raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3, style: Style, count: int
+    raw: RawBox | RawCylinder | RawEllipsoid, placement: own.SE3, style: Style, count: int
 ) -> tuple[PlacedShape, ...]:
     """Shapes around the polyhedron around a body; what that stands out by is added to their excess, a bound then."""
     mesh, slack = _polyhedron(raw)
@@ -117,11 +117,11 @@ def exact_shape(raw: Sphere | Capsule | HeightMap | RawBox | RawCylinder | RawEl
     return Ellipsoid(tuple(raw.radii)) if isinstance(raw, RawEllipsoid) else raw
 
 
-def _capsule(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> PlacedShape:
+def _capsule(raw: RawBox | RawCylinder | RawEllipsoid, placement: own.SE3) -> PlacedShape:
     """The least capsule on the body's longest axis, with the exact excess."""
     if isinstance(raw, RawCylinder):
         radius, half, gap = around_cylinder(raw.radius, raw.half)
-        turn = pin.SE3.Identity()
+        turn = own.SE3.Identity()
     elif isinstance(raw, RawBox):
         longest = int(np.argmax(raw.half))
         across: Array = np.delete(raw.half, longest)
@@ -135,6 +135,6 @@ def _capsule(raw: RawBox | RawCylinder | RawEllipsoid, placement: pin.SE3) -> Pl
     return PlacedShape(shape, placement * turn, gap)
 
 
-def _axis_to_z(axis: int) -> pin.SE3:
+def _axis_to_z(axis: int) -> own.SE3:
     """A rotation whose z axis is the given axis."""
-    return pin.SE3(np.roll(np.eye(3), 2 - axis, axis=1), np.zeros(3))
+    return own.SE3(np.roll(np.eye(3), 2 - axis, axis=1), np.zeros(3))

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wbc.errors import NotFiniteError
 from wbc.geometry import ShapeTable, distances, segment_distances
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.pairs.link_pairs import joint_of
 from wbc.robot.sampling import joint_poses
 from wbc.shapes import PlacedShape, Solid
@@ -41,7 +41,7 @@ class LinkPart:
 
     joint: int
     shape: Solid
-    placement: pin.SE3
+    placement: own.SE3
     ends: tuple[Array, Array]
     radius: float
     exact: bool
@@ -76,7 +76,7 @@ class Links:
         """All shapes at each of the configurations ``steps`` away from the neutral one."""
         return Scenes(self, *joint_poses(self.robot, steps, self._joints))
 
-    def witness(self, first: str, second: str, poses: dict[int, pin.SE3]) -> tuple[float, Array, Array, Array]:
+    def witness(self, first: str, second: str, poses: Mapping[int, Any]) -> tuple[float, Array, Array, Array]:
         """(signed distance [m], normal from first to second, nearest points) of two links.
 
         Raises:
@@ -84,7 +84,7 @@ class Links:
         """
         sides = [[self._number[id(part)] for part in self.parts[link]] for link in (first, second)]
         for part in (*self.parts[first], *self.parts[second]):
-            self._poses[self._number[id(part)]] = place(poses[part.joint] * part.placement)
+            self._poses[self._number[id(part)]] = place(own.SE3(poses[part.joint]) * part.placement)
         one, other = np.repeat(sides[0], len(sides[1])), np.tile(sides[1], len(sides[0]))
         found = distances(self._table, self._poses, one, other, self.robot.characteristic_length)
         gap, normal, point = np.split(found[int(np.argmin(found[:, 0]))], [1, 4])
@@ -151,13 +151,13 @@ class Scenes:
         """Signed distance [m] at the n-th configuration."""
         index = self.links.index
         joints = {part.joint for link in (first, second) for part in self.links.parts[link]}
-        poses = {j: pin.SE3(self._rotations[n, index[j]], self._positions[n, index[j]]) for j in joints}
+        poses = {j: own.SE3(self._rotations[n, index[j]], self._positions[n, index[j]]) for j in joints}
         return self.links.witness(first, second, poses)[0]
 
 
 def _part(robot: Robot, link: str, placed: PlacedShape) -> LinkPart:
-    above = pin.SE3.Identity() if link == WORLD else robot.model.frames[frame_index(robot.model, link)].placement
-    shape, here = placed.shape, above * placed.placement
+    above = own.SE3.Identity() if link == WORLD else own.SE3(robot.tree.frames[frame_index(robot.tree, link)].placement)
+    shape, here = placed.shape, above * placed.place
     a, b, radius = shape.capsule()
-    at = here * pin.SE3(np.eye(3), shape.center)
+    at = here * own.SE3(np.eye(3), shape.center)
     return LinkPart(joint_of(robot, link), shape, at, (here * a, here * b), radius, shape.is_round)

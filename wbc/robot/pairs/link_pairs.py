@@ -28,7 +28,7 @@ def link_pairs(robot: Robot) -> tuple[tuple[str, str], ...]:
 
 def joint_of(robot: Robot, link: str) -> int:
     """Number of the joint that carries a link; links welded to each other have the same."""
-    return 0 if link == WORLD else int(robot.model.frames[frame_index(robot.model, link)].parentJoint)
+    return 0 if link == WORLD else int(robot.tree.frames[frame_index(robot.tree, link)].parentJoint)
 
 
 def neighbours(robot: Robot) -> dict[tuple[str, str], str]:
@@ -51,7 +51,7 @@ def neighbours(robot: Robot) -> dict[tuple[str, str], str]:
 
 def _body_above(robot: Robot, joint: int, shaped: set[int]) -> int:
     """The body on the other side of a joint; -1 above the world, which no joint carries."""
-    model = robot.model
+    model = robot.tree
     if joint == 0:
         return -1
     parent = int(model.parents[joint])

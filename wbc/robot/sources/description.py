@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RobotFileError
-from wbc.multibody import pin
+from wbc.multibody import algebra, own, pin
 from wbc.robot.loops import AnyLoop
 from wbc.robot.rebuilt import on_joint, without_joints
 from wbc.robot.robot import BASES
@@ -62,12 +62,12 @@ class Description:
     transmissions: tuple[str, ...] = ()
 
 
-def root_joint(base: str) -> pin.JointModel | None:
-    """The Pinocchio joint of a base, or None for a fixed one."""
+def root_joint(base: str, library: Any = own) -> Any:
+    """The joint of a base, by ``own`` or ``pin``, or None for a fixed one."""
     validation.one_of("base", base, BASES)
     if base == "fixed":
         return None
-    return pin.JointModelFreeFlyer() if base == "floating" else pin.JointModelPlanar()
+    return library.JointModelFreeFlyer() if base == "floating" else library.JointModelPlanar()
 
 
 def own_base(model: pin.Model) -> str:
@@ -94,10 +94,10 @@ def with_base(model: pin.Model, base: str | None, q: Array | None = None) -> tup
     has = own_base(model)
     if base is None:
         return model, has
-    joint = root_joint(base)
+    joint = root_joint(base, algebra(model))
     if has != "fixed":
         if base == "fixed":
-            return without_joints(model, [1], pin.neutral(model) if q is None else q), base
+            return without_joints(model, [1], algebra(model).neutral(model) if q is None else q), base
         if base == has or (has == "planar" and base == "differential"):
             return model, base
         raise RobotFileError("base", base, f"the description has a {has} base of its own")

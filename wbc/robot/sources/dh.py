@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
-from wbc.multibody import pin
+from wbc.multibody import own, pin, to_pin
 from wbc.robot.sources.description import Description, with_base
 
 CONVENTIONS = ("standard", "modified")
@@ -70,16 +70,18 @@ class DHRow:
 
     def before(self) -> pin.SE3:
         """The fixed part of T before the joint."""
-        turn = _turn_z(self.theta)
-        if self.convention == "standard":
-            return turn
-        return _turn_x(self.alpha) * _shift(self.a, 0.0) * turn * _shift(0.0, self.d)
+        return to_pin(self.parts()[0])
 
     def after(self) -> pin.SE3:
         """The fixed part of T after the joint. (Rz and Tz commute, so the joint may stand between them.)"""
-        if self.convention == "modified":
-            return pin.SE3.Identity()
-        return _shift(0.0, self.d) * _shift(self.a, 0.0) * _turn_x(self.alpha)
+        return to_pin(self.parts()[1])
+
+    def parts(self) -> tuple[own.SE3, own.SE3]:
+        """:meth:`before` and :meth:`after` as this package's own poses."""
+        turn = _turn_z(self.theta)
+        if self.convention == "standard":
+            return turn, _shift(0.0, self.d) * _shift(self.a, 0.0) * _turn_x(self.alpha)
+        return _turn_x(self.alpha) * _shift(self.a, 0.0) * turn * _shift(0.0, self.d), own.SE3.Identity()
 
 
 def read_dh(rows: Sequence[DHRow], base: str | None = None, tool: Any = None) -> Description:
@@ -94,37 +96,38 @@ def read_dh(rows: Sequence[DHRow], base: str | None = None, tool: Any = None) ->
     rows = validation.items("rows", rows, "DHRow")
     if not rows or not all(isinstance(row, DHRow) for row in rows):
         raise ShapeError("rows", rows, "expected a non-empty sequence of DHRow")
-    model = pin.Model()
+    model = own.Model()
     model.name = "dh_chain"
-    model.addFrame(pin.Frame("link0", 0, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    parent, tail, acceleration = 0, pin.SE3.Identity(), {}
+    model.addFrame(own.Frame("link0", 0, 0, own.SE3.Identity(), own.FrameType.BODY))
+    parent, tail, acceleration = 0, own.SE3.Identity(), {}
     frame = model.getFrameId("link0")
     for number, row in enumerate(rows, start=1):
         name = row.name or f"joint{number}"
         if model.existJointName(name):
             raise DuplicateNameError("rows", name, "two joints of this name")
-        kind = pin.JointModelRZ() if row.joint == "revolute" else pin.JointModelPZ()
+        kind = own.JointModelRZ() if row.joint == "revolute" else own.JointModelPZ()
         limits = [np.array([x]) for x in (row.effort, row.velocity, row.lower, row.upper)]
-        parent = model.addJoint(parent, kind, tail * row.before(), name, *limits)
+        before, after = row.parts()
+        parent = model.addJoint(parent, kind, tail * before, name, *limits)
         joint_frame = model.addJointFrame(parent, frame)
-        tail = row.after()
-        frame = model.addFrame(pin.Frame(f"link{number}", parent, joint_frame, tail, pin.FrameType.BODY))
+        tail = after
+        frame = model.addFrame(own.Frame(f"link{number}", parent, joint_frame, tail, own.FrameType.BODY))
         if np.isfinite(row.acceleration):
             acceleration[name] = row.acceleration
-    end = tail if tool is None else tail * validation.pose("tool", tool)
-    model.addFrame(pin.Frame("tip", parent, frame, end, pin.FrameType.OP_FRAME))
+    end = tail if tool is None else tail * validation.own_pose("tool", tool)
+    model.addFrame(own.Frame("tip", parent, frame, end, own.FrameType.OP_FRAME))
     whole, kind_of_base = with_base(model, base)
     notes = {"inertia": "Denavit-Hartenberg rows carry no masses: kinematics only"}
     return Description(whole, kind_of_base, acceleration=acceleration, notes=notes)
 
 
-def _turn_z(angle: float) -> pin.SE3:
-    return pin.SE3(pin.utils.rotate("z", angle), np.zeros(3))
+def _turn_z(angle: float) -> own.SE3:
+    return own.SE3(own.utils.rotate("z", angle), np.zeros(3))
 
 
-def _turn_x(angle: float) -> pin.SE3:
-    return pin.SE3(pin.utils.rotate("x", angle), np.zeros(3))
+def _turn_x(angle: float) -> own.SE3:
+    return own.SE3(own.utils.rotate("x", angle), np.zeros(3))
 
 
-def _shift(x: float, z: float) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array([x, 0.0, z]))
+def _shift(x: float, z: float) -> own.SE3:
+    return own.SE3(np.eye(3), np.array([x, 0.0, z]))

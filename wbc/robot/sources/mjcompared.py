@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.sources.mjnames import FREE, HINGE, SIZES, MjNames, coordinates
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
@@ -65,7 +65,7 @@ class MjCompared:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, whole: pin.Model, order: Sequence[int], names: MjNames, mimics: Sequence[Mimic]
+        self, model: mujoco.MjModel, whole: own.Model, order: Sequence[int], names: MjNames, mimics: Sequence[Mimic]
     ) -> None:
         import mujoco
 
@@ -88,24 +88,24 @@ class MjCompared:
         q, axes = self._draw()
         far = max(1.0, float(np.abs(q).max()) / MANY)
         here = whole.createData()
-        pin.framesForwardKinematics(whole, here, q)
+        own.framesForwardKinematics(whole, here, q)
         for frame, pose in zip(whole.frames, here.oMf, strict=True):
-            body = frame.type == pin.FrameType.BODY
-            if not body and frame.type != pin.FrameType.OP_FRAME:
+            body = frame.type == own.FrameType.BODY
+            if not body and frame.type != own.FrameType.OP_FRAME:
                 continue
             index = (self._names.bodies if body else self._names.sites).index(str(frame.name))
             place, turn = (data.xpos, data.xmat) if body else (data.site_xpos, data.site_xmat)
             gap = np.abs(pose.homogeneous[:3] - np.column_stack([turn[index].reshape(3, 3), place[index]])).max()
             if gap > NEAR * max(far, float(np.abs(place[index]).max())):
                 return f"{frame.name} is {gap:.3g} m or rad from where MuJoCo has it"
-        inertia = np.triu(pin.crba(whole, here, q))
+        inertia = np.triu(own.crba(whole, here, q))
         ours, theirs = axes @ (inertia + np.triu(inertia, 1).T) @ axes.T, np.zeros((whole.nv, whole.nv))
         for row, dof in zip(theirs, dofs.tolist(), strict=True):
             pushed = np.zeros(model.nv)
             mujoco.mj_mulM(model, data, pushed, np.eye(model.nv)[dof])
             row[:] = pushed[dofs]
         forces, weights = np.array(data.qfrc_bias[dofs]), np.sqrt(np.diag(theirs))
-        bias = axes @ pin.nonLinearEffects(whole, here, q, axes.T @ data.qvel[dofs])
+        bias = axes @ own.nonLinearEffects(whole, here, q, axes.T @ data.qvel[dofs])
         largest = max(float(np.abs(theirs).max()), float(np.abs(forces).max()))
         gaps = {
             "inertia": (np.abs(ours - theirs) / np.outer(weights, weights)).max(axis=1),
@@ -223,7 +223,7 @@ class MjCompared:
             data.qpos[at + numbers - 4 : at + numbers] = turn / np.linalg.norm(turn)
             if kind == FREE:
                 data.qpos[at : at + 3], data.qvel[dof : dof + 3] = rng.uniform(-1.0, 1.0, 3), 0.0
-                turned, first = pin.Quaternion(data.qpos[at + 3 : at + 7][TO_PINOCCHIO]), int(self._whole.idx_vs[k])
+                turned, first = own.Quaternion(data.qpos[at + 3 : at + 7][TO_PINOCCHIO]), int(self._whole.idx_vs[k])
                 axes[first : first + 3, first : first + 3] = turned.toRotationMatrix()
         for mimic in reversed(self._mimics):
             data.qpos[places[mimic.follower]] = mimic.ratio * data.qpos[places[mimic.leader]] + mimic.offset

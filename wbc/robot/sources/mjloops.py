@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.loops import AnyLoop, JointCurve, Loop
 from wbc.robot.sources.mjnames import MjNames, pose_of
 from wbc.validation import Array
@@ -22,7 +22,7 @@ def loops_of(
     bodies: Sequence[int],
     joints: set[int],
     names: MjNames,
-    out: pin.Model,
+    out: own.Model,
 ) -> tuple[tuple[AnyLoop, ...], list[int]]:
     """(loops, with their frames added to ``out``; numbers of the equalities that close none of the robot).
 
@@ -57,15 +57,15 @@ def loops_of(
         labels = []
         for body, place, side in zip(ours, places, "ab", strict=True):
             labels.append(f"{name}:{side}")
-            above = out.frames[out.getFrameId(names.bodies[body], pin.FrameType.BODY)] if body else None
+            above = out.frames[out.getFrameId(names.bodies[body], own.FrameType.BODY)] if body else None
             joint, pose = (0, place) if above is None else (int(above.parentJoint), above.placement * place)
-            out.addFrame(pin.Frame(labels[-1], joint, 0, pose, pin.FrameType.OP_FRAME))
+            out.addFrame(own.Frame(labels[-1], joint, 0, pose, own.FrameType.OP_FRAME))
         loops.append(Loop(name, labels[0], labels[1], kinds[kind]))
     return tuple(loops), lost
 
 
-def _shifted(position: Array) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array(position))
+def _shifted(position: Array) -> own.SE3:
+    return own.SE3(np.eye(3), np.array(position))
 
 
 def _curve(model: mujoco.MjModel, name: str, ends: tuple[int, int], terms: list[float], names: MjNames) -> JointCurve:

@@ -12,13 +12,13 @@ import pathlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wbc import extras
 from wbc.errors import RobotFileError
-from wbc.multibody import pin, single_joint
+from wbc.multibody import own, single_joint
 from wbc.robot.sources.description import Description, Mimic, own_base, with_base
 from wbc.robot.sources.files import captured_stderr
 from wbc.robot.sources.mjactuators import driven_joints, elsewhere, force_range, of_actuators
@@ -38,17 +38,6 @@ MOST = 300
 _JOINT_EQUALITY = 2
 #: Numbers this much apart, for a coordinate of 1, say the same of two couplings
 _SAME = 1e-12
-
-
-def is_mjmodel(source: Any) -> bool:
-    """Whether a user handed in a ``mujoco.MjModel``; MuJoCo is not imported for it."""
-    kind = type(source)
-    return kind.__name__ == "MjModel" and kind.__module__.startswith("mujoco")
-
-
-def is_text(source: Any) -> bool:
-    """Whether a string is XML instead of a name or path."""
-    return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
 def compiled(source: str | pathlib.Path) -> mujoco.MjModel:
@@ -112,10 +101,12 @@ def trees_of(model: mujoco.MjModel) -> MjTrees:
     flexes = tuple(f"{mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, f)}_" for f in range(model.nflex))
     bent = [
         r
-        for r, own in joints.items()
-        if flexes and str(model.body(r).name).startswith(flexes) and not any(model.joint(j).name for j in own)
+        for r, held in joints.items()
+        if flexes and str(model.body(r).name).startswith(flexes) and not any(model.joint(j).name for j in held)
     ]
-    alone = [r for r, own in joints.items() if len(own) == 1 and int(model.jnt_type[own[0]]) == FREE and r not in bent]
+    alone = [
+        r for r, held in joints.items() if len(held) == 1 and int(model.jnt_type[held[0]]) == FREE and r not in bent
+    ]
     still = [r for r in joints if r not in bent and not _is_pushed(model, r)]
     floating = [r for r in joints if r not in {*bent, *still} and int(model.jnt_type[joints[r][0]]) == FREE]
     loose = still if len(floating) == 1 else [r for r in alone if r in still]
@@ -155,20 +146,20 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
 
     label, names, trees = source or model_name(model), names_of(model), trees_of(model)
     beside = "; ".join(sentence(why, [names.bodies[b] for b in group]) for why, group in trees.left_out.items())
-    own = [j for body in trees.robot for j in _joints(model, body)]
-    if not own:
+    moving = [j for body in trees.robot for j in _joints(model, body)]
+    if not moving:
         raise RobotFileError(
             "robot", label, "the model has no joint that moves a robot" + f" ({beside})" * bool(beside)
         )
-    dofs = sum(SIZES[int(model.jnt_type[j])][1] for j in own)
+    dofs = sum(SIZES[int(model.jnt_type[j])][1] for j in moving)
     if dofs > MOST:
-        count = len({int(model.body_rootid[model.jnt_bodyid[j]]) for j in own})
+        count = len({int(model.body_rootid[model.jnt_bodyid[j]]) for j in moving})
         reason = f"{dofs} degrees of freedom in {count} trees of bodies, at most {MOST} are held"
         raise RobotFileError("robot", label, f"{reason}: load a model of the robot alone")
     whole, order = _built(model, trees, names)
     mimics, lost = _couplings(model, set(order), names)
-    free = [names.joints[j] for j in own if model.jnt_type[j] == FREE and own_base(whole) == "fixed"]
-    heavy = [names.joints[j] for j in own if model.jnt_type[j] == FREE and model.dof_armature[model.jnt_dofadr[j]]]
+    free = [names.joints[j] for j in moving if model.jnt_type[j] == FREE and own_base(whole) == "fixed"]
+    heavy = [names.joints[j] for j in moving if model.jnt_type[j] == FREE and model.dof_armature[model.jnt_dofadr[j]]]
     carried = [names.bodies[b] for b in trees.robot if model.body_mocapid[b] >= 0]
     said = {
         "objects": f"no part of the robot are bodies {beside}" if beside else "",
@@ -209,27 +200,28 @@ def read_mjmodel(model: mujoco.MjModel, base: str | None = None, source: str = "
     )  # fmt: skip
 
 
-def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[pin.Model, list[int]]:
+def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[own.Model, list[int]]:
     """(the model with its frames, MuJoCo's joints in the order of q)."""
-    out, order = pin.Model(), list[int]()
+    out, order = own.Model(), list[int]()
     out.name = model_name(model)
     gravity = np.zeros(3) if _off(model, "GRAVITY") else np.array(model.opt.gravity)
-    out.gravity = pin.Motion(gravity, np.zeros(3))
+    out.gravity = own.Motion(gravity, np.zeros(3))
     # Of each body: the joint that carries it, its pose there, its frame
-    at: dict[int, tuple[int, pin.SE3, int]] = {0: (0, pin.SE3.Identity(), 0)}
+    at: dict[int, tuple[int, own.SE3, int]] = {0: (0, own.SE3.Identity(), 0)}
     armature, damping, friction = list[Array](), list[Array](), list[Array]()
     for body in trees.robot:
+        made: own.JointModel
         joint, pose, frame = at[int(model.body_parentid[body])]
         pose = pose * pose_of(model.body_pos[body], model.body_quat[body])
         for j in _joints(model, body):
             kind = int(model.jnt_type[j])
             if kind == FREE:
-                pose, anchor, made = pin.SE3.Identity(), pin.SE3.Identity(), pin.JointModelFreeFlyer()
+                pose, anchor, made = own.SE3.Identity(), own.SE3.Identity(), own.JointModelFreeFlyer()
             else:
                 anchor, made = _joint(model, j)
             joint = out.addJoint(joint, made, pose * anchor, names.joints[j])
             frame = out.addJointFrame(joint, frame)
-            back = pin.SE3(np.eye(3), -np.array(model.jnt_pos[j])) if kind in (BALL, HINGE) else pin.SE3.Identity()
+            back = own.SE3(np.eye(3), -np.array(model.jnt_pos[j])) if kind in (BALL, HINGE) else own.SE3.Identity()
             pose = back
             order.append(j)
             dofs = slice(int(model.jnt_dofadr[j]), int(model.jnt_dofadr[j]) + SIZES[kind][1])
@@ -243,7 +235,7 @@ def _built(model: mujoco.MjModel, trees: MjTrees, names: MjNames) -> tuple[pin.M
         if site and int(model.site_bodyid[s]) in at:
             joint, pose, frame = at[int(model.site_bodyid[s])]
             placed = pose * pose_of(model.site_pos[s], model.site_quat[s])
-            out.addFrame(pin.Frame(site, joint, frame, placed, pin.FrameType.OP_FRAME))
+            out.addFrame(own.Frame(site, joint, frame, placed, own.FrameType.OP_FRAME))
     out.armature, loss = np.concatenate(armature), np.concatenate(friction)
     out.damping = np.concatenate(damping) * (not _off(model, "DAMPER", "PASSIVE"))
     out.upperDryFrictionLimit = loss * (not _off(model, "FRICTIONLOSS", "CONSTRAINT"))
@@ -264,24 +256,24 @@ def _joints(model: mujoco.MjModel, body: int) -> Iterator[int]:
     return iter(range(first, first + int(model.body_jntnum[body])))
 
 
-def _joint(model: mujoco.MjModel, j: int) -> tuple[pin.SE3, pin.JointModel]:
+def _joint(model: mujoco.MjModel, j: int) -> tuple[own.SE3, own.JointModel]:
     """(placement in the body, joint): turned or moved back by qpos0, from which MuJoCo counts, so that q is qpos."""
     anchor, axis = np.array(model.jnt_pos[j]), np.array(model.jnt_axis[j])
     if int(model.jnt_type[j]) == BALL:
-        return pin.SE3(np.eye(3), anchor), pin.JointModelSpherical()
+        return own.SE3(np.eye(3), anchor), own.JointModelSpherical()
     axis, ref = axis / np.linalg.norm(axis), float(model.qpos0[int(model.jnt_qposadr[j])])
     if int(model.jnt_type[j]) == SLIDE:
-        return pin.SE3(np.eye(3), -ref * axis), single_joint(axis, slides=True)
-    return pin.SE3(pin.exp3(-ref * axis), anchor), single_joint(axis, slides=False)
+        return own.SE3(np.eye(3), -ref * axis), single_joint(axis, slides=True)
+    return own.SE3(own.exp3(-ref * axis), anchor), single_joint(axis, slides=False)
 
 
-def _inertia(model: mujoco.MjModel, body: int) -> pin.Inertia:
+def _inertia(model: mujoco.MjModel, body: int) -> own.Inertia:
     axes = pose_of(model.body_ipos[body], model.body_iquat[body])
     turned = axes.rotation @ np.diag(model.body_inertia[body]) @ axes.rotation.T
-    return pin.Inertia(float(model.body_mass[body]), axes.translation, turned)
+    return own.Inertia(float(model.body_mass[body]), axes.translation, turned)
 
 
-def _set_limits(model: mujoco.MjModel, out: pin.Model, order: list[int], names: MjNames) -> dict[str, str]:
+def _set_limits(model: mujoco.MjModel, out: own.Model, order: list[int], names: MjNames) -> dict[str, str]:
     """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates.
 
     Returns:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
 
@@ -88,8 +88,8 @@ def _unique(given: Sequence[str], made: Sequence[str], reserved: Collection[str]
     return out
 
 
-def pose_of(position: Array, quaternion: Array) -> pin.SE3:
+def pose_of(position: Array, quaternion: Array) -> own.SE3:
     """A pose from MuJoCo's w, x, y, z."""
-    turn = pin.Quaternion(np.array(quaternion)[TO_PINOCCHIO])
+    turn = own.Quaternion(np.array(quaternion)[TO_PINOCCHIO])
     turn.normalize()
-    return pin.SE3(turn.toRotationMatrix(), np.array(position, dtype=float))
+    return own.SE3(turn.toRotationMatrix(), np.array(position, dtype=float))

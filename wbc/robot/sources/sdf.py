@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from wbc.errors import RobotFileError
-from wbc.multibody import pin, single_joint
+from wbc.multibody import own, single_joint
 from wbc.robot.loops import Kind, Loop
 from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, with_base
 from wbc.robot.sources.urdf_checks import SHORTEST_AXIS, Remarks
@@ -46,7 +46,7 @@ class _Joint:
     kind: str
     parent: str
     child: str
-    pose: pin.SE3
+    pose: own.SE3
     axis: Array
 
     def other(self, link: str) -> str:
@@ -54,12 +54,12 @@ class _Joint:
         return self.parent if link == self.child else self.child
 
     @property
-    def along_z(self) -> pin.SE3:
+    def along_z(self) -> own.SE3:
         """The joint's pose, turned so that its axis is z, where it has one."""
         if not self.axis.any():
             return self.pose
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), self.axis).toRotationMatrix()
-        return self.pose * pin.SE3(turn, np.zeros(3))
+        turn = own.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), self.axis).toRotationMatrix()
+        return self.pose * own.SE3(turn, np.zeros(3))
 
 
 def read_sdf(path: pathlib.Path, tree: ElementTree.Element, base: str | None = None) -> Description:
@@ -96,8 +96,8 @@ class _Reader:
         hangs = self._tree()
         tied = any(joint.parent == WORLD for joint in self._joints)
         roots = [link for link in self._links if link not in hangs]
-        start = self._pose(self._links[roots[0]], ()) if roots and not tied else pin.SE3.Identity()
-        out, fixed = pin.Model(), dict[str, tuple[int, pin.SE3]]()
+        start = self._pose(self._links[roots[0]], ()) if roots and not tied else own.SE3.Identity()
+        out, fixed = own.Model(), dict[str, tuple[int, own.SE3]]()
         out.name = self._model.get("name", "")
         # Where each link is on the joint that carries it: (joint, pose of the model in it)
         fixed[WORLD] = 0, start.inverse()
@@ -134,7 +134,7 @@ class _Reader:
         whole, kind = with_base(out, base if base or tied else "floating")
         states = {}
         if kind == "floating" and own_base(out) == "fixed":
-            states["home"] = {ROOT: np.array(pin.SE3ToXYZQUAT(start))}
+            states["home"] = {ROOT: np.array(own.SE3ToXYZQUAT(start))}
         return Description(
             whole, kind, tuple(mimics), states, notes=self._remarks.said(), source=str(self._path), loops=loops
         )
@@ -169,10 +169,10 @@ class _Reader:
             raise self._error(f"no joint ties these links to {root}: {', '.join(lost)}")
         return hangs
 
-    def _move(self, out: pin.Model, joint: _Joint, link: str, above: int, back: pin.SE3) -> int:
+    def _move(self, out: own.Model, joint: _Joint, link: str, above: int, back: own.SE3) -> int:
         """Adds a joint that moves; where the link is the joint's parent it moves the other way."""
         sign = 1.0 if link == joint.child else -1.0
-        made = pin.JointModelSpherical()
+        made: own.JointModel = own.JointModelSpherical()
         if joint.kind != "ball":
             made = single_joint(sign * joint.axis, slides=joint.kind == "prismatic")
         index = int(out.addJoint(above, made, back * joint.pose, joint.name))
@@ -197,13 +197,13 @@ class _Reader:
             setattr(out, name, values)
         return index
 
-    def _loop(self, out: pin.Model, joint: _Joint, fixed: dict[str, tuple[int, pin.SE3]]) -> Loop:
+    def _loop(self, out: own.Model, joint: _Joint, fixed: dict[str, tuple[int, own.SE3]]) -> Loop:
         """A joint that closes a loop, between frames that are added to both links."""
         names = []
         for side, link in zip("ab", (joint.parent, joint.child), strict=True):
             index, back = fixed[link]
             names.append(f"{joint.name}:{side}")
-            out.addFrame(pin.Frame(names[-1], index, 0, back * joint.along_z, pin.FrameType.OP_FRAME))
+            out.addFrame(own.Frame(names[-1], index, 0, back * joint.along_z, own.FrameType.OP_FRAME))
         ends = (
             self._number(joint.element, "axis/limit/lower", -np.inf),
             self._number(joint.element, "axis/limit/upper", np.inf),
@@ -245,7 +245,7 @@ class _Reader:
         offset = number("offset", 0.0) - ratio * number("reference", 0.0)
         return (Mimic(joint.name, str(mimic.get("joint")), ratio, offset),)
 
-    def _inertia(self, link: str) -> pin.Inertia:
+    def _inertia(self, link: str) -> own.Inertia:
         """Of a link at its own frame; what the file leaves out is 1 kg and 1 kg m^2, as the format says."""
         element = self._links[link]
         if (inertial := element.find("inertial")) is None:
@@ -258,9 +258,12 @@ class _Reader:
         xx, yy, zz = (number(f"inertia/{key}", 1.0) for key in ("ixx", "iyy", "izz"))
         xy, xz, yz = (number(f"inertia/{key}", 0.0) for key in ("ixy", "ixz", "iyz"))
         pose = self._own_pose(inertial)
-        return pose.act(pin.Inertia(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])))
+        moved: own.Inertia = pose.act(
+            own.Inertia(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        )
+        return moved
 
-    def _pose(self, element: ElementTree.Element, way: tuple[str, ...]) -> pin.SE3:
+    def _pose(self, element: ElementTree.Element, way: tuple[str, ...]) -> own.SE3:
         """Of a link, joint or frame in the model."""
         name, pose = str(element.get("name")), element.find("pose")
         if name in way:
@@ -272,24 +275,24 @@ class _Reader:
             above = element.get("attached_to", "")
         return self._named(above or "__model__", name, (*way, name)) * self._own_pose(element)
 
-    def _named(self, frame: str, asked: str, way: tuple[str, ...]) -> pin.SE3:
+    def _named(self, frame: str, asked: str, way: tuple[str, ...]) -> own.SE3:
         if frame in ("__model__", WORLD):
-            return pin.SE3.Identity()
+            return own.SE3.Identity()
         if frame not in self._frames:
             raise self._error(f"{asked!r} is stated in {frame!r}, which is no link, joint or frame of the model")
         return self._pose(self._frames[frame], way)
 
-    def _own_pose(self, element: ElementTree.Element) -> pin.SE3:
+    def _own_pose(self, element: ElementTree.Element) -> own.SE3:
         pose = element.find("pose")
         if pose is None:
-            return pin.SE3.Identity()
+            return own.SE3.Identity()
         if pose.get("rotation_format", "euler_rpy") != "euler_rpy" or pose.get("degrees", "false") not in (
             "false",
             "0",
         ):
             raise self._error(f"the pose of {element.get('name') or element.tag!r} is not in roll, pitch and yaw [rad]")
         values = self._numbers(pose.text or "0 0 0 0 0 0", 6, f"pose of {element.get('name') or element.tag}")
-        return pin.SE3(pin.rpy.rpyToMatrix(*values[3:]), values[:3])
+        return own.SE3(own.rpy.rpyToMatrix(*values[3:]), values[:3])
 
     def _number(self, element: ElementTree.Element, key: str, default: float) -> float:
         text = element.findtext(key)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from wbc.errors import RangeError, RobotFileError
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.sources.description import Description, Mimic, moving_freely, root_joint, with_base
 from wbc.robot.sources.urdf_checks import SINGLE, Remarks, axis_of, check_links, check_tree, number
 from wbc.robot.sources.urdf_model import NotUrdf, UrdfElements, build_model
@@ -81,7 +81,7 @@ def _leaders(joints: Joints, corrections: dict[str, str]) -> dict[str, str]:
     }
 
 
-def _mimics(joints: Joints, leaders: dict[str, str], model: pin.Model, remarks: Remarks) -> tuple[Mimic, ...]:
+def _mimics(joints: Joints, leaders: dict[str, str], model: own.Model, remarks: Remarks) -> tuple[Mimic, ...]:
     """The mimic joints; one whose leader the file does not have stays free, one whose leader is fixed stands still.
 
     Raises:
@@ -144,7 +144,7 @@ def _read_limits(joints: Joints, coupled: set[str], remarks: Remarks) -> list[st
     return unlimited
 
 
-def _turn_plane(model: pin.Model, j: int, axis: Array) -> None:
+def _turn_plane(model: own.Model, j: int, axis: Array) -> None:
     """Turns the plane of a planar joint, which Pinocchio has normal to z, so that it is normal to an axis.
 
     The joint's pose is  origin R M(x, y, angle) R'  with R the least turn that takes z to the axis.
@@ -155,7 +155,7 @@ def _turn_plane(model: pin.Model, j: int, axis: Array) -> None:
     turn = np.diag([1.0, -1.0, -1.0])
     if half @ half > 1e-12:
         turn = (2.0 * np.outer(half, half) / (half @ half) - np.eye(3)) @ np.diag([-1.0, -1.0, 1.0])
-    there = pin.SE3(turn, np.zeros(3))
+    there = own.SE3(turn, np.zeros(3))
     back = there.inverse()
     model.jointPlacements[j] = model.jointPlacements[j] * there
     model.inertias[j] = back.act(model.inertias[j])

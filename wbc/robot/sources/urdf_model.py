@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.errors import RobotFileError
-from wbc.multibody import pin, single_joint
+from wbc.multibody import own, single_joint
 from wbc.robot.sources.description import ROOT
 from wbc.robot.sources.urdf_checks import SINGLE, Remarks
 from wbc.validation import Array
@@ -24,7 +24,7 @@ from wbc.validation import Array
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _VERSION = re.compile(r"\s*\+?(\d+)\.\s*\+?(\d+)")
 #: Types of joints that move as they like: their axis and limits say nothing of their numbers
-_FREE = {"floating": pin.JointModelFreeFlyer, "planar": pin.JointModelPlanar}
+_FREE = {"floating": own.JointModelFreeFlyer, "planar": own.JointModelPlanar}
 _TYPES = (*SINGLE, *_FREE, "fixed")
 #: Elements of a joint -> (attributes that must be numbers where they are, those that must be there)
 _NUMBERS = {
@@ -66,7 +66,7 @@ class UrdfJoint:
     kind: str
     parent: str
     child: str
-    pose: pin.SE3
+    pose: own.SE3
     axis: Array
 
 
@@ -86,7 +86,7 @@ class UrdfElements:
         if tree.get("name") is None:
             raise _refusal("the robot has no name")
         self._quaternions = self._minor(tree.get("version")) >= _QUATERNIONS_SINCE
-        self.inertias: dict[str, pin.Inertia] = {}
+        self.inertias: dict[str, own.Inertia] = {}
         for link in tree.findall("link"):
             name = link.get("name", "")
             if name in self.inertias:
@@ -133,9 +133,9 @@ class UrdfElements:
             raise _refusal(f"{what} is {text!r}, expected {count} numbers")
         return np.array(values)
 
-    def _pose(self, origin: ElementTree.Element | None, what: str) -> pin.SE3:
+    def _pose(self, origin: ElementTree.Element | None, what: str) -> own.SE3:
         if origin is None:
-            return pin.SE3.Identity()
+            return own.SE3.Identity()
         place = self._numbers(origin.get("xyz", "0 0 0"), 3, f"xyz of {what}")
         rpy, quaternion = origin.get("rpy"), origin.get("quat_xyzw")
         if quaternion is not None and not self._quaternions:
@@ -145,13 +145,13 @@ class UrdfElements:
                 raise _refusal(f"{what} has both rpy and quat_xyzw")
             turn = self._numbers(quaternion, 4, f"quat_xyzw of {what}")
             length = float(np.linalg.norm(turn))
-            return pin.SE3(pin.Quaternion(turn / length).matrix() if length > 0.0 else np.eye(3), place)
-        return pin.SE3(_turned(self._numbers(rpy, 3, f"rpy of {what}")) if rpy is not None else np.eye(3), place)
+            return own.SE3(own.Quaternion(turn / length).matrix() if length > 0.0 else np.eye(3), place)
+        return own.SE3(_turned(self._numbers(rpy, 3, f"rpy of {what}")) if rpy is not None else np.eye(3), place)
 
-    def _inertia(self, link: str, element: ElementTree.Element | None) -> pin.Inertia:
+    def _inertia(self, link: str, element: ElementTree.Element | None) -> own.Inertia:
         """Of a link at its own frame; of none where the element is incomplete, which is said."""
         if element is None:
-            return pin.Inertia.Zero()
+            return own.Inertia.Zero()
         try:
             pose = self._pose(element.find("origin"), f"the inertial of link {link!r}")
             mass, moments = (element.find(key) for key in ("mass", "inertia"))
@@ -161,11 +161,11 @@ class UrdfElements:
             xx, xy, xz, yy, yz, zz = (self._number(moments.get(k, ""), f"{k} of link {link!r}") for k in _MOMENTS)
         except NotUrdf as error:
             self._remarks.add("inertia", f"link {link!r} weighs nothing: {error.reason}")
-            return pin.Inertia.Zero()
-        own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            return own.Inertia.Zero()
+        moments_there = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         # Pinocchio's constructor refuses moments that no body has, which files do have
-        out = pin.Inertia.Zero()
-        out.mass, out.lever, out.inertia = kilograms, pose.translation, pose.rotation @ own @ pose.rotation.T
+        out = own.Inertia.Zero()
+        out.mass, out.lever, out.inertia = kilograms, pose.translation, pose.rotation @ moments_there @ pose.rotation.T
         return out
 
     def _joint(self, element: ElementTree.Element) -> UrdfJoint:
@@ -207,19 +207,19 @@ def _turned(rpy: Array) -> Array:
     (a, b, c), (p, q, r) = ([f(0.5 * angle) for angle in rpy.tolist()] for f in (math.sin, math.cos))
     turn = np.array([a * q * r - p * b * c, p * b * r + a * q * c, p * q * c - a * b * r, p * q * r + a * b * c])
     x, y, z, w = turn.tolist()
-    return np.asarray(pin.Quaternion(turn / math.sqrt(x * x + y * y + z * z + w * w)).matrix())
+    return np.asarray(own.Quaternion(turn / math.sqrt(x * x + y * y + z * z + w * w)).matrix())
 
 
-def build_model(elements: UrdfElements, base: pin.JointModel | None) -> pin.Model:
+def build_model(elements: UrdfElements, base: own.JointModel | None) -> own.Model:
     """The model, whose root link the joint of a base carries, or the world; limits are the file's.
 
     Frames: each joint's, moving or fixed, and each link's, with the link's inertia.
     """
-    out, limits = pin.Model(), _UrdfLimits()
+    out, limits = own.Model(), _UrdfLimits()
     out.name = elements.name
     joint, frame = 0, 0
     if base is not None:
-        joint = out.addJoint(0, base, pin.SE3.Identity(), ROOT)
+        joint = out.addJoint(0, base, own.SE3.Identity(), ROOT)
         frame = out.addJointFrame(joint, 0)
         limits.add(None, out, joint)
     for made, parent, at in _depth_first(elements):
@@ -228,14 +228,14 @@ def build_model(elements: UrdfElements, base: pin.JointModel | None) -> pin.Mode
             above = out.frames[frame]
             if made.kind == "fixed":
                 placed = above.placement * made.pose
-                added = pin.Frame(made.name, joint, frame, placed, pin.FrameType.FIXED_JOINT)
+                added = own.Frame(made.name, joint, frame, placed, own.FrameType.FIXED_JOINT)
             else:
                 joint = out.addJoint(joint, _joint_model(made), above.placement * made.pose, made.name)
-                added = pin.Frame(made.name, joint, frame, pin.SE3.Identity(), pin.FrameType.JOINT)
+                added = own.Frame(made.name, joint, frame, own.SE3.Identity(), own.FrameType.JOINT)
                 limits.add(made, out, joint)
             frame = out.addFrame(added)
         link, placement = (elements.root if made is None else made.child), out.frames[frame].placement
-        body = pin.Frame(link, joint, frame, placement, pin.FrameType.BODY, elements.inertias[link])
+        body = own.Frame(link, joint, frame, placement, own.FrameType.BODY, elements.inertias[link])
         at[link] = joint, out.addFrame(body)
     limits.write(out)
     return out
@@ -254,7 +254,7 @@ def _depth_first(
         waiting += elements.below[joint.child][::-1]
 
 
-def _joint_model(joint: UrdfJoint) -> pin.JointModel:
+def _joint_model(joint: UrdfJoint) -> own.JointModel:
     if joint.kind in _FREE:
         return _FREE[joint.kind]()
     axis = joint.axis / np.linalg.norm(joint.axis)
@@ -267,7 +267,7 @@ class _UrdfLimits:
     def __init__(self) -> None:
         self._values: dict[str, list[float]] = {}
 
-    def add(self, joint: UrdfJoint | None, model: pin.Model, index: int) -> None:
+    def add(self, joint: UrdfJoint | None, model: own.Model, index: int) -> None:
         """Those of a joint element, None for a base."""
         nq, nv = int(model.nqs[index]), int(model.nvs[index])
         found = joint.element.find if joint is not None and joint.kind in SINGLE else lambda tag: None
@@ -292,7 +292,7 @@ class _UrdfLimits:
         ):
             self._values.setdefault(key, []).extend(values)
 
-    def write(self, model: pin.Model) -> None:
+    def write(self, model: own.Model) -> None:
         """Into the model."""
         for key, values in self._values.items():
             setattr(model, key, np.array(values))

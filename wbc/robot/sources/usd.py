@@ -15,13 +15,12 @@ import numpy as np
 
 from wbc import extras
 from wbc.errors import RobotFileError
-from wbc.multibody import pin
+from wbc.multibody import own
 from wbc.robot.sources.made import kept
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
 
-SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 #: Schemas of joints -> types of an SDF file
 KINDS = {
     "PhysicsRevoluteJoint": "revolute",
@@ -44,7 +43,7 @@ class UsdJoint:
     name: str
     kind: str
     ends: tuple[str, str]
-    poses: tuple[pin.SE3, pin.SE3]
+    poses: tuple[own.SE3, own.SE3]
     prim: Any
 
 
@@ -110,9 +109,9 @@ class _Stage:
             log.warning("%s: not represented: %s", self._path, "; ".join(self.lost))
         return sdf
 
-    def _standing(self) -> dict[str, pin.SE3]:
+    def _standing(self) -> dict[str, own.SE3]:
         """Poses of the bodies at the zeros of the joints, in a tree of these; its root is where it is."""
-        out: dict[str, pin.SE3] = {}
+        out: dict[str, own.SE3] = {}
         roots = [joint.ends[1] for joint in self._joints if not joint.ends[0]]
         children = {joint.ends[1] for joint in self._joints}
         for path in (*roots, *(path for path in self._bodies if path not in children), *self._bodies):
@@ -148,7 +147,7 @@ class _Stage:
         ):
             place = np.array(position.Get() or (0.0, 0.0, 0.0), dtype=float)
             scale = self._scale(path) if path else np.ones(3)
-            poses.append(prefix * pin.SE3(_rotation(rotation.Get()), self._length * scale * place))
+            poses.append(prefix * own.SE3(_rotation(rotation.Get()), self._length * scale * place))
         if not ends[1][0]:
             # The world is always the parent
             ends, poses = ends[::-1], poses[::-1]
@@ -157,11 +156,11 @@ class _Stage:
         names = (ends[0][0], ends[1][0])
         return UsdJoint(name, kind, names, (poses[0], poses[1]), prim)
 
-    def _body_of(self, relation: Any, joint: str) -> tuple[str, pin.SE3]:
+    def _body_of(self, relation: Any, joint: str) -> tuple[str, own.SE3]:
         """(path of the rigid body, pose in it of what a joint names); "" for the world."""
         targets = relation.GetTargets()
         if not targets:
-            return "", pin.SE3.Identity()
+            return "", own.SE3.Identity()
         prim = named = self._stage.GetPrimAtPath(targets[0])
         while prim and str(prim.GetPath()) not in self._bodies and not prim.IsPseudoRoot():
             prim = prim.GetParent()
@@ -171,10 +170,10 @@ class _Stage:
             return "", self._pose(named)
         return str(prim.GetPath()), self._pose(prim).inverse() * self._pose(named)
 
-    def _pose(self, prim: Any) -> pin.SE3:
+    def _pose(self, prim: Any) -> own.SE3:
         matrix = np.array(self._places.GetLocalToWorldTransform(prim)).T
         turn = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-        return pin.SE3(turn, self._length * matrix[:3, 3])
+        return own.SE3(turn, self._length * matrix[:3, 3])
 
     def _scale(self, path: str) -> Array:
         matrix = np.array(self._places.GetLocalToWorldTransform(self._stage.GetPrimAtPath(path))).T
@@ -193,7 +192,7 @@ class _Stage:
         turn = api.GetPrincipalAxesAttr().Get()
         turned = np.eye(3) if turn is None or turn.GetLength() == 0.0 else _rotation(turn)
         inertial = ElementTree.SubElement(link, "inertial")
-        ElementTree.SubElement(inertial, "pose").text = _text(pin.SE3(turned, center))
+        ElementTree.SubElement(inertial, "pose").text = _text(own.SE3(turned, center))
         ElementTree.SubElement(inertial, "mass").text = repr(mass)
         inertia = ElementTree.SubElement(inertial, "inertia")
         for key, moment in zip(("ixx", "iyy", "izz"), moments * self._mass * self._length**2, strict=True):
@@ -245,9 +244,9 @@ def _rotation(quaternion: Any) -> Array:
     if quaternion is None:
         return np.eye(3)
     numbers = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=float)
-    return np.asarray(pin.Quaternion(numbers / np.linalg.norm(numbers)).toRotationMatrix())
+    return np.asarray(own.Quaternion(numbers / np.linalg.norm(numbers)).toRotationMatrix())
 
 
-def _text(pose: pin.SE3) -> str:
-    numbers = [*pose.translation.tolist(), *pin.rpy.matrixToRpy(pose.rotation).tolist()]
+def _text(pose: own.SE3) -> str:
+    numbers = [*pose.translation.tolist(), *own.rpy.matrixToRpy(pose.rotation).tolist()]
     return " ".join(map(repr, numbers))

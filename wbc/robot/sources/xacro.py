@@ -7,9 +7,8 @@ from collections.abc import Mapping
 
 from wbc import extras
 from wbc.errors import RobotFileError
+from wbc.robot.sources.kinds import XACRO
 from wbc.robot.sources.made import kept
-
-SUFFIX = ".xacro"
 
 
 def expanded(path: pathlib.Path, arguments: Mapping[str, str]) -> pathlib.Path:
@@ -30,4 +29,4 @@ def expanded(path: pathlib.Path, arguments: Mapping[str, str]) -> pathlib.Path:
         reason = str(error).strip().splitlines()
         said = f"{type(error).__name__}: {reason[0] if reason else 'no reason given'}"
         raise RobotFileError("robot", str(path), f"cannot be expanded: {said}") from error
-    return kept(text, f"{path.name.removesuffix(SUFFIX).removesuffix('.urdf')}.urdf")
+    return kept(text, f"{path.name.removesuffix(XACRO).removesuffix('.urdf')}.urdf")

@@ -227,6 +227,8 @@ static int active_set(wbc_tick *t, int warm, int checked, double angle, const do
     if (base) ldp2qp_solution(work);
     else point(t);
     for (int i = 0; base && i < NV; i++) t->x[i] += base[i];
+    /* A search can end with numbers that are none */
+    if (!all_finite(t->x, NV)) return EXIT_CYCLE;
     if (base) {
         meet_active(t);
         if (!firm_rows_hold(t, checked)) return EXIT_CYCLE;

@@ -214,6 +214,7 @@ static int curve_rows(wbc_tick *t) {
 /* The problem again, with a shorter step */
 static void shorten(wbc_tick *t) {
     memset(t->bend, 0, sizeof t->bend);
+    if (t->reduced) find_stiffness(t);
     t->shortened = t->shortened == 0.0 ? t->stiffness : STEEPER * t->shortened;
     assemble(t, 1);
 }

@@ -41,9 +41,14 @@ INLINE int strengthens(const wbc_tick *t, int k) {
     return t->low[NV + k] == t->high[NV + k];
 }
 
-static void strengthen(wbc_tick *t) {
+/* The largest entry on the diagonal of H, in units of dof_scale */
+static void find_stiffness(wbc_tick *t) {
     t->stiffness = 0.0;
     for (int i = 0; i < NV; i++) t->stiffness = larger(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
+}
+
+static void strengthen(wbc_tick *t) {
+    find_stiffness(t);
     for (int i = 0; i < NV; i++)
         if (t->low[i] == t->high[i]) t->R[i * WIDE + i] += t->stiffness / (dof_scale[i] * dof_scale[i]);
     for (int k = 0; k < MC; k++) {

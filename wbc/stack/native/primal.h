@@ -31,6 +31,7 @@ typedef struct {
     int active[M_ALL];          /* 0, or which bound the row is held at: ACTIVE the upper, ACTIVE | LOWER the lower */
     int free[NV], count;        /* variables that no bound fixes */
     int row[NV], rows;          /* general rows that are held, of those that are independent */
+    double slip[MC + 1];        /* by how much further out a row ends: see let_slip */
 } wbc_primal;
 
 static wide wide_row(const wbc_tick *t, int k, const wide *x) {
@@ -41,12 +42,18 @@ static wide wide_row(const wbc_tick *t, int k, const wide *x) {
 
 INLINE int is_soft(const wbc_tick *t, int i) { return i >= NV && softness(t, i - NV) > 0.0; }
 
+/* A rounding of row k, of another size for each row */
+INLINE double rounding_apart(int k) {
+    const double share = k * GOLDEN;
+    return (1.0 + share - floor(share)) * TOLERANCE * row_scale[k];
+}
+
 /* Where a row ends. Of a relaxation at prices hard rows end apart by a rounding each: many meet at the point of a cone,
  * where steps would have no length. */
 static double side(const wbc_tick *t, const wbc_primal *s, int i, int lower) {
     const double end = lower ? t->low[i] : t->high[i];
-    if (MC == 0 || !s->apart || i < NV || t->low[i] == t->high[i] || is_soft(t, i)) return end;
-    const double share = (i - NV) * GOLDEN, gap = (1.0 + share - floor(share)) * 4.0 * TOLERANCE * row_scale[i - NV];
+    if (MC == 0 || i < NV || t->low[i] == t->high[i] || is_soft(t, i)) return end;
+    const double gap = (s->apart ? 4.0 * rounding_apart(i - NV) : 0.0) + s->slip[i - NV];
     return lower ? end - gap : end + gap;
 }
 
@@ -174,6 +181,25 @@ static void hold_rows(const wbc_tick *t, wbc_primal *s) {
         for (int a = 0; a < s->count; a++) q[a] /= left;
         r[s->rows] = left;
         s->row[s->rows++] = k;
+    }
+}
+
+/* Rows at the optimum of a set that depend on those that are held leave the set, and end where they are and a rounding beyond,
+ * unless they are further off than a row that never gives way may be. Left out but in the set, one comes back as soon as a row
+ * that it depends on is released, and pushes that row over its end: the two would take turns until no step is left. */
+static void let_slip(const wbc_tick *t, wbc_primal *s) {
+    for (int k = 0, b = 0; k < MC; k++) {
+        const int i = NV + k;
+        if (b < s->rows && s->row[b] == k) {
+            b++;
+            continue;
+        }
+        if (!s->active[i] || t->low[i] == t->high[i] || is_soft(t, i)) continue;
+        const wide at = wide_row(t, k, s->x), end = active_bound(t, s, i);
+        const double off = (double)(s->active[i] & LOWER ? end - at : at - end);
+        if (off > FIRMLY * row_scale[k]) continue;
+        s->slip[k] += larger(off + rounding_apart(k), 0.0);
+        s->active[i] = 0;
     }
 }
 
@@ -329,6 +355,7 @@ static int primal(wbc_tick *t) {
             same = 0;
             continue;
         }
+        let_slip(t, &s);
         if (longest > STILL * most && ++same < REPEATS) continue;
         same = 0;
         found = !release(t, &s);

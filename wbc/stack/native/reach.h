@@ -140,12 +140,12 @@ INLINE void blend(double *matrix, const double *free, double share) {
 }
 
 /* The factor of H, with equality rows in it or taken out */
-static int refactor(wbc_tick *t) { return REDUCES && t->reduced ? factor_reduced(t, 0.0) : factor(t); }
+static int refactor(wbc_tick *t) { return REDUCES && t->reduced ? factor_reduced(t) : factor(t); }
 
 /* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
 static int cut_off(wbc_tick *t, const double *free, double more) {
     if (REDUCES && t->reduced) {
-        const int ok = factor_reduced(t, more);
+        const int ok = more == 0.0 ? factor_reduced(t) : stiffen_reduced(t, more);
         t->prepared = ok && more == 0.0;
         return ok;
     }
@@ -163,9 +163,8 @@ static void find_pivots(const wbc_tick *t, double *least, double *most) {
     double pivot[NV];
     *least = WBC_INF, *most = 0.0;
     for (int a = 0; REDUCES && t->reduced && a < t->width; a++) {
-        const double root = 1.0 / t->reduced_inverse[a];
-        *least = smaller(*least, root * root);
-        *most = larger(*most, root * root);
+        *least = smaller(*least, t->reduced_pivot[a]);
+        *most = larger(*most, t->reduced_pivot[a]);
     }
     if (REDUCES && t->reduced) return;
     for (int i = 0; i < NV; i++) pivot[i] = dof_scale[i] / t->inverse_diagonal[i];
@@ -309,7 +308,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     if (length <= TRUSTED) return 1;
     const double more = held_short(slope, length);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
-    t->prepared = refactor(t);
+    t->prepared = REDUCES && t->reduced ? stiffen_reduced(t, more) : factor(t);
     return 1;
 }
 

@@ -1,8 +1,8 @@
 /* The equality rows E v = b of a robot with loops are taken out of its QP: v = s + Z z with as many z as motions are left.
  *
- * In v / dof_scale each row gives one variable, and none of the others (Gauss and Jordan). The steps are kept: they are the inverse P
- * of the columns that were given, and its transpose, which multipliers come from. Rows that nearly depend on each other are left to
- * the factor that has all variables. docs/solvers.md#loops */
+ * In v / dof_scale each row gives one variable, and none of the others (Gauss and Jordan). The columns of the variables that were given
+ * then hold the inverse P of what they were; its transpose gives multipliers. Rows that nearly depend on each other are left to the
+ * factor that has all variables. docs/solvers.md#loops */
 #ifndef WBC_REDUCED_H
 #define WBC_REDUCED_H
 
@@ -29,27 +29,29 @@ static int equality_rows(wbc_tick *t) {
         if (t->low[i] == t->high[i]) return 0;
     for (int i = 0; i < NV * WIDE; i += 4) FOUR(t->equal + i) = (four){0};
     for (int k = 0; k < MC; k++) {
-        double square = 0.0;
         t->strength[k] = 0.0;
         if (t->low[NV + k] != t->high[NV + k]) continue;
         if (count == NV) return 0;
-        for (int e = a_start[k]; e < a_end[k]; e++) {
-            const double a = t->equal[a_col[e] * WIDE + count] = t->at[e] * dof_scale[a_col[e]];
-            square += a * a;
+        double even = 0.0, odd = 0.0;
+        int e = a_start[k];
+        for (; e + 1 < a_end[k]; e += 2) {
+            const double a = t->at[e] * dof_scale[a_col[e]], b = t->at[e + 1] * dof_scale[a_col[e + 1]];
+            even += a * a;
+            odd += b * b;
         }
-        if (!(square > DEAD)) return 0;
-        const double scale = 1.0 / sqrt(square);
-        for (int e = a_start[k]; e < a_end[k]; e++) t->equal[a_col[e] * WIDE + count] *= scale;
+        if (e < a_end[k]) even += t->at[e] * dof_scale[a_col[e]] * (t->at[e] * dof_scale[a_col[e]]);
+        if (!(even + odd > DEAD)) return 0;
+        const double scale = 1.0 / sqrt(even + odd);
+        for (e = a_start[k]; e < a_end[k]; e++) t->equal[a_col[e] * WIDE + count] = t->at[e] * dof_scale[a_col[e]] * scale;
         t->equal_scale[count] = scale;
         t->equal_row[count++] = k;
     }
     return count;
 }
 
-/* Variable j is given by the row, of those that give none yet (1 in `open`), whose entry is the largest; 0 where that is below
- * `least`. Columns of the variables that are not given lose their entry there; its own becomes the step of P, which takes from e
- * its multiple by the entry of that row. */
-INLINE int give(wbc_tick *t, int j, int count, int step, double least, double *open) {
+/* Variable j is given by the row, of those in `open`, whose entry is the largest; 0 where that is below `least`. Columns of the other
+ * variables lose their entry there: those that are given are columns of P, and its own becomes one. */
+INLINE int give(wbc_tick *t, int j, int count, double least, double *open) {
     double *own = t->equal + j * WIDE;
     four most = {0};
     int which = 0;
@@ -58,35 +60,41 @@ INLINE int give(wbc_tick *t, int j, int count, int step, double least, double *o
     if (!(largest >= least)) return 0;
     while (fabs(own[which]) * open[which] != largest) which++;
     const double inverse = 1.0 / own[which];
-    t->is_given[j] = 1;
     own[which] -= 1.0;
-    for (int i = 0; i < count; i += 4) FOUR(own + i) *= EACH(inverse);
+    for (int i = 0; i < count; i += 4) FOUR(own + i) *= EACH(-inverse);
     for (int c = 0; c < NV; c++) {
         double *column = t->equal + c * WIDE;
         const double f = column[which];
-        if (t->is_given[c] || f == 0.0) continue;
-        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(-f), GIVEN_FOUR(own + i), GIVEN_FOUR(column + i));
+        if (f == 0.0 || c == j) continue;
+        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(own + i), GIVEN_FOUR(column + i));
     }
+    own[which] += 1.0;
     open[which] = 0.0;
+    t->is_given[j] = 1;
     t->given[which] = j;
-    t->giver[step] = which;
     return 1;
 }
 
-/* Variables for all of `count` rows; 0 where the rows depend on each other */
+/* Variables for all of `count` rows; 0 where the rows depend on each other. Rows without forces give motions, first those that no
+ * motor drives and few rows have; then rows with forces give forces. Joints of one loop alone then have no entries in rows of others. */
 INLINE int give_all(wbc_tick *t, int count) {
     double open[WIDE];
-    int step = 0;
-    for (int i = 0; i < WIDE; i++) open[i] = i < count;
+    int step = 0, late[WIDE] = {0};
+    for (int i = 0; i < WIDE; i++) open[i] = 0.0;
+    for (int i = 0; i < count; i++) open[i] = !(late[i] = late_row[t->equal_row[i]]);
     for (int j = 0; j < NV; j++) t->is_given[j] = 0;
+    for (int n = 0; n < DOFS && step < count; n++) step += give(t, give_order[n], count, CLEAR_PIVOT, open);
+    for (int i = 0; i < count; i++)
+        if (late[i]) open[i] = 1.0;
     for (double least = CLEAR_PIVOT; least >= PIVOT && step < count; least *= PIVOT / CLEAR_PIVOT)
-        for (int j = 0; j < NV && step < count; j++)
-            if (!t->is_given[j]) step += give(t, j, count, step, least, open);
+        for (int n = 0; n < NV && step < count; n++) {
+            const int j = n < NV - DOFS ? DOFS + n : give_order[n - (NV - DOFS)];
+            if (!t->is_given[j]) step += give(t, j, count, least, open);
+        }
     return step == count;
 }
 
-/* Z and P of the rows at hand; 0 where they depend on each other, or are none. Variables are left to be free as late as they can be:
- * pivots of Z'HZ are those of H with firm rows, see find_pivots. */
+/* Z and P of the rows at hand; 0 where they depend on each other, or are none */
 static int eliminate(wbc_tick *t) {
     const int count = t->reduced = equality_rows(t);
     int left = 0;
@@ -106,8 +114,8 @@ static int eliminate(wbc_tick *t) {
     return count;
 }
 
-/* Step k of P: a column, and in it the row whose variable it gives */
-#define STEP(t, which) ((t)->equal + (t)->given[which] * WIDE)
+/* Column k of P: by how much each variable that was given moves with row k, in the order of the rows that give them */
+#define COLUMN(t, k) ((t)->equal + (t)->given[k] * WIDE)
 
 /* Whether the rows that were taken out are those that are equalities now */
 static int same_equalities(const wbc_tick *t) {
@@ -137,40 +145,39 @@ static void spread_given(const wbc_tick *t, const double *e, double *x) {
 
 /* x = P e: the variables that were given, for rows that are e, the others 0; `e`, of WIDE numbers, is changed */
 static void by_rows(const wbc_tick *t, double *e, double *x) {
+    double moved[WIDE] = {0};
     scale_rows(t, e);
-    for (int k = 0; k < t->reduced; k++) {
-        const double *step = STEP(t, t->giver[k]);
-        const four each = EACH(-e[t->giver[k]]);
-        EACH_ROW_GROUP(t, i) FOUR(e + i) = MADD(each, GIVEN_FOUR(step + i), GIVEN_FOUR(e + i));
+    EACH_ROW_GROUP(t, i) {
+        four sum = {0};
+        for (int k = 0; k < t->reduced; k++) sum = MADD(EACH(e[k]), GIVEN_FOUR(COLUMN(t, k) + i), sum);
+        FOUR(moved + i) = sum;
     }
-    spread_given(t, e, x);
+    spread_given(t, moved, x);
 }
 
 /* The same of sizes: no |P e| is larger where |e| are at most these */
 static void size_by_rows(const wbc_tick *t, double *e, double *x) {
+    double moved[WIDE] = {0};
     scale_rows(t, e);
-    for (int k = 0; k < t->reduced; k++) {
-        const double *step = STEP(t, t->giver[k]);
-        const four each = EACH(e[t->giver[k]]);
-        EACH_ROW_GROUP(t, i) FOUR(e + i) = MADD(each, SIZE_OF_FOUR(GIVEN_FOUR(step + i)), GIVEN_FOUR(e + i));
+    EACH_ROW_GROUP(t, i) {
+        four sum = {0};
+        for (int k = 0; k < t->reduced; k++) sum = MADD(EACH(e[k]), SIZE_OF_FOUR(GIVEN_FOUR(COLUMN(t, k) + i)), sum);
+        FOUR(moved + i) = sum;
     }
-    spread_given(t, e, x);
+    spread_given(t, moved, x);
 }
 
 /* Multipliers, of WIDE numbers, of the rows that leave nothing of a force `r` on the variables that were given: r + E' lambda = 0
  * there */
 static void multipliers_of(const wbc_tick *t, const double *r, double *lambda) {
-    for (int k = 0; k < WIDE; k++) lambda[k] = k < t->reduced ? -r[t->given[k]] * dof_scale[t->given[k]] : 0.0;
-    for (int k = t->reduced - 1; k >= 0; k--) {
-        const int which = t->giver[k], at = which & 3;
-        const double *step = STEP(t, which);
-        double *place = lambda + (which & ~3);
+    double push[WIDE] = {0};
+    for (int k = 0; k < t->reduced; k++) push[k] = -r[t->given[k]] * dof_scale[t->given[k]];
+    for (int k = 0; k < t->reduced; k++) {
         four sum = {0};
-        EACH_ROW_GROUP(t, i) sum = MADD(GIVEN_FOUR(step + i), GIVEN_FOUR(lambda + i), sum);
-        /* Four at once: what is read next is not waited for */
-        FOUR(place) -= (four)((four_bits)EACH(SUM_OF_FOUR(sum)) & ((four_bits){0, 1, 2, 3} == (four_bits){at, at, at, at}));
+        EACH_ROW_GROUP(t, i) sum = MADD(GIVEN_FOUR(COLUMN(t, k) + i), GIVEN_FOUR(push + i), sum);
+        lambda[k] = SUM_OF_FOUR(sum) * t->equal_scale[k];
     }
-    for (int k = 0; k < t->reduced; k++) lambda[k] *= t->equal_scale[k];
+    for (int k = t->reduced; k < WIDE; k++) lambda[k] = 0.0;
 }
 
 /* out = H x, of whose symmetric matrix the upper triangle is stored, with zeros left of the diagonal in its group of 8 */
@@ -188,83 +195,139 @@ static void times_hessian(const wbc_tick *t, const double *x, double *out) {
     }
 }
 
-/* The factor of Z'(H + more / dof_scale^2) Z = R'R; 0 where it is not positive definite */
-static int factor_reduced(wbc_tick *t, double more) {
-    double *G = t->reduced_R;
-    t->stiffness = 0.0;
-    for (int i = 0; i < NV; i++) t->stiffness = larger(t->stiffness, t->H[i * WIDE + i] * dof_scale[i] * dof_scale[i]);
-    for (int at = 0; at < THIN; at += 4) {
-        const double *basis = t->basis + at;
-        for (int i = 0; i < NV; i++) {
-            four sum = EACH(more / (dof_scale[i] * dof_scale[i])) * GIVEN_FOUR(basis + i * WIDE), other = {0};
-            for (int j = 0; j < i; j++) other = MADD(EACH(t->H[j * WIDE + i]), GIVEN_FOUR(basis + j * WIDE), other);
-            for (int j = i; j < NV; j++) sum = MADD(EACH(t->H[i * WIDE + j]), GIVEN_FOUR(basis + j * WIDE), sum);
-            FOUR(t->product_of_basis + i * WIDE + at) = sum + other;
+/* `count` rows of H Z from i on, at most four, columns from `at` on */
+INLINE void some_products(wbc_tick *t, int i, int count, int at) {
+    const double *basis = t->basis + at;
+    four sum[4] = {{0}};
+    for (int j = 0; j < i; j++)
+        for (int r = 0; r < count; r++) sum[r] = MADD(EACH(t->H[j * WIDE + i + r]), GIVEN_FOUR(basis + j * WIDE), sum[r]);
+    for (int j = i; j < i + count; j++)
+        for (int r = 0; r < count; r++) {
+            const double h = j < i + r ? t->H[j * WIDE + i + r] : t->H[(i + r) * WIDE + j];
+            sum[r] = MADD(EACH(h), GIVEN_FOUR(basis + j * WIDE), sum[r]);
         }
+    for (int j = i + count; j < NV; j++)
+        for (int r = 0; r < count; r++) sum[r] = MADD(EACH(t->H[(i + r) * WIDE + j]), GIVEN_FOUR(basis + j * WIDE), sum[r]);
+    for (int r = 0; r < count; r++) FOUR(t->product_of_basis + (i + r) * WIDE + at) = sum[r];
+}
+
+/* Entries of four columns from `at` on that are right of column a */
+#define BEHIND(x, at, a) ((four)((four_bits)(x) & ((four_bits){(at), (at) + 1, (at) + 2, (at) + 3} > (four_bits){(a), (a), (a), (a)})))
+
+/* R^-1 of R'R = `gram`, and the squares of R's pivots; 0 where it is not positive definite. Rows wait for reciprocals of pivots only,
+ * not for their roots. */
+static int invert_gram(wbc_tick *t) {
+    double *inverse = t->reduced_inverse, roots[WIDE] = {0};
+    memcpy(t->reduced_R, t->gram, t->width * WIDE * sizeof(double));
+    for (int a = 0; a < t->width; a++) {
+        double *row = t->reduced_R + a * WIDE, *own = inverse + a * WIDE;
+        const double pivot = t->reduced_pivot[a] = row[a], reciprocal = 1.0 / pivot;
+        if (!(pivot > 0.0)) return 0;
+        roots[a] = 1.0 / sqrt(pivot);
+        for (int at = 0; at < THIN; at += 4) {
+            FOUR(row + at) = BEHIND(GIVEN_FOUR(row + at), at, a);
+            FOUR(own + at) = (four){0};
+        }
+        for (int b = a + 1; b < t->width; b++) thin_add(t->reduced_R + b * WIDE, row, -row[b] * reciprocal);
+        own[a] = 1.0;
+        for (int c = 0; c <= a; c++) thin_add(inverse + c * WIDE, row, -inverse[c * WIDE + a] * reciprocal);
     }
     for (int a = 0; a < t->width; a++)
-        for (int at = a & ~3; at < THIN; at += 4) {
-            /* The variable that is left is itself */
+        for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
+    return 1;
+}
+
+/* The factor of Z'HZ = R'R, as its inverse; 0 where it is not positive definite */
+static int factor_reduced(wbc_tick *t) {
+    for (int at = 0; at < THIN; at += 4) {
+        for (int i = 0; i + 4 <= NV; i += 4) some_products(t, i, 4, at);
+        if (NV % 4) some_products(t, NV / 4 * 4, NV % 4, at);
+        /* The variable that is left is itself */
+        for (int a = 0; a < t->width; a++) {
             four sum = EACH(dof_scale[t->left[a]]) * GIVEN_FOUR(t->product_of_basis + t->left[a] * WIDE + at), other = {0};
             for (int n = 0; n < t->reduced; n++) {
                 const int i = t->given[n] * WIDE;
                 other = MADD(EACH(t->basis[i + a]), GIVEN_FOUR(t->product_of_basis + i + at), other);
             }
-            FOUR(G + a * WIDE + at) = sum + other;
+            FOUR(t->gram + a * WIDE + at) = sum + other;
         }
-    for (int a = 0; a < t->width; a++) {
-        double *row = G + a * WIDE;
-        if (!(row[a] > 0.0)) return 0;
-        const double inverse = 1.0 / sqrt(row[a]);
-        t->reduced_inverse[a] = inverse;
-        for (int c = 0; c < THIN; c++) row[c] = c < a ? 0.0 : row[c] * inverse;
-        for (int b = a + 1; b < t->width; b++)
-            if (row[b] != 0.0) thin_add(G + b * WIDE, row, -row[b]);
     }
-    return 1;
+    return invert_gram(t);
 }
 
-/* y = R^-T y */
-static void reduced_transposed(const wbc_tick *t, double *y) {
-    for (int a = 0; a < t->width; a++) {
-        const double own = y[a] * t->reduced_inverse[a];
-        thin_add(y, t->reduced_R + a * WIDE, -own);
-        y[a] = own;
+/* The same of H + more / dof_scale^2, from that of H */
+static int stiffen_reduced(wbc_tick *t, double more) {
+    for (int at = 0; at < THIN; at += 4) {
+        for (int i = 0; i < NV; i++)
+            FOUR(t->product_of_basis + i * WIDE + at) += EACH(more / (dof_scale[i] * dof_scale[i])) * GIVEN_FOUR(t->basis + i * WIDE + at);
+        for (int a = 0; a < t->width; a++) {
+            four sum = {0};
+            for (int n = 0; n < t->reduced; n++) {
+                const int i = t->given[n];
+                sum = MADD(EACH(t->basis[i * WIDE + a] / (dof_scale[i] * dof_scale[i])), GIVEN_FOUR(t->basis + i * WIDE + at), sum);
+            }
+            FOUR(t->gram + a * WIDE + at) += EACH(more) * sum;
+        }
+    }
+    for (int a = 0; a < t->width; a++) t->gram[a * WIDE + a] += more;
+    return invert_gram(t);
+}
+
+/* out += rows' f, of NV rows */
+INLINE void add_rows(const double *rows, const double *f, double *out) {
+    for (int at = 0; at < THIN; at += 4) {
+        four even = GIVEN_FOUR(out + at), odd = {0};
+        int i = 0;
+        for (; i + 1 < NV; i += 2) {
+            even = MADD(EACH(f[i]), GIVEN_FOUR(rows + i * WIDE + at), even);
+            odd = MADD(EACH(f[i + 1]), GIVEN_FOUR(rows + (i + 1) * WIDE + at), odd);
+        }
+        if (i < NV) even = MADD(EACH(f[i]), GIVEN_FOUR(rows + i * WIDE + at), even);
+        FOUR(out + at) = even + odd;
     }
 }
 
-/* y = R^-T Z'(H x + b), where x is 0 but for the variables that were given */
+/* out = R^-T z */
+static void reduced_transposed(const wbc_tick *t, const double *z, double *out) {
+    for (int at = 0; at < THIN; at += 4) {
+        four sum = {0};
+        for (int a = 0; a < t->width; a++) sum = MADD(EACH(z[a]), GIVEN_FOUR(t->reduced_inverse + a * WIDE + at), sum);
+        FOUR(out + at) = sum;
+    }
+}
+
+/* y = R^-T Z'(H x + b), where x is 0 but for the variables that were given, and b may be none */
 static void reduced_forces(const wbc_tick *t, const double *x, const double *b, double *y) {
-    for (int at = 0; at < THIN; at += 4) FOUR(y + at) = (four){0};
-    for (int k = 0; k < t->reduced; k++) thin_add(y, t->product_of_basis + t->given[k] * WIDE, x[t->given[k]]);
-    for (int i = 0; i < NV; i++) thin_add(y, t->basis + i * WIDE, b[i]);
-    reduced_transposed(t, y);
+    double z[WIDE] = {0};
+    for (int at = 0; at < THIN; at += 4) {
+        four sum = {0};
+        for (int k = 0; k < t->reduced; k++)
+            sum = MADD(EACH(x[t->given[k]]), GIVEN_FOUR(t->product_of_basis + t->given[k] * WIDE + at), sum);
+        FOUR(z + at) = sum;
+    }
+    if (b) add_rows(t->basis, b, z);
+    reduced_transposed(t, z, y);
 }
 
 /* x = Z (Z'HZ)^-1 Z'b */
 static void solve_reduced(const wbc_tick *t, const double *b, double *x) {
-    double z[WIDE];
-    for (int at = 0; at < THIN; at += 4) FOUR(z + at) = (four){0};
-    for (int i = 0; i < NV; i++) thin_add(z, t->basis + i * WIDE, b[i]);
-    reduced_transposed(t, z);
-    for (int a = t->width - 1; a >= 0; a--) {
-        double sum = z[a];
-        for (int c = a + 1; c < t->width; c++) sum -= t->reduced_R[a * WIDE + c] * z[c];
-        z[a] = sum * t->reduced_inverse[a];
-    }
+    double y[WIDE], z[WIDE] = {0};
+    add_rows(t->basis, b, z);
+    reduced_transposed(t, z, y);
+    for (int a = 0; a < t->width; a++) z[a] = thin_dot(t->reduced_inverse + a * WIDE, y);
     for (int i = 0; i < WIDE; i++) x[i] = i < NV ? thin_dot(t->basis + i * WIDE, z) : 0.0;
 }
 
 /* T = Z R^-1, through which bounds and rows are seen: v = s + T y */
 static void see_basis(wbc_tick *t) {
-    for (int i = 0; i < NV; i++) {
-        double *row = t->through + i * WIDE;
-        for (int at = 0; at < THIN; at += 4) FOUR(row + at) = GIVEN_FOUR(t->basis + i * WIDE + at);
-        for (int a = 0; a < t->width; a++) {
-            if (row[a] == 0.0) continue;
-            const double own = row[a] * t->reduced_inverse[a];
-            thin_add(row, t->reduced_R + a * WIDE, -own);
-            row[a] = own;
+    for (int at = 0; at < THIN; at += 4) {
+        for (int a = 0; a < t->width; a++)
+            FOUR(t->through + t->left[a] * WIDE + at) = EACH(dof_scale[t->left[a]]) * GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
+        for (int n = 0; n < t->reduced; n++) {
+            const double *own = t->basis + t->given[n] * WIDE;
+            four sum = {0};
+            for (int a = 0; a < t->width; a++) sum = MADD(EACH(own[a]), GIVEN_FOUR(t->reduced_inverse + a * WIDE + at), sum);
+            FOUR(t->through + t->given[n] * WIDE + at) = sum;
         }
     }
 }

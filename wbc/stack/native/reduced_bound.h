@@ -53,10 +53,16 @@ static double reduced_bound(const wbc_tick *t, const double *size) {
         length += gap * gap / t->D[a];
     }
     rest += sqrt(length);
-    for (int at = 0; at < THIN; at += 4) FOUR(image + at) = (four){0};
-    for (int i = 0; i < NV; i++)
-        for (int at = 0; at < THIN; at += 4)
-            FOUR(image + at) = MADD(EACH(size[i]), SIZE_OF_FOUR(GIVEN_FOUR(t->through + i * WIDE + at)), GIVEN_FOUR(image + at));
+    for (int at = 0; at < THIN; at += 4) {
+        four even = {0}, odd = {0};
+        int i = 0;
+        for (; i + 1 < NV; i += 2) {
+            even = MADD(EACH(size[i]), SIZE_OF_FOUR(GIVEN_FOUR(t->through + i * WIDE + at)), even);
+            odd = MADD(EACH(size[i + 1]), SIZE_OF_FOUR(GIVEN_FOUR(t->through + (i + 1) * WIDE + at)), odd);
+        }
+        if (i < NV) even = MADD(EACH(size[i]), SIZE_OF_FOUR(GIVEN_FOUR(t->through + i * WIDE + at)), even);
+        FOUR(image + at) = even + odd;
+    }
     for (int i = 0; i < DOFS; i++) reach = larger(thin_dot(t->through + i * WIDE, t->through + i * WIDE), reach);
     return sqrt(reach) * (sqrt(thin_dot(image, image)) + rest) + most;
 }
@@ -65,13 +71,10 @@ static double reduced_bound(const wbc_tick *t, const double *size) {
  * `residual`, or none, is left of the stationarity;   dy + M' mu = -T'(residual + H dx),   M dy = side - M y */
 static void correct_reduced(wbc_tick *t, double *missed, const double *residual) {
     DAQPWorkspace *work = &t->daqp;
-    double moved[WIDE], force[WIDE], dy[WIDE], mu[ACTIVE_MAX];
+    double moved[WIDE], dy[WIDE], mu[ACTIVE_MAX];
     by_rows(t, missed, moved);
-    for (int i = 0; i < WIDE; i++) {
-        moved[i] = -moved[i];
-        force[i] = residual ? residual[i] : 0.0;
-    }
-    reduced_forces(t, moved, force, dy);
+    for (int i = 0; i < WIDE; i++) moved[i] = -moved[i];
+    reduced_forces(t, moved, residual, dy);
     for (int at = 0; at < THIN; at += 4) FOUR(dy + at) = -GIVEN_FOUR(dy + at);
     for (int a = 0; a < work->n_active; a++) {
         const int i = work->WS[a];

@@ -72,7 +72,7 @@ static int reduced_optimum(wbc_tick *t) {
         t->prepared = 0;
         if (!eliminate(t)) return EXIT_INFEASIBLE;
     }
-    if (!t->prepared && !factor_reduced(t, 0.0)) return EXIT_INFEASIBLE;
+    if (!t->prepared && !factor_reduced(t)) return EXIT_INFEASIBLE;
     see_basis(t);
     reduced_point(t);
     t->prepared = t->factored = 1;

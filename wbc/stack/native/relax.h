@@ -72,8 +72,6 @@ static int least_slack(wbc_tick *t, int order, const double *base, int warm) {
     }
     if (!(warm && active_set(t, 1, order, LOOSE, base) >= 0) && (t->brief || active_set(t, 0, order, LOOSE, base) < 0)) return 0;
     memcpy(t->keep, t->sense, sizeof t->keep);
-    /* A search can end with numbers that are none: bounds that were frozen at them would hold nothing */
-    if (!all_finite(t->x, NV)) return 0;
     for (int i = 0; i < NV; i++) t->x[i] = clamp(t->x[i], t->low[i], t->high[i]);
     return 1;
 }

@@ -78,7 +78,7 @@ static void damp(wbc_tick *t) {
         solve_transposed(t, t->y);
         see_rows(t);
         memset(t->sense, 0, sizeof t->sense);
-        if (active_set(t, 0, 0, LOOSE, NULL) < 0 || !all_finite(t->x, NV)) memcpy(t->x, nearest, sizeof nearest);
+        if (active_set(t, 0, 0, LOOSE, NULL) < 0) memcpy(t->x, nearest, sizeof nearest);
     }
     memcpy(t->H, H, sizeof t->H);
     memcpy(t->g, g, sizeof t->g);

@@ -15,6 +15,8 @@
  *   HANDED      numbers that the rows hand to the curvature; with none of both the rows have no such output
  *   REDUCED     rows of loops, and of torques that nothing gives, which are taken out of the QP, see reduced.h; 0 without loops
  *   REDUCED_NV  NV with such rows, else 0
+ *   give_order late_row   in which order they give velocities or accelerations, and which rows have forces, so that they give after
+ *               the others
  *   BENDING bent   general rows whose residual bends within a tick, and which they are: see bend.h
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
@@ -144,11 +146,12 @@ typedef struct {
     int reduced;                 /* how many rows there are; 0 where all variables are those of the problem */
     int whole;                   /* it has been tried, and the problem is one for all variables */
     int width;                   /* variables that are left */
-    int equal_row[NV], given[NV], giver[NV], left[NV], is_given[NV]; /* rows, the variables that they give, the order of that, the others */
+    int equal_row[NV], given[NV], left[NV], is_given[NV]; /* rows, the variables that they give, the others */
     double missed[NV], missed_size[NV]; /* by how much the command misses the rows, and the size of what was added up */
     double equal[REDUCED_NV * WIDE + 1], equal_scale[NV];
     double basis[REDUCED_NV * WIDE + 1], product_of_basis[REDUCED_NV * WIDE + 1], through[REDUCED_NV * WIDE + 1];
-    double reduced_R[REDUCED_NV * WIDE + 1], reduced_inverse[NV], seen[REDUCED_NV * M_ALL + 1];
+    double gram[REDUCED_NV * WIDE + 1], reduced_R[REDUCED_NV * WIDE + 1], reduced_inverse[REDUCED_NV * WIDE + 1];
+    double reduced_pivot[NV], seen[REDUCED_NV * M_ALL + 1];
     /* DAQP workspace on our own memory */
     DAQPWorkspace daqp;
     DAQPProblem problem;

@@ -20,14 +20,14 @@ _FIT: weakref.WeakKeyDictionary[object, list[object]] = weakref.WeakKeyDictionar
 def check_fits(walker: Walker) -> None:
     """Refuse a walker whose :attr:`Walker.data` are not those of its robot.
 
-    Arms with kinematics of their own (``Walker.limb``) and the two-ended arm are not looked at.
+    Arms with kinematics of their own (``Walker.limb``) are not looked at.
 
     Raises:
-        RangeError: what differs first: limits, or where a hand is.
+        RangeError: what differs first: limits, or where a hand is. ShapeError: another machine.
     """
-    data = walker.data
-    if walker.limb is not None or not isinstance(data, WalkerData):
+    if walker.limb is not None:
         return
+    data = walker.arm_data
     known = _FIT.setdefault(walker.robot, [])
     if any(one is data for one in known):
         return

@@ -1,4 +1,4 @@
-"""Built-in structures: the published cylinder, a plane, a truss, a station module and a row of grapples."""
+"""Built-in structures: the published cylinder, a plane, a truss and a station module."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.shapes import Box, Capsule
-from wbc.walking.holds.hold import FIXED, FREE, Hold, frame_of
+from wbc.walking.holds.hold import FREE, Hold, frame_of
 from wbc.walking.holds.obstacle import Obstacle
 from wbc.walking.holds.structure import Structure
 from wbc.walking.holds.surface import CylinderSurface, PlaneSurface
@@ -225,17 +225,3 @@ def _bar(name: str, a: np.ndarray, b: np.ndarray, radius: float) -> Obstacle:
     length = float(np.linalg.norm(b - a))
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (b - a) / length).matrix()
     return Obstacle(name, Capsule(radius, length), pin.SE3(turn, (a + b) / 2))
-
-
-def grapple_row(count: int = 6, pitch: float = 4.0) -> Structure:
-    """Holds "1", "2", ... along x on the plane z = 0, ``pitch`` [m] apart, x of a hold along +x, fixed roll, no tilt.
-
-    Raises:
-        RangeError: fewer than two holds, or no pitch.
-    """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 2:
-        raise RangeError("count", count, "expected a whole number of at least 2")
-    pitch = validation.scalar("pitch", pitch, low=0.0, open_low=True, unit="m")
-    frames = [frame_of("hold", (k * pitch, 0.0, 0.0), (0, 0, -1), (1, 0, 0)) for k in range(count)]
-    holds = tuple(Hold(str(k + 1), frame, FIXED) for k, frame in enumerate(frames))
-    return Structure("grapples", holds, surface=PlaneSurface(pin.SE3.Identity()))

@@ -10,7 +10,8 @@ from typing import Any
 
 from wbc.errors import WbcError
 from wbc.log import LogFileError
-from wbc.robots import TwoEndedData, Walker, WalkerData, walker
+from wbc.robots import Walker, WalkerData, walker
+from wbc.robots.walker_robot import CLIMBS, MADE
 from wbc.walking.holds.files import save_structure
 from wbc.walking.holds.structure import Structure
 from wbc.walking.log.log import FILE, WalkLog, WalkLogError
@@ -48,7 +49,7 @@ def begin_folder(
 
 def machine_of(machine: Walker) -> dict[str, Any]:
     """A machine as plain data, of which :func:`machine_made` makes it again."""
-    return {"two_ended": machine.two_ended, "arms": len(machine.arms), "data": asdict(machine.data)}
+    return {"arms": len(machine.arms), "data": asdict(machine.data)}
 
 
 def machine_made(plain: Any) -> Walker:
@@ -59,8 +60,8 @@ def machine_made(plain: Any) -> Walker:
     """
     try:
         values = {name: tuple(value) if isinstance(value, list) else value for name, value in plain["data"].items()}
-        if plain["two_ended"]:
-            return walker(data=TwoEndedData.read(**values), two_ended=True)
+        if plain.get("two_ended"):
+            raise WalkLogError("machine", MADE[1], CLIMBS)
         return walker(plain["arms"], data=WalkerData.read(**values))
     except (KeyError, TypeError, AttributeError, WbcError) as error:
         raise WalkLogError("machine", type(plain).__name__, f"the run does not say what walked: {error}") from error

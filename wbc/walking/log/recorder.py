@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wbc import __version__, extras, validation
 from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.log import TickRecorder
-from wbc.multibody import pin
+from wbc.multibody import is_pose, pin
 from wbc.validation import Array
 from wbc.walking.holds.hold import FIXED, FREE
 from wbc.walking.holds.structure import Structure
@@ -108,7 +108,7 @@ class LogRecorder:
         Raises:
             ShapeError: arrays of another length; the tick is then not recorded.
         """
-        numbers = pin.SE3ToXYZQUAT(pose) if isinstance(pose, pin.SE3) else pose
+        numbers = pin.SE3ToXYZQUAT(pose) if is_pose(pose) else pose
         given = numbers, q, v, twist, states, holds, () if command is None else command
         p, q, v, twist, hands, places, asked = (np.array(values, dtype=float)[None] for values in given)
         self.extend(np.array([float(t)]), p, q, v, twist, hands, places, asked, np.array([body_fixed]))

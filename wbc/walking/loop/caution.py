@@ -191,7 +191,7 @@ class Caution:
         law, latch = swinging.law, swinging.latch if swinging.state == "opening" else 0.0
         end = max(course.end, self._progress.path_time)
         u, clock, pace, hand, t = self._progress.path_time, swinging.clock, course.pace, swinging.pace, 0.0
-        closing = self._machine.walker.tolerances.latch_time + SETTLE
+        closing = self._machine.walker.arm_data.latch_time + SETTLE
         rows, most, ramp = [(0.0, u, clock)], swinging.most, ramp_of(swinging)
         while clock < law.duration - 1e-9 or latch > 1e-9 or (course.stands and pace > 0.0):
             left = law.duration - clock

@@ -322,7 +322,7 @@ class Coasting:
         offsets = point - self._structure.positions
         gaps = np.linalg.norm(offsets, axis=1)
         hold = int(gaps.argmin())
-        if gaps[hold] > walker.tolerances.exempt_distance:
+        if gaps[hold] > walker.arm_data.exempt_distance:
             return point
         axis = self._structure.axes[hold]
         height = float(-axis @ offsets[hold])

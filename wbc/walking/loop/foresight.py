@@ -69,7 +69,7 @@ class Foresight:
 
     def __init__(self, walker: Walker, structure: Structure) -> None:
         self.walker, self.structure = walker, structure
-        tree, clearance = Tree.of_model(walker.robot.model), walker.tolerances.clearance - SLACK
+        tree, clearance = Tree.of_model(walker.robot.model), walker.arm_data.clearance - SLACK
         self._hands = [self._grasping(tree, arm) for arm in range(len(walker.arms))]
         hands = {body.name: body for mine in self._hands for body in mine}
         bodies = [hands.get(body.name, body) for body in bodies_of(walker.robot)]
@@ -222,7 +222,7 @@ class Foresight:
         if arm in self.left:
             return [(arm, left) for left in self.left[arm]]
         off = np.linalg.norm(self.structure.positions - place, axis=1)
-        near = np.flatnonzero(off < self.walker.tolerances.exempt_distance)
+        near = np.flatnonzero(off < self.walker.arm_data.exempt_distance)
         return [(arm, self.structure.positions[hold]) for hold in near]
 
     def _grasping(self, tree: Tree, arm: int) -> list[SweptBody]:
@@ -239,12 +239,12 @@ class Foresight:
     def _far(self, arm: int, q: Array, place: Array) -> NDArray[np.int64]:
         """Rows ``[k, nq]`` in which a hand is not near a hold at a place [m]."""
         away = np.linalg.norm(self.hand(arm, q) - place, axis=1)
-        return np.flatnonzero(away > self.walker.tolerances.exempt_distance)
+        return np.flatnonzero(away > self.walker.arm_data.exempt_distance)
 
     def _exemptions(
         self, arm: int, point: Array, deep: float, since: float = -inf, until: float = inf
     ) -> list[Exemption]:
-        name, distance = point.tobytes(), self.walker.tolerances.exempt_distance
+        name, distance = point.tobytes(), self.walker.arm_data.exempt_distance
         if name not in self._mounts:
             self._mounts[name] = tuple(_mounted(self.structure, point))
         return [

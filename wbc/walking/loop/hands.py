@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import dist
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from wbc.errors import ShapeError
 from wbc.multibody import pin
 from wbc.rotations import quaternion
 from wbc.validation import Array
@@ -33,53 +32,28 @@ STEADY = 3
 LINGERING = 0.2
 #: A hold that could not be grasped so many times is taken as vanished
 TRIES = 3
-
-
-class HandLeader(Protocol):
-    """What leads a swinging hand along its law, tick by tick: it differs from arm to arm.
-
-    Attributes:
-        stops: how fast body and hand come to rest. one_motion: the hand moves because the body does, with its pace.
-        late: path time by which a hand that does not delay the body may land later than planned [s].
-    """
-
-    stops: Stops
-    one_motion: bool
-    late: float
-
-    def first(self) -> Array:
-        """The configuration with which a plan begins: the body where its path begins, the arms on their grips."""
-
-    def wrist(self, arm: int) -> Wrist:
-        """Joints 4 to 6 of an arm as its grip has them where the body is now [rad]."""
-
-    def lead(self, swinging: Swinging, early: float, pace: float, aborted: bool) -> None:
-        """Move the aim of the hand on by a tick, as fast as the hand follows, and give it to the stack.
-
-        Args:
-            early: path time until the hold can be held [s]. pace: that the body wants to have.
-        """
+#: Path time by which a hand that does not delay the body may land later than planned [s]
+LATE = 0.15
 
 
 class ArmLeader:
-    """Leads hands of arms with three joints and a wrist, each by a clock of its own that waits for the hand.
+    """Leads swinging hands of arms with three joints and a wrist, each by a clock of its own that waits for the hand.
+
+    Attributes:
+        stops: how fast body and hand come to rest.
 
     Raises:
         ShapeError: another machine.
     """
 
-    one_motion, late = False, 0.15
-
     def __init__(self, machine: Machine, progress: PlanProgress, stack: WalkStack) -> None:
-        if machine.walker.two_ended:
-            raise ShapeError("plan", progress.plan, "expected a plan of a machine with WalkerData")
         self._machine, self._progress, self._stack, self._dt = machine, progress, stack, machine.dt
         self._hand, self._landing = HandCommand(machine.dt), HandLanding(machine.dt)
         self._limb = limb_of(machine.walker)
         self.stops = Stops.of(machine.walker, machine.dt)
 
     def first(self) -> Array:
-        """The body where the path begins, the arms on their grips."""
+        """The configuration with which a plan begins: the body where the path begins, the arms on their grips."""
         walker, progress = self._machine.walker, self._progress
         q, begin = np.array(walker.robot.neutral), pin.SE3(progress.plan.path.poses[0])
         q[:3], q[3:7] = begin.translation, quaternion(begin.rotation)
@@ -88,11 +62,16 @@ class ArmLeader:
         return q
 
     def wrist(self, arm: int) -> Wrist:
-        """Of its grip."""
+        """Joints 4 to 6 of an arm as its grip has them where the body is now [rad]."""
         return self._progress.grips.wrist_at(self._progress.grip[arm], self._progress.sample)
 
     def lead(self, swinging: Swinging, early: float, pace: float, aborted: bool) -> None:
-        """Along the law by the hand's clock; near its hold the hand turns upright."""
+        """Move the hand's aim on by a tick along its law, as fast as the hand follows, and give it to the stack; near
+        its hold the hand turns upright.
+
+        Args:
+            early: path time until the hold can be held [s]. pace: that the body wants to have.
+        """
         machine, progress, arm = self._machine, self._progress, swinging.arm
         swinging.earlier = swinging.axis
         swinging.place, swinging.axis, swinging.x_axis = machine.hand(arm)
@@ -147,7 +126,7 @@ class Hands:
 
     def __init__(self, machine: Machine, stack: WalkStack, grasps: Callable[[str, str], bool]) -> None:
         self.machine, self.stack, self.grasps = machine, stack, grasps
-        self.data = machine.walker.tolerances
+        self.data = machine.walker.arm_data
         self.swinging: Swinging | None = None
         self.manual: Manual | None = None
         self.over: dict[int, int] = {}

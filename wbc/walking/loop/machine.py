@@ -114,7 +114,7 @@ class Machine:
             hold: its place. before, now: places of the hand [m].
         """
         far = dist(now, hold)
-        return far > self.walker.tolerances.exempt_distance and far >= dist(before, hold)
+        return far > self.walker.arm_data.exempt_distance and far >= dist(before, hold)
 
     def _watch(self, before: Array) -> None:
         """Of commands u and rates v of all joints the lag is sum (u - v) du / dt over sum (du / dt)^2, of late."""

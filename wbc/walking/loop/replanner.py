@@ -1,8 +1,6 @@
-"""What a walk does next when its plan does not lead on: it differs from machine to machine."""
+"""What a walk does next when its plan does not lead on."""
 
 from __future__ import annotations
-
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,44 +15,12 @@ from wbc.walking.planner.replanning import PlanSlices, plan_from_here, plan_from
 JOINING = 0.05
 
 
-class Replanner(Protocol):
-    """Plans, in slices, from where a machine stands.
+class BodyReplanner:
+    """Plans, in slices, from where a body stands: the rest of its path, or the straight line to another and then that.
 
     Attributes:
         sight: what proves that a free hand may go to where a plan begins; None: nothing does.
     """
-
-    sight: Foresight | None
-
-    def go(self, goal: Any) -> None:
-        """Plan to another goal from now on.
-
-        Raises:
-            ShapeError: it is none for this machine; nothing is changed.
-        """
-
-    def stand(self) -> None:
-        """Plan to stand where the body is, all hands on holds that it can keep."""
-
-    def from_stance(self, wanted: bool) -> None:
-        """Whether hands that all hold may be taken as the first stance, which is the quickest plan."""
-
-    def rest(self) -> PlanSlices:
-        """Plan the rest from where the machine stands.
-
-        Raises:
-            NoPlanError: there is no plan.
-        """
-
-    def without(self, kept: int) -> PlanSlices | None:
-        """Plan anew all but some re-grasps while the body goes on; None: it has to stop first."""
-
-    def taken(self) -> None:
-        """What was planned last is carried out now."""
-
-
-class BodyReplanner:
-    """Of a body that follows a path: the rest of it, or the straight line to another one and then that."""
 
     def __init__(self, machine: Machine, progress: PlanProgress) -> None:
         self._machine, self._progress = machine, progress
@@ -62,20 +28,28 @@ class BodyReplanner:
         self.sight: Foresight | None = None
         self._quick = True
 
-    def go(self, goal: Any) -> None:
-        """Follow another path."""
+    def go(self, goal: BodyPath) -> None:
+        """Follow another path from now on.
+
+        Raises:
+            ShapeError: it is none; nothing is changed.
+        """
         self._wanted, self._quick = validation.instance("path", goal, BodyPath, "a BodyPath"), True
 
     def stand(self) -> None:
-        """Stay where the body is on its path."""
+        """Plan to stay where the body is on its path, all hands on holds that it can keep."""
         self._wanted, self._quick = standing_path(self._progress.pose), False
 
     def from_stance(self, wanted: bool) -> None:
-        """See :class:`Replanner`."""
+        """Whether hands that all hold may be taken as the first stance, which is the quickest plan."""
         self._quick = wanted
 
     def rest(self) -> PlanSlices:
-        """From where the body stands; a free hand goes to where the plan has it."""
+        """Plan the rest from where the body stands; a free hand goes to where the plan has it.
+
+        Raises:
+            NoPlanError: there is no plan.
+        """
         machine, progress = self._machine, self._progress
         walker, path, pose = machine.walker, progress.plan.path, progress.pose
         if self._wanted is None:
@@ -92,11 +66,11 @@ class BodyReplanner:
         may = None if self.sight is None else self.sight.may_bring
         return plan_from_here(walker, machine.structure, whole, machine.held, machine.q, machine.chain, behind, may)
 
-    def without(self, kept: int) -> PlanSlices | None:
-        """Along the same path."""
+    def without(self, kept: int) -> PlanSlices:
+        """Plan anew all but some re-grasps along the same path while the body goes on."""
         machine, progress = self._machine, self._progress
         return plan_rest(machine.walker, machine.structure, progress.plan, kept, progress.path_time)
 
     def taken(self) -> None:
-        """It is the path of the plan now."""
+        """What was planned last is carried out now: it is the path of the plan."""
         self._wanted = None

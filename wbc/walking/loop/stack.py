@@ -185,7 +185,7 @@ class WalkStack:
         stack.add(tasks.Posture(), name="posture", weight=WRIST)
         stack.add(tasks.JointLimits(), name="limits")
         if collisions:
-            stack.add(tasks.SelfCollision(margin=walker.tolerances.clearance), name="links")
+            stack.add(tasks.SelfCollision(margin=walker.arm_data.clearance), name="links")
         self.stack = stack
         self.controller: Controller = stack.compile(backend=backend)
         self._posture = np.array(walker.robot.neutral)

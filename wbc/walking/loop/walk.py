@@ -14,15 +14,16 @@ from wbc.controller import Step
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.validation import Array
+from wbc.walking.body_path import BodyPath
 from wbc.walking.holds.structure import Structure
 from wbc.walking.loop.body_command import BodyMotion
 from wbc.walking.loop.caution import Caution, Course
 from wbc.walking.loop.coasting import Coasting
 from wbc.walking.loop.foresight import Foresight
-from wbc.walking.loop.hands import ArmLeader, HandLeader, Hands
+from wbc.walking.loop.hands import LATE, ArmLeader, Hands
 from wbc.walking.loop.machine import Machine
 from wbc.walking.loop.progress import PlanProgress
-from wbc.walking.loop.replanner import BodyReplanner, Replanner
+from wbc.walking.loop.replanner import BodyReplanner
 from wbc.walking.loop.stack import DT, WalkStack
 from wbc.walking.loop.state import Event, Hand, State, Swinging, Tick, What
 from wbc.walking.planner.plan import HoldLost, NoPlanError, Plan, Regrasp
@@ -57,8 +58,7 @@ class Walk:
         state: where it begins; default: on the holds of the plan, all hands closed.
         plant: the robot that moves; default: a :class:`wbc.simulation.KinematicPlant`. Its inputs are the joint rates
             of the controller, see :class:`wbc.walking.loop.machine.Machine`.
-        leader, replanner: what leads hands and what plans anew, of another kind of machine.
-        foresees: prove everything clear before it is begun (:class:`Caution`); the two-ended arm's plan is its proof.
+        foresees: prove everything clear before it is begun (:class:`Caution`).
 
     Attributes:
         machine, progress, body, hands, replanner, leader, stack: its parts, each one with a job of its own.
@@ -87,8 +87,6 @@ class Walk:
         grasps: Callable[[str, str], bool] | None = None,
         state: State | None = None,
         plant: Plant | None = None,
-        leader: Callable[[Machine, PlanProgress, WalkStack], HandLeader] = ArmLeader,
-        replanner: Callable[[Machine, PlanProgress], Replanner] = BodyReplanner,
         foresees: bool = True,
     ) -> None:
         self._planning: PlanSlices | None = None
@@ -99,7 +97,8 @@ class Walk:
         self.walker, self.dt = walker, self.stack.dt
         self.machine = machine = Machine(walker, structure, self.dt, plant)
         self.progress = PlanProgress(walker, plan)
-        self.leader, self.replanner = leader(machine, self.progress, self.stack), replanner(machine, self.progress)
+        self.leader = ArmLeader(machine, self.progress, self.stack)
+        self.replanner = BodyReplanner(machine, self.progress)
         self.body = BodyMotion(self.dt, self.leader.stops)
         self.hands = Hands(machine, self.stack, grasps or (lambda _arm, _hold: True))
         self.events: list[Event] = []
@@ -110,9 +109,7 @@ class Walk:
         self.opens = None if state is None else state.opening
         grips, mine = self.progress.grips, self.progress.grip
         if state is None:
-            # Hands that hold first: where the arm moves as one, they place its body
-            machine.held = {arm: int(grips.hold[grip]) for arm, grip in enumerate(mine)}
-            machine.begin(self.leader.first(), machine.held)
+            machine.begin(self.leader.first(), {arm: int(grips.hold[grip]) for arm, grip in enumerate(mine)})
         else:
             machine.begin(state.q, state.held, state.time, state.v)
         self.stack.begin(machine.q)
@@ -120,7 +117,7 @@ class Walk:
         self._caution: Caution | None = None
         self._refusals, self._refused = 0, ""
         self._looked: Regrasp | None = None
-        if foresees and not self.leader.one_motion:
+        if foresees:
             sight = Foresight(walker, structure)
             self.replanner.sight, sight.left = sight, machine.left
             self._caution = Caution(sight, machine, self.progress, self.leader.stops)
@@ -178,7 +175,7 @@ class Walk:
     @property
     def still(self) -> bool:
         """Neither the body nor a hand is commanded to move."""
-        swinging = None if self.leader.one_motion else self.swinging
+        swinging = self.swinging
         if self._coasting is not None and not self._coasting.done:
             return False
         return self.pace == 0.0 and (swinging is None or (swinging.state == "open" and swinging.pace == 0.0))
@@ -288,17 +285,15 @@ class Walk:
             self._stop()
         elif later and not self._changing:
             self._planning = self.replanner.without(later[0])
-            if self._planning is None:
-                self._stop()
 
-    def go(self, goal: Any) -> None:
+    def go(self, goal: BodyPath) -> None:
         """Go somewhere else: the body stops, goes straight to where another path begins, and on along it.
 
         Args:
-            goal: a :class:`wbc.walking.body_path.BodyPath`; of another machine what its replanner takes.
+            goal: a path of its own.
 
         Raises:
-            ShapeError: it is none for this machine; nothing is changed.
+            ShapeError: it is none; nothing is changed.
         """
         self.replanner.go(goal)
         self._stop()
@@ -331,8 +326,6 @@ class Walk:
         if swinging is None:
             return body, 0.0
         law, pace = swinging.law, swinging.pace if swinging.state == "open" else 0.0
-        if self.leader.one_motion:
-            pace = self.pace
         gap = float(np.linalg.norm(swinging.aim.position - self.machine.chain.origins[swinging.arm]))
         return body, float(stops.of_hand(law.places, law.spacing, np.array(swinging.clock), pace, gap))
 
@@ -472,11 +465,11 @@ class Walk:
         if found is not None:
             self._refuse(f"{step.arm} from {step.source} to {step.target}", found)
 
-    def _next_swing(self, step: Regrasp, **more: Any) -> Swinging:
-        """The swing of the next re-grasp, as its hand is to open; or with ``more`` of :class:`Swinging`."""
+    def _next_swing(self, step: Regrasp) -> Swinging:
+        """The swing of the next re-grasp, as its hand is to open."""
         arm, law = self.progress.arm_of(step), self.plan.laws[self.progress.next]
         grip = self._grip(self.progress.next_grip(arm))
-        swinging = self.hands.going(arm, grip, law, **{"latch": self.hands.data.latch_time, **more})
+        swinging = self.hands.going(arm, grip, law, latch=self.hands.data.latch_time)
         swinging.wrist = self.leader.wrist(arm)
         return swinging
 
@@ -543,7 +536,7 @@ class Walk:
         that at which it lands.
         """
         step = self.plan.regrasps[self.progress.next]
-        return step.land + (0.0 if step.delay else self.leader.late)
+        return step.land + (0.0 if step.delay else LATE)
 
     def _end(self) -> float:
         """Path time that the body does not pass [s]."""
@@ -601,7 +594,7 @@ class Walk:
             if swinging.state != "closing":
                 needed = (swinging.law.duration - swinging.clock) / swinging.most + self.hands.data.latch_time + SETTLE
             landing = max(self._before_landing(swinging) - u, 0.0), needed
-        most = 1.0 if self.leader.one_motion else self.body.corners(path).pace(u)
+        most = self.body.corners(path).pace(u)
         self.body.choose(margin, max(end - u, 0.0), landing, self._stands(), most)
         aim, progress.path_time = self.body.go(path, u)
         self.stack.body(aim)
@@ -610,9 +603,6 @@ class Walk:
         """The body is to stop, or not to move on."""
         if self.halted or self.aborted:
             return True
-        if self.leader.one_motion:
-            # A swinging hand goes on to its hold with the body, as long as that is there
-            return self._changing if self.swinging is None else self.swinging.dropped
         return self._changing or (self.swinging is not None and (self.swinging.waits or self.swinging.pauses))
 
     def _soonest(self, swinging: Swinging) -> float:

@@ -53,7 +53,7 @@ class Around:
     def __init__(self, walker: Walker, structure: Structure) -> None:
         self.limb = limb = limb_of(walker)
         self.structure, self.arms = structure, len(walker.arms)
-        tolerances, margins = walker.tolerances, walker.margins
+        tolerances, margins = walker.arm_data, walker.margins
         self.names = (*(f"obstacle {one.id}" for one in structure.obstacles), "the surface", "the walker itself")
         self.bases = np.array([arm.base.homogeneous for arm in walker.arms])
         self.body = _body_of(walker, self.bases)

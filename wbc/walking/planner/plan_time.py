@@ -61,7 +61,7 @@ def planned_joints(walker: Walker, plan: Plan) -> PlannedJoints:
         ShapeError: a plan of a machine without the walker's arms, or without its grips. NoPlanError: one that is not
             complete.
     """
-    limb, grips, latch = limb_of(walker), plan.grips, walker.tolerances.latch_time
+    limb, grips, latch = limb_of(walker), plan.grips, walker.arm_data.latch_time
     if grips is None or len(plan.chain) != len(walker.arms) or len(plan.laws) != len(plan.regrasps):
         raise ShapeError("plan", list(plan.start), "expected a plan with its grips and laws, see follow_plan")
     if not plan.complete:

@@ -48,7 +48,7 @@ class ClearScene:
         self.walker, self.structure = walker, structure
         self._around = around(walker, structure)
         self.tree = tree = Tree.of_model(walker.robot.model)
-        required = walker.tolerances.clearance - TOLERANCE
+        required = walker.arm_data.clearance - TOLERANCE
         self._hands = [self._with_hand(arm.hand) for arm in walker.arms]
         bodies = [self._grasping(body) for body in bodies_of(walker.robot)]
         things = list(things_of(structure))
@@ -103,7 +103,7 @@ class ClearScene:
 
     def _leaving(self, arm: int, point: Array) -> Iterator[Exemption]:
         """Of what a hand is near to where it begins."""
-        surface, near = self.structure.surface, self.walker.tolerances.clearance + self._around.radii[-1]
+        surface, near = self.structure.surface, self.walker.arm_data.clearance + self._around.radii[-1]
         gaps = [float(one.distance(point)) for one in self.structure.obstacles]
         gaps += [] if surface is None else [float(surface.height(point))]
         for k in np.nonzero(np.array(gaps) < near)[0].tolist():

@@ -41,14 +41,15 @@ def figures_of(run: WalkRun, report: Report | None = None) -> list[Figure]:
     """
     data, structure = run.walker.data, run.structure
     run = run.judged(report)
-    arms = "" if run.walker.two_ended else f" with {len(run.walker.arms)} arms"
     told = f"{run.outcome}: {run.reason}" if run.reason else run.outcome
     if report is None and run.log is not None:
         told += " (not checked)"
     out = [
         Figure("outcome", "outcome", run.outcome, told),
         Figure("reason", "", run.reason, ""),
-        Figure("robot", "robot", data.digest, f"{run.walker.robot.name}{arms}, {data.summary()}"),
+        Figure(
+            "robot", "robot", data.digest, f"{run.walker.robot.name} with {len(run.walker.arms)} arms, {data.summary()}"
+        ),
         Figure("arms", "", len(run.walker.arms), ""),
         Figure(
             "structure",
@@ -177,11 +178,10 @@ def _machine(run: WalkRun, log: WalkLog) -> list[Figure]:
     part = np.abs(log.v) / limits.velocity[6:]
     k = int(part.max(axis=0).argmax())
     out = [Figure("rate", "largest joint rate", float(part.max()), f"{part.max():.6f} of its limit, {log.joints[k]}")]
-    if not run.walker.two_ended:
-        angles = np.abs(wrist_angles(run, log))
-        least = float(np.where(np.isnan(angles), np.inf, angles).min())
-        if np.isfinite(least):  # else no hand held
-            out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
+    angles = np.abs(wrist_angles(run, log))
+    least = float(np.where(np.isnan(angles), np.inf, angles).min())
+    if np.isfinite(least):  # else no hand held
+        out.append(Figure("theta5", "smallest |theta5| held", least, f"{np.degrees(least):.2f} deg"))
     return out
 
 

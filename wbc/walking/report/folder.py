@@ -10,7 +10,6 @@ import numpy as np
 from wbc.robots import Walker
 from wbc.track.page import FILE as REPORT
 from wbc.walking.checker import Report, Rules, check_run
-from wbc.walking.checker.clock_and_joints import JUMP, SPIN_JUMP
 from wbc.walking.holds.files import save_structure
 from wbc.walking.log.folder import BEGUN, PLAN, STRUCTURE, URDF, write_whole
 from wbc.walking.log.log import FILE, PART
@@ -23,7 +22,6 @@ from wbc.walking.report.stills import save_stills
 from wbc.walking.run.carrying_out import Progress
 from wbc.walking.run.session import WalkRun
 from wbc.walking.torque.loads import LOADS
-from wbc.walking.two_ended import touching_distance
 
 CHECK = "check.txt"
 #: All files of a run, which the next one in the same folder does not leave behind
@@ -67,14 +65,10 @@ def save_run(run: WalkRun, folder: pathlib.Path, check: bool = True) -> tuple[li
 
 
 def rules_of(walker: Walker) -> Rules:
-    """What the checker goes by: the accelerations of the joints; tips of the two-ended arm are thicker than hands."""
+    """What the checker goes by: the accelerations of the joints."""
     names = [joint for arm in walker.arms for joint in arm.joints]
     limits = np.concatenate([walker.robot.limits.acceleration[arm.v] for arm in walker.arms])
-    found = dict(zip(names, limits.tolist(), strict=True))
-    if walker.two_ended:
-        # Its body is its elbow, which goes as fast as the joints take it
-        return Rules(exempt_distance=touching_distance(walker), accelerations=found, observe=(JUMP, SPIN_JUMP))
-    return Rules(accelerations=found)
+    return Rules(accelerations=dict(zip(names, limits.tolist(), strict=True)))
 
 
 def save_pictures(
@@ -86,10 +80,8 @@ def save_pictures(
         stop: asked between pictures and frames; true ends it.
     """
     told, asked = progress or (lambda what, part: None), stop or (lambda: False)
-    files = list[pathlib.Path]()
-    if not run.walker.two_ended:
-        told("reach map", None)
-        files.append(save_reach_map(run, folder))
+    told("reach map", None)
+    files = [save_reach_map(run, folder)]
     log, ticks = run.log, run.ticks
     if log is None or ticks is None or asked():
         return files

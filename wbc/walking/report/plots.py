@@ -27,8 +27,6 @@ Draw = Callable[..., Any]
 def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.Path) -> list[pathlib.Path]:
     """Writes holds, margins, joints, rates, drift, wrists, speed, tick_time and, of a walk under torques, loads, PNG
     each; returns the files.
-
-    Of the two-ended arm no margins and wrists: its hands hold until they swing, and it has no theta5.
     """
     draws: dict[str, Draw] = {
         "holds": _holds,
@@ -40,8 +38,6 @@ def save_plots(run: WalkRun, log: WalkLog, ticks: TickColumns, folder: pathlib.P
         "speed": _speed,
         "tick_time": _tick_time,
     }
-    if run.walker.two_ended:
-        del draws["margins"], draws["wrists"]
     if run.loads is not None:
         draws["loads"] = _loads
     return save_each({name: partial(draw, run=run, log=log, ticks=ticks) for name, draw in draws.items()}, folder)
@@ -130,9 +126,7 @@ def _panels(run: WalkRun, log: WalkLog, values: Array, limits: tuple[Array, Arra
         curves = [(np.degrees(values[:, j]), arm_colour(k), arms[k].name) for k, j in members.items()]
         joints = list(members.values())
         low, high = float(np.degrees(limits[0][joints].min())), float(np.degrees(limits[1][joints].max()))
-        # Joints of the two-ended arm are counted from tip to tip, its halves from the elbow
-        names = dict.fromkeys(log.joints[j].rpartition("joint")[2] for j in joints)
-        out.append(LogPanel(unit, curves, low, high, f"joint {', '.join(names)}"))
+        out.append(LogPanel(unit, curves, low, high, f"joint {number + 1}"))
     return out
 
 

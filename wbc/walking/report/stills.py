@@ -81,7 +81,7 @@ def add_machine(scene: Scene, run: WalkRun, log: WalkLog, row: int, pale: bool =
 def add_structure(scene: Scene, run: WalkRun, log: WalkLog, held: dict[int, int]) -> None:
     """The structure near the way; ``held``: row of a hold -> arm, in whose colour it is."""
     turn = surroundings.upright(log).rotation.T
-    rows = surroundings.near_rows(run.structure, log, SHOWN * surroundings.scale(run.walker))
+    rows = surroundings.near_rows(run.structure, log, SHOWN)
     scene.add_triangles(surroundings.surface_triangles(run.structure, rows) @ turn, colour=surroundings.SURFACE)
     plain = np.setdiff1d(rows, list(held))
     scene.add_triangles(surroundings.stud_triangles(run.structure, plain) @ turn, colour=surroundings.HOLD)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from wbc.clearance import TriangleMesh
 from wbc.multibody import pin
-from wbc.robots import Walker
 from wbc.shapes import PlacedShape
 from wbc.style import BLUE, ORANGE, PURPLE, TEAL
 from wbc.track import render
@@ -26,15 +25,8 @@ BODY: Colour = (0.93, 0.935, 0.945)
 ARMS = (BLUE, ORANGE, TEAL, PURPLE)
 #: A hold is drawn as a stud [m]: radius, height above the surface, and how many corners
 STUD, TALL, CORNERS = 0.035, 0.02, 10
-#: The two-ended arm is so much longer than an arm of the walker
-TWO_ENDED = 6.0
 #: What is shown of the surface beyond the holds [m], how far under them it lies, and the side of a patch
 EDGE, UNDER, PATCH = 0.18, 0.004, 0.12
-
-
-def scale(walker: Walker) -> float:
-    """How many times larger than those of bodies with arms the pictures of a machine are."""
-    return TWO_ENDED if walker.two_ended else 1.0
 
 
 def arm_colour(arm: int) -> str:

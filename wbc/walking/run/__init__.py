@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         PathRequest as PathRequest,
         ResumeRequest as ResumeRequest,
         Site as Site,
-        TwoEndedRequest as TwoEndedRequest,
     )
     from wbc.walking.run.session import WalkRun as WalkRun, perform_walk as perform_walk
 else:

@@ -1,4 +1,4 @@
-"""A plan is carried out from its beginning to its end: of a body with arms along a path, or of the two-ended arm."""
+"""A plan of a body with arms along a path is carried out from its beginning to its end."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from wbc.errors import ShapeError, WbcError
+from wbc.errors import WbcError
 from wbc.robots import Walker
 from wbc.simulation import Plant
 from wbc.track.summary import Figure
-from wbc.validation import Array
-from wbc.walking.body_path import standing_path
 from wbc.walking.holds.surface import CylinderSurface
 from wbc.walking.log.body_paths import way_of
 from wbc.walking.log.log import WalkLog
@@ -22,14 +20,13 @@ from wbc.walking.loop.walk import PATIENCE, SLACK, Walk
 from wbc.walking.modes.first_grasps import free_state, plan_from_state
 from wbc.walking.modes.veto import Veto
 from wbc.walking.planner.follow import follow_plan
-from wbc.walking.planner.plan import NoPlanError, Plan, Regrasp, read_plan
+from wbc.walking.planner.plan import Plan, Regrasp, read_plan
 from wbc.walking.planner.planner import plan_walk
 from wbc.walking.run.carrying_out import CarryingOut, Progress
 from wbc.walking.run.mode import Asked, Ending, Mode, off_goal
 from wbc.walking.run.plausible import ground
 from wbc.walking.run.recording import WalkRecorder
-from wbc.walking.run.request import PathRequest, TwoEndedRequest
-from wbc.walking.two_ended import TwoEndedPlan, TwoEndedStack, TwoEndedWalk, plan_two_ended
+from wbc.walking.run.request import PathRequest
 
 #: (the next re-grasp, why the last answer was refused or "") -> "" for yes, another hold, or None: nobody answers
 Ask = Callable[[Regrasp, str], str | None]
@@ -133,56 +130,6 @@ class PathMode(PlannedMode[PathRequest]):
         """A detour that was found, or the path of a file, goes with the log, so that the walk can be resumed on it."""
         way = {} if plan.path is self.path and self._given is None else {"way": way_of(plan.path)}
         return {**super().meta(plan), **way}
-
-
-class TwoEndedMode(PlannedMode[TwoEndedRequest]):
-    """The two-ended arm goes end over end.
-
-    Raises:
-        ShapeError: another machine. UnknownNameError: no such hold. What the site raises.
-    """
-
-    def __init__(self, request: TwoEndedRequest, walker: Walker) -> None:
-        super().__init__(walker)
-        _ = walker.two_ended_data
-        self.request, self.structure = request, ground(request.site, walker)
-        first = [self.structure.index(name) for name in request.start]
-        if isinstance(request.goal, str):
-            self.structure.index(request.goal)
-        self.path = standing_path(self.structure.holds[first[0]].pose)
-
-    def plan(self) -> TwoEndedPlan:
-        """End over end to the goal."""
-        request = self.request
-        start = dict(zip(("arm1", "arm2"), request.start, strict=True))
-        plan = plan_two_ended(self.walker, self.structure, start, request.goal, gait=request.gait)
-        far = "" if isinstance(request.goal, str) else self._too_far(plan.path.poses[-1][:3, 3])
-        if far:
-            raise NoPlanError("to", request.goal, far)
-        return plan
-
-    def _too_far(self, elbow: Array) -> str:
-        """Why an elbow [m] is not at the place that was asked for: stances are few, so that it counts within a boom."""
-        away = float(np.linalg.norm(np.asarray(self.request.goal, dtype=float) - elbow))
-        boom = self.walker.two_ended_data.boom_length
-        return "" if away <= boom else f"the elbow comes no nearer to it than {away:.3g} m, a boom is {boom:.3g} m long"
-
-    def missed(self, walk: Walk) -> str:
-        """A hand on the hold, or the elbow near the place."""
-        goal, there = self.request.goal, [walk.structure.ids[hold] for hold in walk.held.values()]
-        if isinstance(goal, str):
-            return "" if goal in there else f"no hand holds {goal!r}"
-        return self._too_far(walk.q[:3])
-
-    def compiled(self, backend: str) -> TwoEndedStack:
-        """With swings by all joints of half the arm."""
-        return TwoEndedStack(self.walker, self.structure, collisions=False, backend=backend)
-
-    def walk(self, plan: Plan, stack: WalkStack, plant: Plant | None) -> TwoEndedWalk:
-        """One hand holds, the other one swings."""
-        if not isinstance(plan, TwoEndedPlan) or not isinstance(stack, TwoEndedStack):
-            raise ShapeError("stack", stack, "expected a TwoEndedStack")
-        return TwoEndedWalk(self.walker, self.structure, plan, stack=stack, plant=plant)
 
 
 def _declined(veto: Veto, ask: Ask) -> str:

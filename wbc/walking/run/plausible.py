@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wbc.errors import RangeError
-from wbc.robots import TwoEndedData, Walker
+from wbc.robots import Walker
 from wbc.walking.holds.built_in import BUILT_IN
 from wbc.walking.holds.structure import Structure
 from wbc.walking.run.request import Site
@@ -23,10 +23,7 @@ SMALL = 0.02, 0.25
 
 def hands_apart(walker: Walker) -> float:
     """More than two hands of a machine can be apart [m]: bases and arms stretched along one line."""
-    data = walker.data
-    if isinstance(data, TwoEndedData):
-        offsets = data.roll_offset + data.yaw_offset + data.pitch_offset + data.elbow_offset
-        return 2.0 * (data.boom_length + offsets)
+    data = walker.arm_data
     arm = data.upper_arm_length + data.forearm_length + data.hand_length
     return 2.0 * (float(np.hypot(data.shoulder_radius + data.shoulder_offset, data.neck_length)) + arm)
 
@@ -40,7 +37,7 @@ def ground(site: Site, walker: Walker) -> Structure:
             site raises.
     """
     structure = site.build()
-    if len(walker.arms) == 2 and not walker.two_ended:
+    if len(walker.arms) == 2:
         if site.structure in BUILT_IN:
             holds = tuple(replace(hold, roll=FOLD, max_tilt=0.0) for hold in structure.holds)
             structure = replace(structure, holds=holds)

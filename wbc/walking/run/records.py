@@ -16,7 +16,6 @@ from wbc.walking.run.request import (
     PublishedRequest,
     Request,
     Site,
-    TwoEndedRequest,
 )
 
 #: Names of the modes in records
@@ -25,7 +24,6 @@ KINDS: Mapping[str, type[Any]] = {
     "published": PublishedRequest,
     "drive": DriveRequest,
     "arm": ArmRequest,
-    "two-ended": TwoEndedRequest,
 }
 
 

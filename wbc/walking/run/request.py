@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from wbc.walking.body_path import BodyPath
     from wbc.walking.holds.structure import Structure
 
-#: The structure with a grid of places, and the row of holds for the two-ended arm
-GRID, GRAPPLES = "cylinder", "grapples"
+#: The structure with a grid of places
+GRID = "cylinder"
 #: Where a walk begins and ends on a built-in structure when nothing is said
 ENDS = {
     "cylinder": ("13,6", "13,18"),
@@ -28,7 +28,6 @@ ENDS = {
     "truss": ("L2,6", "L2,18"),
     "module": ("15,4", "15,14"),
 }
-TWO_ENDED_ENDS = ("1", "2"), "6"
 #: 4 in/s, and [rad/s]
 SPEED, TURN_RATE = 0.1016, 0.05
 
@@ -38,7 +37,7 @@ class Site:
     """On what: a structure less the holds that are taken away.
 
     Attributes:
-        structure: cylinder, plane, truss, module, grapples, or FILE.csv.
+        structure: cylinder, plane, truss, module, or FILE.csv.
         rows: Holds T,A that are taken away by A, such as 12-14.
         columns: Holds T,A that are taken away by T.
         fraction: Part of the holds that is taken away at random [1].
@@ -73,12 +72,7 @@ class Site:
         """With all its holds."""
         from wbc.walking.holds.built_in import BUILT_IN
         from wbc.walking.holds.files import read_structure
-        from wbc.walking.two_ended import grapple_row
 
-        if self.structure == GRAPPLES:
-            if self.rigid:
-                raise RangeError("rigid", self.rigid, "these holds fix the tilt of a hand anyway")
-            return grapple_row()
         make: Callable[..., Structure] | None = dict[str, Any](BUILT_IN).get(self.structure)
         if make is not None:
             return make(max_tilt=0.0) if self.rigid else make()
@@ -87,7 +81,7 @@ class Site:
         named = "/" in self.structure or self.structure.lower().endswith(".csv")
         if named or validation.is_file("structure", self.structure):
             return read_structure(self.structure)
-        validation.one_of("structure", self.structure, (*BUILT_IN, GRAPPLES, "FILE.csv"))
+        validation.one_of("structure", self.structure, (*BUILT_IN, "FILE.csv"))
         raise RangeError("structure", self.structure, "no such file")
 
 
@@ -297,58 +291,6 @@ class ArmRequest(Route):
 
 
 @dataclass(frozen=True)
-class TwoEndedRequest:
-    """The two-ended arm goes end over end.
-
-    Attributes:
-        site: Or the name of its structure.
-        start: Ids of the holds of its two ends, arm1 and arm2.
-        goal: Id of the hold that it goes to, or the place x,y,z of its elbow [m].
-        gait: any, inchworm or turnaround.
-    """
-
-    site: Site = Site(GRAPPLES)
-    start: tuple[str, str] = field(default=TWO_ENDED_ENDS[0], metadata={"option": "from"})
-    goal: str | tuple[float, float, float] = field(default=TWO_ENDED_ENDS[1], metadata={"option": "to"})
-    gait: str = "any"
-
-    def __post_init__(self) -> None:
-        from wbc.walking.two_ended.search import GAITS
-
-        site = Site(self.site) if isinstance(self.site, str) else validation.instance("site", self.site, Site, "a Site")
-        start = validation.strings("from", self.start)
-        if len(start) != 2:
-            raise ShapeError("from", start, "expected two holds, 'ID1 ID2'")
-        goal: Any = self.goal
-        if not isinstance(goal, str):
-            goal = tuple(validation.real_array("to", goal, (3,)).tolist())
-        for name, value in (("site", site), ("start", start), ("goal", goal)):
-            object.__setattr__(self, name, value)
-        validation.one_of("gait", self.gait, tuple(GAITS))
-
-    def to(self, goals: tuple[Place, ...] = ()) -> TwoEndedRequest:
-        """The same to another goal, as text; () for its own. What is no hold is a place x,y,z.
-
-        Raises:
-            ShapeError: several goals. UnknownNameError: holds that are not there.
-        """
-        if len(goals) > 1:
-            raise ShapeError("to", goals, "expected one hold or place x,y,z")
-        goal, structure = str(goals[0]) if goals else self.goal, self.site.build()
-        for name in self.start:
-            structure.index(name)
-        if not isinstance(goal, str):
-            return self
-        if goal not in structure:
-            try:
-                x, y, z = (float(part) for part in goal.split(","))
-            except ValueError:
-                structure.index(goal)
-            return replace(self, goal=(x, y, z))
-        return replace(self, goal=goal)
-
-
-@dataclass(frozen=True)
 class ResumeRequest:
     """A run goes on, at rest in the state that its log has at a time, to its end.
 
@@ -369,4 +311,4 @@ class ResumeRequest:
             raise ShapeError("resume.at", self.at, "expected a time in s")
 
 
-Request = PathRequest | PublishedRequest | DriveRequest | ArmRequest | TwoEndedRequest
+Request = PathRequest | PublishedRequest | DriveRequest | ArmRequest

@@ -36,7 +36,7 @@ from wbc.walking.run.mode import Ending, Mode, Result, compiled_stack, off_goal
 from wbc.walking.run.places import GridPlace, Place
 from wbc.walking.run.recording import Before, WalkRecorder, as_walked, configuration
 from wbc.walking.run.records import request_of
-from wbc.walking.run.request import PathRequest, Request, ResumeRequest, TwoEndedRequest
+from wbc.walking.run.request import PathRequest, Request, ResumeRequest
 
 #: A body goes back along its log for so long at most [s], by straight lines over so many ticks
 TRAIL, EVERY = 20.0, 25
@@ -109,8 +109,6 @@ def going_on(resume: ResumeRequest, seen: frozenset[pathlib.Path] = frozenset())
     begun = dict(read_begun(folder)["request"])
     if begun.get("kind") != RESUME:
         request = request_of(begun)
-        if resume.points and isinstance(request, TwoEndedRequest):
-            return request.to(resume.points)
         return _goal(request, resume.points) if resume.points else request
     try:
         at, points = begun["at"], tuple(_place(place) for place in begun["points"])
@@ -169,7 +167,7 @@ class ResumeMode(Mode[PathRequest]):
         self._old, self._ticks = WalkLog.of(columns), TickColumns.of(columns)
         old = self._old
         self.request = request = _goal(request_of(old.meta.get("request")), resume.points)
-        if walker.two_ended or walker.data.digest != old.meta["robot_digest"]:
+        if walker.arm_data.digest != old.meta["robot_digest"]:
             raise RangeError("resume", old.meta["robot_digest"], "the run has another robot; use the same --set")
         if len(old.arms) != len(walker.arms):
             raise RangeError("resume", len(old.arms), f"the run has another number of arms than {len(walker.arms)}")
@@ -267,8 +265,6 @@ def _goal(request: Request, points: tuple[Place, ...]) -> PathRequest:
     Raises:
         RangeError: it has no goal.
     """
-    if isinstance(request, TwoEndedRequest):
-        raise RangeError("resume", "two-ended", "the run is of the two-ended arm")
     if not points and not request.goes:
         raise RangeError("to", points, "the run was driven and has no goal; say where to go")
     goes = points or request.points, request.speed, request.turn_rate

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from wbc import validation
+from wbc.api import Controller
 from wbc.errors import RangeError, ShapeError
 from wbc.robots import Walker
 from wbc.simulation import Plant, PlantError
@@ -27,13 +29,12 @@ from wbc.walking.run.arm_tasks_mode import ArmTasksMode
 from wbc.walking.run.carrying_out import WELL, Outcome, Progress, settle
 from wbc.walking.run.drive_mode import DriveMode
 from wbc.walking.run.mode import Mode
-from wbc.walking.run.path_mode import Ask, PathMode, TwoEndedMode
+from wbc.walking.run.path_mode import Ask, PathMode
 from wbc.walking.run.plausible import far_apart
 from wbc.walking.run.recording import WalkRecorder
 from wbc.walking.run.records import record_of
-from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, ResumeRequest, TwoEndedRequest
+from wbc.walking.run.request import ArmRequest, DriveRequest, PathRequest, Request, ResumeRequest
 from wbc.walking.run.resume_mode import ResumeMode, going_on
-from wbc.walking.run.resume_two_ended import TwoEndedResumeMode
 from wbc.walking.torque.loads import Loads
 from wbc.walking.torque.loop import TorqueLoop
 
@@ -148,10 +149,8 @@ def mode_of(
         return DriveMode(request, walker, commands)
     if isinstance(request, ArmRequest):
         return ArmTasksMode(request, walker)
-    if isinstance(request, TwoEndedRequest):
-        return TwoEndedMode(request, walker)
     if isinstance(request, ResumeRequest):
-        return TwoEndedResumeMode(request, walker) if walker.two_ended else ResumeMode(request, walker)
+        return ResumeMode(request, walker)
     raise ShapeError("request", request, "expected a request of a walk by the planner 'free'")
 
 
@@ -164,8 +163,11 @@ def perform(
     stop: Callable[[], bool] | None = None,
     plant: Plant | None = None,
     folder: pathlib.Path | None = None,
+    compiled: Callable[[Controller], None] | None = None,
 ) -> WalkRun:
-    """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`."""
+    """Plans, compiles, walks and records. Arguments as of :func:`perform_walk`; ``compiled`` is called once when the
+    controller is ready.
+    """
     if folder is not None:
         about = plant.about if isinstance(plant, TorqueLoop) else None
         begin_folder(folder, mode.asked(), mode.walker, mode.structure, about)
@@ -193,6 +195,8 @@ def perform(
     begin = clock()
     stack = stack or mode.compiled(backend)
     run, begin = replace(run, compile_time=clock() - begin), clock()
+    if compiled is not None:
+        validation.called("compiled", compiled, stack.controller)
     walk = mode.walk(plan, stack, plant)
     meta = {"machine": machine_of(mode.walker), **mode.meta(plan), "request": record_of(mode.request)}
     if isinstance(plant, TorqueLoop):

@@ -76,7 +76,7 @@ class PlantChoice:
         """The plant with the loop of torques over it, for a walker without masses.
 
         Raises:
-            MissingPackageError: MuJoCo is not installed. ShapeError: the two-ended arm, which has no masses.
+            MissingPackageError: MuJoCo is not installed. ShapeError: another machine.
             RangeError: holds that let hands tilt. UnknownNameError: a fault of an arm or a joint that is not there.
         """
         from wbc.robots import with_masses

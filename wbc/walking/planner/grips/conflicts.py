@@ -45,7 +45,7 @@ class LimbShapes:
         pairs = [(i, j) for i in range(count) for j in range(count) if max(i, j) >= limb.still]
         self._one, self._other = [i for i, _ in pairs], [j for _, j in pairs]
         radii = np.array(limb.radii)
-        self.least: Array = radii[self._one] + radii[self._other] + walker.tolerances.clearance
+        self.least: Array = radii[self._one] + radii[self._other] + walker.arm_data.clearance
         self.least = self.least + walker.margins.held_clearance
 
     def points(self, arm: int, postures: Array) -> Array:

@@ -117,7 +117,7 @@ def crossing_height(walker: Walker) -> float:
     """How high above the structure a hand is to cross [m]: its radius and the clearance, and not under the published
     height.
     """
-    tolerances, radius = walker.tolerances, limb_of(walker).radii[-1]
+    tolerances, radius = walker.arm_data, limb_of(walker).radii[-1]
     return max(tolerances.lift_height, radius + tolerances.clearance) + walker.margins.crossing
 
 

@@ -73,7 +73,7 @@ class Swings:
         self.walker, self.structure, self.path, self.grips = walker, structure, path, grips
         self.arms = arms or ArmClearance(walker, grips)
         self.shapes, self.limb, self.margins = self.arms.shapes, self.arms.shapes.limb, walker.margins
-        self.latch = walker.tolerances.latch_time
+        self.latch = walker.arm_data.latch_time
         self.extra = 2 * self.latch + SETTLE
         # The hand is on its hold before it is latched
         self.touch = round((self.latch + SETTLE) / path.spacing)

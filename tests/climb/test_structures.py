@@ -1,0 +1,122 @@
+"""Structures of scarce holds, from seeds: they are walked, and ways over stances are found again."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.climb.structures import FAMILIES, drawn
+from wbc.climb import BodyPlace, ClimbLoop, first_stance, machines, motion, plan_climb
+from wbc.climb.checker import check
+from wbc.climb.climber import Climber
+from wbc.climb.motion import MotionOptions, MoveError, Mover
+from wbc.climb.scene import ClimbScene, SceneBody, of_structure
+from wbc.climb.search import StanceWay, find_stances
+from wbc.climb.stance import Stance
+from wbc.errors import UnknownNameError
+from wbc.shapes import Sphere
+from wbc.walking.run.places import over_holds
+
+#: The published walker's body over its holds [m]
+HEIGHT = 1.32
+
+
+@functools.cache
+def walker() -> Climber:
+    return machines.climber("walker")
+
+
+def asked(family: str, seed: int) -> tuple[ClimbScene, Stance, BodyPlace]:
+    """The scene of a seed, a stance at its start, and its goal."""
+    trial = drawn(family, seed)
+    first, last = over_holds(trial.structure, [trial.start, trial.goal], HEIGHT)
+    scene = of_structure(trial.structure)
+    start = first_stance(walker(), scene, walker().with_body(walker().rest, first))
+    return scene, start, BodyPlace(last.translation, last.rotation)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_structures_are_those_of_their_seeds(family: str) -> None:
+    one, again, other = (drawn(family, seed).structure for seed in (0, 0, 1))
+    assert one.digest == again.digest != other.digest
+    # No hold is inside of anything
+    assert one.clearance(one.positions).min() > -1e-9
+
+
+def test_an_unknown_family_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="spiral"):
+        drawn("spirals", 0)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_structures_are_walked(family: str) -> None:
+    scene, start, goal = asked(family, 0)
+    plan = plan_climb(walker(), scene, start, goal)
+    body = walker().body_pose(plan.q[-1])
+    assert np.linalg.norm(body.translation - goal.position) < 0.02 + 1e-6
+    assert np.linalg.norm(pin.log3(body.rotation.T @ goal.rotation)) < 0.02 + 1e-6
+    if family == "islands":
+        run = ClimbLoop(plan).run(most=2.0 * float(plan.times[-1]))
+        assert run.outcome == "arrived"
+        assert check(run.log, walker(), scene).clean
+
+
+def test_a_way_is_found_again_without_a_move() -> None:
+    scene, start, goal = asked("islands", 1)
+    way = StanceWay(walker(), scene, start, goal)
+    path = way.found()
+    contacts = [stance.contacts for stance in path.stances]
+    assert contacts == [stance.contacts for stance in find_stances(walker(), scene, start, goal).stances]
+    row = next(k for k in range(1, len(contacts) - 1) if contacts[k] != contacts[k + 1])
+    forbidden = contacts[row], contacts[row + 1]
+    # Where a limb goes to a foothold late, it goes elsewhere where it can
+    limb = next(k for k in range(3) if forbidden[0][k] != forbidden[1][k])
+    late = ((), limb, forbidden[1][limb])
+    way.forbid(row, [late])
+    other = [stance.contacts for stance in way.found().stances]
+    assert other[: row + 1] == contacts[: row + 1]
+    assert forbidden not in itertools.pairwise(other)
+    assert all(stance[limb] != late[2] for stance in other)
+    for one, after in itertools.pairwise(other):
+        assert sum(a != b for a, b in zip(one, after, strict=True)) <= 1
+
+
+def test_the_body_goes_round_what_is_in_its_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, start, goal = asked("islands", 0)
+    begin = walker().body_pose(start.q).translation
+    ahead = (goal.position - begin) / np.linalg.norm(goal.position - begin)
+    one, *_, other = find_stances(walker(), scene, start, BodyPlace(begin + 0.3 * ahead)).stances
+    assert one.contacts == other.contacts
+    middle, sides = begin + 0.15 * ahead, (np.cross([0.0, 0.0, 1.0], ahead), np.array([0.0, 0.0, 1.0]))
+
+    def bowed(mover: Mover) -> float:
+        """How far the body is off its straight way at most [m]."""
+        timed, _ = mover.moved(one, other)
+        places = np.array([walker().body_pose(q).translation for q in timed.q]) - begin
+        return float(np.linalg.norm(places - np.outer(places @ ahead, ahead), axis=1).max())
+
+    def blocked() -> Iterator[Mover]:
+        """Movers past a ball that comes nearer to the middle of the way, from one side after the other."""
+        for angle in np.arange(0.0, 2.0 * np.pi, 0.5):
+            for far in np.arange(0.9, 0.2, -0.03):
+                at = middle + far * (np.cos(angle) * sides[0] + np.sin(angle) * sides[1])
+                ball = SceneBody(Sphere(0.05), pin.SE3(np.eye(3), at))
+                mover = Mover(walker(), replace(scene, bodies={**scene.bodies, "ball": ball}), MotionOptions(tries=0))
+                try:
+                    assert bowed(mover) < 0.05
+                except MoveError as error:
+                    if not error.standing:
+                        yield Mover(walker(), mover.scene, mover.options)
+                    break
+
+    assert bowed(Mover(walker(), scene)) < 0.05
+    with monkeypatch.context() as straight:
+        straight.setattr(motion, "BOWS", 0)
+        mover = next(blocked())
+    assert bowed(mover) > 0.02
