@@ -34,7 +34,8 @@ class ClimbRecorder:
         t, path_time       of the plant's clock, and of the plan [s]
         q.NAME             configuration after the tick [m, rad]; v.DOF the velocity that the plant reports
         u.DOF              what was commanded: velocities [m/s, rad/s], or torques [N m]
-        contact.LIMB       row of the foothold that it is closed on, -1 for none; state.LIMB a ``LimbState``
+        contact.LIMB       row in the run's scene of the foothold that it is closed on, -1 for none
+        state.LIMB         a ``LimbState``
         wrench.LIMB.fx     ... mz: of a stack of torques what the contact bears, in the axes of the foothold [N, N m]
         kept               whether every row of the stack held
 
