@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wbc.climb.chain import ROWS, library
 from wbc.climb.climber import Climber
-from wbc.climb.joint_values import joint_values, with_joint_values
+from wbc.climb.joint_values import climb_states, joint_values, with_joint_values
 from wbc.climb.reach import LimbReach
 from wbc.multibody import pin
 from wbc.rotations import matrices
@@ -74,13 +74,14 @@ class Closure:
             return left
         which = np.array(list(poses), dtype=np.int32)
         wanted = np.ascontiguousarray(np.stack(list(poses.values()), axis=1))
-        state, values = self._states(q)
+        state = climb_states(self.climber, q)
         library().wbc_close(
             ctypes.byref(self._reach.table.numbers), _at(self._offsets), state.shape[1], len(which), _at(which),
             _at(wanted), int(turned), ctypes.c_double(body), ctypes.c_double(CLOSED), steps, ctypes.c_long(len(q)),
             _at(state), _at(left),
         )  # fmt: skip
         if steps:
+            values = joint_values(self.climber.robot, q)
             values[:, self._rows] = state[:, 12:]
             q[:] = self._with_values(q, values)
             if body:
@@ -128,12 +129,6 @@ class Closure:
     def poses(self, q: Array) -> tuple[pin.SE3, ...]:
         """Pose in the world of every limb's contact frame."""
         return tuple(self.climber.contact_pose(q, limb) for limb in range(len(self.climber.limbs)))
-
-    def _states(self, q: Array) -> tuple[Array, Array]:
-        """Poses of the body and angles of all limbs ``(n, 12 + k)``, and the numbers of all joints."""
-        root, values = self.climber.robot.model.jointPlacements[1], joint_values(self.climber.robot, q)
-        rotation = (root.rotation @ matrices(q[:, 3:7])).reshape(-1, 9)
-        return np.hstack([rotation, q[:, :3] @ root.rotation.T + root.translation, values[:, self._rows]]), values
 
     def _with_values(self, q: Array, values: Array) -> Array:
         """Configurations with other numbers of joints, followers with their leaders."""

@@ -17,14 +17,13 @@ from wbc.climb.chain import library, limb_table
 from wbc.climb.clear import deepest, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
-from wbc.climb.joint_values import joint_values
+from wbc.climb.joint_values import climb_states
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import RangeError
 from wbc.geometry.kernel import ShapeTable, checked
 from wbc.multibody import pin
-from wbc.rotations import matrices
 from wbc.shapes import PlacedShape
 from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
@@ -224,12 +223,7 @@ class ClimbWorld:
 
     def states_of(self, q: Array) -> Array:
         """Of configurations ``(n, nq)`` that follow each other, a row each."""
-        climber = self.climber
-        root, values = climber.robot.model.jointPlacements[1], joint_values(climber.robot, q)
-        rotation = root.rotation @ matrices(q[:, 3:7])
-        position = q[:, :3] @ root.rotation.T + root.translation
-        angles = [values[:, climber.joints(limb) - 6] for limb in range(len(climber.limbs))]
-        return np.hstack([rotation.reshape(-1, 9), position, *angles])
+        return climb_states(self.climber, q)
 
     def q_of(self, state: Array) -> Array:
         """The configuration of such a row; joints of no limb are at rest."""
