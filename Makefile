@@ -97,7 +97,7 @@ bench-time-laws: $(READY)  ## laws of motion beside raw toppra and raw ruckig, 1
 	$(BIN)/python -m bench.time_laws --full
 
 soak: $(READY)  ## random stacks, faults, calls and walks from seeds, minutes; more with REPEATS=30
-	WBC_REPEATS=$(if $(filter 1,$(REPEATS)),10,$(REPEATS)) $(BIN)/python -m pytest -n $(PYTEST_JOBS) tests/soak tests/fuzz tests/walking/trials $(PYTEST_ARGS)
+	WBC_REPEATS=$(if $(filter 1,$(REPEATS)),10,$(REPEATS)) $(BIN)/python -m pytest -n $(PYTEST_JOBS) tests/soak tests/fuzz tests/climb $(PYTEST_ARGS)
 
 platforms: $(READY)  ## which platforms and Pythons have everything that wbc needs as wheels
 	$(BIN)/python requirements/platforms.py

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import runpy
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,11 +20,14 @@ import wbc
 from bench.gallery import save
 from bench.pool import ROOT
 from tests.plan.scenes import SHELF, panda
-from tests.walking.trials.torque_trials import walker_of
-from tests.walking.trials.trials import among
+from wbc.climb.grids import plane_grid
+from wbc.climb.loop import ClimbOutcome
+from wbc.climb.report.pictures import ClimbPictures
+from wbc.climb.request import ClimbRequest, PathRequest, SceneRequest
+from wbc.climb.scene import SceneBody
+from wbc.climb.scene_files import save_scene
+from wbc.climb.session import climb
 from wbc.track import Scene, render
-from wbc.walking.report.animation import pictures
-from wbc.walking.run.session import perform_walk
 
 SIZE, SMALL = (800, 540), (480, 330)
 #: Pictures of a film, and how far round the path of a hand there is something to see [m]
@@ -32,6 +36,8 @@ FRAMES, ROUND = 24, 0.5
 FORWARDS = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 #: Pictures of a walk, and how long each is shown [s]
 STEPS, SHOWN = 60, 0.2
+#: Posts of it, and the seed that they are drawn from
+POSTS, POSTS_SEED = 8, 2
 
 
 def dual_arm(run: dict[str, Any], file: Path) -> None:
@@ -78,12 +84,21 @@ def film(run: dict[str, Any], file: Path) -> None:
 
 
 def posts(_: dict[str, Any], file: Path) -> None:
-    """The walk of the trial structures "posts 2" (``tests.walking.trials``), from its beginning to its end."""
-    walker = walker_of(3)
+    """The published walker along a plane among posts of a seed, over the low ones and between the high ones."""
+    rng, scene = np.random.default_rng(POSTS_SEED), plane_grid()
+    low, high = scene.positions.min(axis=0), scene.positions.max(axis=0)
+    bodies = dict(scene.bodies)
+    for k in range(POSTS):
+        foot, tall = rng.uniform(low, high), float(rng.uniform(0.3, 1.7))
+        middle = wbc.SE3(np.eye(3), foot + [0.0, 0.0, tall / 2.0])
+        bodies[f"post {k}"] = SceneBody(wbc.shapes.Capsule(float(rng.uniform(0.02, 0.06)), tall), middle)
     with TemporaryDirectory() as folder:
-        run = perform_walk(among("posts", 2, walker, Path(folder)), walker)
-    assert run.log is not None
-    save([image for _, image in pictures(run, run.log, SMALL, STEPS)], file, SHOWN)
+        there = save_scene(replace(scene, bodies=bodies, name="posts"), Path(folder) / "posts.csv")
+        mode = PathRequest(start="8,6", points=("8,17",), speed=0.1)
+        done = climb(ClimbRequest(mode, scene=SceneRequest(scene=str(there))))
+    if done.report is None or not done.report.clean or done.run.outcome is not ClimbOutcome.ARRIVED:
+        raise SystemExit(f"the walk among posts: {done.run.outcome} {done.run.reason} {done.report}")
+    save([image for _, image in ClimbPictures(done.run).frames(SMALL, STEPS)], file, SHOWN)
 
 
 def shelf(_: dict[str, Any], file: Path) -> None:

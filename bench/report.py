@@ -57,7 +57,7 @@ def export_page(results: dict[str, Any]) -> str:
         (row["what"], problem["title"].split(":")[0],
          *(f"{row['ns'][tail]:.0f}" for tail in ("median", "p99", "p99.9")),
          f"{row['counts']['instructions']:.0f}" if "instructions" in row["counts"] else "-")
-        for problem in results["code"].values() for row in problem["rows"]
+        for problem in results["code"].values() for row in problem["rows"] if not row["what"].startswith("Python")
     ]  # fmt: skip
     capped = [
         (name, "none" if row["cap"] is None else str(row["cap"]),

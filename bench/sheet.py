@@ -27,7 +27,7 @@ class Sheet:
 
     def markdown(self) -> str:
         """For a page."""
-        lines = [f"**{self.title}**", "", line(self.columns), line(["---"] + ["---:"] * (len(self.columns) - 1))]
+        lines = [f"**{self.title}**", "", line(self.columns), "|---|" + "---:|" * (len(self.columns) - 1)]
         return "\n".join(lines + [line(row) for row in self.rows])
 
 

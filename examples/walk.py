@@ -1,19 +1,21 @@
-"""Three arms walk along a cylinder: plan, controller and simulated robot in a few lines."""
+"""Three arms walk along a cylinder: plan, controller, simulated robot and check in a few lines."""
 
 import numpy as np
 
-import wbc
-from wbc.walking.run import PathRequest, perform_walk
+from wbc.climb import BodyTrack, ClimbLoop, body_frames, cylinder_grid, machines, plan_along
+from wbc.climb.checker import check
 
-walker = wbc.robots.walker()
-request = PathRequest("cylinder", speed=0.1016, start="13,9", points=("13,14",))
-run = perform_walk(request, walker)
+walker, scene = machines.climber("walker"), cylinder_grid()
+track = BodyTrack(body_frames(walker, scene, ["13,9", "13,14"]), speed=0.1016)
+plan = plan_along(walker, scene, track)
+for move in plan.moves:
+    source, target = (scene.footholds[row].id for row in (move.leaves, move.lands))
+    print(f"{walker.limbs[move.limb].name}: {source} -> {target}, lifted after {move.lift:.2f} s")
 
-for step in run.plan.regrasps:
-    print(f"{step.arm}: {step.source} -> {step.target}, lifted after {step.lift:.2f} s")
-print(f"{run.outcome} after {run.log.t[-1]:.2f} s, {len(run.plan.regrasps)} re-grasps")
-
-limits = walker.robot.limits.velocity[6:]
-print(f"body at most {1e3 * run.ticks.body_error.max():.2f} mm off its command")
-print(f"held hands at most {1e3 * run.ticks.slip.max():.4f} mm off their holds")
-print(f"largest joint rate {np.abs(run.log.v / limits).max():.6f} of its limit")
+run = ClimbLoop(plan).run()
+t, q, v = run.log["t"], run.log.array("q"), run.log.array("v")
+print(f"{run.outcome} after {t[-1]:.2f} s, {len(plan.moves)} re-grasps")
+print(check(run.log, walker, scene))
+speed = np.linalg.norm(np.diff(q[:, :3], axis=0), axis=1) / np.diff(t)
+print(f"body at most {1e3 * speed.max():.1f} mm/s")
+print(f"largest joint rate {np.abs(v / walker.robot.limits.velocity)[:, 6:].max():.6f} of its limit")

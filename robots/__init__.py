@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from wbc.robot.pairs.pairs_file import read_self_pairs as read_self_pairs, save_self_pairs as save_self_pairs
     from wbc.robot.sources.dh import DHRow as DHRow
     from wbc.robots.catalogue import from_dh as from_dh, load as load, names as names, table as table
-    from wbc.robots.limb import BodyLimb as BodyLimb, Limb as Limb
-    from wbc.robots.margins import Margins as Margins
     from wbc.robots.operator_arms import OperatorArm as OperatorArm, operator_arm as operator_arm
     from wbc.robots.pairs import find_self_pairs as find_self_pairs
     from wbc.robots.walker_arms import WalkerArm as WalkerArm

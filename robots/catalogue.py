@@ -20,7 +20,7 @@ from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
 from wbc.robot.sources.kinds import is_mjmodel, is_text
 from wbc.robot.sources.loop_file import read_loops
-from wbc.robot.sources.table import read_table
+from wbc.robot.sources.table import read_robot, read_table
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -31,6 +31,11 @@ _FOLDER = pathlib.Path(__file__).parent
 @functools.cache
 def _by_name() -> dict[str, Recipe]:
     return read_table(_FOLDER)
+
+
+@functools.cache
+def _recipe(name: str) -> Recipe | None:
+    return read_robot(_FOLDER, name)
 
 
 def table() -> tuple[Recipe, ...]:
@@ -180,9 +185,9 @@ def _find(robot: Any) -> tuple[Recipe, Any, Robot | None]:
         from wbc.robot.sources.mjmodel import compiled
 
         robot = compiled(robot)
-    # No name in the table has a folder in front, and reading the table takes a tenth of loading a file
+    # No name in the table has a folder in front
     if isinstance(robot, str) and len(pathlib.Path(robot).parts) < 2:
-        recipe = _by_name().get(robot)
+        recipe = _recipe(robot)
         if recipe is not None:
             pairs = str(_FOLDER / recipe.pairs) if recipe.pairs else ""
             return replace(recipe, pairs=pairs), example_data_folder() / recipe.file, None

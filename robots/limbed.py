@@ -29,11 +29,6 @@ MACHINES_FILE = Path(__file__).parent / "data" / "limbed.toml"
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def limbed_names() -> tuple[str, ...]:
-    """Names of the machines that :func:`limbed` makes."""
-    return tuple(_machines())
-
-
 def limbed(name: str) -> Robot:
     """A body with limbs on a floating base, at rest at the height of its feet.
 

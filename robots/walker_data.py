@@ -21,9 +21,9 @@ FILE = pathlib.Path(__file__).parent / "data" / "walker.toml"
 #: Metres in an inch
 INCH = 0.0254
 #: Digest of the walker's data as they are published and assumed here; figures in pages hold for these
-WALKER_DIGEST = "826c69aef4cf"
+WALKER_DIGEST = "a5af269150b1"
 #: Suffix of a key of the file -> factor to SI; the longest that fits counts
-_UNITS = {"_deg_s": pi / 180, "_m_s": 1.0, "_deg": pi / 180, "_in": INCH, "_m": 1.0, "_s": 1.0}
+_UNITS = {"_deg_s": pi / 180, "_deg": pi / 180, "_in": INCH, "_m": 1.0, "_s": 1.0}
 #: Fields that may be 0 or below
 _SIGNED = ("elbow_limit", "shoulder_limit", "initial_posture", "elbow_offset")
 
@@ -129,14 +129,10 @@ class WalkerData(_Numbers):
         position_limits: largest \\|theta_i\\| [rad].
         elbow_limit: theta3 <= this [rad]. shoulder_limit: theta2 >= -theta3/2 + this [rad].
         initial_posture: of an arm [rad]. body_height: of the body's origin above the surface [m].
-        lift_height: at which a swinging hand crosses [m]. grasp_distance: of the published walker [m].
         shoulder_radius: body centre to arm base [m].
         joint_rates: largest [rad/s]. acceleration_time: from rest to the full rate [s].
         neck_radius, upper_arm_radius, forearm_radius, hand_radius: of the capsules [m].
-        body_half_thickness, clearance, exempt_distance: [m]. latch_time: [s].
-        close_distance, close_angle, close_speed, close_rate: within which our walker closes a hand
-            [m, rad, m/s, rad/s].
-        body_tilt, body_shift: what the body may deviate from its command [rad, m].
+        body_half_thickness, clearance: [m].
 
     Raises:
         ShapeError, NotFiniteError, RangeError: a field that is no number, or no positive one where it must be.
@@ -155,8 +151,6 @@ class WalkerData(_Numbers):
     shoulder_limit: float
     initial_posture: tuple[float, ...]
     body_height: float
-    lift_height: float
-    grasp_distance: float
     shoulder_radius: float
     joint_rates: tuple[float, ...]
     acceleration_time: float
@@ -166,14 +160,6 @@ class WalkerData(_Numbers):
     hand_radius: float
     body_half_thickness: float
     clearance: float
-    exempt_distance: float
-    latch_time: float
-    close_distance: float
-    close_angle: float
-    close_speed: float
-    close_rate: float
-    body_tilt: float
-    body_shift: float
 
     @functools.cached_property
     def joint_accelerations(self) -> tuple[float, ...]:

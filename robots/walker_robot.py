@@ -18,9 +18,7 @@ from wbc.robot import Robot
 from wbc.robot.loading import finish
 from wbc.robot.recipe import LinkShape, Recipe
 from wbc.robot.sources.description import Description
-from wbc.robots.limb import BodyLimb
 from wbc.robots.link_tree import TreeLink, build_model, write_urdf
-from wbc.robots.margins import Margins
 from wbc.robots.walker_arms import BODY, WalkerArm, chain, puma_rows, reversed_chain, two_ended_rows
 from wbc.robots.walker_data import TwoEndedData, WalkerData
 from wbc.robots.walker_shapes import body_shapes, link_pairs, puma_shapes, two_ended_shapes
@@ -29,8 +27,6 @@ from wbc.shapes import Capsule, PlacedShape, Sphere
 BODY_SHAPES = ("capsules", "prism", "none")
 #: Names that :func:`made_here` knows
 MADE = ("walker", "two_ended_arm")
-#: Where walks of bodies with arms refuse the two-ended arm
-CLIMBS = "the two-ended arm climbs: `wbc climb --robot two_ended`"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +37,14 @@ class Walker:
         robot: on a floating base that carries the frame ``body``; q is position, quaternion x, y, z, w, then the
             arms' joints.
         arms: in the order of the robot's joints.
-        min_holds: fewest hands that must hold at any time.
         data: the numbers that it was made of.
         links: the tree of links and joints, as the URDF has it.
-        limb: kinematics of its arms, which are all alike, as the planner asks for them; None: the closed form of
-            :attr:`arm_data`. A robot of one's own brings its own.
-        margins: what plans leave of its limits to feedback, and how long they wait.
     """
 
     robot: Robot
     arms: tuple[WalkerArm, ...]
-    min_holds: int
     data: WalkerData | TwoEndedData
     links: tuple[TreeLink, ...] = field(repr=False)
-    limb: BodyLimb | None = field(default=None, repr=False)
-    margins: Margins = field(default_factory=Margins, repr=False)
 
     def arm(self, name: str) -> WalkerArm:
         """The arm of a name.
@@ -79,7 +68,7 @@ class Walker:
             ShapeError: another machine.
         """
         if not isinstance(self.data, WalkerData):
-            raise ShapeError("walker", self.robot.name, f"expected a body with arms; {CLIMBS}")
+            raise ShapeError("walker", self.robot.name, "expected a body with arms")
         return self.data
 
     def urdf(self, path: str | os.PathLike[str]) -> pathlib.Path:
@@ -211,8 +200,7 @@ def _bodied(count: int, data: WalkerData, artificial_limits: bool, body_shape: s
         for name, base in zip(names, bases, strict=True)
     )
     robot = _with_shapes(robot, shapes, link_pairs(arms, BODY in shapes, data))
-    margins = Margins.of_reach(data.upper_arm_length + data.forearm_length)
-    return Walker(robot, arms, 2 if count > 2 else 1, data, tuple(links), margins=margins)
+    return Walker(robot, arms, data, tuple(links))
 
 
 def _two_ended(data: TwoEndedData) -> Walker:
@@ -231,7 +219,7 @@ def _two_ended(data: TwoEndedData) -> Walker:
     tip, boom, far_tip = "arm1_link1", "arm2_link4", "arm2_link7"
     pairs = [(tip, BODY), (tip, boom), (tip, far_tip), (BODY, far_tip), (boom, far_tip)]
     robot = _with_shapes(robot, shapes, pairs)
-    return Walker(robot, tuple(arms), 1, data, tuple(links))
+    return Walker(robot, tuple(arms), data, tuple(links))
 
 
 def _robot(

@@ -27,8 +27,8 @@ class AxisAlign(Task):
 
         e = F' R' theta n                 theta = angle from d to a, n = d x a / |d x a|           [rad]
 
-    theta n is the rotation vector of the shortest turn that takes d to a; F = (b1, b2) are two unit vectors fixed in
-    the frame and perpendicular to a. The rows are those of the angular velocity across a,
+    theta n is the shortest turn that takes d to a; F = (b1, b2) are two unit vectors of the frame perpendicular to a.
+    The rows are those of the angular velocity across a,
 
         F' R' (w - w_b - d x dd/dt) = -gain e,
 
@@ -48,7 +48,7 @@ class AxisAlign(Task):
         feedforward: dd/dt, rate of the unit vector [1/s]; its part along d has no effect. Default 0.
 
     What it cannot do: choose the turn about the axis, or tell a line's two directions apart: give the nearer one as
-    target. Its rows are not the derivative of e, so a ``Limit`` cannot have it; ``AxisCone`` limits the angle.
+    target. A ``Limit`` cannot have it; ``AxisCone`` limits the angle.
 
     Example:
         >>> import wbc

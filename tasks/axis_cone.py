@@ -42,8 +42,7 @@ class AxisCone(Constraint):
         half_angle_rate: its rate [rad/s]. Default 0.
 
     What it cannot do: hold an axis in a direction (``AxisAlign``, ``Hold``), or limit the point that the axis goes
-    through (``GazeCone``). Over one tick an axis that turns at w against the direction may leave the cone by (1 + 1 /
-    alpha) (w dt)^2 / 2, so alpha must be large against w dt.
+    through (``GazeCone``). alpha must be large against what the axis turns in a tick.
 
     Example:
         >>> import wbc

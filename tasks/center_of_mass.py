@@ -36,9 +36,8 @@ class CenterOfMass(Task):
         target: 3 numbers in the world [m]. Default: where the centre of mass is at the first step.
         feedforward: velocity of the target in the world [m/s]. Default 0.
 
-    What it cannot do: balance: it knows no support polygon, contact force or momentum. Masses are those of the
-    description; a payload that is not in it is not seen. The target is in the world; for one relative to a foot write
-    an ``Expression``.
+    What it cannot do: balance: it knows no support polygon, contact force or momentum. A payload that the description
+    lacks is not seen. For a target relative to a foot write an ``Expression``.
 
     Example:
         >>> import wbc

@@ -33,8 +33,7 @@ class Damping(Task):
         gain: has no effect.
 
     What it cannot do: bring the robot back anywhere (``Posture`` does) or smooth the command (acceleration limits do).
-    It slows the other tasks of its level by about its weight over theirs, in all directions and not only next to a
-    singularity.
+    It slows the other tasks of its level by about its weight over theirs.
 
     Example:
         >>> import wbc

@@ -28,9 +28,8 @@ class Distance(Task):
 
         e = |p + R offset - (p_b + R_b point)| - target                                            [m]
 
-    It moves the points along the line between them and leaves everything else free: the hand may go anywhere on a
-    sphere round the point. Its gradient by the points is a unit vector everywhere; where they coincide to within 1e-10
-    m, and no line is defined, they part along the z axis of the other frame.
+    Everything else is free: the hand may go anywhere on a sphere round the point. Where the points coincide to within
+    1e-10 m they part along the z axis of the other frame.
 
     Attributes:
         frame: name of the frame of the first point.
@@ -44,8 +43,7 @@ class Distance(Task):
         point: the point of the other frame [m].
         point_velocity: its rate in the axes of the other frame [m/s]. Default 0.
 
-    What it cannot do: keep two bodies apart: it has one desired distance of two points and no margin (``Obstacle``
-    has). Where on the sphere the point is, other tasks decide. With a target of 0 a tick oversteps; to bring two
+    What it cannot do: keep two bodies apart (``Obstacle`` does). With a target of 0 a tick oversteps; to bring two
     points together command a position (``EndEffector`` with ``relative_to``).
 
     Example:

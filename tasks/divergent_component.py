@@ -44,9 +44,8 @@ class DivergentComponent(Task):
         gain: how fast xi reaches its target [1/s].
         omega: of the pendulum [1/s].
 
-    What it cannot do: guarantee balance: whether the contacts can make the acceleration is decided by their friction
-    cones. omega is that of a pendulum of constant height: a robot that rises or sinks quickly needs another value in
-    every tick.
+    What it cannot do: guarantee balance: friction cones decide whether the contacts can make the acceleration. A robot
+    that rises or sinks quickly needs another omega in every tick.
 
     Example:
         >>> import wbc

@@ -39,9 +39,9 @@ class DriveTorqueLimits(Constraint):
         scale: shrinks the limits, from 0 to 1.
         torque: T, one number a drive [N m, N].
 
-    What it cannot do: know the inertia of the drives' rotors: ``model.armature`` is one number a joint and has no
-    place for what couples joints. ``TorqueLimits`` of the same joints are limits of their own; in a tick that has no
-    answer those of the drives count. Speeds of drives are limited by a ``Limit`` on a ``JointCoupling``.
+    What it cannot do: know the inertia of the drives' rotors. ``TorqueLimits`` of the same joints are limits of their
+    own; in a tick that has no answer those of the drives count. Speeds of drives are limited by a ``Limit`` on a
+    ``JointCoupling``.
 
     Example:
         >>> import wbc

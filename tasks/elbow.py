@@ -45,8 +45,8 @@ class Elbow(Task):
         target: 3 numbers in the world [m]. Default: where the point is at the first step.
         feedforward: velocity of the target in the world [m/s]. Default 0.
 
-    What it cannot do: command the swivel angle of an arm: while the hand is held, only the part of e along the elbow's
-    curve can be served (``PitchPlane`` commands the angle). Other points of the body are not watched.
+    What it cannot do: command the swivel angle of an arm (``PitchPlane`` does): while the hand is held, only the part
+    of e along the elbow's curve can be served.
 
     Example:
         >>> import wbc

@@ -56,8 +56,7 @@ class EndEffector(Task):
         feedforward: rate of the target in the axes of the reference: twist (linear; angular) [m/s, rad/s], its linear
             part alone or its angular part alone. Default 0.
 
-    What it cannot do: plan: a target that jumps is a velocity that jumps; limits bound it, nothing smooths it. In axes
-    other than those of the reference the path is straight as seen from those axes.
+    What it cannot do: plan: a target that jumps is a velocity that jumps, which limits bound and nothing smooths.
 
     Example:
         >>> import wbc

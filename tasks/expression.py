@@ -42,10 +42,9 @@ class Expression(Task):
         kin.center_of_mass()                                 centre of mass (3)
         kin.joint(name), kin.q                               a joint's coordinate; the whole configuration
 
-    ``p`` holds the declared inputs by name: scalars, vectors, 3x3 rotations, poses. The result is a scalar, a column
-    or a list of them. The Jacobian is exact, by differentiation along the tangent space, and so is the feed-forward of
-    an input that names the input of its ``rate``. The compiled code is cached by the traced formula, not by the Python
-    source.
+    ``p`` holds the declared inputs by name: scalars, vectors, 3x3 rotations, poses. The result is a scalar, a column or
+    a list of them. The Jacobian is exact, and so is the feed-forward of an input that names the input of its ``rate``.
+    Compiled code is cached by the traced formula.
 
     A pickle of it finds the function by its name again. A lambda or local function has none and is pickled by value,
     for which ``cloudpickle`` must be installed; else pickling raises a ``PicklingError``.

@@ -32,9 +32,8 @@ class ExternalWrench(Load):
     Inputs:
         wrench: on the robot, force and moment [N, N m]. Default 0.
 
-    What it cannot do: estimate: what is written is taken as true, and is as old and noisy as its sensor. A wrench that
-    a contact of the stack bears would be counted twice. A payload's inertia is not known before the acceleration is;
-    put it into the description.
+    What it cannot do: estimate: what is written is taken as true. A wrench that a contact of the stack bears would be
+    counted twice. A payload's inertia belongs into the description.
 
     Example:
         >>> import wbc

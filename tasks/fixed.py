@@ -24,16 +24,15 @@ class Fixed(Constraint):
 
         v_i = v0_i - clip(v0_i, -A dt, A dt)     for every degree of freedom i of the joints     [rad/s, m/s]
 
-    ``enabled`` and ``mask`` fix and release joints while running. Full braking is always within ``JointLimits``, so
-    the two never contradict each other inside the position limits. A joint outside them returns if a ``JointLimits``
-    asks for it, which comes first in the order of sacrifice.
+    ``enabled`` and ``mask`` fix and release joints while running. Full braking is always within ``JointLimits``; a
+    joint outside its position limits returns if they ask for it.
 
     Attributes:
         joints: names of the joints, one or several; a base joint fixes the whole base.
         acceleration: bring moving joints to rest at ``robot.limits.acceleration``; False: at once.
 
-    What it cannot do: fix positions: a joint that something else moved is not brought back (``Posture`` does). It
-    saves no time; a joint that never moves is better locked when the robot is loaded.
+    What it cannot do: bring back a joint that something else moved (``Posture`` does). A joint that never moves is
+    better locked when the robot is loaded.
 
     Example:
         >>> import wbc

@@ -41,9 +41,9 @@ class FrameVelocityLimit(Constraint):
         linear: one number a limited axis [m/s].
         angular: one number a limited axis [rad/s].
 
-    What it cannot do: limit the norm: it is a box, and along a diagonal the speed may be sqrt(3) times the limit.
-    Other points of the body may be faster. A limit that drops suddenly is broken for as long as ``JointLimits`` lets
-    the joints brake. For a frame that stands still use ``Hold``, which also takes drift back.
+    What it cannot do: limit the norm: along a diagonal the speed may be sqrt(3) times the limit. Other points of the
+    body may be faster. A limit that drops suddenly is broken while the joints brake. For a frame that stands still use
+    ``Hold``.
 
     Example:
         >>> import wbc

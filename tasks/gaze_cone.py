@@ -47,8 +47,7 @@ class GazeCone(Constraint):
         half_angle_rate: its rate [rad/s]. Default 0.
 
     What it cannot do: see what hides the point, keep it between two distances (``Limit`` of a ``Distance``), match a
-    rectangular image (it is the cone within it), or turn the camera to the point (``LookAt``). Over one tick a point
-    that moves by s across the line of sight leaves the cone by about (1 / alpha + 1) s^2 / (2 |r|).
+    rectangular image, or turn the camera to the point (``LookAt``).
 
     Example:
         >>> import wbc

@@ -26,7 +26,7 @@ UPRIGHT = 1e-12
 
 @dataclass(frozen=True)
 class Hold(Constraint):
-    """A frame does not move (a thing to grasp is a ``wbc.walking.Hold``), and drift from its target decays like
+    """A frame does not move (a thing to grasp is a ``wbc.climb.Foothold``), and drift from its target decays like
     exp(-gain t): the equality J v = -gain e, with
 
         position     J = J_lin (3 x nv), e = p - p_target                             [m/s]
@@ -37,9 +37,8 @@ class Hold(Constraint):
         roll         J = [J_lin; de/dq] (4 x nv), e = (p - p_target, atan2(x'Y, x'X)), x of the frame, X and Y of the
                      target: the turn about the target's z axis is held, z itself may tilt by less than pi / 2
 
-    All in world axes at the frame's origin, but for the last rows of ``axis`` and ``roll``. What the frame moves by at
-    second order within a tick is made up for, up to 1e-3 of ``stack.length`` per second; what cannot be is in
-    ``step.lost``, and the tick is ``relaxed`` (docs/reach.md).
+    All in world axes at the frame's origin, but for the last rows of ``axis`` and ``roll``. Second-order motion within
+    a tick is made up for (docs/reach.md).
 
     Attributes:
         frame: name of the frame.
@@ -54,9 +53,8 @@ class Hold(Constraint):
         gain: how fast drift decays [1/s], to stay below 1/dt; 0 leaves it as it is.
 
     What it cannot do: hold what the robot cannot do: six rows on an arm with fewer free joints, or in a singular pose,
-    are dependent, and with drift they may contradict. A frame that moves when it becomes held stops as fast as
-    ``JointLimits`` lets it. It is geometry, without contact forces, friction or slip. The held pose is fixed in the
-    world.
+    may contradict. A frame that moves stops as fast as ``JointLimits`` lets it. There are no contact forces, friction
+    or slip.
 
     Example:
         >>> import wbc

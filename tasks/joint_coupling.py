@@ -46,9 +46,9 @@ class JointCoupling(Task):
             where the sum is at the first step.
         feedforward: its rate. Default 0.
 
-    What it cannot do: hold exactly: it is a task with a weight (what the mechanism itself couples is held by
-    ``Mechanism``). Turns are not counted: a gear of 2/3 between two unbounded joints has three positions that satisfy
-    it, and the nearest is taken. Joints of several degrees of freedom are refused.
+    What it cannot do: hold exactly: it is a task with a weight (``Mechanism`` holds what the mechanism couples). Turns
+    are not counted: of several positions that satisfy a gear the nearest is taken. Joints of several degrees of freedom
+    are refused.
 
     Example:
         >>> import wbc

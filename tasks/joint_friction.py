@@ -38,8 +38,8 @@ class JointFriction(Load):
         coulomb: the same [N m, N].
         slow: speed up to which friction grows with speed, as tanh does [rad/s, m/s].
 
-    What it cannot do: overcome stiction: a joint at rest has no direction, and the first move has an error of
-    ``coulomb``. Friction that depends on load or temperature is not in it.
+    What it cannot do: overcome stiction: the first move has an error of ``coulomb``. Friction that depends on load or
+    temperature is not in it.
 
     Example:
         >>> import wbc

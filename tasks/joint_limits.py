@@ -50,8 +50,8 @@ class JointLimits(Constraint):
     than A allows (docs/robots.md).
 
     Where limits exclude each other actuators come first, acceleration before velocity. From a viable state (v0^2 / (2
-    A) <= d, limits unchanged) that does not happen and the position limit is not passed, whatever is commanded and
-    however dt varies. From outside the joint brakes at A, then returns, and the violation does not grow again.
+    A) <= d, limits unchanged) that does not happen, and the position limit is not passed however dt varies. From
+    outside the joint brakes at A, then returns.
 
     Attributes:
         position, velocity, acceleration: which limits to keep. Without ``acceleration`` the joint may stop at once,
@@ -67,10 +67,9 @@ class JointLimits(Constraint):
         return_rate: slowest return from outside [1/s]; 0: none is asked for.
 
     What it cannot do: keep the limit when v0 is not the velocity that the joint has, or when the robot starts too fast
-    too close to it. The promise ``shortest_dt`` is not checked: where it is broken the limit is passed. Without an
-    acceleration limit A is infinite and the joint may stop at once. Degrees of freedom whose rate is not that of one
-    coordinate (floating and planar bases, ball joints, unbounded joints) have no position limit. Whether the motors
-    have the torque for A is considered on a floating base with ``TorqueLimits`` only.
+    too close to it. The promise ``shortest_dt`` is not checked. Floating and planar bases, ball and unbounded joints
+    have no position limit. Whether the motors have the torque for A is considered on a floating base with
+    ``TorqueLimits`` only.
 
     Example:
         >>> import wbc

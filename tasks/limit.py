@@ -49,8 +49,7 @@ class Limit(Constraint):
         lower_rate, upper_rate: their rates [unit/s]. Default 0.
 
     What it cannot do: limit a velocity: tasks with a Jacobian of their own are refused. An error that wraps jumps by a
-    turn opposite to its target: keep both bounds away from there, and give both. Three rows of a position are a box,
-    not a length.
+    turn opposite to its target: give both bounds, away from there. Three rows of a position are a box, not a length.
 
     Example:
         >>> import wbc

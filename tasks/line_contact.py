@@ -45,8 +45,8 @@ class LineContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
-    What it cannot do: follow the surface: the frame's z axis is the normal, so where the frame turns about the edge
-    its cone turns with it. It does not know whether the surface is there.
+    What it cannot do: follow the surface: where the frame turns about the edge its cone turns with it. It does not know
+    whether the surface is there.
 
     Example:
         >>> import wbc

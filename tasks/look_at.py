@@ -29,10 +29,8 @@ class LookAt(Task):
         e = F' R' theta n            theta = angle from d to a, n = d x a / |d x a|                [rad]
                                      d = (t - c) / r, r = |t - c|, c = p + R offset                [m]
 
-    theta n is the rotation vector of the shortest turn that takes the line of sight d to the axis, F = (b1, b2) two
-    unit vectors fixed in the frame and perpendicular to a. The rows are those of the angular velocity across the axis
-    less that of the line of sight, so theta falls exactly like exp(-gain t); the turn about the axis and the distance
-    r are free:
+    theta n is the shortest turn that takes the line of sight d to the axis, F = (b1, b2) two unit vectors of the frame
+    perpendicular to a. theta falls exactly like exp(-gain t); the turn about the axis and the distance r are free:
 
         F' R' (w - d x dd/dt) = -gain e,         d x dd/dt = d x (dt/dt - dc/dt) / r.
 
@@ -53,8 +51,7 @@ class LookAt(Task):
         feedforward: rate of t in the axes of the reference [m/s]. Default 0.
 
     What it cannot do: see an obstacle in the line of sight, limit the angle (``GazeCone``), or keep a distance
-    (``Distance``) or a horizon (a second ``AxisAlign``). A target that passes close by asks for a turn at its speed
-    over r, until the rows fade.
+    (``Distance``) or a horizon (a second ``AxisAlign``).
 
     Example:
         >>> import wbc

@@ -64,8 +64,8 @@ class Manipulability(Task):
         feedforward: its rate [1/s]. Default 0.
 
     What it cannot do: find the best configuration: it climbs w, which has several maxima. In a singular configuration
-    the gradient is zero, so something else must move the arm out of it. It measures velocities without joint limits.
-    An arm that is singular everywhere is refused; choose rows with ``along``.
+    the gradient is zero. Joint limits do not count. An arm that is singular everywhere is refused; choose rows with
+    ``along``.
 
     Example:
         >>> import wbc

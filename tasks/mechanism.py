@@ -29,10 +29,9 @@ class Mechanism(Constraint):
         loop          de/dq v = -e / dt, as fast as 0.1 lengths or rad/s allow, and e(q (+) v dt) = 0 to 1e-10 of them
         the same      d2e/dt2 = -2 w (de/dt + w e / 2),  w = 0.2 / dt, w e / 2 up to the same rates (accelerations)
 
-    It is added to every stack under the name ``mechanism`` where ``robot.couplings`` (mimic joints of the description
-    that were not locked when the robot was loaded), ``robot.locked_dofs`` or ``robot.loops`` is not empty. The right
-    side of a mimic row brings back a configuration that does not fit, within the joint limits, that of a loop one that
-    is open. What e bends by within a tick is made up for, see docs/reach.md.
+    It is added to every stack under the name ``mechanism`` where ``robot.couplings`` (mimic joints that were not
+    locked), ``robot.locked_dofs`` or ``robot.loops`` is not empty. The right sides bring back a configuration that does
+    not fit. What e bends by within a tick is made up for, see docs/reach.md.
 
     Inputs:
         gain: how fast a configuration that does not fit its couplings is brought back [1/s].

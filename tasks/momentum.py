@@ -46,9 +46,8 @@ class Momentum(Task):
         target: momentum, linear [kg m/s] and angular [kg m^2/s], or the part that ``kind`` says. Default 0.
         lag: what its time integral lacks [kg m; kg m^2]. Default 0.
 
-    What it cannot do: change physics: a robot that floats freely keeps its momentum whatever is commanded. It holds no
-    position, so the centre of mass drifts (``CenterOfMass`` holds it). Rotors of motors (armature) and payloads that
-    the description does not have are not seen.
+    What it cannot do: change physics: a robot that floats freely keeps its momentum. The centre of mass drifts
+    (``CenterOfMass`` holds it). Rotors of motors (armature) and payloads that the description lacks are not seen.
 
     Example:
         >>> import wbc

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Obstacle(Constraint):
     """Links keep clear of a sphere, capsule, box, cylinder, ellipsoid, convex hull, mesh, half-space or height map, at
-    rest or moving (a structure's box or capsule is a ``wbc.walking.Obstacle``):
+    rest or moving (a body of what is climbed is a ``wbc.climb.SceneBody``):
 
         h = (signed distance between a shape of a link and the obstacle) - margin >= 0     [m]
 
@@ -48,10 +48,9 @@ class Obstacle(Constraint):
     convex parts. Rows of shape i are ``link[i]`` with a suffix where there are several, sensed rows ``closest[k]``;
     ``controller.pairs(name)`` says which pairs they were about.
 
-    Choose ``margin`` to cover the curvature of a point's path over one tick, at most (1/2) rho w^2 dt^2 for a point
-    within rho of joint axes that turn at w in all: some millimetres at 10 ms on an arm at full speed, more for boxes
-    and hulls, whose nearest points jump when they rock. From an overlap the rows push apart at -rate h at least; where
-    the joints cannot follow, the step is ``relaxed``.
+    Choose ``margin`` to cover the curvature of a point's path over one tick: some millimetres at 10 ms on an arm at
+    full speed, more for boxes and hulls, whose nearest points jump when they rock. From an overlap the rows push apart
+    at -rate h at least; where the joints cannot follow, the step is ``relaxed``.
 
     Attributes:
         shape: a shape of :mod:`wbc.shapes`, or several :class:`wbc.shapes.Convex`, the parts of a mesh.
@@ -67,9 +66,9 @@ class Obstacle(Constraint):
         velocity: twist of the obstacle: linear [m/s], angular [rad/s]; world axes, at its origin. Default 0.
         margin: what is kept between the shapes [m].
 
-    What it cannot do: see what the link shapes do not cover. An obstacle that crosses a link within a tick is not
-    seen, so speed times dt must stay well below the sizes. A link that hardly moves may have no direction out. A link
-    inside two parts of a mesh that push in opposite directions stays there.
+    What it cannot do: see what the link shapes do not cover. An obstacle that crosses a link within a tick is not seen.
+    A link that hardly moves, or is inside two parts of a mesh that push in opposite directions, may have no direction
+    out.
 
     Example:
         >>> import numpy as np

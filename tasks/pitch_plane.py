@@ -29,10 +29,10 @@ class PitchPlane(PlaneItem, Task):
 
     **Axis form**, ``PitchPlane(shoulder, elbow, wrist, axis=joint)``, for arms whose pitch axes are parallel and
     offset: the plane is perpendicular to the joint's axis y, the line is r = (w - s) - y (y.(w - s)), and alpha = (r /
-    |r|).omega is the rate of the body that carries the joint, relative to ``base`` (E. Dupuis, PhD thesis, McGill
-    2001, eqs. 4.5-4.7, 4.38). alpha is not the derivative of any angle: nothing is held without drift, and ``target``
-    is counted from where the plane is now. **With** ``reference=`` the row is the angle of the same plane, with u x y
-    in place of e - s, and can be held.
+    |r|).omega is the rate of the body that carries the joint, relative to ``base`` (E. Dupuis, PhD thesis, McGill 2001,
+    eqs. 4.5-4.7, 4.38). alpha is not the derivative of any angle and drifts; ``target`` is counted from where the plane
+    is now. **With** ``reference=`` the row is the angle of the same plane, with u x y in place of e - s, and can be
+    held.
 
     Rows fade, and are reported as faded, near |w - s| = 0 (axis form: r = 0), where the elbow is on the line
     (three-point form), and near u = -pole (angles): from the widths below to a tenth of them.
@@ -52,10 +52,10 @@ class PitchPlane(PlaneItem, Task):
         target: psi [rad]; in the axis form without ``reference`` an angle from wherever the plane is now, default 0.
         feedforward: rate of the target, or of the plane [rad/s]. Default 0.
 
-    What it cannot do: hold an angle on a singular set; count turns; choose a sense of rotation for a target exactly
-    opposite; or control the line itself (a hand task does). With alpha as the seventh row of a seven-joint arm some
-    states are singular although the hand's Jacobian is not. On a Panda the origin of ``panda_link4`` crosses the line
-    at q4 = -0.467 rad, where the three-point plane flips; take ``panda_link3`` or ``axis="panda_joint4"``.
+    What it cannot do: hold an angle on a singular set, count turns, or control the line itself (a hand task does). With
+    alpha as the seventh row of a seven-joint arm some states are singular although the hand's Jacobian is not. On a
+    Panda the origin of ``panda_link4`` crosses the line at q4 = -0.467 rad, where the three-point plane flips; take
+    ``panda_link3`` or ``axis="panda_joint4"``.
 
     Example:
         >>> import wbc

@@ -30,9 +30,8 @@ class PitchPlaneLimit(PlaneItem, Constraint):
         lower, upper: bounds of psi [rad], lower < upper < lower + 2 pi; (3, 4) is a range that contains pi.
         others: as in :class:`wbc.tasks.PitchPlane`.
 
-    What it cannot do: guard the plane inside the faded zones; count turns; know the shorter turn back where psi is
-    opposite to the middle (there the two rows swap roles); keep a gap 2 pi - (upper - lower) smaller than the plane's
-    turn in one tick.
+    What it cannot do: guard the plane inside the faded zones, count turns, or keep a gap 2 pi - (upper - lower) smaller
+    than the plane's turn in one tick.
 
     Example:
         >>> import wbc

@@ -23,8 +23,8 @@ class PointContact(Pressing, Contact):
 
     d_k are unit vectors across z, evenly spread from x on. This is the largest pyramid with ``edges`` faces inside of
     Coulomb's cone |(f_x, f_y)| <= friction f_z; it leaves out at most the share 1 - cos(pi / edges) of a tangential
-    force, 29 % for 4 and 8 % for 8 edges. For the foot of a quadruped or a finger tip. Compiled for velocities it is a
-    ``Hold`` of a position; for torques (docs/torque.md) its force stays within the pyramid.
+    force, 29 % for 4 and 8 % for 8 edges. Compiled for velocities it is a ``Hold`` of a position; for torques
+    (docs/torque.md) its force stays within the pyramid.
 
     Attributes:
         frame: name of the frame; z is the normal, from the surface to the robot.

@@ -43,9 +43,8 @@ class Posture(Task):
         feedforward: velocity of the target in its tangent space, nv numbers, or those of the chosen joints
             [rad/s, m/s]. Default 0.
 
-    What it cannot do: know limits: a target outside them is aimed at, and ``JointLimits`` stops the joint there. Turns
-    are not counted. With a weight it is a compromise that shifts the other tasks by about its weight over theirs; at a
-    later level it is not.
+    What it cannot do: know limits (``JointLimits`` stops the joint there), or count turns. With a weight it shifts the
+    other tasks by about its weight over theirs; at a later level it does not.
 
     Example:
         >>> import wbc

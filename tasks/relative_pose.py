@@ -36,8 +36,8 @@ class RelativePose(Task):
     on a straight line and the rotation about one axis through the point, each without disturbing the other.
 
     ``kind="position"`` is a ball joint at the point; ``"orientation"`` lets the hands slide without turning. Where the
-    object goes is for other tasks: give it a frame on each hand and send both to the same pose, as in the example. For
-    a hand that works on what the other hand holds ``EndEffector(b, relative_to=a)`` is cheaper.
+    object goes is for other tasks, as in the example. For a hand that works on what the other hand holds
+    ``EndEffector(b, relative_to=a)`` is cheaper.
 
     Attributes:
         frame_a, frame_b: names of the two frames.

@@ -23,9 +23,8 @@ class RigidGrasp(Contact):
 
         -force <= f <= force  [N],      -torque <= m <= torque  [N m]
 
-    The equality J v = -gain e is that of a stack that commands velocities. For accelerations it holds as
-    J a + (dJ/dt) v = -rate (J v + gain e) - gain J v, so that drift decays with both rates, and for torques w
-    is a variable of the optimisation. docs/torque.md.
+    For accelerations it holds as J a + (dJ/dt) v = -rate (J v + gain e) - gain J v; for torques w is a variable of the
+    optimisation. docs/torque.md.
 
     Attributes:
         frame: name of the frame.

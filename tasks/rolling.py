@@ -86,11 +86,10 @@ class Rolling(Constraint):
             height of the first wheel's contact at the first step. Only the axis counts without rows of contact.
         gain: of the rows of contact, if there are any [1/s].
 
-    What it cannot do: resolve rows that contradict each other: four plain wheels that are not steered only go
-    straight. A robot that skids in turns is loaded with ``base="differential"`` and has rollers with ``roller=0``.
-    Rows that repeat each other are dropped. Slip that has happened is not undone. It knows no friction, load or steep
-    slope, and wheels are thin. For a wheel that lies flat (|d| below 1e-6 before it is made a unit vector) the rows
-    fade to zero.
+    What it cannot do: resolve rows that contradict each other: four plain wheels that are not steered only go straight.
+    A robot that skids in turns is loaded with ``base="differential"`` and has rollers with ``roller=0``. Slip that has
+    happened is not undone. It knows no friction, load or steep slope, and wheels are thin. For a wheel that lies flat
+    the rows fade to zero.
 
     Example:
         >>> import wbc

@@ -58,8 +58,7 @@ class RollingContact(Pressing, Contact):
         most: largest normal force [N].
 
     What it cannot do: have rollers (``Rolling`` has their motion), rolling resistance, or the torque by which a wide
-    wheel resists turning on the spot. How two wheels on one axle share the sideways force is what the tasks of their
-    forces say. A wheel that lies flat (axis within 1e-6 of the normal) has no rolling direction; its rows fade.
+    wheel resists turning on the spot. A wheel that lies flat has no rolling direction; its rows fade.
 
     Example:
         >>> import wbc

@@ -80,9 +80,8 @@ class SelfCollision(Constraint):
         margin: what is kept between the shapes, >= 0 [m].
 
     What it cannot do: see what the link shapes do not cover. With fewer rows than sensed pairs that push at once the
-    tick brakes, or leaves pairs within their margins opening too slowly; the log says either once. A ``margin`` that
-    is raised while running is kept in full only by pairs that postures bring farther apart than twice the declared
-    one.
+    tick brakes, or pairs within their margins open too slowly. A ``margin`` raised while running is kept only by pairs
+    that postures bring farther apart than twice the declared one.
 
     Example:
         >>> import wbc

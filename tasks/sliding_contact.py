@@ -42,9 +42,8 @@ class SlidingContact(Pressing, Contact):
         most: largest normal force [N].
         slow: speed up to which friction grows with speed [m/s].
 
-    What it cannot do: stick: friction is that of sliding, against the measured velocity; below ``slow`` it is less
-    than it may be, and at rest 0 (a point that sticks is a ``PointContact``). The target's plane stands still, or in a
-    ``MovingFrame``; it does not follow a curved surface by itself.
+    What it cannot do: stick: below ``slow`` friction is less than it may be, and at rest 0 (a point that sticks is a
+    ``PointContact``). It does not follow a curved surface by itself.
 
     Example:
         >>> import wbc

@@ -40,8 +40,7 @@ class SupportRegion(Constraint):
         offsets: how far each plane is from the origin of the world along its normal [m].
 
     What it cannot do: update itself: the region is that of the contacts when it was computed, and with torque limits
-    that of the configuration. It is about rest; what accelerates the centre of mass is for the cones of the contacts
-    to bear. Planes that leave no point between them make rows give way, by name.
+    that of the configuration. It is about rest. Planes that leave no point between them make rows give way.
 
     Example:
         >>> import wbc

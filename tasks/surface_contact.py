@@ -26,9 +26,9 @@ class SurfaceContact(Pressing, Contact):
         m_min = -mu (X + Y) f_z + |Y f_x - mu m_x| + |X f_y - mu m_y|
         m_max = +mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|,      mu = friction / sqrt(2)
 
-    These are exactly the wrenches of forces at the four corners within friction pyramids (Caron, Pham and Nakamura,
-    ICRA 2015), which are within Coulomb's cones: at most 29 % of a tangential force is left out. For a flat foot or a
-    palm. Compiled for velocities it is a ``Hold``; the wrench counts for torques (docs/torque.md).
+    These are the wrenches of forces at the four corners within friction pyramids (Caron, Pham and Nakamura, ICRA 2015),
+    which leave out at most 29 % of a tangential force. Compiled for velocities it is a ``Hold``; the wrench counts for
+    torques (docs/torque.md).
 
     Attributes:
         frame: name of the frame; z is the normal, from the surface to the robot.
@@ -44,8 +44,8 @@ class SurfaceContact(Pressing, Contact):
         least: least normal force [N].
         most: largest normal force [N].
 
-    What it cannot do: roll over an edge or toes (``LineContact``). The rectangle is centred on the frame's origin. It
-    does not know whether the ground is there, flat or soft.
+    What it cannot do: roll over an edge or toes (``LineContact``). It does not know whether the ground is there, flat
+    or soft.
 
     Example:
         >>> import wbc

@@ -49,7 +49,7 @@ class TorqueLimits(Constraint):
         last: with ``slew``, tau0, read-only; 1e30: not known [N m, N].
 
     What it cannot do: know limits that fall with speed, or the friction of gears (``JointFriction``). Where no torque
-    within the limits carries the robot, what is held gives way, and the step says by how much.
+    within the limits carries the robot, what is held gives way.
 
     Example:
         >>> import wbc

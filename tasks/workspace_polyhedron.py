@@ -49,8 +49,7 @@ class WorkspacePolyhedron(Constraint):
         velocity: twist of W (linear m/s; angular rad/s) in the axes of the reference, at the origin of W. Default 0.
 
     What it cannot do: guard the body around the point (``Obstacle`` with half-spaces does), or have a re-entrant
-    corner: it is convex. Planes that leave no point between them are not refused: the rows then give way, see
-    ``Step.relaxed``.
+    corner. Planes that leave no point between them are not refused: the rows then give way.
 
     Example:
         >>> import wbc

@@ -23,11 +23,9 @@ class WrenchSum(Constraint):
 
         sum_i (f_i; m_i + (p_i - point) x f_i) = target        [N; N m]
 
-    p_i is the origin of the frame of contact i. Of all contacts it is the contact wrench sum, which is the rate of the
-    robot's momentum about the point less the moment of its weight. Of two hands it is what they carry together: a box
-    of mass m that accelerates at a asks for the force m (g - a), and within their friction the hands squeeze it no
-    harder than that takes, as the tasks of their forces ask for the least sum of squares. With ``soft=`` it is a task
-    with a price. Only a stack that commands torques can have it.
+    p_i is the origin of the frame of contact i. Of all contacts it is the rate of the robot's momentum about the point
+    less the moment of its weight; of two hands what they carry together: a box of mass m that accelerates at a asks for
+    the force m (g - a). With ``soft=`` it is a task with a price. Only a stack that commands torques can have it.
 
     Attributes:
         contacts: names of contacts of the stack.

@@ -10,11 +10,19 @@ import pinocchio as pin
 # isort: split
 import coal
 
-from wbc.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Shape, Sphere
+from wbc.clearance import EndlessCylinder, TriangleMesh
+from wbc.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere
+
+#: A cylinder without end is so long [m]
+ENDLESS = 100.0
 
 
-def coal_shape(shape: Shape) -> object:
+def coal_shape(shape: Shape | EndlessCylinder | TriangleMesh) -> object:
     """Coal's own, about the same origin."""
+    if isinstance(shape, TriangleMesh):
+        return _mesh(shape)
+    if isinstance(shape, EndlessCylinder):
+        return coal.Cylinder(shape.radius, ENDLESS)
     if isinstance(shape, Sphere):
         return coal.Sphere(shape.radius)
     if isinstance(shape, Capsule):
@@ -29,7 +37,19 @@ def coal_shape(shape: Shape) -> object:
         points = coal.StdVec_Vec3s()
         points.extend(shape.points)
         return coal.Convex.convexHull(points, True, "Qt")
+    assert isinstance(shape, HalfSpace), shape
     return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+
+
+def _mesh(shape: TriangleMesh) -> object:
+    corners, rows = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    corners.extend(list(shape.corners.reshape(-1, 3)))
+    rows.extend([coal.Triangle(3 * k, 3 * k + 1, 3 * k + 2) for k in range(len(shape.corners))])
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(rows), len(corners))
+    mesh.addSubModel(corners, rows)
+    mesh.endModel()
+    return mesh
 
 
 def coal_pose(pose: pin.SE3) -> object:

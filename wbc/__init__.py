@@ -19,6 +19,7 @@ __version__ = "0.2.0"
 if TYPE_CHECKING:
     from wbc import (
         analysis as analysis,
+        climb as climb,
         coordinates as coordinates,
         errors as errors,
         proximity as proximity,
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
         track as track,
         trajectory as trajectory,
         viewer as viewer,
-        walking as walking,
     )
     from wbc.api import Controller as Controller, Stack as Stack
     from wbc.controller import Certificate as Certificate, Policy as Policy, Status as Status, Step as Step

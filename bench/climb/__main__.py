@@ -43,12 +43,13 @@ HEADS = (
 
 def one(robot: str, scene: str, seed: int, plant: str) -> dict[str, Any]:
     """One cell, in this process."""
-    from wbc.climb.request import ClimbRequest
+    from wbc.climb.request import ClimberRequest, ClimbRequest, PlantRequest, SceneRequest
     from wbc.climb.session import climb
     from wbc.errors import WbcError
 
     about = {"robot": robot, "scene": scene, "seed": seed, "plant": plant}
-    request = ClimbRequest(robot=robot, scene=scene, seed=seed, plant=plant, **(UNKNOWN if plant == "mujoco" else {}))
+    moved = PlantRequest(plant=plant, **(UNKNOWN if plant == "mujoco" else {}))  # type: ignore[arg-type]
+    request = ClimbRequest(climber=ClimberRequest(robot=robot), scene=SceneRequest(scene=scene, seed=seed), plant=moved)
     try:
         done = climb(request)
     except WbcError as error:

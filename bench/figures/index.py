@@ -13,13 +13,12 @@ from bench.figures import pages, store
 from bench.ik import tables as ik
 from bench.plan import constrained, tables as plan
 from bench.pool import ROOT
-from bench.walk.page import page_sheets
 
 View = Callable[[Any], str]
 #: What a tick consists of
 TICK = ("wbc/controller", "wbc/stack", "wbc/qp", "wbc/symbolic", "tasks")
 #: What a walk consists of
-WALK = (*TICK, "wbc/walking", "robots")
+WALK = (*TICK, "wbc/climb", "robots")
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,13 @@ def _retarget_page(data: Any) -> str:
     return page(data)
 
 
+def _walker_page(data: Any) -> str:
+    """As :func:`_retarget_page`."""
+    from bench.climb.walker import page
+
+    return page(data)
+
+
 _ALL = (
     Figure(
         "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 15.0, ("make", "bench"),
@@ -69,12 +75,9 @@ _ALL = (
         "bench/ik.json", {"chains": ik.summary},
     ),
     Figure(
-        "walk", (*WALK, "bench/walk"), 20.0,
-        ("python", "-m", "bench.walk", "--output", "bench/data"),
-        "bench/data/walk.json",
-        {
-            "all": lambda data: "\n\n".join(sheet.markdown() for sheet in page_sheets(data["parts"])),
-        },
+        "walk", (*WALK, "bench/climb/walker.py"), 20.0,
+        ("python", "-m", "bench.climb.walker", "--output", "bench/data"),
+        "bench/data/walker.json", {"all": _walker_page},
     ),
     Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch"), 1.0),
@@ -103,7 +106,6 @@ _ALL = (
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/published/newton_euler"), 3.0),
     Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
-    Figure("fsp_norms", ("wbc/resolvers/fsp", "wbc/published/ikor"), 0.5),
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),
     Figure("programs", ("examples", "bench/programs"), 0.1),

@@ -20,13 +20,13 @@ Data = dict[str, Any]
 
 
 def stamp() -> dict[str, str]:
-    """Command, commit, date and machine, to be asked for before anything is measured."""
+    """Command, commit, date, machine and its load, to be asked for before anything is measured."""
     processor = next(
         (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line),
         platform.machine(),
     )
     load, cores = Path("/proc/loadavg").read_text().split()[0], len(os.sched_getaffinity(0))
-    machine = f"{processor}, {cores} cores, load {load} before the run"
+    machine = f"{processor}, {cores} cores, load {load}"
     command = " ".join(["python", *sys.orig_argv[1:]]).replace(f"{ROOT}/", "")
     commit, date = git("rev-parse", "--short", "HEAD"), f"{datetime.now(UTC):%Y-%m-%d}"
     return {"command": command, "commit": commit, "date": date, "machine": machine}
@@ -57,7 +57,8 @@ def shown(part: str | Data) -> str:
 
 def signed(about: Mapping[str, str], command: str) -> str:
     """The line under a block; the command is the usual one where the stamp has none."""
-    return f"*`{about.get('command', command)}`, {about['date']}, commit {about['commit']}; {about['machine']}.*"
+    machine = about["machine"].removesuffix(" before the run")
+    return f"*`{about.get('command', command)}`, {about['date']}, commit {about['commit']}; {machine}.*"
 
 
 def changed(commit: str, paths: Sequence[str]) -> list[str] | None:

@@ -1,4 +1,4 @@
-"""Ticks a second of many robots, beside mink and pink; and what derivatives cost."""
+"""Ticks a second of many robots, beside mink and pink."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bench.ours import Ours
 from bench.pool import Worker, cores
 from bench.prepare import panda, talos
 from bench.problems import Case, load
-from bench.sheet import Sheet, us
+from bench.sheet import Sheet
 from wbc.validation import Array
 
 #: Where the peers are installed, see the Makefile
@@ -22,7 +22,7 @@ PASSES, TURNS = {"panda": 50, "talos": 10}, 7
 
 
 def parts() -> dict[str, Sheet | str]:
-    """Rates, and derivatives."""
+    """Rates."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, make in (("panda", panda), ("talos", talos)):
@@ -41,33 +41,7 @@ def parts() -> dict[str, Sheet | str]:
         "mink + daqp",
         "pink + daqp",
     )
-    return {"rates": Sheet("", columns, rows), "derivatives": derivatives()}
-
-
-def derivatives() -> Sheet:
-    """Of the Panda's ticks, by the configuration and by the target of the hand, on one thread."""
-    with tempfile.TemporaryDirectory() as folder:
-        case = load(panda(Path(folder)))
-        ours, q = states(case)
-    batch = ours.controller.batch(len(q), threads=1)
-    batch.set(**{case.problem.frames[0]: case.poses[:, 0]})
-    step, rows = batch.step(q), []
-    asked: list[tuple[str, tuple[str, ...]]] = [
-        ("q", ("q",)),
-        ("the target of the hand", (case.problem.frames[0], "target")),
-    ]
-    for text, names in asked:
-        together = alone = np.inf
-        for _ in range(TURNS):
-            began = perf_counter()
-            step.derivative(*names)
-            middle = perf_counter()
-            for k in range(0, len(q), 20):
-                step[k].derivative(*names)
-            together = min(together, (middle - began) / len(q))
-            alone = min(alone, (perf_counter() - middle) / len(range(0, len(q), 20)))
-        rows.append((f"by {text}", us(1e6 * together), us(1e6 * alone)))
-    return Sheet("", ("derivative of a tick [us]", "of a batch", "of single steps"), rows)
+    return {"rates": Sheet("", columns, rows)}
 
 
 def states(case: Case) -> tuple[Ours, Array]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 import pinocchio as pin
@@ -14,14 +13,12 @@ from bench.pool import ROOT
 from bench.sheet import Sheet
 from wbc.api import Controller
 from wbc.robot import Robot
-from wbc.servo import Response, Servo
+from wbc.servo import Servo
 from wbc.simulation import Command, CommandKind, MujocoPlant
 
 ARM = ROOT / "bench" / "servo_arm.xml"
 HOME = np.array([0.0, 0.3, 0.0, -1.6, 0.0, 1.8, 0.0])
 DT, TICKS, SETTLED = 0.001, 4000, 500
-#: Servos drawn at random
-COUNT = 6
 KINDS = (CommandKind.POSITION, CommandKind.VELOCITY, CommandKind.TORQUE)
 
 
@@ -51,15 +48,6 @@ class Hardware:
         model.body_mass[model.body("flange").id] += self.payload
         model.body_gravcomp[1:] = float(kind is CommandKind.VELOCITY)
         return MujocoPlant(model, robot)
-
-
-def drawn(seed: int) -> Hardware:
-    """Servos at random."""
-    rng = np.random.default_rng(seed)
-    low, high = (10**2.9, 0.03, 50.0, 0.0, 0.0, 0.0), (10**3.9, 0.15, 400.0, 3.0, 2.0, 2.0)
-    numbers = rng.uniform((np.log10(low[0]), *low[1:]), (np.log10(high[0]), *high[1:]))
-    stiffness, lag, drive, damping, friction, payload = numbers.tolist()
-    return Hardware(10.0**stiffness, lag, drive, damping, friction, payload, int(rng.integers(0, 21)))
 
 
 def controller() -> Controller:
@@ -125,9 +113,8 @@ def error(follower: ByHand | Servo, kind: CommandKind, hardware: Hardware) -> fl
 
 
 def parts() -> dict[str, Sheet | str]:
-    """The plain servos by who follows; random servos; what a step costs."""
-    control = controller()
-    return {"plain": plain(control), "random": random_servos(control), "cost": cost(control)}
+    """The plain servos by who follows."""
+    return {"plain": plain(controller())}
 
 
 def plain(control: Controller) -> Sheet:
@@ -143,45 +130,3 @@ def plain(control: Controller) -> Sheet:
     columns = ("hand off its path, median [mm]", "ticks at what was commanded", "at measured q", "at measured q and v",
                "`Servo`, told nothing", "`Servo`, told")  # fmt: skip
     return Sheet("", columns, rows)
-
-
-def random_servos(control: Controller) -> Sheet:
-    """Each drawn servo, told nothing and told what was found."""
-    rows = []
-    for seed in range(COUNT):
-        hardware, cells = drawn(seed), []
-        for kind in KINDS:
-            if kind is CommandKind.TORQUE:
-                delay = Response(delay=hardware.delay * DT)
-                cells.append(f"{error(Servo(control, kind, response=delay), kind, hardware):.2g}")
-                continue
-            untold = Servo(control, kind)
-            first = error(untold, kind, hardware)
-            cells.append(f"{first:.2g} / {error(Servo(control, kind, response=untold.response), kind, hardware):.2g}")
-        h = hardware
-        drawn_as = (h.stiffness, 1e3 * h.lag, h.drive, h.friction, h.payload, h.delay)
-        rows.append(
-            (*(f"{number:.{digits}f}" for number, digits in zip(drawn_as, (0, 0, 0, 1, 1, 0), strict=True)), *cells)
-        )
-    columns = ("stiffness, N m/rad", "lag, ms", "drive, N m s/rad", "friction, N m", "payload, kg", "delay, ms",
-               "position, mm", "velocity, mm", "torque, mm")  # fmt: skip
-    return Sheet("", columns, rows)
-
-
-def cost(control: Controller) -> Sheet:
-    """Median of a step."""
-    rows: list[tuple[str, ...]] = [("tick alone", f"{_median_us(control):.1f}")]
-    for kind in KINDS:
-        servo = Servo(control, kind)
-        servo.reset(HOME)
-        rows.append((str(kind), f"{_median_us(servo):.1f}"))
-    return Sheet("", ("a step, median [us]", ""), rows)
-
-
-def _median_us(stepped: Controller | Servo) -> float:
-    spent = np.empty(4000)
-    for k in range(spent.size):
-        began = perf_counter()
-        stepped.step(HOME)
-        spent[k] = perf_counter() - began
-    return 1e6 * float(np.median(spent))

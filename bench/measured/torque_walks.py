@@ -1,46 +1,48 @@
-"""Walks under torques: in two simulators, in gravity, with faults; what the checker says, and what is borne."""
+"""Walks under torques: on two plants, in gravity, with faults; what the checker says, and what is borne."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
 from multiprocessing import get_context
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from textwrap import shorten
 
 import numpy as np
-import pinocchio as pin
-from scipy.optimize import linprog
 
-import wbc
+import wbc.robots
 from bench.sheet import Sheet
-from tests.walking.trials.torque_trials import witnessed
-from wbc.robots import Walker
+from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, plan_climb
+from wbc.climb.along import AlongOptions, BodyTrack, plan_along
+from wbc.climb.bearing import check_borne
+from wbc.climb.checker import CheckRules, check
+from wbc.climb.climber import Climber
+from wbc.climb.faults import PlantFault
+from wbc.climb.grids import INCH, cylinder_grid, grid_pose
+from wbc.climb.loop import ClimbLoop, LoopOptions
+from wbc.climb.machines import walking_arms
+from wbc.climb.plants import PlantErrors, climb_plant
+from wbc.errors import RangeError, WbcError
 from wbc.robots.walker_data import spaced_radius
-from wbc.simulation import Encoders, GripKind, Motors
-from wbc.validation import Array
-from wbc.walking.checker import Report, check_walk
-from wbc.walking.report.folder import rules_of
-from wbc.walking.run.path_mode import PathMode
-from wbc.walking.run.request import PathRequest, Site
-from wbc.walking.run.session import perform_walk
-from wbc.walking.torque.bearing import SHARE, stances
-from wbc.walking.torque.faults import Fault, delay_of
 
-#: What is asked for in all of them
-REQUEST = PathRequest(Site(rigid=True), "13,9", ("13,14",))
+#: Way of the body: column, rows, distance from the axis [m], speed [m/s]
+COLUMN, ROWS, RADIUS, SPEED = 13.0, (9.0, 11.5, 14.0), 152 * INCH, 4 * INCH
+Gravity = tuple[float, float, float]
 #: Along -y, towards the holds [m/s^2]
 MOST, MOON = (0.0, -1.0, 0.0), (0.0, -1.62, 0.0)
-#: Directions of gravity that are tried, along the structure's axes
-DIRECTIONS = {"towards the holds, -y": (0, -1, 0), "across, x": (1, 0, 0), "along the cylinder, z": (0, 0, 1)}
-#: Letters of a refusal that the table has room for
-WHY = 60
+#: Directions of gravity that are tried, along the scene's axes
+DIRECTIONS: dict[str, Gravity] = {
+    "towards the holds, -y": (0, -1, 0), "across, x": (1, 0, 0), "along the cylinder, z": (0, 0, 1),
+}  # fmt: skip
+#: The largest that is tried, and halvings of the interval [m/s^2], [1]
+LARGEST, HALVINGS = 8.0, 9
+#: Letters of a reason that the table has room for
+WHY = 90
 #: Walks at once
 WORKERS = 2
+HEADS = ("walk", "end", "grip slip", "largest grip", "ticks / real time", "checker")
 
 
 def parts() -> dict[str, Sheet | str]:
@@ -54,13 +56,11 @@ class Trial:
 
     name: str
     plant: str = "pinocchio"
-    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gravity: Gravity = (0.0, 0.0, 0.0)
     faults: tuple[str, ...] = ()
-    motors: Motors = field(default_factory=Motors)
-    encoders: Encoders | None = None
-    payload: float = 0.0
+    errors: PlantErrors = field(default_factory=PlantErrors)
     arms: int = 3
-    rigid: bool = True
+    swivels: bool = False
 
 
 TRIALS = (
@@ -68,11 +68,12 @@ TRIALS = (
     Trial("MuJoCo, no gravity", "mujoco"),
     Trial("Pinocchio, 1 m/s^2", gravity=MOST),
     Trial("Pinocchio, on the Moon, 1.62 m/s^2", gravity=MOON),
-    Trial("the same with four arms", gravity=MOON, arms=4),
-    Trial("four arms on holds that let hands tilt", arms=4, rigid=False),
-    Trial("20 kg on the body that the loop does not know", payload=20.0),
-    Trial("friction that it does not know, 2 N m and 2 N m s", motors=Motors(coulomb=2.0, viscous=2.0)),
-    Trial("encoders with noise, 1e-5 rad and 1e-3 rad/s", encoders=Encoders(position=1e-5, velocity=1e-3)),
+    Trial("MuJoCo, on the Moon", "mujoco", gravity=MOON),
+    Trial("four arms on the Moon", gravity=MOON, arms=4),
+    Trial("three arms, 2.5 m/s^2", gravity=(0.0, -2.5, 0.0)),
+    Trial("four arms on holds that let hands tilt", arms=4, swivels=True),
+    Trial("20 kg on the body that the loop does not know", errors=PlantErrors(payload=20.0)),
+    Trial("friction that it does not know, 2 N m and 2 N m s", errors=PlantErrors(rubbing=2.0)),
     Trial("20 ms of delay, known", faults=("delay 0.02",)),
     Trial("a motor of a hand that holds goes limp", faults=("limp arm3_joint2 at 4",)),
     Trial("one of a hand in the air", faults=("limp arm2_joint2 at 3.2",)),
@@ -86,81 +87,73 @@ def walks() -> Sheet:
     """A row for each trial; each in a process that has none of the others' state."""
     # Forked processes would share locks of what is loaded here
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
-        found = list(pool.map(tried, TRIALS))
-    return Sheet("", ("walk", "end", "hold slip", "largest grip", "external checker"), found)
+        return Sheet("", HEADS, list(pool.map(tried, TRIALS)))
 
 
 def tried(trial: Trial) -> tuple[str, ...]:
     """The row of a trial."""
-    bare, faults = machine(trial.arms), tuple(map(Fault.read, trial.faults))
-    request = replace(REQUEST, site=Site(rigid=trial.rigid))
-    motors = replace(trial.motors, delay=delay_of(faults))
-    loop = witnessed(bare, request.site.build(), trial.plant, trial.gravity, trial.payload, motors, trial.encoders,
-                     faults)  # fmt: skip
-    run = perform_walk(request, bare, plant=loop)
+    robot = machine(trial.arms, trial.swivels)
+    try:
+        plan = planned(robot, trial.gravity)
+        plant = climb_plant(trial.plant, robot, plan.scene, trial.errors, list(map(PlantFault.read, trial.faults)))
+        assert plant is not None
+        goal = BodyPlace(robot.body_pose(plan.q[-1]).translation)
+        loop = ClimbLoop(
+            plan, plant, options=LoopOptions(delay=plant.errors.delay),
+            replan=lambda scene, at: plan_climb(robot, scene, at, goal, ClimbOptions.by_torques()),
+        )  # fmt: skip
+    except WbcError as error:
+        return (trial.name, shorten(f"refused: {error}", WHY, placeholder=" ..."), *[""] * 4)
+    begun = time.process_time()
+    run = loop.run(3.0 * float(plan.times[-1]))
+    spent, t = time.process_time() - begun, run.log["t"]
     print(f"{trial.name}: {run.outcome} {run.reason}", file=sys.stderr)
-    if run.log is None or run.ticks is None:
-        return (trial.name, shorten(f"{run.outcome}: {run.reason}", WHY, placeholder=" ..."), *[""] * 3)
-    with TemporaryDirectory() as folder:
-        urdf, rules = bare.urdf(Path(folder) / "robot.urdf"), rules_of(bare)
-        found = [check_walk(log, urdf, run.structure, rules) for log in (loop.truth(run.log), run.log)]
-    watch = loop.watch
+    report = check(run.log, robot, run.scene, CheckRules.by_torques())
+    slip = next(finding.worst for finding in report.findings if finding.rule == "closed grip slips")
+    wrenches = np.abs(run.log.array("wrench")).reshape(len(t), -1, 2, 3).max(axis=(0, 1, 3))
+    end = f"{run.outcome} after {t[-1]:.1f} s" + (f": {run.reason}" if run.reason else "")
     return (
         trial.name,
-        f"{run.outcome} after {run.log.t[-1]:.1f} s",
-        f"{1e3 * run.ticks.slip.max():.2g} mm",
-        f"{watch.force:.0f} N, {watch.moment:.0f} N m",
-        verdict(*found),
+        shorten(end, WHY, placeholder=" ..."),
+        f"{1e3 * max(slip, 0.0):.2g} mm",
+        f"{wrenches[0]:.0f} N, {wrenches[1]:.0f} N m",
+        f"{t[-1] / spent:.1f}",
+        ", ".join(finding.rule for finding in report.violations) or "clean",
     )
 
 
-def verdict(was: Report, read: Report) -> str:
-    """Of where the robot was, and of what was read where that is another one."""
-    true, seen = (", ".join(finding.kind for finding in report.violations) or "clean" for report in (was, read))
-    return true if true == seen else f"{true}; of what was read: {seen}"
-
-
 @cache
-def machine(arms: int) -> Walker:
+def machine(arms: int, swivels: bool = False) -> Climber:
     """The walker; more than three arms stand as far from each other as three do."""
     data = wbc.robots.walker().arm_data
     radius = spaced_radius(arms, data.shoulder_radius)
-    return wbc.robots.walker(arms, data=replace(data, shoulder_radius=radius))
+    robot = walking_arms(wbc.robots.walker(arms, data=replace(data, shoulder_radius=radius)), f"walker of {arms}")
+    limbs = [replace(limb, contact=replace(limb.contact, rolls=False, swivels=True)) for limb in robot.limbs]
+    return replace(robot, limbs=limbs) if swivels else robot
+
+
+@cache
+def planned(robot: Climber, gravity: Gravity) -> ContactPlan:
+    """Along the way at its speed."""
+    options, scene = ClimbOptions.by_torques(), replace(cylinder_grid(), gravity=np.array(gravity, dtype=float))
+    way = BodyTrack([grid_pose(COLUMN, row, RADIUS) for row in ROWS], SPEED)
+    return plan_along(robot, scene, way, None, AlongOptions(options.motion, options.stances.margin))
 
 
 def bearable() -> Sheet:
-    """The largest gravity in which all stances of the course's plan can be held still."""
+    """The largest gravity in which all stances of the weightless plan are borne, and where the next one is not."""
     rows = []
     for arms in (3, 4):
-        mode = PathMode(REQUEST, machine(arms))
-        looked = list(stances(machine(arms), mode.plan(), mode.structure))
+        plan = planned(machine(arms), (0.0, 0.0, 0.0))
         for name, direction in DIRECTIONS.items():
-            least, when, hands = min(most_gravity(arms, looked, np.array(direction, dtype=float)))
-            rows.append((f"{arms} arms, {name}", f"{least:.2f} m/s^2", f"{when:.1f} s, on {hands}"))
-    return Sheet("", ("gravity", "borne at rest", "least at"), rows)
-
-
-def most_gravity(
-    arms: int, looked: list[tuple[float, Array, dict[str, GripKind]]], direction: Array
-) -> Iterator[tuple[float, float, str]]:
-    """At each stance the largest gravity, by the linear programme of wrenches within the rating, torques within their
-    limits, and a base in balance; each with the reserve that a walk is refused without.
-    """
-    robot, rating = wbc.robots.with_masses(machine(arms)).robot, wbc.robots.hold_rating()
-    model, limits = robot.model.copy(), SHARE * robot.limits.effort[6:]
-    model.gravity.linear = direction
-    data, box = model.createData(), SHARE * np.array([rating.force] * 3 + [rating.torque] * 2)
-    for time, q, held in looked:
-        weight = pin.computeGeneralizedGravity(model, data, q)
-        rows = [pin.computeFrameJacobian(model, data, q, model.getFrameId(hand), pin.LOCAL)[:5] for hand in held]
-        push = np.vstack(rows).T
-        torque = np.hstack([-push[6:], weight[6:, None]])
-        found = linprog(
-            np.append(np.zeros(push.shape[1]), -1.0),
-            A_ub=np.vstack([torque, -torque]),
-            b_ub=np.tile(limits, 2),
-            A_eq=np.hstack([push[:6], -weight[:6, None]]),
-            b_eq=np.zeros(6),
-            bounds=[(-most, most) for most in np.tile(box, len(held))] + [(0.0, None)],
-        )
-        yield float(found.x[-1]), time, ", ".join(hand.removesuffix("_hand") for hand in held)
+            least, most, why = 0.0, LARGEST, ""
+            for _ in range(HALVINGS):
+                size = 0.5 * (least + most)
+                scene = replace(plan.scene, gravity=size * np.array(direction, dtype=float))
+                try:
+                    check_borne(replace(plan, scene=scene))
+                    least = size
+                except RangeError as error:
+                    most, why = size, str(error).partition("stand on ")[2].partition(" (got")[0]
+            rows.append((f"{arms} arms, {name}", f"{least:.2f} m/s^2", shorten(why, WHY, placeholder=" ...")))
+    return Sheet("", ("gravity", "borne at rest", "beyond it"), rows)

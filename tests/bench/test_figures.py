@@ -14,7 +14,7 @@ from bench import measured
 from bench.figures import __main__ as command, floors, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
 from bench.sheet import Sheet
-from tests.project.test_floors import FLOORS, WALKING
+from tests.project.test_floors import FLOORS
 
 ROOT = Path(__file__).parents[2]
 PAGES = pages.all_pages()
@@ -64,7 +64,7 @@ def test_the_page_of_the_architecture_has_every_part_on_its_floor() -> None:
     page = (ROOT / "docs" / "architecture.md").read_text()
     rows = re.findall(r"^\| (\d+) \| (`[^|]+) \|", page, flags=re.MULTILINE)
     found = {name: int(floor) for floor, names in rows for name in re.findall(r"`([a-z_.]+)`", names)}
-    assert found == FLOORS | WALKING
+    assert found == FLOORS
 
 
 def test_what_stands_in_no_block_is_found() -> None:

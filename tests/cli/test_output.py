@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 from wbc.cli.app import COMMANDS, app
-from wbc.walking.checker.report import Finding, Report
 
 #: Run one after the other in one folder; those of walks, films, loops and long searches have tests of their own
 COMMANDS_RUN = (
@@ -82,14 +79,3 @@ def test_lines_stay_whole_in_a_pipe() -> None:
     out, _ = printed("robots show walker")
     assert "limit" in next(row for row in out.splitlines() if row.startswith("acceleration:"))
     assert max(map(len, out.splitlines())) > 80
-
-
-def test_checks_of_a_walk_are_readable_at_80_columns() -> None:
-    """No word is broken."""
-    worst = Finding("jump of the body's turn rate", 12, 1.23456e-4, 0.02, "rad/s", 123.456, "arm1_link2 and arm3_link2")
-    report = Report((worst,), 1000, 5000, 100.0, 0)
-    stream = io.StringIO()
-    Console(width=80, file=stream).print(report.table())
-    text = stream.getvalue()
-    assert {"jump", "body's", "arm1_link2", "arm3_link2", "123.456"} <= set(text.split()), text
-    assert max(map(len, text.splitlines())) <= 80

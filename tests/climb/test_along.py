@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
+import textwrap
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
-from wbc.climb.along import BodyTrack, plan_along
+from wbc.climb.along import AlongOptions, BodyTrack, plan_along, planning
 from wbc.climb.checker import check
+from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.drive import ClimbDrive, standing_plan
+from wbc.climb.grids import cylinder_grid, grid_pose, remove_rows
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
 from wbc.climb.resume import stance_in
-from wbc.climb.scene import of_structure
 from wbc.climb.scenes import draw, placed, size_of
 from wbc.climb.search import NoStancesError
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
-from wbc.walking import cylinder, remove_rows
-from wbc.walking.holds.built_in import grid_pose
 
 INCH = 0.0254
 
@@ -38,7 +40,7 @@ def walker() -> Climber:
 
 @pytest.fixture(scope="module")
 def scene() -> ClimbScene:
-    return of_structure(cylinder(rigid=True))
+    return cylinder_grid()
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +77,34 @@ def test_the_body_goes_on_while_limbs_change_footholds(plan: ContactPlan, run: C
     assert np.linalg.norm(along - (along @ way)[:, None] * way, axis=1).max() < 1e-3
 
 
+@pytest.mark.parametrize(("begin", "end"), [((6, 18), (14.37, 6)), ((14.37, 6), (6, 18)), ((19, 12), (6, 12))])
+def test_long_ways_at_full_speed_take_little_searching(walker: Climber, scene: ClimbScene, begin: tuple[float, float],
+                                                       end: tuple[float, float]) -> None:  # fmt: skip
+    middle = 0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1])
+    track = BodyTrack((over(*begin), over(*middle), over(*end)), 6 * INCH)
+    plan = plan_along(walker, scene, track, options=AlongOptions(moves=500))
+    assert plan.times[-1] < 1.03 * track.duration
+    clean(ClimbLoop(plan, backend="vm").run(most=2.0 * float(plan.times[-1])), walker, scene)
+
+
+def test_footholds_count_while_a_limb_comes_holds_and_leaves(plan: ContactPlan, walker: Climber,
+                                                             scene: ClimbScene) -> None:  # fmt: skip
+    clearances, last = Clearances(walker, scene), float(plan.times[-1])
+    contacts, within = [[row] for row in plan.start], [[(0.0, last)] for _ in plan.start]
+    for move in plan.moves:
+        limb = within[move.limb]
+        limb[-1] = limb[-1][0], move.land
+        limb.append((move.lift, last))
+        contacts[move.limb].append(move.lands)
+    assert clearances.moving(contacts, plan.times, plan.q, plan.v, within) is None
+    move = plan.moves[0]
+    within[move.limb][1] = move.land + 0.2, last
+    near = clearances.moving(contacts, plan.times, plan.q, plan.v, within)
+    assert near is not None
+    assert move.lift < near.time < move.land + 0.3
+    assert walker.limbs[move.limb].name in near.first + near.second
+
+
 def test_a_round_way_on_a_cylinder_keeps_its_distance(walker: Climber, scene: ClimbScene) -> None:
     track = BodyTrack((over(11, 12), over(13, 12)), 4 * INCH)
     axis_distance = [np.linalg.norm(pose.translation[:2]) for pose in track.sampled]
@@ -105,7 +135,7 @@ def test_other_limbs_go_along_a_way(name: str, family: str) -> None:
 
 
 def test_ways_without_footholds_are_refused(walker: Climber) -> None:
-    less = of_structure(remove_rows(cylinder(rigid=True), "10-20"))
+    less = remove_rows(cylinder_grid(), "10-20")
     with pytest.raises(NoStancesError, match=r"all limbs can hold to \d+ % of it"):
         plan_along(walker, less, BodyTrack((over(13, 8), over(13, 12)), 6 * INCH))
     for poses, speed, error in (
@@ -114,6 +144,27 @@ def test_ways_without_footholds_are_refused(walker: Climber) -> None:
     ):  # fmt: skip
         with pytest.raises(error):
             BodyTrack(poses, speed)
+
+
+def test_a_search_that_lacks_memory_says_so() -> None:
+    """In a process of its own with little more than it has: it used to end there."""
+    source = """
+        import resource
+        from pathlib import Path
+        from tests.climb.test_along import BodyTrack, cylinder_grid, machines, over, plan_along
+        walker, scene = machines.climber("walker"), cylinder_grid()
+        plan_along(walker, scene, BodyTrack((over(13, 8), over(13, 9)), 0.1))
+        track = BodyTrack((over(13, 2), over(13, 23)), 0.02)
+        for more in (1, 2, 3, 4):
+            most = 4096 * int(Path("/proc/self/statm").read_text().split()[0]) + more * 2**20
+            resource.setrlimit(resource.RLIMIT_AS, (most, -1))
+            try:
+                plan_along(walker, scene, track)
+            except MemoryError as error:
+                print("lacks memory for", error)
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(source)], capture_output=True, text=True, check=True)
+    assert "lacks memory for a search along a way" in done.stdout
 
 
 def test_a_start_that_is_not_on_the_way_is_refused(plan: ContactPlan, walker: Climber, scene: ClimbScene) -> None:
@@ -182,10 +233,14 @@ def test_a_limb_works_while_the_others_hold(plan: ContactPlan, walker: Climber, 
 
 
 def test_a_limb_that_fails_is_lifted_and_the_others_go_on() -> None:
-    from wbc.climb.request import ClimbRequest
+    from wbc.climb.request import ClimberRequest, ClimbRequest, PathRequest, PlantRequest, SceneRequest
     from wbc.climb.session import climb
 
-    done = climb(ClimbRequest(robot="hexapod_grips", scene="cylinder", goal="0,8", fail=("limb1 at 1",)), backend="vm")
+    request = ClimbRequest(
+        PathRequest(points=("0,8",)), ClimberRequest("hexapod_grips"), SceneRequest(scene="cylinder"),
+        PlantRequest(fail=("limb1 at 1",)),
+    )  # fmt: skip
+    done = climb(request, backend="vm")
     assert done.run.outcome is ClimbOutcome.ARRIVED, done.run.reason
     assert done.report is not None
     assert done.report.clean, str(done.report)
@@ -202,3 +257,25 @@ def test_footholds_of_able_limbs(scene: ClimbScene) -> None:
     able = some.held_by(["arm2", "arm3"])
     assert [foothold.id for foothold in able.footholds] == [foothold.id for foothold in rest]
     assert {foothold.limbs for foothold in able.footholds} == {("arm2", "arm3")}
+
+
+def test_a_way_on_which_a_limb_has_to_let_go_at_once_is_none(walker: Climber, scene: ClimbScene) -> None:
+    start = first_stance(walker, scene, walker.with_body(walker.rest, over(13, 12)))
+    begin = walker.body_pose(start.q)
+    # Within the first instant the body is farther off than any limb is long
+    away = BodyTrack((begin, begin * pin.SE3(np.eye(3), np.array([0.0, 0.0, 40.0]))), 400.0)
+    with pytest.raises(NoStancesError, match=r"has to let go of .* as it begins"):
+        plan_along(walker, scene, away, start)
+    off = dataclasses.replace(start, q=walker.with_limb(start.q, 0, walker.angles(start.q, 0) + 0.01))
+    with pytest.raises(RangeError, match="is not at this foothold"):
+        plan_along(walker, scene, BodyTrack((begin, over(13, 13)), 4 * INCH), off)
+
+
+def test_a_way_on_which_joints_would_have_to_stop_is_none(walker: Climber, scene: ClimbScene,
+                                                          monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    def stops(x: np.ndarray, *_: object) -> np.ndarray:
+        return np.where(np.abs(np.arange(len(x)) - len(x) // 2) < 2, 0.0, 1.0)
+
+    monkeypatch.setattr(planning, "fastest", stops)
+    with pytest.raises(NoStancesError, match="have to stop"):
+        plan_along(walker, scene, BodyTrack((over(13, 12), over(13, 12.5)), 4 * INCH))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -133,7 +135,7 @@ def _least_torque(robot: Climber) -> float:
 
 def test_a_pad_bears_what_its_pull_allows() -> None:
     robot = climber("anymal_c")
-    hung = Climber(robot.robot, [_with(limb, SuctionPad(pull=1000.0)) for limb in robot.limbs], robot.rest)
+    hung = Climber(robot.robot, [replace(limb, contact=SuctionPad(pull=1000.0)) for limb in robot.limbs], robot.rest)
     ceiling = [
         Foothold(str(k), pin.SE3(pin.utils.rotate("x", np.pi), robot.contact_pose(robot.rest, k).translation))
         for k in range(4)
@@ -142,12 +144,6 @@ def test_a_pad_bears_what_its_pull_allows() -> None:
     margin = Equilibrium(hung, scene).margin([0, 1, 2, 3], robot.rest)
     assert margin == pytest.approx(slack_by_scipy(hung, scene, [0, 1, 2, 3], robot.rest), abs=1e-6)
     assert margin > 0.0 > Equilibrium(robot, scene).margin([0, 1, 2, 3], robot.rest)
-
-
-def _with(limb: object, contact: object) -> object:
-    from dataclasses import replace
-
-    return replace(limb, contact=contact)  # type: ignore[type-var]
 
 
 def test_contacts_that_are_none_are_named() -> None:

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 from collections.abc import Callable
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,7 +14,10 @@ import pytest
 from tests.climb.by_hand import TRIPODS, gait
 from wbc.climb import ClimbScene, ContactPlan
 from wbc.climb.checker import CheckRules, check
+from wbc.climb.checker.clearances import coal_distance
 from wbc.climb.loop import ClimbLoop, ClimbRun
+from wbc.climb.request import ClimberRequest, ClimbRequest, PathRequest, SceneRequest
+from wbc.climb.session import climb
 from wbc.errors import RangeError, ShapeError
 from wbc.log import Log
 from wbc.shapes import Box, PlacedShape, Sphere
@@ -197,3 +201,16 @@ def test_logs_of_others_are_refused() -> None:
     few = dataclasses.replace(plan.scene, footholds=plan.scene.footholds[:3])
     with pytest.raises(ShapeError, match="3 footholds"):
         check(run.log, plan.climber, few)
+
+
+def test_distances_are_known_where_coal_has_no_answer() -> None:
+    capsule, box = coal.Capsule(0.0508, 0.1524), coal.Box(4.7, 0.24415, 0.1)
+    rotation = np.array([[0.95428, 0.29893, 0.0], [0.29893, -0.95427, 1e-5], [0.0, 0.0, -1.0]])
+    at = pin.SE3(rotation, np.array([0.0, 0.0, 0.1262]))
+    assert coal_distance(capsule, at, box, pin.SE3.Identity()) == pytest.approx(-0.0508, abs=4e-5)
+
+
+def test_a_round_foot_leaves_a_mesh_that_it_is_deep_in() -> None:
+    done = climb(ClimbRequest(PathRequest(speed=0.0), ClimberRequest("anymal_c"), SceneRequest(scene="mesh")))
+    assert done.report is not None
+    assert done.report.clean, done.report

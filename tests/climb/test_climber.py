@@ -26,7 +26,7 @@ def test_accessors_are_those_of_the_configuration() -> None:
         angles = rng.uniform(-1.0, 1.0, len(robot.joints(limb)))
         bent = robot.with_limb(q, limb, angles)
         assert np.allclose(robot.angles(bent, limb), angles)
-        assert np.array_equal(bent[robot.q_rows(limb)], angles)
+        assert np.array_equal(bent[robot.robot.position_index[robot.joints(limb)]], angles)
         wanted = robot.robot.pose(bent, one.frame) * one.placement
         assert np.allclose(robot.contact_pose(bent, limb).homogeneous, wanted.homogeneous, atol=1e-12)
         assert robot.row(one.name) == limb

@@ -15,16 +15,16 @@ from tests.climb.structures import FAMILIES, drawn
 from wbc.climb import BodyPlace, ClimbLoop, first_stance, machines, motion, plan_climb
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
+from wbc.climb.grids import GRIDS
+from wbc.climb.loop.records import scene_digest
 from wbc.climb.motion import MotionOptions, MoveError, Mover
-from wbc.climb.scene import ClimbScene, SceneBody, of_structure
+from wbc.climb.places import body_frames, body_over
+from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.search import StanceWay, find_stances
-from wbc.climb.stance import Stance
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.world import ClimbWorld, PostureOutcome
 from wbc.errors import UnknownNameError
 from wbc.shapes import Sphere
-from wbc.walking.run.places import over_holds
-
-#: The published walker's body over its holds [m]
-HEIGHT = 1.32
 
 
 @functools.cache
@@ -34,19 +34,20 @@ def walker() -> Climber:
 
 def asked(family: str, seed: int) -> tuple[ClimbScene, Stance, BodyPlace]:
     """The scene of a seed, a stance at its start, and its goal."""
-    trial = drawn(family, seed)
-    first, last = over_holds(trial.structure, [trial.start, trial.goal], HEIGHT)
-    scene = of_structure(trial.structure)
-    start = first_stance(walker(), scene, walker().with_body(walker().rest, first))
-    return scene, start, BodyPlace(last.translation, last.rotation)
+    course = drawn(family, seed)
+    first, last = (body_over(walker(), frame) for frame in (course.start, course.goal))
+    start = first_stance(walker(), course.scene, walker().with_body(walker().rest, first))
+    return course.scene, start, BodyPlace(last.translation, last.rotation)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_structures_are_those_of_their_seeds(family: str) -> None:
-    one, again, other = (drawn(family, seed).structure for seed in (0, 0, 1))
-    assert one.digest == again.digest != other.digest
+    scene, again, other = (drawn(family, seed).scene for seed in (0, 0, 1))
+    assert scene_digest(scene) == scene_digest(again) != scene_digest(other)
     # No hold is inside of anything
-    assert one.clearance(one.positions).min() > -1e-9
+    for body in scene.bodies.values():
+        assert isinstance(body, SceneBody)
+        assert body.distances(scene.positions).min() > -1e-9
 
 
 def test_an_unknown_family_is_refused() -> None:
@@ -65,6 +66,21 @@ def test_structures_are_walked(family: str) -> None:
         run = ClimbLoop(plan).run(most=2.0 * float(plan.times[-1]))
         assert run.outcome == "arrived"
         assert check(run.log, walker(), scene).clean
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"), [("plane_grid", ("8,8", "8,13")), ("truss_grid", ("L2,6", "L2,11")), ("module", ("15,4", "15,7"))]
+)
+def test_built_in_grids_are_walked(name: str, ends: tuple[str, str]) -> None:
+    scene = GRIDS[name]()
+    first, last = body_frames(walker(), scene, ends)
+    start = first_stance(walker(), scene, walker().with_body(walker().rest, first))
+    plan = plan_climb(walker(), scene, start, BodyPlace(last.translation, last.rotation))
+    assert plan.moves
+    run = ClimbLoop(plan, backend="vm").run()
+    assert run.outcome == "arrived", run.reason
+    report = check(run.log, walker(), scene)
+    assert report.clean, str(report)
 
 
 def test_a_way_is_found_again_without_a_move() -> None:
@@ -120,3 +136,26 @@ def test_the_body_goes_round_what_is_in_its_way(monkeypatch: pytest.MonkeyPatch)
         straight.setattr(motion, "BOWS", 0)
         mover = next(blocked())
     assert bowed(mover) > 0.02
+
+
+def test_the_body_makes_way_for_a_limb_that_lifts() -> None:
+    scene, start, _ = asked("islands", 0)
+    model, q = walker().robot.model, start.q
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    link = data.oMf[model.getFrameId("arm1_link4")].translation
+    # Over its forearm, as low as the stance lets it be
+    ball = SceneBody(Sphere(0.05), pin.SE3(np.eye(3), link + [0.0, 0.0, 0.14]))
+    below = replace(scene, bodies={**scene.bodies, "ball": ball})
+    world = ClimbWorld(walker(), below, start, clear=0.01)
+    contacts, state = world.contacts(world.start), world.state_of(q)
+    assert world.look(contacts, state)[0][1] >= 0.0
+    assert world.stuck(contacts, state) == 1
+    kept = contacts.copy()
+    kept[walker().row("arm1")] = FREE_LIMB
+    outcome, after, _, _, moves = world.lift(contacts, kept, 0.0, state)
+    assert (outcome, moves) == (PostureOutcome.STANDS, True)
+    assert world.stuck(contacts, after) == 0
+    # Nor does it begin there
+    near = first_stance(walker(), below, q)
+    assert world.stuck(world.contacts(near.contacts), world.state_of(near.q)) == 0

@@ -113,7 +113,11 @@ class Goods:
             out.add(answer, name="item")
             if rng.random() < 0.15:
                 try:
-                    _finite(out.compile(backend="vm").step(Q).v)
+                    controller = out.compile(backend="vm")
+                    if isinstance(answer, tasks.MovingFrame):
+                        # Nobody knows where it is until it is told
+                        controller["item"].pose = (np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+                    _finite(controller.step(Q).v)
                 except CommandError:
                     pass  # forces, which a stack of velocities has none of
                 except wbc.WbcError as error:

@@ -53,7 +53,7 @@ MADE = (
     *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
     *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
     *("Sample", "Basis", "Condition", "Mode", "MissingPartError", "RateFileError", "PointSet", "Resolver", "Source"),
-    *("Coordinate", "TREES", "PRESETS", "ALGORITHMS", "Limb", "BodyLimb"),
+    *("Coordinate", "TREES", "PRESETS", "ALGORITHMS"),
     *("WalkerArm", "LawCertificate", "RankCertificate", "RankWitness", "LocusBranch"),
     # Algebra of polynomials that only the package makes
     *("Exact", "Notation", "factored_determinant", "joint_roots", "singular_vector_locus", "sub_determinant_locus"),

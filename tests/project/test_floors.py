@@ -62,7 +62,6 @@ FLOORS = {
     "wbc.teleop": 12,
     "wbc.track": 12,
     "wbc.published": 12,
-    "wbc.walking": 12,
     "wbc.climb": 12,
     "wbc.retarget": 12,
     "wbc.pages": 12,
@@ -72,21 +71,6 @@ FLOORS = {
     "wbc.formats": 13,
     "wbc.learning": 13,
     "wbc.cli": 14,
-}
-#: Floors inside wbc.walking; a room imports only rooms on lower floors
-WALKING = {
-    "holds": 0,
-    "arms": 0,
-    "body_path": 1,
-    "native": 1,
-    "log": 2,
-    "checker": 3,
-    "planner": 3,
-    "loop": 4,
-    "modes": 5,
-    "torque": 5,
-    "run": 6,
-    "report": 7,
 }
 #: Parts that may import only the listed floors, whatever stands below them
 ONLY = {"wbc.qp": {0}, "wbc.resolvers": {0, 1}}
@@ -264,22 +248,6 @@ def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: py
     solver.parent.mkdir(parents=True)
     solver.write_text("from wbc.robot import Robot\nfrom wbc.errors import WbcError\n")
     assert faults(solver) == ["wbc/qp/bad.py:1: wbc.qp imports wbc.robot"]
-
-
-def test_rooms_of_walking_import_only_rooms_below() -> None:
-    used, up = set(), []
-    for path in PACKAGE_FILES:
-        module = module_name(path)
-        if not module.startswith("wbc.walking."):
-            continue
-        here = module.split(".")[2]
-        used.add(here)
-        for line, target in mentioned(path):
-            there = [*target.split("."), ""][2]
-            if target.startswith("wbc.walking.") and there != here and not WALKING[there] < WALKING[here]:
-                up.append(f"{relative(path)}:{line}: {here} names {there}")
-    assert up == []
-    assert used == set(WALKING)
 
 
 def test_no_modules_or_packages_side_by_side_import_each_other_in_a_circle() -> None:

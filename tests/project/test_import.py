@@ -12,7 +12,7 @@ HEAVY = ("matplotlib", "typer", "rich", "scipy", "pyarrow", "toppra", "ruckig", 
 #: What robots are made of, besides
 NUMBERS = ("numpy", "casadi", "pinocchio", "coal", "daqp", "flint")
 #: Parts of the package that commands about robots and coordinates do without
-UPPER = tuple(f"wbc.{name}" for name in ("controller", "qp", "export", "ik", "track", "walking", "trajectory"))
+UPPER = tuple(f"wbc.{name}" for name in ("controller", "qp", "export", "ik", "track", "climb", "trajectory"))
 #: Arguments of a command -> what it must not import
 BUDGETS = {
     "--help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
@@ -21,7 +21,7 @@ BUDGETS = {
     "coordinates": (*HEAVY[3:], "matplotlib", *UPPER, "flint"),
     "ik --help": (*HEAVY[3:], "matplotlib", *NUMBERS, *UPPER, "wbc.robot", "wbc.tasks"),
     # Its requests check numbers and poses
-    "walk --help": (*HEAVY[3:], "matplotlib", *NUMBERS[4:], "casadi", "wbc.walking.loop", "wbc.robot", "wbc.tasks"),
+    "walk --help": (*HEAVY[3:], "matplotlib", *NUMBERS[4:], "casadi", "wbc.climb.loop", "wbc.robot", "wbc.tasks"),
 }
 
 

@@ -15,7 +15,7 @@ NAMES = {
     *("Controller", "Policy", "Stack", "Status", "Step", "Certificate", "Explanation", "Recording", "Replay", "replay"),
     *("InverseKinematics", "SE3", "Solution", "WbcError", "__version__"),
     *("analysis", "coordinates", "errors", "proximity", "resolvers", "robots", "shapes", "tasks"),
-    *("teleop", "track", "trajectory", "viewer", "walking"),
+    *("climb", "teleop", "track", "trajectory", "viewer"),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import pathlib
 import time
 import xml.etree.ElementTree as ElementTree
 
@@ -16,6 +17,8 @@ from tests.robots.files import example, joints
 from wbc.errors import RobotFileError, WbcError
 from wbc.robot import Recipe, Robot
 from wbc.robot.sources.files import example_data_folder, listed_data_folder
+from wbc.robot.sources.table import read_robot
+from wbc.robots import catalogue
 
 TABLE = {recipe.name: recipe for recipe in wbc.robots.table()}
 LOADABLE = [name for name, recipe in TABLE.items() if not recipe.problem]
@@ -51,6 +54,11 @@ def test_rows_with_a_problem_are_listed_and_refused(name: str) -> None:
         wbc.robots.load(name)
     reason = {"ur3_xacro": "the robot has no name"}[name]
     assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [*TABLE, "pand", "a]\n[panda"])
+def test_a_row_read_alone_is_that_of_the_table(name: str) -> None:
+    assert read_robot(pathlib.Path(catalogue.__file__).parent, name) == TABLE.get(name)
 
 
 def test_of_seventy_descriptions_the_one_that_does_not_load_has_no_link() -> None:

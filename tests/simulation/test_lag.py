@@ -1,46 +1,23 @@
-"""Every loop on a robot that lags: track, walk, drive and teleoperation take another plant, and stay what they are."""
+"""Every loop on a robot that lags: track, climb and teleoperation take another plant, and stay what they are."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wbc
+from tests.climb.by_hand import climber, gait
 from tests.simulation.lagging import LaggingPlant
 from wbc import track
+from wbc.climb.checker import check
+from wbc.climb.loop import ClimbLoop
 from wbc.errors import ShapeError
-from wbc.robots import Walker
 from wbc.simulation import KinematicPlant
 from wbc.teleop import Order, Teleoperation, run_session
-from wbc.walking import Structure, cylinder
-from wbc.walking.body_path import grid_path
-from wbc.walking.checker import check_walk
-from wbc.walking.loop.stack import WalkStack
-from wbc.walking.loop.walk import Tick, Walk
-from wbc.walking.modes.drive import Drive, standing_plan
-from wbc.walking.planner.planner import plan_walk
-from wbc.walking.run.recording import WalkRecorder
 
-#: Lag of a servo [s], delay in milliseconds, and noise of an encoder [rad]: slow, quick, and very slow
-SERVO, QUICK, SLOW = (0.02, 5, 2e-5), (0.01, 2, 1e-6), (0.05, 10, 0.0)
-
-
-@pytest.fixture(scope="module")
-def machine() -> Walker:
-    return wbc.robots.walker()
-
-
-@pytest.fixture(scope="module")
-def structure() -> Structure:
-    return cylinder(rigid=True)
-
-
-@pytest.fixture(scope="module")
-def stack(machine: Walker, structure: Structure) -> WalkStack:
-    return WalkStack(machine, structure, collisions=False)
+#: Lag of a servo [s], delay in milliseconds, and noise of an encoder [rad]: slow, and quick
+SERVO, QUICK = (0.02, 5, 2e-5), (0.01, 2, 1e-6)
 
 
 def test_a_tracked_path_lags_and_ends_where_it_ends() -> None:
@@ -83,70 +60,27 @@ def test_an_operator_drives_a_lagging_arm() -> None:
     assert set(logs[2].status) == {"solved"}
 
 
-def test_a_walk_on_servos_is_judged_by_the_checker(
-    machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
-) -> None:
-    plan, ends = plan_walk(machine, structure, grid_path([(13, 9), (13, 14)], 0.1016)), []
-    for plant in (KinematicPlant(machine.robot), LaggingPlant(machine.robot, *QUICK)):
-        walk, ticks = Walk(machine, structure, plan, stack=stack, plant=plant), list[Tick]()
-        recorder = WalkRecorder(walk)
-
-        def keep(tick: Tick, recorder: WalkRecorder = recorder, ticks: list[Tick] = ticks) -> None:
-            recorder.tick(tick)
-            ticks.append(tick)
-
-        assert walk.run(keep) == "arrived"
-        report = check_walk(recorder.log()[0], machine.urdf(tmp_path / "robot.urdf"), structure)
-        assert report.ok, str(report)
-        assert len(walk.progress.steps) >= 1
-        ends.append((walk.time, max(tick.slip for tick in ticks), max(tick.body_error for tick in ticks)))
-    # Hands on their holds slip and the body is late, within what the rules allow; hands that lag wait over their holds
-    assert ends[0][0] - 0.2 < ends[1][0] < ends[0][0] + 1.0
-    assert ends[0][1] < 3e-5 < ends[1][1] < 3e-4
-    assert ends[0][2] < 1e-4 < ends[1][2] < 2e-3
+@pytest.mark.parametrize("name", ["hexapod", "wall_climber"])
+def test_a_climb_on_servos_comes_to_its_end(name: str) -> None:
+    """Limbs close later, and stay where they closed."""
+    plan = gait([(0,), (3,)], 0.02, machine=climber(name))
+    run = ClimbLoop(plan, LaggingPlant(plan.climber.robot, *QUICK)).run(10.0)
+    assert run.outcome == "arrived", run.reason
+    assert plan.times[-1] < run.log["t"][-1] < plan.times[-1] + 0.5
+    rules = {finding.rule: finding for finding in check(run.log, plan.climber, plan.scene).findings}
+    slips = "closed grip slips" if name == "wall_climber" else "closed contact slips"
+    for rule in ("closed contact off its foothold", slips):
+        assert rules[rule].kept, str(rules[rule])
 
 
-def test_slow_servos_walk_later_and_violate_nothing(
-    machine: Walker, structure: Structure, stack: WalkStack, tmp_path: Path
-) -> None:
-    """How late they are shows in their motion, and gains are lower then; else a hand would not come to rest."""
-    plan = plan_walk(machine, structure, grid_path([(13, 9), (13, 14)], 0.1016))
-    walk = Walk(machine, structure, plan, stack=stack, plant=LaggingPlant(machine.robot, *SLOW))
-    recorder = WalkRecorder(walk)
-    assert walk.run(recorder.tick) == "arrived"
-    assert walk.machine.lag == pytest.approx(SLOW[0] + SLOW[1] * 1e-3, rel=0.2)
-    report = check_walk(recorder.log()[0], machine.urdf(tmp_path / "robot.urdf"), structure)
-    assert report.ok, str(report)
-    assert walk.time < 1.5 * plan.path.duration
-
-
-def test_a_driven_body_on_servos(machine: Walker, structure: Structure, stack: WalkStack) -> None:
-    pose = pin.SE3(grid_path([(13, 11), (13, 12)], 0.1).poses[0])
-    plan = standing_plan(machine, structure, pose)
-    walk = Walk(machine, structure, plan, stack=stack, plant=LaggingPlant(machine.robot, *SERVO))
-    drive, begin = Drive(walk), walk.q[:3].copy()
-    drive.steer(0.0, 0.05, 0.0)
-    ticks = [drive.tick() for _ in range(600)]
-    drive.steer(0.0, 0.0, 0.0)
-    while not drive.standing and len(ticks) < 2000:
-        ticks.append(drive.tick())
-    assert drive.standing
-    assert np.linalg.norm(walk.q[:3] - begin) > 0.2
-    assert len(walk.progress.steps) >= 1
-    assert max(tick.slip for tick in ticks) < 1e-3
-    assert {str(tick.status) for tick in ticks} == {"solved"}
-
-
-def test_a_plant_of_another_robot_is_refused_everywhere(
-    machine: Walker, structure: Structure, stack: WalkStack
-) -> None:
+def test_a_plant_of_another_robot_is_refused_everywhere() -> None:
     other = KinematicPlant(wbc.robots.load("ur5"))
-    robot = wbc.robots.load("panda")
+    robot, steps = wbc.robots.load("panda"), gait([(0,), (3,)])
     plan = track.PathRun(robot, "panda_hand_tcp", track.SplinePath([0.0, 1.0], [np.eye(4)] * 2), "none", robot.neutral)
     with pytest.raises(ShapeError, match=r"plant\.nq"):
         track.track(plan, plant=other)
     with pytest.raises(ShapeError, match=r"plant\.nq"):
-        Walk(machine, structure, plan_walk(machine, structure, grid_path([(13, 9), (13, 9.5)], 0.1)), plant=other)
+        ClimbLoop(steps, other)
     session = Teleoperation("spherical_4r", acceleration=0.5)
     with pytest.raises(ShapeError, match=r"plant\.nq"):
         run_session(session, Steady(), session.robot.neutral, plant=other)

@@ -8,7 +8,7 @@ import pytest
 
 from tests.project.layout import ROOT, nodes, relative, sources
 
-LOOPS = ("wbc/track", "wbc/teleop", "wbc/walking/loop", "wbc/walking/modes", "wbc/walking/run")
+LOOPS = ("wbc/track", "wbc/teleop")
 
 
 @pytest.mark.parametrize("folder", LOOPS)

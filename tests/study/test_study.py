@@ -246,6 +246,20 @@ def test_reach_and_sets_of_inverse_kinematics_agree_with_the_robot() -> None:
     assert moved["measure"][0] == pytest.approx(abs(np.linalg.det(J)), rel=1e-9)
 
 
+def test_layouts_are_planned_between_places_that_seeds_draw() -> None:
+    from wbc.study.scenarios import layouts
+
+    few = layouts(seed=2, least=0.1, most=0.4, speed=0.05)
+    assert few["planned"] == 1.0
+    assert 0.1 <= few["removed"] <= 0.4
+    # The longest way on 25 x 24 holds, and the shortest that is drawn
+    assert 6.0 * 0.235 / 0.05 < few["duration"] < 3600.0
+    assert 2.0 <= few["regrasps"] < 60.0
+    none = layouts(seed=2, least=0.995, most=0.995)
+    assert none["planned"] == 0.0
+    assert np.isnan([none["regrasps"], none["duration"]]).all()
+
+
 def test_the_command(tmp_path: Path) -> None:
     file, folder = tmp_path / "asked.yaml", tmp_path / "run"
     (tmp_path / "mine.py").write_text(HERE.read_text())

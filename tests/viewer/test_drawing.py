@@ -132,7 +132,7 @@ def test_a_note_marks_reserved_and_gone_holds_and_draws_the_ways_of_hands() -> N
     controller, scene = standing().clone(), Scene()
     empty = DrawnMesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32), (0, 0, 0))
     places = np.array([[0.0, 0, 0], [1.0, 0, 0], [0.0, 1.0, 0]])
-    around = Scenery((), empty, ("a", "b", "c"), places, (0.0, 0.0, 1.0), "panda_link0", ("arm1",), {})
+    around = Scenery((), empty, ("a", "b", "c"), places, (0.0, 0.0, 1.0), "panda_link0", ("arm1",), {}, 0.25)
     drawing = Drawing(scene, controller, scenery=around)  # type: ignore[arg-type]
     ways = [[[0.0, 0, 0], [0.5, 0, 0.2], [1.0, 0, 0]], [[0.0, 0, 0], [0.0, 1.0, 0]]]
     drawing.note({"reserved": ["b"], "gone": ["c"], "held": ["a"], "ways": ways})

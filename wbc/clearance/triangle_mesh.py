@@ -74,13 +74,6 @@ class TriangleMesh(Geometry):
         """Distance [m] of points ``[..., 3]`` in the surface's frame; within a solid it is negative."""
         return segments_from(self, points, points)
 
-    def segment_distance(self, a: Array, b: Array) -> Array:
-        """Distance [m] of the segments from ``a`` to ``b``, ``[..., 3]`` each in the surface's frame.
-
-        0 where one goes through the surface; of one wholly within a solid less the distance from the surface.
-        """
-        return segments_from(self, a, b)
-
     @property
     def reach(self) -> float:
         return float(np.linalg.norm(self.corners, axis=2).max())

@@ -52,23 +52,22 @@ COMMANDS = {
         "Follow a timed path; leave a log, plots and a summary.", {"path": "track.Track", "demo": "track.Demo"}
     ),
     "walk": Listed(
-        "Walk on holds; drive, resume and check walks.",
+        "Walk and climb with any limbs on any scene.",
         {
             "path": "walk.WalkPath",
             "drive": "walk.DriveWalk",
-            "arm": "walk.WalkArm",
-            "published": "walk.Published",
+            "limb": "walk.WalkLimb",
             "resume": "walk.Resume",
             "check": "walk.CheckWalk",
             "compare": "walk.Compare",
+            "published": "walk.Published",
         },
     ),
     "plan": Listed("Find a path to a pose or configuration, clear of obstacles.", {"": "plan.PlanPath"}),
-    "climb": Listed("Climb and walk with any limbs on any scene.", {"": "climb.ClimbTo"}),
     "retarget": Listed("Clips of people and animals onto robots.", {"": "retarget.RetargetClips"}),
     "view": Listed(
         "See and drive robots, and see runs, in the browser.",
-        {"show": "view.ViewShow", "play": "view.Play", "pairs": "view.ViewPairs", "climb": "view.Climb"},
+        {"show": "view.ViewShow", "play": "view.Play", "pairs": "view.ViewPairs", "walk": "view.ViewWalk"},
     ),
     "coordinates": Listed(
         "Pairs of coordinates: modes, advice, loci, driving.",

@@ -29,7 +29,7 @@ class TrackOutput:
 class Where:
     """Of a walk: its folder."""
 
-    out: Annotated[Path | None, "Run folder. Default: runs/walk-STRUCTURE-TIME."] = None
+    out: Annotated[Path | None, "Run folder. Default: runs/walk-ROBOT-SCENE-TIME."] = None
     force: Annotated[bool, "Write into a folder that has a run."] = False
 
 

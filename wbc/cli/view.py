@@ -16,6 +16,7 @@ from wbc.cli import console
 from wbc.cli.reading import Option
 from wbc.cli.replay import Trust
 from wbc.cli.scene import Backend
+from wbc.climb.request import ClimberRequest, SceneRequest
 from wbc.errors import UnknownNameError, nearest
 
 if TYPE_CHECKING:
@@ -99,16 +100,28 @@ class ViewPairs(Driven):
         operate(self.robot, self.seconds, backend=self.backend, **options)
 
 
+#: The published walker, on which it is shown where nothing else is said
+WALKER = ClimberRequest()
+#: Its cylinder
+CYLINDER = SceneRequest()
+
+
 @dataclass(frozen=True)
-class Climb(Driven):
-    """Steer the walker on its structure."""
+class ViewWalk(Driven):
+    """Steer a climber on a scene."""
+
+    climber: Annotated[ClimberRequest, "What climbs"] = WALKER
+    scene: Annotated[SceneRequest, "On what"] = CYLINDER
+    place: Annotated[str, "Over which it stands at first, such as 13,6 on a grid, or a foothold's id."] = ""
 
     def drive(self, options: dict[str, Any]) -> None:
-        """The walker."""
-        from wbc.viewer.climbing import climb
+        """A climber."""
+        from wbc.viewer.climbing import climb, standing
 
-        about("Steer with W S A D and Q E or the stick, or click a hold.")
-        climb(self.seconds, backend=self.backend, **options)
+        with console.err().status("the first stance"):
+            stood = standing(self.climber, self.scene, self.place)
+        about("Steer with W S A D and Q E or the stick, or click a foothold.")
+        climb(*stood, self.seconds, backend=self.backend, **options)
 
 
 @dataclass(frozen=True)

@@ -1,177 +1,169 @@
-"""``wbc walk``: walks on holds, planned, carried out, checked and shown, a command a mode."""
+"""``wbc walk``: any limbs on any scene, planned, carried out, checked and shown, a command a mode."""
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from wbc.cli.output import FOLDER, WALKED, WalkOutput, Where
 from wbc.cli.reading import Option
-from wbc.errors import RangeError
-from wbc.walking.run.request import (
-    ArmRequest,
+from wbc.climb.request import (
+    DEFAULT_SPEED,
+    KEYBOARD,
+    ClimberRequest,
+    ClimbRequest,
     DriveRequest,
+    LimbRequest,
+    Objective,
     PathRequest,
-    PublishedRequest,
-    ResumeRequest,
+    PlantRequest,
+    RemovedFootholds,
+    SceneRequest,
 )
-from wbc.walking.torque.choice import PlantChoice
-
-if TYPE_CHECKING:
-    from wbc.robots import Walker
+from wbc.errors import RangeError
 
 _WHAT = "What it does"
-
-
-@dataclass(frozen=True)
-class Machine:
-    """What walks."""
-
-    arms: Annotated[int, "Of the body, 2 to 6; with more than three it is larger."] = 3
-    set: Annotated[tuple[str, ...], "NAME=VALUE of the walker's data, in SI; may be repeated."] = ()
-
-    def walker(self) -> Walker:
-        """The machine.
-
-        Raises:
-            ShapeError, UnknownNameError, RangeError: no such arms, or changes of data that are none.
-        """
-        from wbc.cli.walking import body
-
-        return body(self.arms, self.set)
-
-
-Moved = Annotated[PlantChoice, "What walks"]
-Walks = Annotated[Machine, "What walks"]
+#: The whole published cylinder
+NONE_REMOVED = RemovedFootholds()
+What = Annotated[ClimberRequest, "What climbs"]
+OnWhat = Annotated[SceneRequest, "On what"]
+ByWhat = Annotated[PlantRequest, "What moves, and what happens meanwhile"]
 Writes = Annotated[WalkOutput, "How it is done, and what it writes"]
-Ask = Annotated[bool, "Propose every re-grasp: a line is empty for yes, or another hold; at its end the walk stops."]
+Asks = Annotated[bool, "Propose every move: a line is empty for yes, or another foothold; at its end the walk stops."]
 
 
 @dataclass(frozen=True)
 class WalkPath:
-    """Walk over places with a body of two to six arms.
+    """Walk and climb over places with any limbs.
 
-    Leaves log, plan, check, pictures and a page. Ends with 3 if the walk is not possible or does not arrive, with 4 if
-    the checker finds a violation. Ctrl-C ends it early; what was done until then is written all the same, and so is
-    what a kill leaves.
+    Leaves what was asked, log, plan, check, figures, pictures and pages. Ends with 3 if there is no plan or it does not
+    arrive, with 4 if the checker finds a violation. Ctrl-C ends it early; what was done until then is written all the
+    same, and so is what a kill leaves.
+
+    Example: wbc walk --robot anymal_c --scene stairs
     """
 
-    request: Annotated[PathRequest, _WHAT]
-    plant: Moved
-    machine: Walks = Machine()
+    mode: Annotated[PathRequest, _WHAT]
+    climber: What
+    scene: OnWhat
+    plant: ByWhat
     output: Writes = WALKED
-    ask: Ask = False
-    least_time: Annotated[bool, "Least time of the plan's joint path, by toppra, among the figures."] = False
+    ask: Asks = False
 
     def run(self) -> int:
-        from wbc.cli.walking import WalkLines, carried_out
-        from wbc.walking.run.session import mode_of
+        from wbc.cli.climbing import carried_out
 
-        free = self.request.free_start
-        if free and self.plant.dynamic:
-            reason = "a body that nothing holds is not fixed in it; --free-start is kinematic"
-            raise RangeError("plant", self.plant.name, reason)
-        if free and self.least_time:
-            raise RangeError("least-time", True, "it is of a plan of arms that hold")
-        lines = WalkLines() if self.ask else None
-        mode = mode_of(self.request, self.machine.walker(), lines.answer if lines else None)
-        return carried_out(mode, self.output, self.plant, lines, least_time=self.least_time)
+        return carried_out(ClimbRequest(self.mode, self.climber, self.scene, self.plant), self.output, asks=self.ask)
 
 
 @dataclass(frozen=True)
 class DriveWalk:
-    """Drive the body by rates, from a file or the keyboard."""
+    """Drive the body by rates, from a file, from texts or by the keyboard.
 
-    request: Annotated[DriveRequest, _WHAT]
-    plant: Moved
-    machine: Walks = Machine()
+    Example: wbc walk drive --rate "0.05,0,0,0,0,0 for 4" --rate "0,0,0,0,0,0.05 for 2"
+    """
+
+    mode: Annotated[DriveRequest, _WHAT]
+    climber: What
+    scene: OnWhat
+    plant: ByWhat
     output: Writes = WALKED
 
     def run(self) -> int:
+        from wbc.cli.climbing import carried_out
         from wbc.cli.console import tell
-        from wbc.cli.walking import carried_out
+        from wbc.climb.keyboard import HELP, KeyTwists
         from wbc.terminal import terminal, terminal_keys
-        from wbc.walking.modes.keyboard import HELP, KeyCommands
-        from wbc.walking.run.session import mode_of
 
-        if not self.request.commands:
-            raise RangeError("commands", "", "give a file of rates, or keyboard")
-        walker = self.machine.walker()
+        request = ClimbRequest(self.mode, self.climber, self.scene, self.plant)
         with contextlib.ExitStack() as stack:
-            commands = None
-            if self.request.commands == "keyboard":
+            keys = None
+            if self.mode.commands == KEYBOARD:
                 terminal("commands")
-                if self.plant.dynamic:
-                    raise RangeError("plant", self.plant.name, "the keyboard drives the kinematic plant")
                 tell(HELP)
-                commands = KeyCommands(stack.enter_context(terminal_keys()))
-            return carried_out(mode_of(self.request, walker, commands=commands), self.output, self.plant)
+                keys = KeyTwists(stack.enter_context(terminal_keys()))
+            return carried_out(request, self.output, twists=keys)
 
 
 @dataclass(frozen=True)
-class WalkArm:
-    """Move one hand, while the body stands."""
+class WalkLimb:
+    """Move one limb, while the body stands and the others hold.
 
-    request: Annotated[ArmRequest, _WHAT]
-    plant: Moved
-    machine: Walks = Machine()
+    Example: wbc walk limb --limb arm2 --do "rate 0.007,0.08,0,0,0,0 for 1.5" --do "hold 15,12" --from 13,11
+    """
+
+    mode: Annotated[LimbRequest, _WHAT]
+    climber: What
+    scene: OnWhat
+    plant: ByWhat
     output: Writes = WALKED
 
     def run(self) -> int:
-        from wbc.cli.walking import carried_out
-        from wbc.walking.run.session import mode_of
+        from wbc.cli.climbing import carried_out
 
-        return carried_out(mode_of(self.request, self.machine.walker()), self.output, self.plant)
+        return carried_out(ClimbRequest(self.mode, self.climber, self.scene, self.plant), self.output)
 
 
 @dataclass(frozen=True)
 class Published:
-    """Walk as the published planner does, on its cylinder."""
+    """Walk as the published planner does, on its cylinder.
 
-    request: Annotated[PublishedRequest, _WHAT]
+    Attributes:
+        start: place that the body begins over: T,A[,DEGREES].
+        points: place that it goes to; may be repeated.
+        objective: velocity: from place to place at the speed; destination: fewest moves.
+        speed: of the body [m/s].
+        turn_rate: of the body [rad/s].
+    """
+
+    start: str = field(default="13,6", metadata={"option": "from"})
+    points: tuple[str, ...] = field(default=("13,18",), metadata={"option": "to"})
+    objective: Objective = "velocity"
+    speed: float = DEFAULT_SPEED
+    turn_rate: float = 0.05
+    removed: Annotated[RemovedFootholds, "On what"] = NONE_REMOVED
     output: Annotated[Where, "What it writes"] = FOLDER
 
     def run(self) -> int:
-        from wbc.cli.walking import published
+        from wbc.cli.climbing import published
 
-        return published(self.request, self.output)
+        places, speeds = (self.start, *self.points), (self.speed, self.turn_rate)
+        return published(self.removed, places, self.objective, speeds, self.output)
 
 
 @dataclass(frozen=True)
 class Resume:
     """Go on with a run, ended or killed, or begin it again.
 
-    It keeps structure, robot, plant and rates.
+    It keeps scene, robot, plant and speeds.
     """
 
-    request: Annotated[ResumeRequest, _WHAT]
+    folder: Annotated[Path, Option("Folder of a run, ended or killed.", placed=True)]
+    at: Annotated[float | None, "Time in its log that it goes on from [s]. Default: the end."] = None
+    to: Annotated[tuple[str, ...], "Place to go to; may be repeated. Default: where the run was to go."] = ()
     output: Writes = WALKED
-    ask: Ask = False
+    ask: Asks = False
 
     def run(self) -> int:
-        from wbc.cli.walking import WalkLines, carried_out
-        from wbc.walking.run.resume_mode import going_on, machine_walked, plant_walked
-        from wbc.walking.run.session import mode_of
+        from wbc.cli.climbing import carried_out
+        from wbc.climb.folder import resumed
 
-        folder, out = Path(self.request.folder), self.output.out
-        if out is not None and out.resolve() == folder.resolve():
+        out = self.output.out
+        if out is not None and out.resolve() == self.folder.resolve():
             raise RangeError("out", str(out), "this is the folder of the run that is gone on with; it needs its own")
-        request, lines = going_on(self.request), WalkLines() if self.ask else None
-        mode = mode_of(request, machine_walked(request, folder), lines.answer if lines else None)
-        plant = PlantChoice.of_run(plant_walked(request, folder))
-        return carried_out(mode, self.output, plant, lines, name="resumed")
+        return carried_out(resumed(self.folder, self.at, self.to), self.output, asks=self.ask)
 
 
 @dataclass(frozen=True)
 class CheckWalk:
-    """Check the walk in a run's folder; exit code 4 if it violates anything."""
+    """Check the run in a folder; exit code 4 if it violates anything."""
 
     folder: Annotated[Path, Option("Folder of a run, ended or killed.", placed=True)]
 
     def run(self) -> int:
-        from wbc.cli.walking import checked
+        from wbc.cli.climbing import checked
 
         return checked(self.folder)
 
@@ -180,15 +172,15 @@ class CheckWalk:
 class Compare:
     """Show what two plans do differently, a line each; exit code 1 if anything."""
 
-    one: Annotated[Path, Option("A plan.json, or the folder of a run.", placed=True)]
+    one: Annotated[Path, Option("A plan.npz, or the folder of a run.", placed=True)]
     other: Annotated[Path, Option("Another one.", placed=True)]
 
     def run(self) -> int:
         from wbc.cli.console import say
-        from wbc.walking.planner.plan import differences, read_plan
+        from wbc.climb.plan_files import differences, read_record
 
-        first, second = (read_plan(path / "plan.json" if path.is_dir() else path) for path in (self.one, self.other))
+        first, second = read_record(self.one), read_record(self.other)
         lines = differences(first, second)
-        for line in lines or [f"the same {len(first.regrasps)} re-grasps"]:
+        for line in lines or [f"the same {len(first.moves)} moves"]:
             say(line)
         return int(bool(lines))

@@ -23,6 +23,10 @@ from wbc.validation import Array
 
 #: Greatest force by which contacts are thought to squeeze what is between them, in weights; as in ``native/balance.h``
 ROOM = 1e3
+#: What a share of the weight that contacts cannot balance costs, beside one of a motor's effort
+UNBALANCED = 100.0
+#: What lacks less than this counts as rounding [N m; N; weights]
+COUNTS = 1e-6
 #: Area by which the two polygons of a region may differ [m^2]
 AREA = 1e-5
 
@@ -82,6 +86,37 @@ class Equilibrium:
         """
         held = self._checked(contacts)
         return self._with_motors(held, q, self._poses(held, q), effort, least) >= least
+
+    def lacking(self, contacts: Sequence[int], q: Array, effort: float = 1.0) -> list[tuple[str, float]]:
+        """Which joints' motors lack how much torque [N m; N] to hold the robot at rest with a share of their efforts,
+        the worst first; ``contacts`` lack shares of the weight that they do not bear. Empty where nothing lacks.
+
+            minimise  sum of s / size    over wrenches and s >= 0 with  G w = r,  A w - s <= b
+
+        Args:
+            contacts, q, effort: as of :meth:`margin`.
+
+        Raises:
+            ShapeError, RangeError: contacts that are none.
+        """
+        held, weight = self._checked(contacts), self.world.weight
+        if self.driven(held, q, 0.0, effort):
+            return []
+        G, r, A, _, b, motors = self._motors_program(held, q, self._poses(held, q), effort)
+        cones, limits = len(A) - 2 * len(motors), self.climber.robot.limits.effort[motors] / weight
+        sizes = np.concatenate([np.ones(cones), limits, limits])
+        # What no wrench of these contacts balances at all is the contacts' as well
+        base = np.vstack([np.eye(6), -np.eye(6)]).T
+        rows, count = np.hstack([A, -np.diag(sizes), np.zeros((len(A), 12))]), G.shape[1]
+        cost = np.concatenate([np.zeros(count), np.ones(len(A)), np.full(12, UNBALANCED)])
+        free = [(None, None)] * count + [(0.0, None)] * (len(A) + 12)
+        answer = linprog(cost, rows, b, np.hstack([G, np.zeros((6, len(A))), base]), r, free, method="highs")
+        over = answer.x[count : count + len(A)] * sizes
+        names = [self.climber.robot.dof_names[dof] for dof in motors]
+        both = np.maximum(over[cones : cones + len(motors)], over[cones + len(motors) :]) * weight
+        lacks = [("contacts", float(over[:cones].max(initial=0.0) + answer.x[count + len(A) :].sum()))]
+        lacks += sorted(zip(names, both.tolist(), strict=True), key=lambda lack: -lack[1])
+        return [(name, amount) for name, amount in lacks if amount > COUNTS]
 
     def wrench_slacks(self, contacts: Sequence[int], q: Array, point: Array, wrenches: Array) -> tuple[Array, Array]:
         """Slacks of contacts, turned as in a configuration, for wrenches that they have to give, and their bounds: as
@@ -183,17 +218,32 @@ class Equilibrium:
         """The slack with torques of motors within their efforts, which take no part in it; ``enough``, where the least
         forces have that.
         """
-        robot, weight = self.climber.robot, self.world.weight
-        model, data = robot.model, robot.model.createData()
-        center = self.climber.center_of_mass(q)
-        G, r, A, s, b = self._program(held, poses, center)
+        G, r, sides, slacks, ends, _ = self._motors_program(held, q, poses, effort)
         if np.linalg.matrix_rank(G) < 6:
             return -np.inf
+        sides = np.hstack([sides, slacks[:, None]])
+        if enough < np.inf and (sides @ [*np.linalg.lstsq(G, r)[0], enough] <= ends).all():
+            return enough
+        free = [(None, None)] * G.shape[1] + [(None, 1.0)]
+        cost = np.concatenate([np.zeros(G.shape[1]), [-1.0]])
+        answer = linprog(cost, sides, ends, np.hstack([G, np.zeros((6, 1))]), r, free, method="highs")
+        if answer.status != 0:
+            return -np.inf
+        slack = float(answer.x[-1])
+        return slack if not self.world.numbers.weightless else (np.inf if slack > 0.0 else -np.inf)
+
+    def _motors_program(
+        self, held: tuple[int, ...], q: Array, poses: Array, effort: float
+    ) -> tuple[Array, Array, Array, Array, Array, list[int]]:
+        """G, r, A, s and b as of :meth:`_program`, with a row for each sign of the torque of the motors at last."""
+        robot, weight = self.climber.robot, self.world.weight
+        model, data = robot.model, robot.model.createData()
+        G, r, A, s, b = self._program(held, poses, self.climber.center_of_mass(q))
         pin.computeJointJacobians(model, data, q)
         own = (
             -(self.climber.mass * pin.jacobianCenterOfMass(model, data, q)).T @ np.asarray(self.scene.gravity) / weight
         )
-        pulled = []
+        pulled = [np.zeros((model.nv, 0))]
         for limb, row in enumerate(held):
             if row >= 0:
                 cone, turn = self.world.cone(limb, int(self._first[row])), poses[limb, :9].reshape(3, 3)
@@ -205,15 +255,5 @@ class Equilibrium:
                 pulled.append(J.T @ np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
         motors = [dof for dof in robot.motors if np.isfinite(robot.limits.effort[dof])]
         torque, most = -np.hstack(pulled)[motors], effort * robot.limits.effort[motors] / weight
-        sides = np.vstack([np.hstack([A, s[:, None]]), np.hstack([torque, np.zeros((len(motors), 1))])])
-        sides = np.vstack([sides, np.hstack([-torque, np.zeros((len(motors), 1))])])
-        ends = np.concatenate([b, most - own[motors], most + own[motors]])
-        if enough < np.inf and (sides @ [*np.linalg.lstsq(G, r)[0], enough] <= ends).all():
-            return enough
-        free = [(None, None)] * G.shape[1] + [(None, 1.0)]
-        cost = np.concatenate([np.zeros(G.shape[1]), [-1.0]])
-        answer = linprog(cost, sides, ends, np.hstack([G, np.zeros((6, 1))]), r, free, method="highs")
-        if answer.status != 0:
-            return -np.inf
-        slack = float(answer.x[-1])
-        return slack if not self.world.numbers.weightless else (np.inf if slack > 0.0 else -np.inf)
+        sides, slacks = np.vstack([A, torque, -torque]), np.concatenate([s, np.zeros(2 * len(motors))])
+        return G, r, sides, slacks, np.concatenate([b, most - own[motors], most + own[motors]]), motors

@@ -82,19 +82,27 @@ class Clearances:
         """Two bodies that are nearer than they may be in a stance; None: there are none."""
         return self.moving([(row,) for row in contacts], np.array([0.0, 1.0]), np.stack([q, q]), None)
 
-    def moving(self, contacts: Sequence[Sequence[int]], times: Array, q: Array, v: Array | None) -> Nearest | None:
+    def moving(
+        self, contacts: Sequence[Sequence[int]], times: Array, q: Array, v: Array | None,
+        within: Sequence[Sequence[tuple[float, float]]] | None = None,
+    ) -> Nearest | None:  # fmt: skip
         """Two bodies that come nearer to each other than they may, and when; None: it is proven that there are none.
 
         Args:
             contacts: of each limb the rows of the footholds that it leaves, holds or lands on; ``FREE_LIMB`` for none.
             times: knots ``(n)``. q: configurations there ``(n, nq)``.
             v: velocities there ``(n, nv)``, with cubics between; None: even between knots.
+            within: of each of the contacts from when to when the limb comes, holds and leaves; None: all the time.
         """
         motion = self._motion(times, q, v)
         exempt = [
-            entry
+            replace(entry, since=since, until=until)
             for limb, rows in enumerate(contacts)
-            for row in set(rows)
+            for row, since, until in (
+                [(row, -np.inf, np.inf) for row in set(rows)]
+                if within is None
+                else [(row, *when) for row, when in zip(rows, within[limb], strict=True)]
+            )
             for entry in self._exempt(limb, row, AT_FOOTHOLD if len(set(rows)) == 1 else 0)
         ]
         swept = self._sweeper.sweep(motion, self._chosen(contacts, motion), exempt, aim="any", tolerance=TOLERANCE)
@@ -118,7 +126,7 @@ class Clearances:
         ):
             change = np.linalg.norm(rates[:-1] - mean, axis=1) + np.linalg.norm(rates[1:] - mean, axis=1)
             slack.append(float((4.0 / 27.0 * span[:, 0] * change).max()))
-        return Motion.cubic(tree, times, values, v[:, 6:], q[:, :7], free_slack=np.array([slack]))
+        return replace(motion, free_slack=np.array([slack]))
 
     def _chosen(self, contacts: Sequence[Sequence[int]], motion: Motion) -> NDArray[np.intp]:
         """Pairs of links, and links with bodies that are as near as the robot is large."""

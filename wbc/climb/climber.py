@@ -60,6 +60,7 @@ class Climber:
         limbs: two or more.
         rest: configuration ``(nq)`` [m, rad] about which postures are sought; ``robot.neutral`` where it is None.
         name: short; the robot's where it is empty.
+        height: of the body's origin over the places that it is told to go over [m]; 0: as at rest.
 
     Raises:
         ShapeError: no floating base, closed loops, less than two limbs, or a limb without a joint of its own.
@@ -72,6 +73,7 @@ class Climber:
     limbs: Sequence[ClimbLimb]
     rest: Any = None
     name: str = ""
+    height: float = 0.0
 
     def __post_init__(self) -> None:
         robot = validation.instance("Climber.robot", self.robot, Robot, "a wbc Robot, see wbc.robots.load")
@@ -91,6 +93,7 @@ class Climber:
                 raise DuplicateNameError("Climber.limbs", name, "two limbs of this name")
         object.__setattr__(self, "limbs", limbs)
         object.__setattr__(self, "name", validation.name("Climber.name", self.name or robot.name))
+        object.__setattr__(self, "height", validation.scalar("Climber.height", self.height, low=0.0, unit="m"))
         rest = robot.configuration("Climber.rest", robot.neutral if self.rest is None else self.rest)
         rest.flags.writeable = False
         object.__setattr__(self, "rest", rest)
@@ -126,10 +129,6 @@ class Climber:
     def joints(self, limb: int) -> NDArray[np.intp]:
         """Rows in v of a limb's angles ``(k)``."""
         return self._dofs[limb]
-
-    def q_rows(self, limb: int) -> NDArray[np.intp]:
-        """Rows in q of a limb's angles ``(k)``, -1 of a joint without end, which q has as (cos, sin)."""
-        return np.asarray(self.robot.position_index[self._dofs[limb]], dtype=np.intp)
 
     def fixed(self, limb: int) -> Fixed:
         """Rows of the contact's pose that a limb fixes while it holds."""

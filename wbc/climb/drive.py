@@ -11,26 +11,39 @@ from wbc import validation
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.climber import Climber
 from wbc.climb.goal import BodyPlace
+from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop import ClimbLoop
 from wbc.climb.motion import MoveError
 from wbc.climb.plan import ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import NoStancesError, StanceOptions
-from wbc.climb.stance import Stance
+from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.turn import BodyTurn, MovingStance
+from wbc.errors import InfeasibleError, RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
 
 #: How long a way is planned ahead, one after the other where there are no footholds for it [s]
 AHEAD = (8.0, 4.0, 2.0, 1.0)
+#: Rates that changed twice within this time will change again: a way is planned 2 s ahead [s]
+BUSY = 1.0
 #: Rates below these are none [m/s, rad/s]
 NONE = 1e-4
 #: How far ahead it is to come another way [s]
 OTHERWISE = 2.0
 #: Rates that a body may have at least where it goes another way round [m/s, rad/s]
-SLOWEST = 0.02
+SLOWEST = 0.01
 #: Moves that are looked at for such a way, at most
 FEW_MOVES = 400
+#: How often a body goes over into another twist at most [s]
+EVERY = 0.2
+#: A body that is to go otherwise waits so long for limbs to land, else they land afterwards [s]
+PATIENCE = 1.5
+#: Footholds to which a limb in the air is brought, the nearest first, at most
+LANDINGS = 6
+#: How far the body has gone until that is tried again [m]
+ELSEWHERE = 0.02
 #: How long a body that is not to move stands before it is asked again [s]
 STANDS = 0.1
 
@@ -40,8 +53,8 @@ class ClimbDrive:
 
         P(t) = P exp(t [v; w])
 
-    as far as there are footholds for it: 8 s ahead, then 4, 2, 1, then it stands. A new twist is taken up once all
-    limbs hold and the robot is at rest; between two ways it is at rest.
+    as far as there are footholds for it: 8 s ahead, then 4, 2, 1, then it stands. A new twist is taken up at once while
+    limbs land, where that is proven; else as soon as all hold. Between two ways the robot is at rest.
 
         drive = ClimbDrive(climber)
         loop = ClimbLoop(standing_plan(climber, scene, stance), replan=drive.following, onward=drive.onward)
@@ -61,6 +74,10 @@ class ClimbDrive:
         self.climber, self.options, self.stands = climber, options or AlongOptions(), ""
         self._about = None if about is None else validation.pose("about", about)
         self._twist, self._ends = np.zeros(6), False
+        self._new, self._turned = False, -EVERY
+        self._busy, self._changed = False, -BUSY
+        self._over: BodyTurn | None = None
+        self._aloft: tuple[tuple[int, ...], Array] = ((), np.zeros(3))
 
     def steer(self, twist: Any, loop: ClimbLoop) -> None:
         """The twist from now on (linear; angular) ``(6)`` [m/s, rad/s].
@@ -68,11 +85,28 @@ class ClimbDrive:
         Raises:
             ShapeError, NotFiniteError: no twist.
         """
+        before = self._twist
+        self.command(twist)
+        if self._twist is not before:
+            self._busy, self._changed = loop.time - self._changed < BUSY, loop.time
+        if self._new and not loop.ended and loop.time >= self._turned + EVERY:
+            self._new, self._turned = False, loop.time
+            turned = self._turn(loop)
+            if turned is None:
+                lands = max((move.land for move in loop.coming if move.lift < loop.path_time), default=0.0)
+                loop.redirect("other rates were commanded", lands > loop.path_time + PATIENCE)
+            else:
+                loop.go_over(turned)
+
+    def command(self, twist: Any) -> None:
+        """The twist ``(6)`` of what is planned from now on, where nothing is carried out yet.
+
+        Raises:
+            ShapeError, NotFiniteError: no twist.
+        """
         asked = validation.real_array("twist", twist, (6,))
         if not np.array_equal(asked, self._twist):
-            self._twist = asked
-            if not loop.ended:
-                loop.redirect("other rates were commanded")
+            self._twist, self._new = asked, True
 
     def finish(self, loop: ClimbLoop) -> None:
         """It comes to rest and the run ends."""
@@ -81,16 +115,20 @@ class ClimbDrive:
 
     def onward(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
         """What comes after a plan that is done."""
-        return None if self._ends else self.following(scene, stance)
+        if not self._ends:
+            return self.following(scene, stance)
+        return self._landing(scene, stance)
 
     def following(self, scene: ClimbScene, stance: Stance) -> ContactPlan:
         """The way from a stance on; where there is none, one on which it stands."""
         self.stands = ""
         ahead, turned = float(np.linalg.norm(self._twist[:3])), float(np.linalg.norm(self._twist[3:]))
+        if min(stance.contacts) < 0 and (landing := self._landing(scene, stance)) is not None:
+            return landing
         if ahead <= NONE and turned <= NONE:
             return standing_plan(self.climber, scene, stance)
         if min(stance.contacts) >= 0:
-            for seconds in AHEAD:
+            for seconds in AHEAD[2:] if self._busy else AHEAD:
                 try:
                     return plan_along(self.climber, scene, self._track(stance, seconds), stance, self.options)
                 except NoStancesError as error:
@@ -105,6 +143,46 @@ class ClimbDrive:
             return standing_plan(self.climber, scene, stance)
         self.stands = ""
         return plan
+
+    def _turn(self, loop: ClimbLoop) -> ContactPlan | None:
+        """How the body goes over into its twist while limbs land; None: none does, or no such plan is proven."""
+        plan, now, reference = loop.plan, loop.path_time, loop.reference
+        moves = [replace(move, lift=0.0, land=move.land - now) for move in loop.coming if move.lift < now < move.land]
+        held = {move.limb for move in moves}
+        if not moves or not loop.steady or any(move.lands == FREE_LIMB for move in moves):
+            return None
+        if self._over is None or self._over.scene is not plan.scene:
+            self._over = BodyTurn(self.climber, plan.scene, self.options.motion)
+        contacts = tuple(FREE_LIMB if k in held else row for k, row in enumerate(loop.held))
+
+        q = reference.q(now)
+        state = MovingStance(contacts, q, reference.derivatives(now)[0])
+        return self._over.planned(state, self._body_twist(q), lambda time: reference.q(now + time), moves)
+
+    def _body_twist(self, q: Array) -> Array:
+        """The twist in the axes of the body."""
+        if self._about is None:
+            return self._twist
+        return np.asarray(self.climber.body_pose(q).actInv(self._about).toActionMatrix() @ self._twist)
+
+    def _landing(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
+        """A limb in the air comes down to a foothold that is near; None: none can, or none could from near by."""
+        place = self.climber.body_pose(stance.q).translation
+        contacts, before = self._aloft
+        if contacts == stance.contacts and np.linalg.norm(place - before) < ELSEWHERE:
+            return None
+        for limb, at in enumerate(stance.contacts):
+            if at != FREE_LIMB:
+                continue
+            away = np.linalg.norm(scene.positions - self.climber.contact_pose(stance.q, limb).translation, axis=1)
+            for row in np.argsort(away)[:LANDINGS]:
+                name, foothold = self.climber.limbs[limb].name, scene.footholds[int(row)].id
+                try:
+                    return plan_limb_work(self.climber, scene, stance, name, [foothold], self.options.motion)
+                except (InfeasibleError, RangeError):
+                    continue
+        self._aloft = tuple(stance.contacts), place
+        return None
 
     def _freely(self, ahead: float, turned: float) -> ClimbOptions:
         motion = self.options.motion

@@ -13,17 +13,20 @@ from wbc.climb.climber import Climber
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import StanceOptions, counted, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.world import ClimbWorld, PostureOutcome
+from wbc.climb.world import TURNS, ClimbWorld, PostureOutcome
 
 #: Footholds that are tried of each limb, nearest first
 NEAREST = 6
 #: Stances that are tried at most
 STANCES = 400
+#: Of those in which the robot can stand at most, from which the one is chosen that the most limbs can leave
+CHOSEN = 24
 
 
 def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOptions | None = None) -> Stance:
     """The stance on the footholds nearest to the limbs in a configuration in which the robot can stand with the margin
-    of the options; limbs without a foothold near stay in the air.
+    of the options, and from which every limb can lift off, if there is one; limbs without a foothold near stay in the
+    air.
 
     Args:
         q: configuration ``(nq)`` about which it is sought, contacts near their footholds.
@@ -42,24 +45,30 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         # Of turns about the normal the nearest first
         turned = 1.0 - world.places[:, [0, 3, 6]] @ pose.rotation[:, 0] if climber.fixed(limb) == "pose" else 0.0
         cost = np.where(world.cone_of[limb] >= 0, away + 0.2 * turned, np.inf)
-        order = np.argsort(cost, kind="stable")[:NEAREST]
-        near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0]
+        order = np.argsort(cost, kind="stable")
+        holds = list(dict.fromkeys(world.hold[order[: NEAREST * TURNS]].tolist()))[:NEAREST]
+        near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0 and world.hold[k] in holds]
         choices.append(near or [(1.0, FREE_LIMB)])
     state, best, tried, outcomes = world.state_of(at), -np.inf, 0, Counter[PostureOutcome]()
+    stands, least = list[Stance](), len(choices) + 1
     for places in cheapest_first(choices):
         held = [int(world.hold[place]) for place in places if place >= 0]
         if len(set(held)) < len(held):
             continue
         tried += 1
-        if tried > STANCES:
+        if tried > STANCES or outcomes[PostureOutcome.STANDS] == CHOSEN:
             break
         contacts = world.contacts(places)
         how, found, slack, _ = world.stand(contacts, contacts, given.margin, state, followed=False)
-        if how == PostureOutcome.STANDS:
-            rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)
-            return Stance(rows, world.q_of(found))
         outcomes[how] += 1
+        if how == PostureOutcome.STANDS and (stuck := world.stuck(contacts, found)) < least:
+            rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)
+            stands, least = [Stance(rows, world.q_of(found))], stuck
+            if not stuck:
+                break
         best = max(best, slack if how == PostureOutcome.NOT_BORNE else -np.inf)
+    if stands:
+        return stands[0]
     reason = f"none of {min(tried, STANCES)} stances on the footholds nearest to it can be stood on"
     reason += f" ({counted(outcomes)})" if outcomes else ""
     if np.isfinite(best):

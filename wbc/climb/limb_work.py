@@ -10,6 +10,7 @@ import numpy as np
 from wbc import validation
 from wbc.climb.balance import Equilibrium
 from wbc.climb.climber import Climber
+from wbc.climb.let_go import joined, let_go
 from wbc.climb.motion import MotionOptions, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.reach import LimbReach
@@ -34,7 +35,8 @@ def plan_limb_work(
     targets: Sequence[Any],
     options: MotionOptions | None = None,
 ) -> ContactPlan:
-    """A plan on which a limb goes to one target after the other, at rest in each.
+    """A plan on which a limb goes to one target after the other, at rest in each. Limbs in the air that touch a body
+    leave it first, as of :func:`let_go`.
 
         plan_limb_work(climber, scene, stance, "arm3", [pin.SE3(...), "15,12"])
 
@@ -53,6 +55,7 @@ def plan_limb_work(
         raise ShapeError("targets", (), "expected one target or more")
     given = MotionOptions() if options is None else validation.instance("options", options, MotionOptions, "options")
     balance = Equilibrium(climber, scene)
+    lifting, start = let_go(climber, scene, start, given)
     others = tuple(FREE_LIMB if k == row else at for k, at in enumerate(start.contacts))
     if (slack := balance.margin(others, start.q)) < 0.0:
         raise InfeasibleError(
@@ -76,7 +79,8 @@ def plan_limb_work(
             )
         contacts = tuple(at if j == row else hold for j, hold in enumerate(others))
         stances.append(Stance(contacts, climber.with_limb(stances[-1].q, row, angles)))
-    return carry_out(climber, scene, StancePath(stances, np.zeros(len(stances) - 1)), given, balance)
+    plan = carry_out(climber, scene, StancePath(stances, np.zeros(len(stances) - 1)), given, balance)
+    return plan if lifting is None else joined(lifting, plan)
 
 
 def moved_by(pose: Any, twist: Any, seconds: float) -> list[pin.SE3]:

@@ -10,16 +10,15 @@ import numpy as np
 from wbc import validation
 from wbc.climb.climber import Climber, ClimbLimb
 from wbc.climb.contacts import ContactKind, FlatFoot, GripHand, PointFoot
+from wbc.climb.scene import FLIP
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robots.catalogue import load
 from wbc.robots.limbed import arms_on_body, limbed
 from wbc.robots.pairs import find_self_pairs
-from wbc.robots.walker_masses import with_masses
-from wbc.robots.walker_robot import walker
+from wbc.robots.walker_masses import hold_rating, with_masses
+from wbc.robots.walker_robot import Walker, walker
 
-#: From a hand's approach to the outward normal of what it holds
-FLIP = pin.SE3(pin.utils.rotate("x", pi), np.zeros(3))
 #: Acceleration of the joints of robots whose description has none [rad/s^2]: full torque on a leg without load
 QUICK = 60.0
 #: The same for a humanoid, whose limbs are heavier [rad/s^2]
@@ -65,10 +64,16 @@ def _table(frames: Sequence[str], shapes: str, acceleration: float, contact: Con
     return make
 
 
+def walking_arms(machine: Walker, name: str) -> Climber:
+    """A body with arms as a climber; of two arms one alone says where the body is, so that hands do not roll."""
+    rating, heavy = hold_rating(), with_masses(machine)
+    hand = GripHand(rating.force, rating.torque, rolls=len(machine.arms) > 2)
+    limbs = [ClimbLimb(arm.hand, hand, FLIP, arm.name) for arm in heavy.arms]
+    return Climber(heavy.robot, limbs, name=name, height=heavy.arm_data.body_height)
+
+
 def _walker(name: str) -> Climber:
-    machine = with_masses(walker())
-    hand = GripHand(rolls=True)
-    return Climber(machine.robot, [ClimbLimb(arm.hand, hand, FLIP, arm.name) for arm in machine.arms], name=name)
+    return walking_arms(walker(), name)
 
 
 def _two_ended(name: str) -> Climber:

@@ -25,6 +25,7 @@ from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene, reaches
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
+from wbc.climb.watch import PlanWatch
 from wbc.climb.world import LEFT_OUT, ClimbWorld, CloseLinks
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.validation import Array
@@ -161,6 +162,7 @@ class Mover:
     Attributes:
         climber, scene, options: as given.
         balance: what says whether contacts bear the robot; None: it is not asked, as where there is no gravity.
+        watch: the clock of the plan that moves are for; once its time is over no other way is tried.
 
     Raises:
         what :class:`Clearances` and :class:`PathTiming` raise.
@@ -170,6 +172,7 @@ class Mover:
     scene: ClimbScene
     options: MotionOptions = field(default_factory=MotionOptions)
     balance: Balanced | None = None
+    watch: PlanWatch = field(default_factory=PlanWatch, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -213,6 +216,8 @@ class Mover:
         bow, stuck = self._bow(one, other, row, known)
         look = None if self.closure.short else functools.partial(self._look, one, other)
         for shape in self._shapes(one, other, bow):
+            if refusals and self.watch.passed:
+                break
             # Where the contacts do not bear the robot another swing changes nothing, another way of the body may
             if unborne and shape.bow == bow:
                 continue
@@ -449,6 +454,8 @@ def carry_out(
     times, q, v = [np.zeros(1)], [path[0].q[None]], [np.zeros((1, climber.robot.nv))]
     moves, margins, now = list[ContactMove](), list[float](), 0.0
     for row, (one, other) in enumerate(itertools.pairwise(path)):
+        told = f"motion {row + 1} of {len(path) - 1}"
+        mover.watch.look(told.__str__)
         timed, margin = mover.moved(one, other, row)
         if margin is not None:
             margins.append(margin)

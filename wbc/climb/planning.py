@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,9 +17,10 @@ from wbc.climb.let_go import joined, let_go
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.climb.search import AT_START, LateMove, StanceOptions, StanceWay
+from wbc.climb.search import AT_START, LateMove, NoStancesError, StanceOptions, StanceWay, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.time_law import MotionSpeeds
+from wbc.climb.watch import PlanWatch
 from wbc.errors import RangeError
 from wbc.validation import Array
 
@@ -33,11 +35,22 @@ class ClimbOptions:
     Attributes:
         stances, motion: of the search and of the motion; stances keep clearances, margin and friction of both.
         again: how often stances are sought again without a move that has no motion, at most.
+        seconds: time of all of it at most [s]; a plan that it ends is refused as of a limit.
+        told: is called with what was done so far, some times a second; what it raises ends planning.
+
+    Raises:
+        RangeError: a time that is not above 0 s.
     """
 
     stances: StanceOptions = field(default_factory=StanceOptions)
     motion: MotionOptions = field(default_factory=MotionOptions)
     again: int = 80
+    seconds: float = np.inf
+    told: Callable[[str], None] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.seconds > 0.0:
+            raise RangeError("ClimbOptions.seconds", self.seconds, "expected a time above 0 s")
 
     @classmethod
     def by_torques(cls) -> ClimbOptions:
@@ -68,7 +81,8 @@ def plan_climb(
     first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
     lifting, first = let_go(climber, scene, first, given.motion)
     equilibrium = Equilibrium(climber, scene, given.motion.friction)
-    mover = Mover(climber, scene, given.motion, equilibrium)
+    watch = PlanWatch(given.seconds, given.told)
+    mover = Mover(climber, scene, given.motion, equilibrium, watch)
     sought = replace(
         given.stances,
         clearance=max(given.stances.clearance, given.motion.clearance),
@@ -77,13 +91,25 @@ def plan_climb(
         friction=min(given.stances.friction, given.motion.friction),
     )
     blamed = Counter[LateMove]()
-    way = StanceWay(climber, scene, first, goal, sought)
+    way = StanceWay(climber, scene, first, goal, sought, watch)
+    last: MoveError | None = None
     for tries in range(given.again + 1):
-        stances = way.found()
+        try:
+            stances = way.found()
+        except NoStancesError as error:
+            if last is None:
+                raise
+            before = f"{tries} ways over stances have a move without a motion, the last one {last}; no other was found"
+            raise error.about(before) from last
         try:
             plan = carry_out(climber, scene, stances, mover=mover)
             return plan if lifting is None else joined(lifting, plan)
         except MoveError as error:
+            last = error
+            if watch.passed:
+                seen = f"{tries + 1} ways over stances were found, and none could be moved along; the last: {error}"
+                reason = f"the limit of {given.seconds:g} s ended planning, which proves nothing: {seen}"
+                raise no_stances("seconds", given.seconds, reason, "limit") from error
             contacts = [tuple(stance.contacts) for stance in stances.stances]
             moves = [row for row in range(len(contacts) - 1) if contacts[row] != contacts[row + 1]]
             # A body that cannot shift is kept from the move that it shifts for, or at last from the one before

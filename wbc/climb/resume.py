@@ -7,17 +7,25 @@ import numpy as np
 from wbc import validation
 from wbc.climb.climber import Climber
 from wbc.climb.closure import CLOSED, Closure
+from wbc.climb.loop.loop import STILL
 from wbc.climb.loop.records import scene_digest
+from wbc.climb.motion import MotionOptions
+from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.turn import BodyTurn, MovingStance
 from wbc.climb.world import held_pose
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.log import Log
 from wbc.multibody import pin
+from wbc.validation import Array
 
 #: How far a configuration of a log may be from the stance that it is taken for [m, rad]: limbs under torques close
 #: up to 7.5 mm beside their footholds
 NEAR_STANCE = 0.02
+#: Time in which limbs in the air come to rest at least [s], and share of the joints' accelerations for that at most [1]
+COASTS = 0.25
+SLOWING = 0.5
 
 
 def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = None) -> Stance:
@@ -30,17 +38,8 @@ def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = 
         ShapeError: the log is of another robot or scene, or of no climb. RangeError: a time that is not in the log.
         InfeasibleError: limbs that were closed then cannot be at their footholds.
     """
-    validation.instance("log", log, Log, "a Log")
-    for field, own in (("robot_digest", climber.robot.fingerprint), ("scene_digest", scene_digest(scene))):
-        if log.meta.get(field) != own:
-            was = log.meta.get(field.removesuffix("_digest"))
-            raise ShapeError("log", was, f"its {field.removesuffix('_digest')} is another one than was given")
-    t = log["t"]
-    when = float(t[-1]) if at is None else validation.scalar("at", at, unit="s")
-    if not t[0] <= when <= t[-1]:
-        raise RangeError("at", when, f"the log is from {t[0]:g} to {t[-1]:g} s")
-    row = int(np.searchsorted(t, when + 1e-9, side="right")) - 1
-    q, contacts = log.array("q")[row], tuple(int(k) for k in log.array("contact")[row])
+    row = _row(log, climber, scene, at)
+    when, q, contacts = log["t"][row], log.array("q")[row], tuple(int(k) for k in log.array("contact")[row])
     q = climber.robot.configuration(
         "log.q", q / np.r_[np.ones(3), np.full(4, np.linalg.norm(q[3:7])), np.ones(len(q) - 7)]
     )
@@ -54,3 +53,47 @@ def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = 
             "at", when, f"limbs that held then are {max(left, moved):.3g} m or rad off their footholds"
         )
     return Stance(contacts, closed)
+
+
+def coming_to_rest(
+    log: Log, climber: Climber, scene: ClimbScene, at: float | None = None, options: MotionOptions | None = None
+) -> ContactPlan | None:
+    """How a robot that moves at an instant of its log comes to rest, proven clear: body and limbs in the air evenly,
+    limbs that hold where they do.
+
+    Args:
+        at: time [s]; None: the last one. options: clearances and limits that are kept.
+
+    Returns:
+        None where it is at rest, or no such way is proven.
+
+    Raises:
+        What :func:`stance_in` raises.
+    """
+    stance, v = stance_in(log, climber, scene, at), log.array("v")[_row(log, climber, scene, at)]
+    if float(np.abs(v).max()) <= STILL:
+        return None
+    state, robot = MovingStance(stance.contacts, stance.q, v), climber.robot
+    able = robot.limits.acceleration[robot.base_nv :] > 0.0
+    slowing = np.abs(v[robot.base_nv :][able]) / (SLOWING * robot.limits.acceleration[robot.base_nv :][able])
+    coasts = max(COASTS, float(slowing.max(initial=0.0)))
+
+    def falling(time: float) -> Array:
+        part = min(time, coasts)
+        return np.asarray(pin.integrate(robot.model, stance.q, part * (1.0 - 0.5 * part / coasts) * v))
+
+    return BodyTurn(climber, scene, options or MotionOptions()).planned(state, np.zeros(6), falling, lasts=coasts)
+
+
+def _row(log: Log, climber: Climber, scene: ClimbScene, at: float | None) -> int:
+    """The row of an instant."""
+    validation.instance("log", log, Log, "a Log")
+    for field, own in (("robot_digest", climber.robot.fingerprint), ("scene_digest", scene_digest(scene))):
+        if log.meta.get(field) != own:
+            was = log.meta.get(field.removesuffix("_digest"))
+            raise ShapeError("log", was, f"its {field.removesuffix('_digest')} is another one than was given")
+    t = log["t"]
+    when = float(t[-1]) if at is None else validation.scalar("at", at, unit="s")
+    if not t[0] <= when <= t[-1]:
+        raise RangeError("at", when, f"the log is from {t[0]:g} to {t[-1]:g} s")
+    return int(np.searchsorted(t, when + 1e-9, side="right")) - 1

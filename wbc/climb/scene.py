@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,22 +11,21 @@ from typing import Any
 import numpy as np
 
 from wbc import pickling, validation
-from wbc.clearance import EndlessCylinder, TriangleMesh
+from wbc.clearance import TriangleMesh
 from wbc.clearance.scene import Shape, Unbounded
 from wbc.climb.climber import Climber
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.geometry.kernel import segments_from
 from wbc.multibody import pin
-from wbc.shapes import HalfSpace, PlacedShape, Solid
+from wbc.robot.recipe import segment_shape
+from wbc.shapes import PlacedShape, Solid
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
-from wbc.walking.holds.files import read_structure
-from wbc.walking.holds.structure import Structure
-from wbc.walking.holds.surface import PlaneSurface
 
-#: From the approach direction of a structure's hold to the outward normal of a foothold
+#: From a frame whose z axis is the way to a surface to the one with its outward normal
 FLIP = pin.SE3(pin.utils.rotate("x", pi), np.zeros(3))
-#: A hold that does not say what it is on is on a body as near as this [m]: less than a hand is wide
-MOUNTED = 0.01
+#: An axis and a reference closer to each other than this [rad] leave the turn about the axis undetermined
+LEAST_ANGLE = 1e-6
 #: A scene whose footholds are all within this share of a robot's span is of another scale [1]
 LEAST_SHARE = 0.02
 
@@ -43,7 +41,7 @@ class Foothold:
         friction: Coulomb's coefficient of the surface here [1]; infinite: the limb's own counts alone.
         limbs: names of limbs that may hold it; empty for all.
         rolls: about z a limb that holds it may be turned against x by any multiple of 2 pi / ``rolls``; 0: by any
-            angle.
+            angle. A limb whose contact is free to turn about z, as that of a hand that rolls, is not bound by it.
 
     Raises:
         ShapeError, NotFiniteError, RotationError: no name, pose or names. RangeError: friction that is not above 0, or
@@ -87,6 +85,11 @@ class SceneBody:
         if not isinstance(self.shape, (Solid, TriangleMesh, Unbounded)):
             raise ShapeError("SceneBody.shape", self.shape, "expected a solid, a mesh or a shape without end")
         object.__setattr__(self, "placement", validation.pose("SceneBody.placement", self.placement))
+
+    def distances(self, points: Array) -> Array:
+        """Distances of points of the world ``(n, 3)`` from the shape, negative within it ``(n)`` [m]."""
+        local = (points - self.placement.translation) @ self.placement.rotation
+        return segments_from(self.shape, local, local)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,47 +193,29 @@ class ClimbScene:
         return replace(self, footholds=[replace(f, pose=by * f.pose) for f in self.footholds], bodies=bodies)
 
 
-def of_structure(structure: Structure, gravity: Any = (0.0, 0.0, 0.0)) -> ClimbScene:
-    """The scene of a structure: its holds are footholds, its surface is the body ``surface``, its obstacles are bodies.
-
-    A hold's largest tilt is not used: hands are exact. A hold that does not say what it is on is on the body that is
-    nearest to it within ``MOUNTED``.
-
-    Args:
-        gravity: [m/s^2]; structures have none.
-
-    Raises:
-        ShapeError, NotFiniteError: gravity that is not three finite numbers.
-    """
-    rolls, positions = {"free": 0, "fixed": 1}, structure.positions
-    near = {obstacle.id: obstacle.distance(positions) for obstacle in structure.obstacles}
-    if structure.surface is not None:
-        near["surface"] = structure.surface.height(positions)
-    names, away = list(near), np.abs(np.array(list(near.values()))).reshape(len(near), len(positions))
-    mounts = [names[k] if names else "" for k in (away.argmin(axis=0) if names else np.zeros(len(positions), int))]
-    on = [
-        hold.on or (mount if names and away[:, k].min() <= MOUNTED else "")
-        for k, (hold, mount) in enumerate(zip(structure.holds, mounts, strict=True))
-    ]
-    footholds = [
-        Foothold(hold.id, hold.pose * FLIP, body, rolls=rolls[hold.roll] if isinstance(hold.roll, str) else hold.roll)
-        for hold, body in zip(structure.holds, on, strict=True)
-    ]
-    bodies = {obstacle.id: SceneBody(obstacle.shape, obstacle.placement) for obstacle in structure.obstacles}
-    if structure.surface is not None:
-        surface = structure.surface
-        shape = HalfSpace() if isinstance(surface, PlaneSurface) else EndlessCylinder(surface.radius)
-        bodies["surface"] = SceneBody(shape, surface.pose)
-    return ClimbScene(footholds, bodies, gravity, structure.name)
+def bar(a: Any, b: Any, radius: float) -> SceneBody:
+    """A capsule of a radius about the segment between two points of the world [m]."""
+    shape = segment_shape(np.array(a), np.array(b), radius, 0.0)
+    return SceneBody(shape.shape, shape.placement)
 
 
-def read_scene(path: str | os.PathLike[str], gravity: Any = (0.0, 0.0, 0.0)) -> ClimbScene:
-    """The scene in a structure's file, as :func:`of_structure`.
+def frame_along(field: str, position: Any, axis: Any, reference: Any) -> pin.SE3:
+    """The frame with z along ``axis`` and x along the part of ``reference`` across it.
 
     Raises:
-        StructureFileError: a file that is missing, or that cannot be read; line and column are named.
+        ShapeError, NotFiniteError: not three finite numbers each.
+        RangeError: a direction of no length, or two that are parallel within 1e-6 rad.
     """
-    return of_structure(read_structure(path), gravity)
+    z, x = validation.unit_vector(f"{field}.axis", axis), validation.unit_vector(f"{field}.reference", reference)
+    across = x - (x @ z) * z
+    if np.linalg.norm(across) < LEAST_ANGLE:
+        raise RangeError(f"{field}.reference", reference, "parallel to the z axis: the x axis is undetermined")
+    across = across / np.linalg.norm(across)
+    # Once more, so that the frame is orthonormal to the last digits
+    across = across - (across @ z) * z
+    across = across / np.linalg.norm(across)
+    rotation = np.column_stack([across, np.cross(z, across), z])
+    return pin.SE3(rotation, validation.real_array(f"{field}.position", position, (3,)))
 
 
 def reaches(climber: Climber) -> Array:

@@ -11,10 +11,9 @@ import numpy as np
 from wbc import validation
 from wbc.clearance import CylinderInside, EndlessCylinder, TriangleMesh
 from wbc.climb.climber import Climber
-from wbc.climb.scene import ClimbScene, Foothold, SceneBody, reaches
+from wbc.climb.scene import ClimbScene, Foothold, SceneBody, bar, reaches
 from wbc.climb.surfaces import FootholdRules, footholds_on, frame_on
 from wbc.multibody import pin
-from wbc.robot.recipe import segment_shape
 from wbc.shapes import Box, Convex, HalfSpace
 from wbc.shapes.surfaces import between_rows
 from wbc.validation import Array
@@ -120,7 +119,7 @@ def _truss(rng: np.random.Generator, size: float, density: float) -> ClimbCourse
         for k, ((y, z), (v, w)) in enumerate([(corners[i], corners[j]) for i, j in ((0, 2), (1, 3), (0, 1), (2, 3))]):
             bars[f"batten {a},{k + 1}"] = np.array([x, y, z - radius]), np.array([x, v, w - radius])
         footholds.append(Foothold(f"middle {a}", frame_on([x, 0.0, 0.0], Z), f"batten {a},1"))
-    bodies = {name: _bar(a, b, radius) for name, (a, b) in bars.items()}
+    bodies = {name: bar(a, b, radius) for name, (a, b) in bars.items()}
     return _along(footholds, bodies, WEIGHTLESS, bay, (bays - 1) * bay)
 
 
@@ -224,14 +223,14 @@ def _rebar(rng: np.random.Generator, size: float, density: float) -> ClimbCourse
     bodies, footholds = dict[str, SceneBody](), list[Foothold]()
     for t in range(rows):
         y = (t - (rows - 1) / 2) * pitch
-        bodies[f"along {t}"] = _bar(y * Y - radius * Z, y * Y - radius * Z + columns * pitch * X, radius)
+        bodies[f"along {t}"] = bar(y * Y - radius * Z, y * Y - radius * Z + columns * pitch * X, radius)
         for a in range(columns):
             at = np.array([(a + 0.5) * pitch, y, 0.0])
             footholds.append(Foothold(f"{t},{a}", frame_on(at, Z), f"along {t}"))
     wide = 0.5 * (rows - 1) * pitch
     for a in range(columns + 1):
         at = a * pitch * X - radius * Z
-        bodies[f"across {a}"] = _bar(at - wide * Y, at + wide * Y, radius)
+        bodies[f"across {a}"] = bar(at - wide * Y, at + wide * Y, radius)
     return _along(footholds, bodies, WEIGHTLESS, 3 * pitch, (columns - 3) * pitch)
 
 
@@ -309,11 +308,6 @@ def _platforms(boxes: Sequence[tuple[float, float, float]], size: float, width: 
         footholds += footholds_on(f"floor {k + 1}", body.shape, body.placement, rules)
     start, end = frame_on([0.0, 0.0, boxes[0][2]], Z), frame_on([goal, 0.0, boxes[-1][2]], Z)
     return ClimbCourse(ClimbScene(footholds, bodies, EARTH), start, end)
-
-
-def _bar(a: Array, b: Array, radius: float) -> SceneBody:
-    placed_shape = segment_shape(a, b, radius, 0.0)
-    return SceneBody(placed_shape.shape, placed_shape.placement)
 
 
 def _apart(rng: np.random.Generator, width: float, height: float, least: float) -> Array:

@@ -32,6 +32,7 @@ from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
+from wbc.climb.watch import PlanWatch
 from wbc.climb.world import SPARE, ClimbWorld, PostureOutcome
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.multibody import pin
@@ -186,15 +187,20 @@ class StanceWay:
 
     What was seen on the way to other stances is kept for that.
 
+    Args:
+        watch: the clock of the plan that it is for; None: there is none.
+
     Raises:
         as :func:`find_stances`.
     """
 
     def __init__(
-        self, climber: Climber, scene: ClimbScene, start: Stance, goal: Goal, options: StanceOptions | None = None
-    ) -> None:
+        self, climber: Climber, scene: ClimbScene, start: Stance, goal: Goal, options: StanceOptions | None = None,
+        watch: PlanWatch | None = None,
+    ) -> None:  # fmt: skip
         self._options = validation.instance("options", options or StanceOptions(), StanceOptions, "options")
         self._climber, self._scene, self._start = climber, scene, start
+        self._watch = watch or PlanWatch()
         self._places: Sequence[Any] = goal.places if isinstance(goal, Route) else [goal]
         self._searches: list[StanceSearch] = []
         self._legs: list[StancePath] = []
@@ -211,7 +217,7 @@ class StanceWay:
                 start = self._legs[-1].stances[-1] if self._legs else self._start
                 target = self._places[leg]
                 self._searches.append(StanceSearch(self._climber, self._scene, start, target, self._options))
-            self._legs.append(self._searches[leg].run())
+            self._legs.append(self._searches[leg].run(self._watch))
         stances = [self._start, *itertools.chain.from_iterable(leg.stances[1:] for leg in self._legs)]
         least = min(float(leg.margins[0]) for leg in self._legs)
         margins = [least, *itertools.chain.from_iterable(leg.margins[1:] for leg in self._legs)]
@@ -277,7 +283,7 @@ class StanceSearch:
         counted = options.effort < np.inf and np.any(scene.gravity)
         self._balance = Equilibrium(climber, scene, options.friction) if counted else None
 
-    def run(self) -> StancePath:
+    def run(self, watch: PlanWatch) -> StancePath:
         """The way found, see :func:`find_stances`; called again, one without the moves that were forbidden since."""
         if not self._known:
             first = self.first = self._nearest = self._checked_start()
@@ -300,7 +306,8 @@ class StanceSearch:
             if id(node) in self._removed:
                 continue
             self._push(node, moves)
-            if sum(self.tried.values()) >= most or time.monotonic() > until:
+            watch.look(self._so_far)
+            if sum(self.tried.values()) >= most or time.monotonic() > until or watch.passed:
                 raise self._refusal("limit")
             if self._forbidden(node.contacts, after):
                 continue
@@ -605,6 +612,10 @@ class StanceSearch:
             reason = f"no stance there is within reach: {lacking}; {saw}; {which}"
             return no_stances("goal", goal, reason, "goal", nearest)
         return no_stances("goal", goal, f"every stance that can be come to was seen: {saw}; {which}", cause, nearest)
+
+    def _so_far(self) -> str:
+        away, tried = self._distance(self._nearest), sum(self.tried.values())
+        return f"{self.seen} stances, {tried} moves looked at, {away:.3g} m to go"
 
     def _told(self, node: _Node) -> str:
         held = zip(self._names, self._rows(node.contacts), strict=True)

@@ -1,41 +1,45 @@
-"""Where the plans of a climb come from: a goal, rates of the body, targets of one limb; and what happens meanwhile."""
+"""Where the plans of a climb come from: a path, rates of the body, work of one limb; and what happens meanwhile."""
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import wbc.log
-from wbc.climb import scenes
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.drive import ClimbDrive, standing_plan
 from wbc.climb.first import first_stance
-from wbc.climb.goal import BodyPlace, LimbAt
+from wbc.climb.goal import BodyPlace, LimbAt, Route
+from wbc.climb.let_go import joined
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import ClimbLoop
 from wbc.climb.loop.loop import Onward, Replan
 from wbc.climb.motion import MoveError
 from wbc.climb.plan import ContactPlan
+from wbc.climb.plan_files import read_plan
 from wbc.climb.planning import ClimbOptions, plan_climb
-from wbc.climb.request import ClimbRequest
-from wbc.climb.resume import stance_in
+from wbc.climb.rates import TwistSource, TwistTable, read_twists, round_surface, twist_of, twists_of
+from wbc.climb.request import ClimbRequest, DriveRequest, LimbRequest, PathRequest
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import NoStancesError
-from wbc.climb.stance import Stance
+from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
+from wbc.track.target_file import read_targets
 from wbc.validation import Array
 
-#: "NUMBERS for SECONDS"
-_RATES = re.compile(r"\s*([^\s]+)\s+for\s+(\S+)\s*")
 #: "NAME at SECONDS"
 _AT = re.compile(r"\s*(.+?)\s+at\s+(\S+)\s*")
+#: A body so near to the end of its way is there [m]
+THERE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,179 +47,274 @@ class PlanSource:
     """What a loop carries out.
 
     Attributes:
-        first: the plan that it begins with. replan: what it asks where the plan cannot go on. onward: what it asks once
-            a plan is done; None: that is the end.
+        plan: makes the plan that it begins with. replan: what it asks where the plan cannot go on. onward: what it asks
+            once a plan is done; None: that is the end.
         before_tick: what is done before every tick.
-        most: time after which it is ended [s].
+        lasts: until which time it is driven [s]; None: as long as the plan takes.
+        notes: what plans do otherwise than was asked.
     """
 
-    first: ContactPlan
+    plan: Callable[[], ContactPlan]
     replan: Replan
     onward: Onward | None
     before_tick: Callable[[ClimbLoop], None]
-    most: float
+    lasts: float | None = None
+    notes: list[str] = field(default_factory=list)
 
 
-def source_of(request: ClimbRequest, climber: Climber, scene: ClimbScene, start: pin.SE3, goal: pin.SE3) -> PlanSource:
+@dataclass(frozen=True, eq=False)
+class ClimbSetup:
+    """What a request means: a robot, a scene, and where on it.
+
+    Attributes:
+        request: what was asked. climber: the robot.
+        scene: what it climbs, all of it.
+        way: poses of the body over the places of the request, the first one where it begins.
+        stance: where the robot stands, on footholds of ``scene``; None: a first stance is to be found.
+        rest: how it comes to rest there first, where it moved; None: it stands.
+        since: time that has passed for what happens meanwhile [s].
+        told: is called with how far planning is.
+    """
+
+    request: ClimbRequest
+    climber: Climber
+    scene: ClimbScene
+    way: tuple[pin.SE3, ...]
+    stance: Stance | None = None
+    rest: ContactPlan | None = None
+    since: float = 0.0
+    told: Callable[[str], None] | None = None
+
+    @property
+    def options(self) -> ClimbOptions:
+        """What plans for the request's plant keep, at the speeds that it asks for."""
+        options = ClimbOptions() if self.request.plant.plant == "kinematic" else ClimbOptions.by_torques()
+        mode = self.request.mode
+        if not isinstance(mode, PathRequest):
+            return options
+        options = replace(options, seconds=mode.planning_time, told=self.told)
+        if not mode.speed:
+            return options
+        speeds = replace(options.motion.speeds, speed=mode.speed, turn_rate=mode.turn_rate)
+        return replace(options, motion=replace(options.motion, speeds=speeds))
+
+    @property
+    def along(self) -> AlongOptions:
+        """The same for plans along a way."""
+        options = self.options
+        return AlongOptions(options.motion, options.stances.margin)
+
+    def stands(self) -> Stance:
+        """Where the robot stands at first.
+
+        Raises:
+            NoStancesError: nowhere.
+        """
+        if self.stance is not None:
+            return self.stance
+        begun = self.climber.with_body(self.climber.rest, self.way[0])
+        return first_stance(self.climber, self.scene, begun, self.options.stances)
+
+
+def source_of(setup: ClimbSetup, twists: TwistSource | None = None) -> PlanSource:
     """The source that a request asks for.
 
     Args:
-        start, goal: frames on the scene's surface, z outwards, x along the way.
+        twists: what drives the body in place of the request's file, as a keyboard; of drives.
 
     Raises:
-        ShapeError, RangeError: texts that are none, or sources that do not go together. What planners raise.
+        ShapeError, RangeError: texts that are none. What files and planners raise.
     """
-    chosen = [name for name, given in (("drive", request.drive), ("limb", request.limb)) if given]
-    if len(chosen) > 1 or (chosen and request.resume is not None and request.goal is not None):
-        raise ShapeError("drive", request.drive, "give rates, a limb, or a goal, and not two of them")
-    if bool(request.limb) != bool(request.do):
-        raise ShapeError("do", request.do, "give a limb and what it does together")
-    events = _events(request)
-    if request.resume is not None:
-        stance = stance_in(wbc.log.load(request.resume), climber, scene, request.at)
+    mode, rest = setup.request.mode, setup.rest
+    if isinstance(mode, DriveRequest):
+        given = twists or (read_twists(mode.commands) if mode.commands else twists_of(mode.rate))
+        source = _driven(setup, given)
     else:
-        stance = None
-    if request.drive:
-        return _driven(request, climber, scene, stance or _stands(request, climber, scene, start), events)
-    if request.limb:
-        return _worked(request, climber, scene, stance or _stands(request, climber, scene, start), events)
-    return _walked(request, climber, scene, start, goal, stance=stance, events=events)
+        source = _worked(setup, mode) if isinstance(mode, LimbRequest) else _walked(setup, mode)
+    return source if rest is None else replace(source, plan=lambda: joined(rest, source.plan()))
 
 
-def _stands(request: ClimbRequest, climber: Climber, scene: ClimbScene, start: pin.SE3) -> Stance:
-    return first_stance(climber, scene, scenes.placed(climber, start), _options(request).stances)
+def _walked(setup: ClimbSetup, mode: PathRequest) -> PlanSource:
+    climber, notes = setup.climber, list[str]()
+    given = read_plan(mode.plan, climber, setup.scene) if mode.plan else None
 
+    def along(now: ClimbScene, at: Stance | None, poses: Sequence[pin.SE3]) -> ContactPlan | None:
+        if mode.objective != "velocity" or not mode.speed or (at is not None and min(at.contacts) == FREE_LIMB):
+            return None
+        try:
+            return plan_along(climber, now, BodyTrack(poses, mode.speed, mode.turn_rate), at, setup.along)
+        except NoStancesError as error:
+            notes.append(f"slower than asked, over other stances: {error}")
+            return None
 
-def _options(request: ClimbRequest) -> ClimbOptions:
-    """What plans for the request's plant keep, at the speeds that it asks for."""
-    options = ClimbOptions.by_torques() if request.plant == "mujoco" else ClimbOptions()
-    if request.speed <= 0.0:
-        return options
-    speeds = replace(options.motion.speeds, speed=request.speed, turn_rate=request.turn_rate)
-    return replace(options, motion=replace(options.motion, speeds=speeds))
-
-
-def _along(options: ClimbOptions) -> AlongOptions:
-    return AlongOptions(options.motion, options.stances.margin)
-
-
-def _walked(
-    request: ClimbRequest, climber: Climber, scene: ClimbScene, start: pin.SE3, goal: pin.SE3, *, stance: Stance | None,
-    events: Callable[[ClimbLoop], None],
-) -> PlanSource:  # fmt: skip
-    options = _options(request)
-
-    def replan(now: ClimbScene, at: Stance) -> ContactPlan:
-        goals = _goals(climber, now, goal)
+    def over_stances(now: ClimbScene, at: Stance, left: Sequence[pin.SE3]) -> ContactPlan:
+        goals, options, begun = _goals(climber, now, left), setup.options, time.monotonic()
         for k, sought in enumerate(goals):
             try:
-                return plan_climb(climber, now, at, sought, options)
+                still = options.seconds - (time.monotonic() - begun)
+                return plan_climb(climber, now, at, sought, replace(options, seconds=still))
             except (NoStancesError, MoveError):
-                if k == len(goals) - 1:
+                if k == len(goals) - 1 or time.monotonic() - begun >= options.seconds:
                     raise
         raise AssertionError
 
-    first = None
-    if stance is None and request.speed > 0.0:
-        poses = [climber.body_pose(scenes.placed(climber, frame)) for frame in (start, goal)]
-        try:
-            first = plan_along(
-                climber, scene, BodyTrack(poses, request.speed, request.turn_rate), None, _along(options)
-            )
-        except NoStancesError:
-            first = None
-    if first is None:
-        first = replan(scene, stance or _stands(request, climber, scene, start))
-    return PlanSource(first, replan, None, events, 2.0 * float(first.times[-1]) + 10.0)
+    def replan(now: ClimbScene, at: Stance) -> ContactPlan:
+        here = climber.body_pose(at.q)
+        left = still_to_go(setup.way, here)
+        near = np.linalg.norm(left[0].translation - here.translation) <= THERE
+        plan = None if near else along(now, at, (here, *left))
+        return plan or over_stances(now, at, left)
+
+    def first() -> ContactPlan:
+        if given is not None:
+            return given
+        if setup.stance is not None:
+            return replan(setup.scene, setup.stance)
+        return along(setup.scene, None, setup.way) or over_stances(setup.scene, setup.stands(), setup.way[1:])
+
+    return PlanSource(first, replan, None, events_of(setup), notes=notes)
 
 
-def _goals(climber: Climber, scene: ClimbScene, goal: pin.SE3) -> list[BodyPlace | LimbAt]:
-    """The body over a frame; where limbs with few joints take it along, so that it seldom can be at a place of its own,
-    one of them at the foothold that is nearest to the frame.
+def still_to_go(way: Sequence[pin.SE3], here: pin.SE3) -> tuple[pin.SE3, ...]:
+    """The places of a way that are left for a body: those after the leg that it is nearest to, of two the earlier."""
+    points = np.array([pose.translation for pose in way])
+    begins, legs = points[:-1], np.diff(points, axis=0)
+    if not len(legs):
+        return tuple(way)
+    part = np.einsum("ij,ij->i", here.translation - begins, legs) / np.maximum(np.einsum("ij,ij->i", legs, legs), 1e-12)
+    away = np.linalg.norm(begins + np.clip(part, 0.0, 1.0)[:, None] * legs - here.translation, axis=1)
+    leg = int(np.argmin(away > away.min() + THERE))
+    at_its_end = leg + 2 < len(way) and float(np.linalg.norm(points[leg + 1] - here.translation)) <= THERE
+    return tuple(way[leg + 1 + int(at_its_end) :])
+
+
+def _goals(climber: Climber, scene: ClimbScene, way: Sequence[pin.SE3]) -> list[Route]:
+    """The body at one pose after the other; where limbs with few joints take it along, so that it seldom can be at a
+    place of its own, one of them at the foothold that is nearest to the middle of the limbs there.
     """
     if not Closure(climber).short:
-        return [BodyPlace(climber.body_pose(scenes.placed(climber, goal)).translation)]
-    nearest = int(np.argmin(np.linalg.norm(scene.positions - goal.translation, axis=1)))
-    return [LimbAt(limb.name, scene.footholds[nearest].id) for limb in climber.limbs]
+        return [Route([BodyPlace(pose.translation) for pose in way])]
+    nearest = []
+    for pose in way:
+        q = climber.with_body(climber.rest, pose)
+        tips = [climber.contact_pose(q, limb).translation for limb in range(len(climber.limbs))]
+        away = np.linalg.norm(scene.positions - np.mean(tips, axis=0), axis=1)
+        nearest.append(scene.footholds[int(np.argmin(away))].id)
+    return [Route([LimbAt(limb.name, foothold) for foothold in nearest]) for limb in climber.limbs]
 
 
-def _driven(
-    request: ClimbRequest, climber: Climber, scene: ClimbScene, stance: Stance, events: Callable[[ClimbLoop], None]
-) -> PlanSource:
-    commands = [_rates("drive", text) for text in request.drive]
-    ends = np.cumsum([seconds for _, seconds in commands])
-    drive = ClimbDrive(climber, options=_along(_options(request)))
+def _driven(setup: ClimbSetup, twists: TwistSource) -> PlanSource:
+    drive, events = ClimbDrive(setup.climber, options=setup.along), events_of(setup)
+    now: Array | None = np.zeros(6)
 
     def before_tick(loop: ClimbLoop) -> None:
+        nonlocal now
         events(loop)
-        leg = int(np.searchsorted(ends, loop.time, side="right"))
-        if leg < len(commands):
-            drive.steer(commands[leg][0], loop)
-        else:
+        if now is None:
+            return
+        asked = twists.at(loop.time)
+        if asked is None:
             drive.finish(loop)
+        elif not np.array_equal(asked, now):
+            drive.steer(round_surface(loop.scene, setup.climber.body_pose(loop.stance.q), asked), loop)
+        now = asked
 
-    first = standing_plan(climber, scene, stance)
-    return PlanSource(first, drive.following, drive.onward, before_tick, 2.0 * float(ends[-1]) + 30.0)
+    def first() -> ContactPlan:
+        return standing_plan(setup.climber, setup.scene, setup.stands())
+
+    lasts = float(twists.times[-1]) if isinstance(twists, TwistTable) else np.inf
+    return PlanSource(first, drive.following, drive.onward, before_tick, lasts)
 
 
-def _worked(
-    request: ClimbRequest, climber: Climber, scene: ClimbScene, stance: Stance, events: Callable[[ClimbLoop], None]
-) -> PlanSource:
-    pose, targets = climber.contact_pose(stance.q, climber.row(request.limb)), list[Any]()
-    for text in request.do:
-        what, _, rest = text.strip().partition(" ")
-        if what == "hold":
-            targets.append(rest.strip())
-            pose = scene.footholds[scene.row(targets[-1])].pose
-        elif what == "rate":
-            twist, seconds = _rates("do", rest)
-            targets += moved_by(pose, twist, seconds)
+def _worked(setup: ClimbSetup, mode: LimbRequest) -> PlanSource:
+    climber, scene = setup.climber, setup.scene
+    limb = mode.limb or climber.limbs[0].name
+    row, steps = climber.row(limb), [_step(scene, text) for text in mode.do]
+    last = list[Any]()
+
+    def first() -> ContactPlan:
+        stance = setup.stands()
+        pose, targets, leaving = climber.contact_pose(stance.q, row), list[Any](), 0
+        for what, given in steps:
+            if what == "hold":
+                targets.append(given)
+                pose = scene.footholds[scene.row(given)].pose
+                continue
+            if what == "rate":
+                leaving = leaving if targets else len(moved_by(pose, *given)) - 1
+                targets += moved_by(pose, *given)
+            else:
+                targets += [t.pose if t.oriented else pin.SE3(pose.rotation, t.pose.translation) for t in given]
             pose = targets[-1]
-        else:
-            raise ShapeError("do", text, "expected 'hold FOOTHOLD' or 'rate VX,VY,VZ,WX,WY,WZ for SECONDS'")
-
-    motion = _options(request).motion
+        last[:] = targets[-1:]
+        # On its way off a foothold a limb is at first too near to what it held to rest there
+        for left_out in range(leaving):
+            with contextlib.suppress(MoveError):
+                return plan_limb_work(climber, scene, stance, limb, targets[left_out:], setup.options.motion)
+        return plan_limb_work(climber, scene, stance, limb, targets[leaving:], setup.options.motion)
 
     def replan(now: ClimbScene, at: Stance) -> ContactPlan:
-        return plan_limb_work(climber, now, at, request.limb, targets[-1:], motion)
+        return plan_limb_work(climber, now, at, limb, last, setup.options.motion)
 
-    first = plan_limb_work(climber, scene, stance, request.limb, targets, motion)
-    return PlanSource(first, replan, None, events, 2.0 * float(first.times[-1]) + 10.0)
+    return PlanSource(first, replan, None, events_of(setup))
 
 
-def _events(request: ClimbRequest) -> Callable[[ClimbLoop], None]:
+def _step(scene: ClimbScene, text: str) -> tuple[str, Any]:
+    """What a limb is to do: to a foothold, through poses, or by a twist for a time."""
+    what, _, rest = text.strip().partition(" ")
+    rest = rest.strip()
+    if what == "hold" and rest:
+        return what, scene.footholds[scene.row(rest)].id
+    if what == "poses" and rest:
+        return what, read_targets(Path(rest))
+    if what == "rate":
+        return what, twist_of("do", rest)
+    expected = "'hold FOOTHOLD', 'poses FILE' or 'rate VX,VY,VZ,WX,WY,WZ for SECONDS'"
+    raise ShapeError("do", text, f"expected {expected}")
+
+
+@dataclass(frozen=True)
+class Happening:
+    """A foothold that vanishes, or a limb that fails: ``what`` happens to ``name`` at ``time`` [s]."""
+
+    time: float
+    what: str
+    name: str
+
+
+def happenings(request: ClimbRequest) -> list[Happening]:
+    """What a request says that happens, by time.
+
+    Raises:
+        ShapeError, RangeError: texts that are none.
+    """
+    plant = request.plant
+    asked = [("vanish", text) for text in plant.vanish] + [("fail", text) for text in plant.fail]
+    return sorted((_when(what, text) for what, text in asked), key=lambda happening: happening.time)
+
+
+def events_of(setup: ClimbSetup) -> Callable[[ClimbLoop], None]:
     """What happens at its time: footholds that vanish, limbs that fail."""
-    waiting = sorted(
-        [(*_when("vanish", text), "vanish") for text in request.vanish]
-        + [(*_when("fail", text), "fail") for text in request.fail]
-    )
+    waiting = happenings(setup.request)
+    for happening in waiting:
+        if happening.what == "fail":
+            setup.climber.row(happening.name)
+        else:
+            setup.scene.row(happening.name)
 
     def happen(loop: ClimbLoop) -> None:
-        while waiting and loop.time >= waiting[0][0]:
-            _, name, what = waiting.pop(0)
-            if what == "fail":
-                loop.fail(name)
+        while waiting and setup.since + loop.time >= waiting[0].time:
+            happening = waiting.pop(0)
+            if happening.what == "fail":
+                loop.fail(happening.name)
             else:
-                loop.see(loop.scene.without(name))
+                gone = happening.name in {foothold.id for foothold in loop.scene.footholds}
+                loop.see(loop.scene.without(happening.name) if gone else loop.scene)
 
     return happen
 
 
-def _rates(field: str, text: str) -> tuple[Array, float]:
-    """A twist and for how long [s]."""
-    parts = _RATES.fullmatch(text)
-    try:
-        if parts is None:
-            raise ValueError
-        numbers, seconds = np.array([float(part) for part in parts[1].split(",")]), float(parts[2])
-    except ValueError:
-        raise ShapeError(field, text, "expected 'VX,VY,VZ,WX,WY,WZ for SECONDS'") from None
-    if len(numbers) != 6 or not np.isfinite([*numbers, seconds]).all() or not seconds > 0.0:
-        raise ShapeError(field, text, "expected six finite rates and a time above 0 s")
-    return numbers, seconds
-
-
-def _when(field: str, text: str) -> tuple[float, str]:
+def _when(field: str, text: str) -> Happening:
     parts = _AT.fullmatch(text)
     try:
         if parts is None:
@@ -223,6 +322,6 @@ def _when(field: str, text: str) -> tuple[float, str]:
         seconds = float(parts[2])
     except ValueError:
         raise ShapeError(field, text, "expected 'NAME at SECONDS'") from None
-    if not seconds >= 0.0:
-        raise RangeError(field, seconds, "expected a time of at least 0 s")
-    return seconds, parts[1]
+    if not 0.0 <= seconds < np.inf:
+        raise RangeError(field, seconds, "expected a finite time of at least 0 s")
+    return Happening(seconds, field, parts[1])

@@ -169,18 +169,30 @@ class PathTiming:
     def _used(self, times: Array, coordinates: Array, rates: Array) -> float:
         """By which factor the cubics between knots have to be slowed to keep all limits."""
         velocity, acceleration = self._limits
-        h, step = np.diff(times)[:, None], np.diff(coordinates, axis=0)
-        a, b = rates[:-1], rates[1:]
-        speeds = np.concatenate([rates, 3.0 * step / h - a - b])
-        pulls = np.concatenate([(6.0 * step / h - 4.0 * a - 2.0 * b) / h, (-6.0 * step / h + 2.0 * a + 4.0 * b) / h])
-        body = [np.linalg.norm(speeds[:, part], axis=1).max() for part in (slice(3), slice(3, 6))]
-        ratio = max(
-            float((np.abs(speeds[:, 6:]) / velocity[6:]).max()),
-            float(np.sqrt((np.abs(pulls[:, 6:]) / acceleration[6:]).max())),
-            float(body[0] / self.speeds.speed),
-            float(body[1] / self.speeds.turn_rate),
-        )
+        speeds = _hull(times, coordinates[:, :6], rates[:, :6])[0]
+        body = [np.linalg.norm(speeds[..., part], axis=-1).max() for part in (slice(3), slice(3, 6))]
+        needs = cubics_need(times, coordinates[:, 6:], rates[:, 6:], velocity[6:], acceleration[6:])
+        ratio = max(float(needs.max()), float(body[0] / self.speeds.speed), float(body[1] / self.speeds.turn_rate))
         return ratio * (1.0 + 1e-6) if ratio > 1.0 else 1.0
+
+
+def cubics_need(times: Array, values: Array, rates: Array, velocity: Array, acceleration: Array) -> Array:
+    """By which factor the cubic of each interval has to be slowed to keep limits, at least ``(n - 1)``.
+
+    Args:
+        values, rates: at the knots ``(n, k)``. velocity, acceleration: limits ``(k)``.
+    """
+    speeds, pulls = _hull(times, values, rates)
+    parts = (np.abs(speeds) / velocity).max(axis=(0, 2)), np.sqrt((np.abs(pulls) / acceleration).max(axis=(0, 2)))
+    return np.asarray(np.maximum(*parts))
+
+
+def _hull(times: Array, values: Array, rates: Array) -> tuple[Array, Array]:
+    """Rates ``(3, n - 1, k)`` and accelerations ``(2, n - 1, k)`` between which those of cubics between knots are."""
+    h, step = np.diff(times)[:, None], np.diff(values, axis=0)
+    a, b = rates[:-1], rates[1:]
+    pulls = (6.0 * step / h - 4.0 * a - 2.0 * b) / h, (-6.0 * step / h + 2.0 * a + 4.0 * b) / h
+    return np.stack([a, 3.0 * step / h - a - b, b]), np.stack(pulls)
 
 
 def fastest(s: Array, a: Array, b: Array, squared: Array, sided: tuple[Array, Array] | None = None) -> Array:

@@ -94,7 +94,7 @@ class _ClimbNumbers(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("limb", "offset", "foothold", "cone_of", "cone", "on", "hold", "piece")),
         *((name, ctypes.c_void_p) for name in ("shape", "body", "pair", "support")),
         *((name, ctypes.c_int) for name in ("places", "supports", "largest")),
-        ("work", ctypes.c_void_p),
+        *((name, ctypes.c_void_p) for name in ("work", "gap")),
         *((name, ctypes.c_long) for name in ("programs", "searches", "sweeps", "measured")),
     ]
 
@@ -307,6 +307,10 @@ class ClimbWorld:
         )  # fmt: skip
         return PostureOutcome(how), out, float(slack[0]), which
 
+    def stuck(self, contacts: NDArray[np.int32], state: Array) -> int:
+        """How many limbs cannot lift off where they hold without links that touch, the body as it is."""
+        return int(self._code.wbc_stuck(self._world, _at(contacts), _at(state)))
+
     def lift(
         self, contacts: NDArray[np.int32], kept: NDArray[np.int32], wanted: float, state: Array, attempt: int = 0
     ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32], bool]:
@@ -330,38 +334,6 @@ class ClimbWorld:
             _at(slack), _at(which),
         )  # fmt: skip
         return PostureOutcome(how), out, float(slack[0]), which
-
-    def pieces(self, limb: int, angles: Array) -> Array:
-        """Poses in the body's frame of the centres of a limb's shapes at some angles ``(n, pieces, 12)``."""
-        given = np.ascontiguousarray(angles)
-        out = np.empty((len(given), self._code.wbc_pieces_of(self._world, limb, ctypes.c_long(0), None, None), 12))
-        self._code.wbc_pieces_of(self._world, limb, ctypes.c_long(len(given)), _at(given), _at(out))
-        return out
-
-    def alone(
-        self, limb: int, pieces: Array, bodies: Array, contact: NDArray[np.int32], off: Array
-    ) -> NDArray[np.bool_]:  # fmt: skip
-        """At which instants a limb is too near to the scene, to the body or to itself ``(n)``.
-
-        Args:
-            pieces: of the limb, as of :meth:`pieces`. bodies: poses of the body ``(n, 12)``. contact: places ``(n)``
-                that it holds, comes from or goes to. off: how far from there its contact is ``(n)`` [m].
-        """
-        marks, work = np.zeros(len(pieces), dtype=np.bool_), np.empty((len(pieces), 13))
-        given = [np.ascontiguousarray(array) for array in (pieces, bodies, contact, off)]
-        self._code.wbc_mark_alone(
-            self._world, limb, *map(_at, given), ctypes.c_long(len(pieces)), _at(marks), _at(work)
-        )  # fmt: skip
-        return marks
-
-    def beside(self, one: int, pieces: Array, other: int, others: Array) -> NDArray[np.bool_]:
-        """At which instants two limbs are too near to each other ``(n)``, by the poses of their pieces."""
-        marks = np.zeros(len(pieces), dtype=np.bool_)
-        given = [np.ascontiguousarray(array) for array in (pieces, others)]
-        self._code.wbc_mark_limbs(
-            self._world, one, _at(given[0]), other, _at(given[1]), ctypes.c_long(len(pieces)), _at(marks)
-        )  # fmt: skip
-        return marks
 
     def first_touch(self, contacts: NDArray[np.int32], states: Array) -> CloseLinks | None:
         """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may

@@ -44,11 +44,6 @@ class MomentumObserver:
         self.residual[:] = 0.0
         self._sum[:] = self._momentum(q, v)
 
-    def struck(self, q: Array, v: Array) -> None:
-        """The velocity has jumped to v by a blow that is known, such as a hand that closes: r stays as it is."""
-        momentum = self._momentum(q, v)
-        self._sum[:] = momentum - self.residual / self._gain
-
     def update(self, q: Array, v: Array, torque: Array) -> Array:
         """A period on.
 

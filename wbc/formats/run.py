@@ -16,7 +16,7 @@ from wbc.controller.step import state_of
 from wbc.errors import WbcError
 from wbc.formats.errors import FormatError
 from wbc.log import Log, LogFile, load
-from wbc.log.log import log_of
+from wbc.log.log import FILES, log_of
 from wbc.multibody import pin
 from wbc.record.recorder import recorded_inputs
 from wbc.record.recording import Recording
@@ -85,8 +85,8 @@ class Run:
         if recording is not None:
             file = LogFile(recording)
             self._file = Recording(recording) if "kinds" not in file.about else file
-        elif path.is_dir() and not any(path.glob("log.*")) and (path / "run.part").is_file():
-            self._file = LogFile(path / "run.part")
+        elif path.is_dir() and (part := _unfinished(path)) is not None:
+            self._file = LogFile(part)
         elif path.suffix == ".part" and is_recording(path):
             self._file = LogFile(path)
         else:
@@ -226,6 +226,12 @@ class Run:
             for number, frame in enumerate(model.frames)
             if frame.type == pin.FrameType.BODY
         }
+
+
+def _unfinished(folder: pathlib.Path) -> pathlib.Path | None:
+    """The log of a run that was killed, of a folder that has no whole one."""
+    there = [folder / name for name in FILES if (folder / name).is_file()]
+    return there[0] if there and there[0].suffix == ".part" else None
 
 
 def seven(pose: pin.SE3) -> Array:

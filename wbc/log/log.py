@@ -20,7 +20,7 @@ from wbc.validation import Array
 
 FORMATS = ("parquet", "npz")
 #: Logs in a run's folder, of which the first that is there is read: whole ones, and one that is still written
-FILES = (*(f"log.{kind}" for kind in FORMATS), "run.npz", "run.part")
+FILES = (*(f"log.{kind}" for kind in FORMATS), "log.part", "run.npz", "run.part")
 #: Key of what a file says about its columns
 _META = "wbc"
 #: What keys of tables begin with

@@ -28,8 +28,6 @@ LABELS = {
 }
 #: Width and height of one half of the film [pixels]
 SIZE = (360, 360)
-#: Rays along each side of a pixel
-RAYS = 2
 #: Pictures of the film a second [1/s]
 FRAMES_PER_SECOND = 5
 #: Pictures of the film, at most

@@ -20,7 +20,6 @@ from wbc.simulation import Plant
 from wbc.validation import Array
 
 MOTIONS = ("sea", "tumble", "swing", "rest")
-JOBS = ("peg", "grasp")
 #: Significant heights of a sea along x, y, z [m] and about them [rad]
 SIGNIFICANT = (0.04, 0.04, 0.06, 0.07, 0.07, 0.07)
 #: Peak period of a sea [s]

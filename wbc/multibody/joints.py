@@ -6,6 +6,7 @@ quaternion; v is the twist of the child side in its own axes, in the directions 
 
 from __future__ import annotations
 
+import copy
 import math
 from functools import partial
 from typing import Any
@@ -14,12 +15,12 @@ import numpy as np
 
 from wbc.multibody import rotations as turns
 from wbc.multibody.rotations import Array, vector
-from wbc.multibody.spatial import SE3, LikePinocchio, SpatialMotion, exp6, log6
+from wbc.multibody.spatial import SE3, Copied, SpatialMotion, exp6, log6
 
 _PREFIX = "JointModel"
 
 
-class JointModel(LikePinocchio):
+class JointModel(Copied):
     """A joint; ``idx_q`` and ``idx_v`` say where its numbers begin in q and v once a model has it.
 
     Attributes:
@@ -39,6 +40,12 @@ class JointModel(LikePinocchio):
     def shortname(self) -> str:
         """The name of its kind, as Pinocchio has it."""
         return _PREFIX + self._name
+
+    def copy(self) -> JointModel:
+        """A joint of its own."""
+        out = copy.copy(self)
+        out.S, out.neutral = self.S.copy(), self.neutral.copy()
+        return out
 
     def extract(self) -> JointModel:
         """The joint itself."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc.multibody.joints import JointModel
 from wbc.multibody.rotations import Array
-from wbc.multibody.spatial import SE3, Inertia, LikePinocchio, SpatialMotion
+from wbc.multibody.spatial import SE3, Copied, Inertia, LikePinocchio, SpatialMotion
 
 #: Standard gravity, upwards [m/s^2], which a model has that says nothing else
 GRAVITY = -9.81
@@ -53,7 +53,7 @@ class ReferenceFrame(IntEnum):
 _ANY = ~FrameType(0)
 
 
-class FrameOnJoint(LikePinocchio):
+class FrameOnJoint(Copied):
     """A named placement on the body of a joint.
 
     ``FrameOnJoint(name, joint, frame it hangs on, placement, type, inertia)``, or without the frame that it hangs on.
@@ -64,6 +64,12 @@ class FrameOnJoint(LikePinocchio):
         self.name, self.parentJoint, self.parentFrame = str(name), int(joint), int(above)
         self.placement, self.type = SE3(placement), FrameType(kind)
         self.inertia = Inertia(*inertia)
+
+    def copy(self) -> FrameOnJoint:
+        """A frame of its own."""
+        out = copy.copy(self)
+        out.placement, out.inertia = self.placement.copy(), self.inertia.copy()
+        return out
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, FrameOnJoint) and vars(self) == vars(other)
@@ -187,15 +193,17 @@ class Model(LikePinocchio):
             given["lowerVelocityLimit"] = -np.asarray(max_velocity)
         for defaults, size in ((OF_DOFS, added.nv), (OF_COORDINATES, added.nq)):
             for key, default in defaults.items():
-                value = default if given.get(key) is None else given[key]
-                setattr(self, key, np.append(getattr(self, key), np.full(size, value, dtype=np.float64)))
+                before: Array = getattr(self, key)
+                longer = np.empty(len(before) + size)
+                longer[: len(before)], longer[len(before) :] = before, default if given.get(key) is None else given[key]
+                setattr(self, key, longer)
         return added.id
 
     def addFrame(self, frame: FrameOnJoint, append_inertia: bool = True) -> int:
         """Its number; its inertia weighs on its joint. A frame of the same name and type stays, and has the number."""
         if self.existFrame(frame.name, frame.type):
             return self.getFrameId(frame.name, frame.type)
-        self.frames.append(copy.deepcopy(frame))
+        self.frames.append(frame.copy())
         if append_inertia:
             self.inertias[frame.parentJoint] += frame.placement.act(frame.inertia)
         return self.nframes - 1

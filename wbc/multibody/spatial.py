@@ -13,12 +13,19 @@ from wbc.multibody.rotations import Array, skew, vector
 #: Relative difference of what is approximately equal
 ALIKE = 1e-12
 
-_drawn = [np.random.default_rng()]
+_drawn: list[np.random.Generator] = []
 
 
 def seed(number: int) -> None:
     """Random poses and twists are the same again after the same number."""
-    _drawn[0] = np.random.default_rng(number)
+    _drawn[:] = [np.random.default_rng(number)]
+
+
+def _generator() -> np.random.Generator:
+    """Made when it is first asked for: its module takes as long to import as some of this package's rooms."""
+    if not _drawn:
+        _drawn.append(np.random.default_rng())
+    return _drawn[0]
 
 
 class LikePinocchio:
@@ -31,7 +38,16 @@ class LikePinocchio:
         raise AttributeError(reason, name=name, obj=self)
 
 
-class SE3(LikePinocchio):
+class Copied(LikePinocchio):
+    """A value of numbers and arrays, whose copy by ``copy.deepcopy`` is that of its own ``copy``."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        return self.copy()
+
+
+class SE3(Copied):
     """A pose (R, p), which takes x to R x + p.
 
     ``SE3(rotation, translation)`` of a matrix or a :class:`Quaternion`, ``SE3(homogeneous)``, or a copy of a pose.
@@ -67,8 +83,8 @@ class SE3(LikePinocchio):
     @staticmethod
     def Random() -> SE3:
         """A random turn, and a shift of at most 1 m along each axis; see :func:`seed`."""
-        q = _drawn[0].normal(size=4)
-        return SE3(turns.quaternion_matrix(q / np.linalg.norm(q)), _drawn[0].uniform(-1.0, 1.0, 3))
+        q = _generator().normal(size=4)
+        return SE3(turns.quaternion_matrix(q / np.linalg.norm(q)), _generator().uniform(-1.0, 1.0, 3))
 
     @staticmethod
     def Interpolate(first: SE3, last: SE3, share: float) -> SE3:
@@ -193,7 +209,7 @@ def _alike(a: Array, b: Array, prec: float) -> bool:
     return bool(np.linalg.norm(a - b) <= prec * max(1.0, min(float(np.linalg.norm(a)), float(np.linalg.norm(b)))))
 
 
-class SpatialMotion(LikePinocchio):
+class SpatialMotion(Copied):
     """A twist (linear; angular) [m/s, rad/s], or its rate, of two vectors or of six numbers."""
 
     __slots__ = ("vector",)
@@ -214,7 +230,7 @@ class SpatialMotion(LikePinocchio):
     @staticmethod
     def Random() -> SpatialMotion:
         """Numbers of at most 1; see :func:`seed`."""
-        return SpatialMotion(_drawn[0].uniform(-1.0, 1.0, 6))
+        return SpatialMotion(_generator().uniform(-1.0, 1.0, 6))
 
     @property
     def linear(self) -> Array:
@@ -280,7 +296,7 @@ class SpatialMotion(LikePinocchio):
         return SpatialMotion, (self.vector,)
 
 
-class Inertia(LikePinocchio):
+class Inertia(Copied):
     """A body's mass [kg], centre of mass [m] and moments about that [kg m^2]; ``Inertia(mass, lever, inertia)``.
 
     Raises:
@@ -307,7 +323,7 @@ class Inertia(LikePinocchio):
     @staticmethod
     def Random() -> Inertia:
         """Of an ellipsoid somewhere; see :func:`seed`."""
-        mass, *axes = _drawn[0].uniform(0.1, 1.0, 4)
+        mass, *axes = _generator().uniform(0.1, 1.0, 4)
         moved: Inertia = SE3.Random().act(Inertia.FromEllipsoid(mass, *axes))
         return moved
 
@@ -366,7 +382,9 @@ class Inertia(LikePinocchio):
 
     def copy(self) -> Inertia:
         """An inertia of its own."""
-        return Inertia(self)
+        out = Inertia.__new__(Inertia)
+        out.mass, out.lever, out.inertia = self.mass, self.lever.copy(), self.inertia.copy()
+        return out
 
     def __add__(self, other: Inertia) -> Inertia:
         mass = self.mass + other.mass

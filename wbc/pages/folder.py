@@ -27,10 +27,9 @@ h >= 0, kept by dh/dq v + dh/dt >= -rate h, rows lower <= A v <= upper, equaliti
 cannot all hold, those of the highest
 [order of sacrifice](../controller.md#when-rows-cannot-all-hold-the-order-of-sacrifice) give way first.
 
-A tick is linear and looks one tick ahead. A margin may be passed by the curvature of a point's path, at most
-(1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all; what moves faster than the joints can is
-lost, as actuator limits come first; going round something is for a planner. At an error of half a turn both senses of
-rotation are as short, and noise may choose.
+A tick is linear and looks one tick ahead: a margin may be passed by the curvature of a point's path, at most
+(1/2) rho w^2 dt^2 for a point within rho of joint axes that turn at w in all. At an error of half a turn noise may
+choose the sense of rotation.
 
 Fields are given when the item is declared. An input can also be set afterwards, `controller["name"].field = value`,
 from the next tick on. A bad value raises a typed error of `wbc.errors` that names it, and changes nothing. All have

@@ -91,7 +91,8 @@ def _names(cls: type[Item], text: Docstring, block: Block) -> str:
             first = _once(FIRST.sub("", meaning, count=1), name, said)
             meaning = "; ".join([told, first] if told and first and not told.startswith(first) else [told or first])
         required = parameter.default is inspect.Parameter.empty
-        about = (kind if required else f"{kind}, default {_default(parameter.default)}", meaning)
+        left_out = required or (parameter.default is None and kind.endswith("or None"))  # the type has said it
+        about = (kind if left_out else f"{kind}, default {_default(parameter.default)}", meaning)
         # Fields that a docstring describes together stay together
         if entries and entries[-1][0] == about:
             entries[-1][1].append(name)
@@ -115,14 +116,15 @@ def _once(meaning: str, name: str, said: dict[str, str]) -> str:
 def _every(item: Item, block: Block, text: Docstring) -> str:
     """What the item is, what is measured, and the rows."""
     if isinstance(item, Task):
-        kind = "A task" if type(item).jacobian is Task.jacobian else "A task with a Jacobian of its own"
+        task = "[task](README.md#every-item)"
+        kind = f"A {task}" if type(item).jacobian is Task.jacobian else f"A {task} with a Jacobian of its own"
     else:
         assert isinstance(item, Constraint)
         form = "equalities" if item.equality and block.form == "rows" else block.form
-        kind = f"A constraint: {form}, order of sacrifice {item.order}"
+        kind = f"A [constraint](README.md#every-item): {form}, order of sacrifice {item.order}"
     own = [name for name in ("gain", "rate") if name in block.slots and name not in text.inputs]
     first = "".join(f", `{name}` {_number(block.slots[name].input)} 1/s" for name in own)
-    out = f"{kind}{first}; see [every item](README.md#every-item)."
+    out = f"{kind}{first}."
     if sensed := [slot.input for slot in block.slots.values() if slot.input.sensed]:
         names = ", ".join(f"`{one.name}`" for one in sensed)
         out += f" Read-only, measured before every tick: {names}."

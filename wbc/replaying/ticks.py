@@ -28,7 +28,7 @@ from wbc.validation import Array
 _PLACES = (
     *("wbc.tasks.", "wbc.robot.", "wbc.shapes", "wbc.stack.declaration", "wbc.api.stack"),
     *("wbc.coordinates.items", "wbc.coordinates.rows", "wbc.coordinates.point_sets", "wbc.analysis.rows"),
-    *("wbc.climb.loop.stack", "wbc.climb.contacts", "wbc.walking.loop.stack"),
+    *("wbc.climb.loop.stack", "wbc.climb.contacts"),
 )
 #: Models and poses where Pinocchio is not installed; all classes there are values
 _ALGEBRA = "wbc.multibody."

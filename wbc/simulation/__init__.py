@@ -15,11 +15,8 @@ from wbc.simulation.plant import (
     CommandKind as CommandKind,
     GripKind as GripKind,
     GrippingPlant as GrippingPlant,
-    LoadedPlant as LoadedPlant,
-    MovingPlant as MovingPlant,
     Plant as Plant,
     PlantError as PlantError,
     PlantState as PlantState,
-    WatchedPlant as WatchedPlant,
 )
 from wbc.simulation.real_time import RealTime as RealTime

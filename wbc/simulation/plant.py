@@ -124,31 +124,5 @@ class GrippingPlant(Protocol):
         """Frames that what held them has let go of, since this was last asked."""
 
 
-@runtime_checkable
-class MovingPlant(Protocol):
-    """What a plant has besides whose robot has masses, so that it can go on with a velocity."""
-
-    def move(self, v: Array) -> None:
-        """Have this velocity ``[nv]``, right after a reset."""
-
-
-@runtime_checkable
-class WatchedPlant(Protocol):
-    """What a plant has besides that notices when something of it fails."""
-
-    def failing(self) -> str:
-        """What has failed, by name, so that the robot is to be brought to rest; "": nothing."""
-
-
-@runtime_checkable
-class LoadedPlant(WatchedPlant, Protocol):
-    """What a plant has besides that knows what holds and motors bear."""
-
-    def holds_without(self, frame: str) -> bool:
-        """Whether the robot stays where it is when this frame, which is held, is let go of; if not, :meth:`failing`
-        says why.
-        """
-
-
 class PlantError(WbcError):
     """A plant that has no valid reading, or cannot do what it is to do; it was commanded to rest."""

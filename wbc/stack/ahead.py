@@ -25,7 +25,6 @@ KERNELS = (
     "plan/native/plan.c",
     "proximity/native/sensor.c",
     "resolvers/fsp/native/fsp.c",
-    "walking/native/planner.c",
 )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pathlib
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from wbc import validation
 from wbc.errors import CompileError
@@ -17,7 +16,6 @@ from wbc.stack.key import key
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram, build, loaded
 
-BackendName = Literal["auto", "native", "vm"]
 BACKENDS = ("auto", "native", "vm")
 
 

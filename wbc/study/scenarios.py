@@ -15,10 +15,9 @@ from wbc.tasks import EndEffector, JointLimits
 from wbc.validation import Array
 
 if TYPE_CHECKING:
+    from wbc.climb import Climber, ClimbScene
     from wbc.ik import InverseKinematics
     from wbc.robot import Robot
-    from wbc.robots import Walker
-    from wbc.walking import Structure
 
 #: Most rows of one trial
 MOST = 10**6
@@ -139,30 +138,36 @@ def layouts(*, seed: int, least: float = 0.1, most: float = 0.6, speed: float = 
     Args:
         speed: of the body [m/s].
     """
-    from wbc.walking import remove_fraction
-    from wbc.walking.body_path import grid_path
-    from wbc.walking.planner.plan import NoPlanError
-    from wbc.walking.planner.planner import plan_walk
+    from wbc.climb import BodyPlace, ClimbOptions, MotionOptions, NoStancesError, first_stance, plan_climb
+    from wbc.climb.grids import remove_fraction
+    from wbc.climb.motion import MoveError
+    from wbc.climb.places import body_frames
+    from wbc.climb.time_law import MotionSpeeds
 
     low = validation.scalar("least", least, low=0.0, high=1.0)
     high = validation.scalar("most", most, low=low, high=1.0)
     rng = np.random.default_rng(seed)
     removed = low + (high - low) * float(rng.random())
-    walker, structure = _walker()
+    climber, grid = _walker()
     ends = np.zeros((2, 2))
     # As far apart as a few re-grasps
     while np.hypot(*(ends[0] - ends[1])) < 6.0:
         ends = rng.integers((3, 3), (23, 22), (2, 2), endpoint=True).astype(float)
-    path = grid_path([tuple(end) for end in ends], speed)
+    begin, end = body_frames(climber, grid, [f"{t:g},{a:g}" for t, a in ends])
+    scene, options = (
+        remove_fraction(grid, removed, seed),
+        ClimbOptions(motion=MotionOptions(speeds=MotionSpeeds(speed))),
+    )
     try:
-        plan = plan_walk(walker, remove_fraction(structure, removed, seed), path, objective="destination", detour=True)
-    except NoPlanError:
+        start = first_stance(climber, scene, climber.with_body(climber.rest, begin))
+        plan = plan_climb(climber, scene, start, BodyPlace(end.translation, end.rotation), options)
+    except (NoStancesError, MoveError):
         return {"removed": removed, "planned": 0.0, "regrasps": np.nan, "duration": np.nan}
     return {
         "removed": removed,
         "planned": 1.0,
-        "regrasps": float(len(plan.regrasps)),
-        "duration": plan.path.duration + plan.delay,
+        "regrasps": float(len(plan.moves)),
+        "duration": float(plan.times[-1]),
     }
 
 
@@ -186,10 +191,11 @@ def _kinematics(name: str, frame: str) -> tuple[Robot, str, InverseKinematics]:
 
 
 @functools.lru_cache(maxsize=1)
-def _walker() -> tuple[Walker, Structure]:
-    from wbc.walking import cylinder
+def _walker() -> tuple[Climber, ClimbScene]:
+    from wbc.climb.grids import cylinder_grid
+    from wbc.climb.machines import climber
 
-    return robots.walker(), cylinder(rigid=True)
+    return climber("walker"), cylinder_grid()
 
 
 def _box(robot: Robot) -> tuple[Array, Array]:

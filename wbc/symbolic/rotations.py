@@ -81,15 +81,6 @@ def from_quaternion(quat: ca.SX) -> ca.SX:
     )
 
 
-def to_quaternion(rotation: ca.SX) -> ca.SX:
-    """Unit quaternion (x, y, z, w), w >= 0, by the branch with the largest pivot (Shepperd 1978).
-
-    Every branch is guarded, so the three that are not taken stay finite in value and derivative.
-    """
-    chosen = _any_quaternion(rotation)
-    return chosen * _sign_of_scalar(chosen)
-
-
 def _sign_of_scalar(quat: ca.SX) -> ca.SX:
     """The sign that keeps |angle| <= pi; a zero w counts as positive."""
     return ca.if_else(quat[3] < 0, -1, 1)

@@ -176,6 +176,7 @@ class Scene:
         size: tuple[int, int] = (960, 600),
         azimuth: float = math.radians(16.0),
         elevation: float = math.radians(24.0),
+        around: Array | None = None,
     ) -> pathlib.Path:
         """Draw it into a PNG file, whose folder is made where it is not there; returns the file.
 
@@ -183,6 +184,7 @@ class Scene:
             size: width and height [pixels].
             azimuth: side that it is seen from: 0 is +x, pi/2 is +y [rad].
             elevation: height that it is seen from: 0 is level, 1.5 nearly from above, which is the most [rad].
+            around: points that fill the picture, n x 3 [m]; default: everything.
         """
         azimuth = validation.scalar("Scene.azimuth", azimuth, unit="rad")
         elevation = validation.scalar("Scene.elevation", elevation, low=-HIGHEST, high=HIGHEST, unit="rad")
@@ -195,7 +197,10 @@ class Scene:
         if not any(len(mesh.triangles) for mesh in self._solid):
             raise RangeError("Scene", len(self._solid), "nothing was added that is not pale")
         fine = (SUPERSAMPLING * sides[0], SUPERSAMPLING * sides[1])
-        camera = render.framed(self.points(), fine, azimuth, elevation)
+        shown = self.points() if around is None else validation.ordinary_array("Scene.around", around)
+        if shown.ndim != 2 or shown.shape[1] != 3 or len(shown) < 2:
+            raise ShapeError("Scene.around", around, f"expected two points or more, n x 3, not {shown.shape}")
+        camera = render.framed(shown, fine, azimuth, elevation)
         image = _render(camera, self._solid, self._pale, self._floor)
         with validation.writing("Scene.file", path, RobotFileError, ValueError):
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -514,7 +514,9 @@ def look(server: viser.ViserServer, controller: Controller, tick: Tick, scenery:
         camera.position, camera.look_at = viewpoint(controller, tick)
         return
     body = tick.pose(scenery.body)
-    away = body.rotation @ np.array([-0.75, 0.6, -1.0])
+    up = np.array(scenery.up)
+    ahead = body.rotation[:, 0] - (body.rotation[:, 0] @ up) * up
+    away = -0.75 * ahead - 0.6 * np.cross(up, ahead) + up
     camera.position = body.translation + 2.6 * size(controller.stack.robot) * away
     camera.look_at = np.array(body.translation)
     camera.up = scenery.up

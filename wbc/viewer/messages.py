@@ -4,9 +4,9 @@ A message is one JSON object with ``type``; ``wbc``: 1 is the format, and may be
 
     {"type": "set", "item": "hand", "values": {"target": [x, y, z, qx, qy, qz, qw], "weight": 2.0, "enabled": true}}
     {"type": "rate", "item": "hand", "rate": [vx, vy, vz, wx, wy, wz]}       m/s, rad/s, along the world's axes
-    {"type": "steer", "rates": [round, along, spin]}    parts of full speed, of a walk; {"type": "go", "hold": "3,4"}
-    {"type": "ask", "on": true}    {"type": "approve"}    every lift of a hand waits for a yes
-    {"type": "arm", "name": "arm2"}    {"type": "hand", "rates": [round, along, out, turn]}    one hand of a walk
+    {"type": "steer", "rates": [right, ahead, left]}    parts of full speed, of a climb; {"type": "go", "hold": "3,4"}
+    {"type": "ask", "on": true}    {"type": "approve"}    every lift of a limb waits for a yes
+    {"type": "arm", "name": "arm2"}    {"type": "hand", "rates": [right, ahead, out, left]}    one limb of it
     {"type": "pair", "name": "xi | alpha"}    {"type": "swap"}    {"type": "drive", "rates": [0.5, 0, 0, 0, 0, 0]}
     {"type": "stop"}    {"type": "resume"}    {"type": "operate"}    {"type": "release"}
 
@@ -45,7 +45,7 @@ OBEYED: dict[str, tuple[str, ...]] = {
     "swap": (),
     "drive": ("rates",),
 }
-#: Those of them that only a walk obeys
+#: Those of them that only a climb obeys
 WALKED = ("steer", "go", "ask", "approve", "arm", "hand")
 #: Those that only an arm obeys which is driven by pairs of coordinates
 PAIRED = ("pair", "swap", "drive")

@@ -1,4 +1,4 @@
-"""What stands around a robot and does not move: surfaces and obstacles, and holds that can be clicked."""
+"""What stands around a robot and does not move: surfaces and bodies, and footholds that can be clicked."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from wbc.validation import Array
 from wbc.viewer.bodies import DrawnMesh, Dress
 from wbc.viewer.messages import PAIRED, MessageError
 
-#: A click counts for the hold that it passes nearer than this [m]
-NEAR = 0.25
-
 
 class Scenery(NamedTuple):
-    """Meshes in the world, and holds.
+    """Meshes in the world, and footholds.
 
     Attributes:
-        surfaces: what is only seen. studs: what holds look like, all in one. holds: their ids. places: [n x 3] m.
-        up: direction that is up for whoever looks [3]. body: frame that cameras begin at. arms: names.
+        surfaces: what is only seen. studs: what footholds look like, all in one. holds: their ids. places: [n x 3] m.
+        up: direction that is up for whoever looks [3]. body: frame that cameras begin at. arms: names of limbs.
         dress: what the robot's links look like.
+        near: a click counts for the foothold that it passes nearer than this [m].
     """
 
     surfaces: tuple[DrawnMesh, ...]
@@ -33,27 +31,28 @@ class Scenery(NamedTuple):
     body: str
     arms: tuple[str, ...]
     dress: Dress
+    near: float
 
     def hit(self, origin: Array, direction: Array) -> str | None:
-        """The first hold that a ray passes near to, None where it passes none."""
+        """The first foothold that a ray passes near to, None where it passes none."""
         way = direction / np.linalg.norm(direction)
         along = (self.places - origin) @ way
         off = np.linalg.norm(self.places - origin - along[:, None] * way, axis=1)
-        near = (off < NEAR) & (along > 0.0)
+        near = (off < self.near) & (along > 0.0)
         if not near.any():
             return None
         first = along[near].min()
         # Of those that lie about as far as the first the one that was meant
-        near &= along < first + NEAR
+        near &= along < first + self.near
         return self.holds[int(np.where(near, off, np.inf).argmin())]
 
     def nearest(self, place: Array) -> int:
-        """Row of the hold at a place."""
+        """Row of the foothold at a place."""
         return int(np.linalg.norm(self.places - place, axis=1).argmin())
 
 
 def checked(message: Mapping[str, Any], holds: tuple[str, ...], arms: tuple[str, ...]) -> None:
-    """Refuse what a walk does not obey.
+    """Refuse what a climb does not obey.
 
     Raises:
         WbcError: which field does not fit.
@@ -72,4 +71,4 @@ def checked(message: Mapping[str, Any], holds: tuple[str, ...], arms: tuple[str,
     elif kind in PAIRED:
         raise MessageError("message.type", kind, "only an arm that is driven by pairs obeys it")
     elif kind in ("set", "rate"):
-        raise MessageError("message", message.get("item"), "the walk sets its own targets; steer it")
+        raise MessageError("message", message.get("item"), "a climb sets its own targets; steer it")

@@ -1,4 +1,4 @@
-"""What stands around a walker, for pages; and walks as pages that play."""
+"""What stands around a climber, for pages; and climbs as pages that play."""
 
 from __future__ import annotations
 
@@ -6,70 +6,61 @@ import pathlib
 
 import numpy as np
 
-from wbc.multibody import pin
-from wbc.robots import Walker
-from wbc.shapes import PlacedShape
-from wbc.track import render
+from wbc.climb.climber import Climber
+from wbc.climb.loop import ClimbRun
+from wbc.climb.report import surroundings
+from wbc.climb.scene import ClimbScene
+from wbc.climb.scenes import size_of
+from wbc.climb.stance import FREE_LIMB
 from wbc.validation import Array
-from wbc.viewer.bodies import OBSTACLE, Colour, DrawnMesh, Dress, indexed
+from wbc.viewer.bodies import DrawnMesh, indexed
 from wbc.viewer.runs import save_motion
 from wbc.viewer.scenery import Scenery
-from wbc.walking.holds.structure import Structure
-from wbc.walking.report import surroundings
-from wbc.walking.report.parts import joining_pieces, link_colours
-from wbc.walking.report.stills import held_by
-from wbc.walking.run.recording import configuration
-from wbc.walking.run.session import WalkRun
 
-#: Colours of the structure and of its holds
-SURFACE: Colour = (204, 213, 223)
-STUD: Colour = (143, 153, 168)
+#: A click counts for the foothold that it passes nearer than this, as a share of the shortest limb's reach
+CLICK_WITHIN = 0.12
+#: Bodies are drawn this far from the way of the body, as a share of that reach: a page can be turned to see them all
+AROUND = 100.0
 
 
-def save_walk_page(run: WalkRun, file: pathlib.Path) -> list[pathlib.Path]:
-    """Write a walk as a page that plays in a browser; returns the file, none where nothing was carried out.
+def save_climb_page(run: ClimbRun, file: pathlib.Path) -> pathlib.Path:
+    """Write a climb as a page that plays in a browser; returns the file.
 
     Raises:
         MissingPackageError, ViewerError: as of :func:`wbc.viewer.runs.save_page`.
     """
-    log, walker = run.log, run.walker
-    if log is None:
-        return []
-    places = [configuration(walker, log, row) for row in range(len(log))]
-    notes = [{"held": [log.hold_id[hold] for hold in held_by(log, row)]} for row in range(len(log))]
-    scenery = scenery_of(walker, run.structure, places[len(places) // 2])
-    return [save_motion(walker.robot, log.t, places, file, scenery=scenery, notes=notes)]
+    climber, scene, q = run.plans[0].climber, run.scene, run.log.array("q")
+    contacts = run.log.array("contact").astype(int)
+    notes = [{"held": [scene.footholds[k].id for k in row if k != FREE_LIMB]} for row in contacts.tolist()]
+    scenery = scenery_of(climber, scene, q[len(q) // 2], contacts[len(q) // 2])
+    return save_motion(climber.robot, run.log["t"], q, file, scenery=scenery, notes=notes)
 
 
-def scenery_of(walker: Walker, structure: Structure, q: Array) -> Scenery:
-    """Structure and holds under a walker at a configuration, from whose body up is seen."""
-    rows = np.arange(len(structure))
-    surfaces: list[DrawnMesh] = []
+def scenery_of(climber: Climber, scene: ClimbScene, q: Array, contacts: Array) -> Scenery:
+    """Bodies and footholds round a climber at a configuration, which holds some of them, as rows."""
+    reach, rows = size_of(climber), np.arange(len(scene.footholds))
+    surfaces = list[DrawnMesh]()
     for triangles, colour in (
-        (surroundings.surface_triangles(structure, rows), SURFACE),
-        (surroundings.obstacle_triangles(structure, rows), OBSTACLE),
+        (surroundings.surface_triangles(scene, rows, reach), surroundings.SURFACE),
+        (surroundings.body_triangles(scene, np.array(q[None, :3]), AROUND * reach), surroundings.BODY),
     ):
         if len(triangles):
-            surfaces.append(indexed(triangles, colour))
-    up = [float(x) for x in -pin.XYZQUATToSE3(q[:7]).rotation[:, 2]]
+            surfaces.append(indexed(triangles, _bytes(colour)))
+    up = surroundings.upwards(scene, [int(row) for row in contacts if row != FREE_LIMB])
+    none = np.zeros((0, 3, 3))
     return Scenery(
         tuple(surfaces),
-        indexed(surroundings.stud_triangles(structure, rows), STUD),
-        tuple(structure.ids),
-        np.array(structure.positions),
-        (up[0], up[1], up[2]),
-        "body",
-        tuple(arm.name for arm in walker.arms),
-        _dress(walker),
+        indexed(surroundings.stud_triangles(scene, rows, surroundings.STUD * reach), _bytes(surroundings.FREE)),
+        tuple(foothold.id for foothold in scene.footholds),
+        np.array(scene.positions),
+        (float(up[0]), float(up[1]), float(up[2])),
+        climber.robot.model.names[1],
+        tuple(limb.name for limb in climber.limbs),
+        {link: (none, _bytes(colour)) for link, colour in surroundings.link_colours(climber).items()},
+        CLICK_WITHIN * reach,
     )
 
 
-def _dress(walker: Walker) -> Dress:
-    """Arms in their colours, with the pieces that join their shapes."""
-    colours = link_colours(walker)
-    parts: dict[str, list[Array]] = {link: [np.zeros((0, 3, 3))] for link in colours}
-    for piece in joining_pieces(walker, colours):
-        parts.setdefault(piece.link, []).append(render.triangles(PlacedShape(piece.shape, piece.placement)))
-        colours.setdefault(piece.link, piece.colour)
-    bytes_of = {link: tuple(round(255 * part) for part in colour) for link, colour in colours.items()}
-    return {link: (np.concatenate(parts[link]), (r, g, b)) for link, (r, g, b) in bytes_of.items()}
+def _bytes(colour: surroundings.Colour) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * part) for part in colour)
+    return red, green, blue

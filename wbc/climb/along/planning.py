@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from wbc import validation
 from wbc.climb.along.body_track import BodyTrack
-from wbc.climb.along.search import AlongSearch, Standing
-from wbc.climb.along.spans import SpanTable
-from wbc.climb.along.swings import SwingLimits, Swings
+from wbc.climb.along.search import AlongSearch, Standing, SwingLimits
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.joint_values import joint_values, with_joint_values
@@ -23,19 +22,28 @@ from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, reaches
 from wbc.climb.search import counted_words, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.time_law import fastest
+from wbc.climb.time_law import cubics_need, fastest
 from wbc.climb.world import ClimbWorld
 from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
 
-#: How many times slower than asked a way is planned, with how many postures of a limb at a foothold, and how many
-#: standings the search keeps of each number of swings, one after the other
-TRIED = ((1.0, 1, 8), (1.0, 2, 8), (1.0, 1, 40), (1.0, 2, 40), (1.2, 1, 40), (1.5, 2, 40), (2.0, 2, 40), (4.0, 2, 40))
+#: How many times slower than asked a way is planned, and how many standings the search keeps of each number of swings,
+#: one after the other
+TRIED = ((1.0, 8), (1.0, 16), (1.0, 40), (1.2, 40), (1.5, 40), (2.0, 40), (4.0, 40))
+#: Postures of a limb at a foothold
+POSTURES = 2
 #: A contact rises by this share of the shortest limb's reach
 RISE = 1.0 / 20.0
 #: Time between knots where the way is slow [s]
 SLOW = 0.055
+#: Change of speed, as a part of the asked one, over an interval without knots inside [1]; over n parts n^2 times that
+GAINED = 0.03
+#: How often intervals of the law are halved in which cubics would exceed a limit by more than this factor
+HALVED = 4
+NEARLY = 1.0 + 1e-3
+#: Mean speed, as a part of the asked one, below which a way has come to a stop [1]
+STANDING = 1e-6
 #: How far a start may be from the beginning of the way [m, rad]
 AT_BEGINNING = 1e-3
 #: How often swings that are not proven clear are left out
@@ -93,25 +101,31 @@ def plan_along(
     clearances = Clearances(climber, scene, motion.clearance, motion.apart)
     first = None if start is None else _begun(climber, track, start)
     furthest, said = 0.0, ""
-    searches = dict[tuple[float, int], tuple[AlongSearch, tuple[int, ...] | None]]()
-    for slower, postures, width in TRIED:
-        if (slower, postures) not in searches:
+    searches = dict[float, tuple[AlongSearch, tuple[int, ...]]]()
+    for slower, width in TRIED:
+        if slower not in searches:
             slow = replace(track, speed=track.speed / slower, turn_rate=track.turn_rate / slower)
-            table = SpanTable(world, slow, postures)
-            rows = None if first is None else _rows(table, world, first)
-            searches[slower, postures] = AlongSearch(table, Swings(table, limits), given.margin, given.moves), rows
-        search, rows = searches[slower, postures]
+            search = AlongSearch(world, track if slower == 1.0 else slow, limits, POSTURES, given.margin)
+            searches[slower] = search, () if first is None else _rows(search, first)
+        search, rows = searches[slower]
+        if -1 in rows and first is not None:
+            limb = rows.index(-1)
+            at = scene.footholds[first.contacts[limb]].id
+            said = said or f"{climber.limbs[limb].name} has to let go of {at} as it begins"
+            continue
+        search.begin(rows or None, width)
         for _ in range(AGAIN):
-            last = search.run(rows, width)
-            if last is None:
+            way = search.run(given.moves)
+            if way is None:
                 break
-            values = _values(search, chain := last.chain)
-            plan = None if values is None else _TimedWay(search, chain, values, motion, slower)
-            if plan is not None and plan.proven(clearances):
-                return plan.contact_plan()
-        part = search.furthest / search.end
-        if part >= furthest:
-            furthest, said = part, counted_words(search.outcomes)
+            timed = _TimedWay(search, *way, motion, slower)
+            if timed.stands:
+                said = said or "joints would have to stop on the way"
+                break
+            if timed.proven(clearances):
+                return timed.contact_plan()
+        if search.furthest >= furthest:
+            furthest, said = search.furthest, counted_words(search.outcomes) or said
     reason = f"no footholds lead along the way: all limbs can hold to {100.0 * furthest:.0f} % of it"
     raise no_stances("track", track.duration, f"{reason} ({said})" if said else reason, "reach", 0.0)
 
@@ -129,128 +143,157 @@ def _begun(climber: Climber, track: BodyTrack, start: Stance) -> Stance:
     return start
 
 
-def _rows(table: SpanTable, world: ClimbWorld, start: Stance) -> tuple[int, ...]:
-    """Spans that begin with the start's postures."""
-    rows = []
+def _rows(search: AlongSearch, start: Stance) -> tuple[int, ...]:
+    """Spans that begin with the start's postures; -1 of a limb that has to let go at once."""
+    rows, world = [], search.world
     for limb, place in enumerate(world.start):
-        row = table.begun(limb, place, world.climber.angles(start.q, limb))
-        if row < 0:
-            at = world.scene.footholds[start.contacts[limb]].id
-            raise RangeError("start.q", at, f"{world.climber.limbs[limb].name} is not at this foothold")
-        rows.append(row)
+        foothold = world.scene.footholds[start.contacts[limb]]
+        off = world.climber.contact_pose(start.q, limb).translation - foothold.pose.translation
+        if np.linalg.norm(off) > AT_BEGINNING:
+            raise RangeError("start.q", foothold.id, f"{world.climber.limbs[limb].name} is not at this foothold")
+        rows.append(search.begun(limb, place, world.climber.angles(start.q, limb)))
     return tuple(rows)
 
 
-def _denser(x: Array, speed: Array, span: Array) -> tuple[tuple[Array, Array, NDArray[np.intp]], Array]:
-    """Knots at all instants and, where the way is slow, between them: times, places on the way, and which knots the
-    instants are; and speeds along the way.
-    """
-    times, places, rates, knot, now = [np.zeros(1)], [x[:1]], [speed[:1]], [0], 0.0
-    for k, long in enumerate(span):
-        t = long * np.arange(1, (count := max(1, int(np.ceil(long / SLOW)))) + 1) / count
-        gain = (speed[k + 1] - speed[k]) / long
-        times.append(now + t)
-        places.append(np.minimum(x[k] + t * (speed[k] + 0.5 * gain * t), x[k + 1]))
-        rates.append(speed[k] + gain * t)
-        knot.append(knot[-1] + count)
-        now += long
-    return (np.concatenate(times), np.concatenate(places), np.array(knot)), np.concatenate(rates)
+def _speeds(curve: PPoly, x: Array, rate: Array, pull: Array, most: float) -> Array:
+    """Speeds along the way at some of its places for the least time in which joints keep rates and accelerations."""
+    slopes = np.asarray(curve(x, 1))
+    # Curves of limbs meet where they lift and land, with another second derivative on each side
+    second = [np.asarray(curve(at, 2)) for at in (x, np.nextafter(x, -np.inf))]
+    moves = np.isfinite(pull) & (np.abs(slopes).max(axis=0) > 1e-9)
+    used = (np.abs(slopes[:, moves]) / rate[moves]).max(axis=1, initial=0.0)
+    a, b = slopes[:, moves] / pull[moves], np.hstack([some[:, moves] / pull[moves] for some in second])
+    return fastest(x, np.hstack([a, a]), b, np.minimum(1.0 / np.maximum(used, 1e-9) ** 2, most**2))
 
 
-def _values(search: AlongSearch, chain: list[Standing]) -> Array | None:
-    """Numbers of the joints at all instants ``(n, nv - 6)``; None: a limb cannot go so, which the search is told."""
-    climber = search.world.climber
-    out = np.tile(joint_values(climber.robot, climber.rest[None])[0], (search.end + 1, 1))
-    for limb in range(len(climber.limbs)):
-        columns, now, row = climber.joints(limb) - 6, 0, chain[0].rows[limb]
-        for standing in [*chain[1:], None]:
-            if standing is not None and standing.limb != limb:
-                continue
-            last = search.end if standing is None else standing.lift
-            out[now : last + 1, columns] = search.table.held(limb, row, now, last)
-            if np.isnan(out[now : last + 1, columns]).any():
-                search.table.cut(limb, row)
-                return None
-            if standing is None:
-                break
-            angles = search.swung(standing)
-            if angles is None:
-                return None
-            out[standing.lift : standing.now + 1, columns] = angles
-            row, now = standing.rows[limb], standing.now
-    for coupling in climber.robot.couplings:
-        out[:, coupling.follower - 6] = coupling.ratio * out[:, coupling.leader - 6] + coupling.offset
-    return out
+def _denser(x: Array, speed: Array, span: Array, parts: NDArray[np.intp]) -> list[Array]:
+    """Knots at places of the way and between them, so many to an interval: times, places and speeds along the way."""
+    row = np.repeat(np.arange(len(span)), parts)
+    long, part = span[row], np.arange(1, len(row) + 1) - np.repeat(np.cumsum(parts) - parts, parts)
+    gain, t = (speed[row + 1] - speed[row]) / long, long * part / parts[row]
+    begun = np.concatenate([[0.0], np.cumsum(span)])
+    places = np.minimum(x[row] + t * (speed[row] + 0.5 * gain * t), x[row + 1])
+    times = np.where(part == parts[row], begun[row + 1], begun[row] + t)
+    rates = speed[row] + gain * t
+    return [np.insert(some, 0, first) for some, first in ((times, 0.0), (places, x[0]), (rates, speed[0]))]
+
+
+def _pairs(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """The first with the second, the third with the fourth, and so on."""
+    return list(zip(numbers[::2], numbers[1::2], strict=True))
 
 
 class _TimedWay:
-    """The motion of a way that was found."""
+    """The motion of a way that was found.
+
+    Attributes:
+        stands: whether joints would have to stop on it; then there is none.
+    """
 
     def __init__(
-        self, search: AlongSearch, chain: list[Standing], values: Array, motion: MotionOptions, slower: float
+        self, search: AlongSearch, chain: list[Standing], angles: Array, motion: MotionOptions, slower: float
     ) -> None:  # fmt: skip
-        self.climber = climber = search.world.climber
-        self.search, self.chain = search, chain
-        track, robot = search.table.track, climber.robot
+        self.climber, self.search, self.chain = search.world.climber, search, chain
+        limits, x = self.climber.robot.limits, search.track.instants
+        rate, pull = (
+            motion.speeds.share * limits.velocity[6:],
+            motion.speeds.acceleration_share * limits.acceleration[6:],
+        )
+        curve = self._curve(angles)
+        for halved in range(HALVED + 1):
+            speed = _speeds(curve, x, rate, pull, slower)
+            mean = 0.5 * (speed[1:] + speed[:-1])
+            self.stands = bool((mean < STANDING).any())
+            if self.stands:
+                return
+            span = np.diff(x) / mean
+            gains = np.abs(np.diff(speed)) / GAINED
+            parts = np.ceil(np.maximum(np.maximum(span / SLOW, np.sqrt(gains)), 1.0)).astype(int)
+            times, at, speeds = _denser(x, speed, span, parts)
+            values, rates = np.asarray(curve(at)), np.asarray(curve(at, 1)) * speeds[:, None]
+            needs = np.maximum.reduceat(cubics_need(times, values, rates, rate, pull), np.cumsum(parts) - parts)
+            if halved == HALVED or needs.max() < NEARLY:
+                break
+            exceeded = needs >= NEARLY
+            x = np.sort(np.concatenate([x, 0.5 * (x[:-1] + x[1:])[exceeded]]))
+        slowed = max(1.0, float(needs.max()))
+        self.times = times * slowed
+        knots = np.concatenate([[0], np.cumsum(parts)])
+        self._knot = knots[np.searchsorted(x, search.track.instants)]
+        q, v = self._body(at)
+        self.q = with_joint_values(self.climber.robot, q, values)
+        self.v = np.hstack([v * speeds[:, None], rates]) / slowed
+
+    def _curve(self, angles: Array) -> PPoly:
+        """Joints ``(nv - 6)`` over the way: splines of each limb while it holds and while it swings."""
+        climber, x = self.climber, self.search.track.instants
+        terms = np.zeros((4, len(x) - 1, climber.robot.nv - 6))
+        terms[3] = joint_values(climber.robot, climber.rest[None])[0]
+        for limb, values in enumerate(np.split(angles, self.search.world.offsets[1:-1], axis=1)):
+            swings = [(move.lift, move.now) for move in self.chain[1:] if move.limb == limb]
+            ends = [0, *itertools.chain.from_iterable(swings), len(x) - 1]
+            holds = [CubicSpline(x[i : j + 1], values[i : j + 1]) if i < j else None for i, j in _pairs(ends)]
+            for k, (lift, land) in enumerate(swings):
+                # As fast at first and at last as while it holds; one that lifts at once is at rest
+                rates = [
+                    None if held is None else (1, held(x[at], 1))
+                    for held, at in zip(holds[k:], (lift, land), strict=False)
+                ]
+                free = "not-a-knot"
+                swung = CubicSpline(
+                    x[lift : land + 1], values[lift : land + 1], bc_type=tuple(r or free for r in rates)
+                )
+                terms[:, lift:land, climber.joints(limb) - 6] = swung.c
+            for held, (i, j) in zip(holds, _pairs(ends), strict=True):
+                if held is not None:
+                    terms[:, i:j, climber.joints(limb) - 6] = held.c
+        for coupling in climber.robot.couplings:
+            terms[:, :, coupling.follower - 6] = coupling.ratio * terms[:, :, coupling.leader - 6]
+            terms[3, :, coupling.follower - 6] += coupling.offset
+        return PPoly(terms, x)
+
+    def _body(self, at: Array) -> tuple[Array, Array]:
+        """Configurations with the body at places of the way, and its twists at full speed: cubic between instants."""
+        track, climber = self.search.track, self.climber
         h = float(track.instants[1])
-        slopes = np.gradient(values, h, axis=0)
-        second = np.zeros_like(values)
-        second[1:-1] = np.diff(values, 2, axis=0) / h**2
-        second[0], second[-1] = second[1], second[-2]
-        limits, dofs = robot.limits, np.arange(6, robot.nv)
-        rate = motion.speeds.share * limits.velocity[dofs]
-        pull = motion.speeds.acceleration_share * limits.acceleration[dofs]
-        moves = np.isfinite(pull) & (np.abs(slopes).max(axis=0) > 1e-9)
-        used = np.abs(slopes[:, moves]) / rate[moves]
-        bound = np.minimum(1.0 / np.maximum(used.max(axis=1, initial=0.0), 1e-9) ** 2, slower**2)
-        x = track.instants
-        speed = fastest(x, slopes[:, moves] / pull[moves], second[:, moves] / pull[moves], bound)
-        span = 2.0 * np.diff(x) / np.maximum(speed[1:] + speed[:-1], 1e-9)
-        at, rate = _denser(x, speed, span)
-        self.times, self._knot = at[0], at[2]
-        # Joints are cubic between the instants of the way, the body goes evenly
-        curve = CubicHermiteSpline(x, values, slopes, axis=0)
-        q = np.tile(climber.rest, (len(rate), 1))
-        twists = np.empty((len(rate), 6))
-        for k, u in enumerate(at[1]):
-            row = min(int(np.searchsorted(x, u, side="right")) - 1, len(x) - 2)
-            part = (u - x[row]) / h
-            one, other = track.sampled[row], track.sampled[row + 1]
-            q[k] = climber.with_body(q[k], one * pin.exp6(pin.Motion(part * pin.log6(one.actInv(other)).vector)))
-            twists[k] = (1.0 - part) * track.twists[row] + part * track.twists[row + 1]
-        self.q = with_joint_values(robot, q, np.asarray(curve(at[1])))
-        self.v = np.hstack([twists, np.asarray(curve(at[1], 1))]) * rate[:, None]
+        q, twists = np.tile(climber.rest, (len(at), 1)), np.empty((len(at), 6))
+        rows = np.clip(np.searchsorted(track.instants, at, side="right") - 1, 0, len(track.instants) - 2)
+        for k, (row, u) in enumerate(zip(rows, at / h - rows, strict=True)):
+            pose, first, last = track.sampled[row], track.twists[row], track.twists[row + 1]
+            step = pin.log6(pose.actInv(track.sampled[row + 1])).vector / h
+            square, cubic = 3.0 * step - 2.0 * first - last, first + last - 2.0 * step
+            q[k] = climber.with_body(q[k], pose * pin.exp6(pin.Motion(h * u * (first + u * (square + u * cubic)))))
+            twists[k] = first + u * (2.0 * square + 3.0 * u * cubic)
+        return q, twists
 
     def proven(self, clearances: Clearances) -> bool:
         """Whether links are proven clear all the way; if not, the search is told what may not be."""
-        for before, standing in itertools.pairwise([*self.chain, None]):
-            assert before is not None
-            first, last = before.now, self.search.end if standing is None else standing.now
-            held = self._footholds(before.rows)
-            contacts: list[tuple[int, ...]] = [(row, row) for row in held]
-            if standing is not None:
-                contacts[standing.limb] = (held[standing.limb], self._footholds(standing.rows)[standing.limb])
-            some = slice(self._knot[first], self._knot[last] + 1)
-            near = clearances.moving(contacts, self.times[some], self.q[some], self.v[some])
-            if near is None:
-                continue
-            if standing is None or near.time < self.times[self._knot[standing.lift]]:
-                self.search.barred.add(before.rows)
-            else:
-                self.search.forbidden.add(standing.swing[:3])
-            return False
-        return True
+        times, knot, stays = self.times, self._knot, [[0.0] for _ in self.climber.limbs]
+        contacts = [[row] for row in self._footholds(self.chain[0])]
+        for standing in self.chain[1:]:
+            stays[standing.limb] += [float(times[knot[standing.now]]), float(times[knot[standing.lift]])]
+            contacts[standing.limb].append(self._footholds(standing)[standing.limb])
+        # Footholds count from when a limb lifts to come there until it has landed on another one
+        within = [list(zip([0.0, *some[2::2]], [*some[1::2], float(times[-1])], strict=True)) for some in stays]
+        near = clearances.moving(contacts, times, self.q, self.v, within)
+        if near is None:
+            return True
+        number = sum(float(times[knot[standing.now]]) < near.time for standing in self.chain[1:])
+        after = self.chain[number + 1 :]
+        swings = bool(after) and near.time >= float(times[knot[after[0].lift]])
+        self.search.refuse(number + int(swings), swings)
+        return False
 
-    def _footholds(self, rows: tuple[int, ...]) -> tuple[int, ...]:
-        return tuple(int(self.search.world.hold[place]) for place in self.search.places(rows))
+    def _footholds(self, standing: Standing) -> tuple[int, ...]:
+        return tuple(int(self.search.world.hold[place]) for place in standing.places)
 
     def contact_plan(self) -> ContactPlan:
         """As the loop takes it."""
         moves = []
         for before, standing in itertools.pairwise(self.chain):
             limb = standing.limb
-            leaves, lands = self._footholds(before.rows)[limb], self._footholds(standing.rows)[limb]
+            leaves, lands = self._footholds(before)[limb], self._footholds(standing)[limb]
             lift, land = (float(self.times[self._knot[k]]) for k in (standing.lift, standing.now))
             moves.append(ContactMove(limb, leaves, lands, lift, land))
-        start = self._footholds(self.chain[0].rows)
+        start = self._footholds(self.chain[0])
         return ContactPlan(self.climber, self.search.world.scene, start, moves, self.times, self.q, self.v, None)

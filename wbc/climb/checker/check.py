@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbc.climb.checker.asked import check_body, check_presence
 from wbc.climb.checker.clearances import check_clearances
 from wbc.climb.checker.cones import check_cones
 from wbc.climb.checker.record import OPEN, Climbed
@@ -22,7 +23,8 @@ def check(log: Log, climber: Climber, scene: ClimbScene, rules: CheckRules | Non
     """Whether a climb is one that robot and scene allow: everything is computed anew from t, q and contacts.
 
     Joints are within their limits of position, and of rate and acceleration as means over ``rules.window``; closed
-    contacts are at footholds that their limbs may hold, one each, and still; links keep clear of bodies and of each
+    contacts are at footholds that their limbs may hold, one each, that have not vanished, and still; the body goes as
+    it was asked to (:mod:`wbc.climb.checker.asked`); links keep clear of bodies and of each
     other at every tick (by Coal) and between them (:mod:`wbc.climb.checker.clearances`); and the contacts can bear the
     robot (:mod:`wbc.climb.checker.cones`), or do as logged.
 
@@ -42,6 +44,8 @@ def check(log: Log, climber: Climber, scene: ClimbScene, rules: CheckRules | Non
     _check_time(climbed, float(log.meta.get("period", np.median(np.diff(climbed.t)))), tally)
     _check_joints(climbed, rules, tally)
     _check_contacts(climbed, rules, tally)
+    check_presence(climbed, tally)
+    check_body(climbed, rules, tally)
     check_clearances(climbed, rules, tally)
     check_cones(climbed, rules, tally)
     return tally.report()
@@ -81,7 +85,9 @@ def _check_joints(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> None
 def _check_contacts(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> None:
     tally.declare("closed contact off its foothold", rules.hold_distance, "m")
     tally.declare("closed contact turned", rules.hold_angle, "rad")
-    tally.declare("closed contact slips", rules.slip, "m")
+    slips = {True: "closed grip slips", False: "closed contact slips"}
+    for pulls in sorted({limb.contact.pulls for limb in climbed.climber.limbs}):
+        tally.declare(slips[pulls], rules.grip_slip if pulls else rules.slip, "m")
     tally.declare("foothold that is another's", 0.0, "limbs")
     places, turns = climbed.tips
     for k, limb in enumerate(climbed.climber.limbs):
@@ -94,7 +100,7 @@ def _check_contacts(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> No
             tally.add("closed contact off its foothold", off, t, where)
             moved = np.linalg.norm(places[first:last, k] - places[first, k], axis=1)
             # A grip that closes draws itself to its foothold: that is no slip
-            tally.add("closed contact slips", moved - np.maximum(off[0] - off, 0.0), t, where)
+            tally.add(slips[limb.contact.pulls], moved - np.maximum(off[0] - off, 0.0), t, where)
             turned = turns[first:last, k]
             if limb.contact.fixed != "position":
                 across = np.linalg.norm(np.cross(turned[:, :, 2], foothold.pose.rotation[:, 2]), axis=1)

@@ -43,10 +43,19 @@ from wbc.validation import Array
 
 #: Distance beyond which nothing is measured [m]
 FAR = 0.05
+#: How much farther beside it than closed contacts are, at no height [m], and for each metre of height [1]: 60 degrees
+ASIDE = 0.003
+LEAN = 1.75
+#: By which part of its distance it is at least less deep than at the foothold [1]
+RISES = 0.5
 #: Distance that is allowed of a tip and what it holds [m]
 HOLDING = -1.0
 #: Radius of a point, for Coal [m]
 POINT = 1e-6
+#: No distance is larger; Coal says as much where it has no answer [m]
+LARGEST = 1e6
+#: How far beside a pose it is asked again then [m]
+BESIDE = 1e-5
 #: Length of a cylinder without end, for Coal [m]
 ENDLESS = 200.0
 #: Shortest part of the way between two ticks that is looked at
@@ -77,9 +86,9 @@ class _SweptPart:
 def check_clearances(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> None:
     """Links against bodies and each other.
 
-    The link at a limb's tip may be as deep in the body that its foothold is on as it is while it holds there, on the
-    way from there and to there as well; the contact's point itself stays out of every body. What a closed contact
-    holds is for the rules of contacts to judge.
+    The link at a limb's tip may be as deep in the body that its foothold is on as it would be there, near by on the way
+    from there and to there; the contact's point itself stays out of every body. What a closed contact holds is for the
+    rules of contacts to judge.
     """
     tally.declare("clearance of bodies", rules.clearance - rules.swept, "m", least=True)
     tally.declare("clearance of links", rules.clearance - rules.swept, "m", least=True)
@@ -116,17 +125,60 @@ def _floor(climbed: Climbed, around: _PairDistances, link: _SweptPart, body: _Sw
     for k, limb in enumerate(climbed.climber.limbs):
         if int(model.frames[model.getFrameId(limb.frame)].parentJoint) != link.joint:
             continue
-        stretches = climbed.stretches(k)
-        for at, (first, last, row) in enumerate(stretches):
-            if row == OPEN or climbed.scene.footholds[row].on != body.name:
-                continue
-            held = min(around.distance(link, body, tick) for tick in range(first, last))
-            # From where it lifts and to where it lands it is in the air
-            start = stretches[at - 1][0] if at and stretches[at - 1][2] == OPEN else first
-            end = stretches[at + 1][1] if at + 1 < len(stretches) and stretches[at + 1][2] == OPEN else last
-            floor[start:end] = np.minimum(floor[start:end], held - rules.depth)
-            floor[first:last] = HOLDING
+        for first, last, row in climbed.stretches(k):
+            if row != OPEN and climbed.scene.footholds[row].on == body.name:
+                floor[first:last] = HOLDING
+        for row, first, last in _ways(climbed, k):
+            if climbed.scene.footholds[row].on == body.name:
+                _lower_near(climbed, around, (link, body, k), (row, first, last), floor, rules)
     return floor
+
+
+def _ways(climbed: Climbed, limb: int) -> list[tuple[int, int, int]]:
+    """(foothold, first tick, tick after the last) between which a limb in the air may be on its way off it or to it:
+    those that it held before and holds next, and those that it was to go to meanwhile, from then on.
+    """
+    out, stretches = list[tuple[int, int, int]](), climbed.stretches(limb)
+    for at, (first, last, row) in enumerate(stretches):
+        if row != OPEN:
+            continue
+        if at:
+            out.append((stretches[at - 1][2], first, last))
+        else:
+            # A log that begins in the air does not say what was left: the nearest foothold
+            away = climbed.scene.positions - climbed.tips[0][first, limb]
+            out.append((int((away * away).sum(axis=1).argmin()), first, last))
+        if at + 1 < len(stretches):
+            out.append((stretches[at + 1][2], first, last))
+        aims = climbed.aims[first:last, limb]
+        out += [(int(aim), first + int((aims == aim).argmax()), last) for aim in np.unique(aims[aims != OPEN])]
+    return sorted(set(out))
+
+
+def _lower_near(
+    climbed: Climbed,
+    around: _PairDistances,
+    what: tuple[_SweptPart, _SweptPart, int],
+    way: tuple[int, int, int],
+    floor: Array,
+    rules: CheckRules,
+) -> None:
+    """Over a foothold of its way a limb in the air may be as deep as it would be there, less half of its distance from
+    where closed contacts may be; its contact's point is out of the body all the same.
+    """
+    link, body, limb = what
+    row, first, last = way
+    pose = climbed.scene.footholds[row].pose
+    offs, normal = pose.translation - climbed.tips[0][first:last, limb], pose.rotation[:, 2]
+    heights = -(offs @ normal)
+    aside = np.linalg.norm(offs + heights[:, None] * normal, axis=1)
+    beside = ASIDE + rules.hold_distance
+    near = (-rules.depth <= heights) & (aside <= beside + heights * LEAN)
+    for k in np.flatnonzero(near).tolist():
+        if around.distance(link, body, first + k) < rules.clearance:
+            held = around.distance(link, body, first + k, offs[k])
+            lowest = held + RISES * max(float(np.linalg.norm(offs[k])) - beside, 0.0) - rules.depth
+            floor[first + k] = min(floor[first + k], lowest)
 
 
 def _outside(climbed: Climbed, limb: int, body: _SweptPart, rules: CheckRules) -> Array:
@@ -155,15 +207,17 @@ class _PairDistances:
         base = np.column_stack([np.linalg.norm(moved[:, :3], axis=1), np.linalg.norm(moved[:, 3:6], axis=1)])
         self._moved = np.hstack([base[:, :1], np.zeros((len(moved), 2)), base[:, 1:], np.zeros((len(moved), 2)),
                                  moved[:, 6:]])  # fmt: skip
-        self._request = coal.DistanceRequest()
-        self._request.enable_signed_distance = True
 
-    def distance(self, a: _SweptPart, b: _SweptPart, k: int) -> float:
-        """Of two parts at a tick [m]."""
+    def distance(self, a: _SweptPart, b: _SweptPart, k: int, moved: Array | None = None) -> float:
+        """Of two parts at a tick, the first one moved or not [m]."""
         key = id(a), id(b), k
-        if key not in self._known:
-            poses = (pin.SE3(self._poses[k, p.joint, :, :3], self._poses[k, p.joint, :, 3]) for p in (a, b))
-            self._known[key] = self._between(a, b, *poses)
+        if moved is None and key in self._known:
+            return self._known[key]
+        first, other = (pin.SE3(self._poses[k, p.joint, :, :3], self._poses[k, p.joint, :, 3]) for p in (a, b))
+        if moved is not None:
+            first.translation = first.translation + moved
+            return self._between(a, b, first, other)
+        self._known[key] = self._between(a, b, first, other)
         return self._known[key]
 
     def room(self, a: _SweptPart, b: _SweptPart, floor: Array) -> Array:
@@ -226,9 +280,32 @@ class _PairDistances:
     def _between(self, a: _SweptPart, b: _SweptPart, at: pin.SE3, there: pin.SE3) -> float:
         if b.solid is None:
             return _within(a.shape, (there * b.pose).actInv(at * a.pose), b.shape.sizes[3])
-        poses = [coal.Transform3s(x.rotation, x.translation) for x in (at * a.pose, there * b.pose)]
-        result = coal.DistanceResult()
-        return float(coal.distance(a.solid, poses[0], b.solid, poses[1], self._request, result))
+        if isinstance(b.shape, (HeightMap, TriangleMesh)) and isinstance(a.shape, (Capsule, Sphere)):
+            # Of triangles that a solid meets Coal takes any; its core meets none before it is a radius deep
+            return coal_distance(_core(a.shape), at * a.pose, b.solid, there * b.pose) - a.shape.radius
+        return coal_distance(a.solid, at * a.pose, b.solid, there * b.pose)
+
+
+def _core(shape: Capsule | Sphere) -> coal.CollisionGeometry:
+    """The point or segment in the middle of a round shape."""
+    return coal.Sphere(POINT) if isinstance(shape, Sphere) else coal.Capsule(POINT, shape.length)
+
+
+def coal_distance(a: coal.CollisionGeometry, at: pin.SE3, b: coal.CollisionGeometry, there: pin.SE3) -> float:
+    """Distance of two solids at poses, below 0 where they meet [m]; where Coal has no answer, as where the core of a
+    round one touches a face, the middle one of those a hair beside it.
+    """
+    request, answers = coal.DistanceRequest(), list[float]()
+    request.enable_signed_distance = True
+    for aside in BESIDE * np.vstack([np.zeros(3), np.eye(3)]):
+        poses = (
+            coal.Transform3s(at.rotation, at.translation + aside),
+            coal.Transform3s(there.rotation, there.translation),
+        )
+        answers.append(float(coal.distance(a, poses[0], b, poses[1], request, coal.DistanceResult())))
+        if abs(answers[0]) < LARGEST:
+            return answers[0]
+    return float(np.median(answers[1:])) - BESIDE
 
 
 def _apart(model: pin.Model, around: _PairDistances, a: _SweptPart, b: _SweptPart) -> bool:

@@ -28,7 +28,9 @@ class Climbed:
         climber: the robot. scene: what it climbed.
         t: times ``(n)`` [s]. q: configurations ``(n, nq)``. contacts: rows of footholds ``(n, limbs)``, or
             ``OPEN``.
+        aims: rows of footholds that limbs are on their way to through the air ``(n, limbs)``, or ``OPEN``.
         wrenches: ``(n, limbs, 6)`` in the axes of the footholds, None of a log without torques [N, N m].
+        presence: (row of a foothold, time, 1: it came, or 0: it vanished) ``(k, 3)`` [s].
     """
 
     climber: Climber
@@ -36,7 +38,9 @@ class Climbed:
     t: Array
     q: Array
     contacts: NDArray[np.intp]
+    aims: NDArray[np.intp]
     wrenches: Array | None
+    presence: Array
 
     @classmethod
     def of(cls, log: Log, climber: Climber, scene: ClimbScene) -> Climbed:
@@ -54,12 +58,15 @@ class Climbed:
             raise ShapeError("log", list(log.group("contact")), f"expected contacts of {', '.join(names)}")
         if len(log) < 2:
             raise ShapeError("log", len(log), "expected two ticks or more")
-        contacts = log.array("contact").astype(np.intp)
-        if contacts.min() < OPEN or contacts.max() >= len(scene.footholds):
-            raise ShapeError("log", int(contacts.max()), f"the scene has {len(scene.footholds)} footholds")
+        contacts, aims = (log.array(name).astype(np.intp) for name in ("contact", "aim"))
+        aims = aims if aims.shape[1] else np.full_like(contacts, OPEN)
+        for rows in (contacts, aims):
+            if rows.min() < OPEN or rows.max() >= len(scene.footholds):
+                raise ShapeError("log", int(rows.max()), f"the scene has {len(scene.footholds)} footholds")
         wrenches = log.array("wrench")
         known = wrenches.reshape(len(log), len(names), 6) if wrenches.shape[1] else None
-        return cls(climber, scene, log["t"], q, contacts, known)
+        presence = np.asarray(log.tables.get("presence", np.zeros((0, 3))))
+        return cls(climber, scene, log["t"], q, contacts, aims, known, presence)
 
     @cached_property
     def moved(self) -> Array:
@@ -80,6 +87,13 @@ class Climbed:
                 pose = pin.updateFramePlacement(model, data, frame) * limbs[limb].placement
                 places[k, limb], turns[k, limb] = pose.translation, pose.rotation
         return places, turns
+
+    @cached_property
+    def body(self) -> Array:
+        """Twists of the body between ticks in its own axes, linear first ``(n - 1, 6)`` [m/s, rad/s]."""
+        poses = [self.climber.body_pose(q) for q in self.q]
+        moved = [pin.log6(a.actInv(b)).vector for a, b in pairwise(poses)]
+        return np.array(moved) / np.diff(self.t)[:, None]
 
     def stretches(self, limb: int) -> list[tuple[int, int, int]]:
         """(first tick, tick after the last, foothold or ``OPEN``) of a limb, one after another."""

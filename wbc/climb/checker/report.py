@@ -19,13 +19,15 @@ class CheckRules:
         acceleration: of the change of that rate beyond the joint's limit, relative.
         hold_distance: of a closed contact from its foothold [m].
         hold_angle: of its axis, or its pose where that is fixed [rad].
-        slip: of a closed contact since it closed [m].
+        slip: of a closed contact since it closed [m]. grip_slip: the same of one that pulls [m].
         clearance: least distance of links from bodies and from each other [m].
         depth: how deep a tip may be in the body that it holds, beyond how deep it is while it holds [m].
         swept: distance to which the swept clearance is found; it is proven to this [m].
         margin: least slack of all contact cones at rest, as a share of the weight.
         every: time between instants at which that is looked for [s].
         cone: by which a logged wrench may be outside its cone, as a share of the weight.
+        speed: of the body's origin that was asked for, at most [m/s]. turn_rate: of the body [rad/s]. None: none was.
+        jump: of the velocity of the body's origin between ticks [m/s]. jump_turn: of its turn rate [rad/s]. None: any.
     """
 
     position: float = 1e-6
@@ -35,23 +37,30 @@ class CheckRules:
     hold_distance: float = 0.002
     hold_angle: float = 0.02
     slip: float = 0.001
+    grip_slip: float = 0.001
     clearance: float = 0.0
     depth: float = 2e-4
     swept: float = 2e-4
     margin: float = 0.0
     every: float = 0.1
     cone: float = 1e-6
+    speed: float | None = None
+    turn_rate: float | None = None
+    jump: float | None = None
+    jump_turn: float | None = None
 
     @classmethod
     def by_torques(cls) -> CheckRules:
         """Of a simulator with soft contacts: limbs close up to 7.5 mm beside their footholds, grips in the body
-        too, and feet slip by up to 5 mm; their impact accelerates joints beyond what they are asked for, up to twice.
+        too, and feet slip by up to 5 mm, grips by 1 mm; their impact accelerates joints beyond what they are asked
+        for, up to twice.
         """
         return cls(hold_distance=0.008, slip=0.005, depth=0.004, acceleration=1.0)
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            validation.scalar(f"CheckRules.{field.name}", getattr(self, field.name), low=0.0)
+            if getattr(self, field.name) is not None or field.default is not None:
+                validation.scalar(f"CheckRules.{field.name}", getattr(self, field.name), low=0.0)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from wbc.climb.climber import ClimbLimb
 from wbc.climb.loop.limb_state import CLOSED, Cause, LimbState, after
 from wbc.climb.loop.options import LoopOptions
 from wbc.climb.loop.reference import PlanReference
-from wbc.climb.loop.stack import FootholdContact, contact_frame
+from wbc.climb.loop.stack import COMPONENTS, FootholdContact, contact_frame
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import Foothold
 from wbc.climb.stance import FREE_LIMB
@@ -67,12 +67,14 @@ class LimbMachine:
 
     Attributes:
         state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
+        frame: name of its contact frame.
     """
 
     def __init__(self, limb: ClimbLimb, parts: LoopParts) -> None:
         self.name, self._kind, self._parts = limb.name, limb.contact, parts
-        self._frame = contact_frame(limb)
-        self._number = parts.robot.model.getFrameId(self._frame)
+        self.frame = contact_frame(limb)
+        self._number = parts.robot.model.getFrameId(self.frame)
+        self._gripping, self._closed_at = False, (np.zeros(3), 0.0)
         items = parts.controller
         self._contact, self._swing = items[f"{self.name} contact"], items[f"{self.name} swing"]
         self._force = items[f"{self.name} contact force"] if parts.torques else None
@@ -112,6 +114,13 @@ class LimbMachine:
     def coming(self) -> ContactMove | None:
         """The move that is under way or comes next; None: no more."""
         return self._moves[0] if self._moves else None
+
+    @property
+    def aim(self) -> int:
+        """Row of the foothold that it is on its way to through the air, or ``FREE_LIMB``."""
+        move = self.coming
+        under_way = self.state in (LimbState.SWINGING, LimbState.REACHING)
+        return move.lands if under_way and move is not None else FREE_LIMB
 
     @property
     def moves(self) -> list[ContactMove]:
@@ -251,6 +260,34 @@ class LimbMachine:
             return off, float(np.arccos(np.clip(pose.rotation[:, 2] @ target.rotation[:, 2], -1.0, 1.0)))
         return off, float(np.linalg.norm(pin.log3(pose.rotation.T @ target.rotation)))
 
+    def torn(self) -> Foothold:
+        """The plant's grip is gone; what it held."""
+        self._gripping = False
+        return self._footholds[self.held]
+
+    def slipped(self, seen: pin.Data) -> float:
+        """How far a grip has gone from where it closed, what it came nearer to its foothold left out [m].
+
+        Args:
+            seen: with the kinematics of where the robot is.
+        """
+        if not self._gripping:
+            return 0.0
+        place = pin.updateFramePlacement(self._parts.robot.model, seen, self._number).translation
+        first, off = self._closed_at
+        nearer = max(off - float(np.linalg.norm(place - self._target.translation)), 0.0)
+        return float(np.linalg.norm(place - first)) - nearer
+
+    def fixing(self, seen: pin.Data) -> Array:
+        """Rows of its contact frame's Jacobian that a closed contact fixes.
+
+        Args:
+            seen: with the joints' Jacobians of where the robot is.
+        """
+        model, kind = self._parts.robot.model, self._kind
+        rows = pin.getFrameJacobian(model, seen, self._number, pin.ReferenceFrame.LOCAL)
+        return np.asarray(rows[list(COMPONENTS[kind.fixed])])
+
     def _there(self, q: Array) -> bool:
         """Whether it is near enough to its foothold to close; a foot that touches, also a little beside it."""
         off, turned = self.off(q)
@@ -279,7 +316,9 @@ class LimbMachine:
         self._contact.set(target=target, **inputs)
         self._contact.enabled, self._swing.enabled = True, False
         if self._parts.plant is not None and self._kind.pulls:
-            self._parts.plant.grasp(self._frame, target, GripKind(self._kind.fixed))
+            self._parts.plant.grasp(self.frame, target, GripKind(self._kind.fixed))
+            place, self._gripping = self._seen_pose(q).translation, True
+            self._closed_at = place, float(np.linalg.norm(place - target.translation))
         self.held, self._late = foothold, 0.0
 
     def _open(self, q_planned: Array) -> None:
@@ -287,8 +326,9 @@ class LimbMachine:
         self._contact.enabled, self._swing.enabled = False, True
         if self._force is not None:
             self._force.weight = OPEN
-        if self._parts.plant is not None and self._kind.pulls:
-            self._parts.plant.release(self._frame)
+        if self._parts.plant is not None and self._gripping:
+            self._parts.plant.release(self.frame)
+        self._gripping = False
         pin.forwardKinematics(self._parts.robot.model, self._planned, q_planned)
         self._pose = pin.updateFramePlacement(self._parts.robot.model, self._planned, self._number).copy()
         self.held, self._late = FREE_LIMB, 0.0

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import inf, sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
+from wbc.climb.bearing import check_borne
+from wbc.climb.climber import Climber
 from wbc.climb.loop.ahead import StateAhead
+from wbc.climb.loop.hand_over import HandOvers
 from wbc.climb.loop.limb import LimbMachine, LoopParts
 from wbc.climb.loop.limb_state import CLOSED, Cause, LimbState
+from wbc.climb.loop.motor_watch import FeltPlant, MotorWatch
 from wbc.climb.loop.options import PERIODS, LoopOptions
+from wbc.climb.loop.pace import PlanPace
 from wbc.climb.loop.records import WRENCH, ClimbRecorder
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.loop.stack import climb_stack
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene, Foothold
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.controller import core_of
+from wbc.controller import Step, core_of
 from wbc.controller.handle import InputGroup
 from wbc.errors import RangeError, WbcError
 from wbc.log import Log
 from wbc.multibody import pin
-from wbc.simulation import CommandKind, GrippingPlant, Plant, PlantError
+from wbc.simulation import CommandKind, GrippingPlant, Plant, PlantError, PlantState
 from wbc.simulation.connection import Connection
 from wbc.validation import Array
 
@@ -34,16 +41,30 @@ from wbc.validation import Array
 Replan = Callable[[ClimbScene, Stance], ContactPlan]
 #: What comes after a plan that is done: from the scene and where the robot stands; None: nothing
 Onward = Callable[[ClimbScene, Stance], ContactPlan | None]
-#: Time in which the plan comes to a stop, or goes on again, where a limb is late [s]
-STOPPING = 0.2
+#: Whether a limb may lift: "" for yes, the id of another foothold that it is to go to, None for not yet
+Approve = Callable[[ContactMove], str | None]
+#: A plan of one limb, by name, to a foothold, by id, from where the robot stands
+Placed = Callable[[ClimbScene, Stance, str, str], ContactPlan]
 #: How far the body may be from the plan, by torques, before that slows down: from half of this on [m]
 LAG = 8e-3
 #: Least rate at which a plan goes on for a body that is off it [1]
 SLOWEST = 0.1
+#: Rate of a plan, by how far the body is off it, above which a robot is at the plan's end [1]: within :data:`LAG`
+ARRIVED = 0.5
 #: Rates with which a robot is at rest [m/s, rad/s]
 STILL = 5e-3
 #: Gain of all that follows the plan by velocities, and of closed contacts, times the period
 FOLLOWING = 0.2
+#: How far a grip may go from where it closed before it counts as slipping [m]
+SLIPS = 1e-3
+#: Singular value of closed limbs' rows, of metres and radians, below which they leave the body free
+FIXES = 1e-4
+#: Torques and wrenches that cannot do what they are to for so long end a run [s]
+OVERLOAD = 0.1
+#: Time in which a robot comes to rest of which something has failed, at most [s]
+RESTING = 2.0
+#: How far from the present plan another one may begin that goes on from it [m, rad]
+CONTINUES = 1e-6
 #: States before a lift
 STANDING = (LimbState.HELD, LimbState.UNLOADING, LimbState.FREE)
 #: Changes of one limb's state within a tick, at most
@@ -69,6 +90,7 @@ class ClimbRun:
         scene: of the first plan, with the footholds that came later after its own.
         plans: carried out one after another; the last one may be unfinished.
         changes: (time [s], limb, state, cause) of every change of a limb's state.
+        noted: (time [s], in words) of what was found wrong with the plant.
     """
 
     outcome: ClimbOutcome
@@ -77,6 +99,7 @@ class ClimbRun:
     scene: ClimbScene
     plans: tuple[ContactPlan, ...]
     changes: tuple[tuple[float, str, LimbState, Cause], ...]
+    noted: tuple[tuple[float, str], ...] = ()
 
 
 class ClimbLoop:
@@ -88,7 +111,12 @@ class ClimbLoop:
 
     A plan waits for a limb that is late: its time slows down to a stop within 0.2 s. :meth:`see` tells what the scene
     is by now; where that concerns what is left of the plan, the robot comes to rest and ``replan`` is asked for another
-    one from the stance that it is in. Until it has answered nothing moves.
+    one from the stance that it is in. Until it has answered nothing moves. By :meth:`stop` it rests on
+    its plan until :meth:`carry_on`.
+
+    Where a grip that the plant reports as lost was, there is no foothold any more. A grip that slips, a motor that
+    gives less than it is commanded (:class:`MotorWatch`), and torques that give way for 0.1 s bring the robot to rest,
+    and the run ends with their names.
 
     Args:
         plan: what is carried out, from its first configuration. plant: default: the kinematic one.
@@ -96,8 +124,15 @@ class ClimbLoop:
             is done; None: nothing does. options: see there.
         backend: as of ``Stack.compile``.
 
+    Attributes:
+        approve: asked with a move before its limb lifts, every tick until it answers; None: nobody is asked.
+        place: what plans a move to a foothold that ``approve`` names instead; ``replan`` plans the rest.
+        step: of the controller, of the last tick; None: there was none.
+        waiting: the move that waits for an answer. refused: why a foothold that was named is not taken; "" if it is.
+
     Raises:
-        ShapeError, RangeError: a plan that is none, or a plant that does not fit.
+        ShapeError, RangeError: a plan that is none, or that motors and contacts do not bear at rest under torques; a
+            plant that does not fit.
     """
 
     def __init__(
@@ -110,35 +145,51 @@ class ClimbLoop:
         options: LoopOptions | None = None,
         backend: str = "auto",
     ) -> None:
-        _check_plan(plan)
         options, self._replan, self._onward = options or LoopOptions(), replan, onward
         kinds = (CommandKind.VELOCITY,) if plant is None else tuple(plant.commands)
         self._torques = CommandKind.VELOCITY not in kinds and CommandKind.TORQUE in kinds
         kind = CommandKind.TORQUE if self._torques else CommandKind.VELOCITY
         self.dt = options.period or PERIODS[kind]
+        self._check(plan)
         self._connection = Connection(plant, plan.climber.robot, self.dt, kind)
         stack = climb_stack(plan.climber, plan.scene.gravity, self.dt, kind)
         command: Any = str(kind)
         self.robot, self.controller = stack.robot, stack.compile(command=command, backend=backend)
-        grips = plant if isinstance(plant, GrippingPlant) else None
+        grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
+        self._grips = grips
         parts = LoopParts(self.robot, stack, self.controller, options, grips, self._torques, self.dt)
         self._limbs = [LimbMachine(limb, parts) for limb in plan.climber.limbs]
         self._set_gains(options)
         fields = ("target", "feedforward", *(["acceleration"] * self._torques))
         self._follow = InputGroup(core_of(self.controller), [("reference", field, None) for field in fields])
-        self._planned = self.robot.model.createData()
+        self._planned, self._seen = self.robot.model.createData(), self.robot.model.createData()
         self._changes: list[tuple[float, str, LimbState, Cause]] = []
         self._plans: list[ContactPlan] = []
         self._footholds: dict[str, Foothold] = {}
-        self._recorder = ClimbRecorder(plan, self._torques, self.dt)
+        self._recorder, self._logs = ClimbRecorder(plan, self._torques, self.dt), options.log
+        self.step: Step | None = None
         self._outcome: ClimbOutcome | None = None
-        self._reason, self._scene = "", plan.scene
-        self._needs, self._turns, self._waiting, self._due = "", "", False, -inf
+        self._reason, self._scene, self._in_sight = "", plan.scene, plan.scene
+        self._needs, self._turns, self._late, self._due = "", "", False, -inf
         self._failed: set[str] = set()
-        self._path_time, self._rate = 0.0, 1.0
+        self.approve: Approve | None = None
+        self.place: Placed = _place_by(plan.climber)
+        self.waiting: ContactMove | None = None
+        self.refused, self._stopped, self._other, self._aside = "", "", "", False
+        self._unload, self._patience = (options.unload if self._torques else 0.0), options.patience
+        self._pace = PlanPace(self.robot, self.dt, hard=not self._torques)
+        self._noted: list[tuple[float, str]] = []
+        self._states: list[int] = []
+        self._granted: set[int] = set()
+        self._broken, self._ends_by, self._given_way = "", inf, 0
+        self._path_time = 0.0
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._ahead = StateAhead(self.robot, options.delay, self.dt)
         self._state = self._connection.reset(np.array(plan.q[0], dtype=float))
+        felt: FeltPlant | None = plant if self._torques and isinstance(plant, FeltPlant) else None
+        self._felt = felt
+        self._motors = MotorWatch(self.robot, self.dt, options.delay)
+        self._motors.begin(self._state.q, self._state.v)
         self.controller.reset(self._state.q)
         self._begin(plan)
         for limb, foothold in zip(self._limbs, plan.start, strict=True):
@@ -165,12 +216,21 @@ class ClimbLoop:
                 while self._outcome is None and (most is None or self._state.time < most):
                     if before_tick is not None:
                         before_tick(self)
-                    self.tick()
+                    if self._outcome is None:
+                        self.tick()
         except PlantError as error:
             self._end(ClimbOutcome.PLANT_FAILED, str(error))
         if self._outcome is None:
             self._end(ClimbOutcome.OUT_OF_TIME, f"{most:g} s were given")
         return self.result()
+
+    def end(self, reason: str) -> None:
+        """The run is over, as stopped; what it has done stays.
+
+        Args:
+            reason: in words.
+        """
+        self._end(ClimbOutcome.STOPPED, validation.name("reason", reason))
 
     def result(self) -> ClimbRun:
         """What was done so far; a run that has not ended is out of time."""
@@ -178,7 +238,21 @@ class ClimbLoop:
         scene = self._plans[0].scene
         if len(self._footholds) > len(scene.footholds):
             scene = replace(scene, footholds=list(self._footholds.values()))
-        return ClimbRun(outcome, self._reason, self._recorder.log(), scene, tuple(self._plans), tuple(self._changes))
+        return ClimbRun(outcome, self._reason, self._recorder.log(), scene, tuple(self._plans), tuple(self._changes),
+                        tuple(self._noted))  # fmt: skip
+
+    @contextmanager
+    def recorded(self, file: Path) -> Iterator[None]:
+        """Within it the log is written to a file as it comes, so that a run that is killed leaves what it did.
+
+        Raises:
+            LogFileError: it cannot be written.
+        """
+        self._recorder.write_to(file)
+        try:
+            yield
+        finally:
+            self._recorder.close()
 
     def see(self, scene: ClimbScene) -> None:
         """What the scene is from now on: footholds may have gone or come, and bodies appeared.
@@ -188,7 +262,11 @@ class ClimbLoop:
         """
         if not np.array_equal(scene.gravity, self._scene.gravity):
             raise RangeError("scene.gravity", scene.gravity, "the stack was compiled for another one")
-        scene = self._able(scene)
+        before, there = ({foothold.id for foothold in some.footholds} for some in (self._in_sight, scene))
+        for row, name in enumerate(self._footholds):
+            if (name in before) != (name in there):
+                self._recorder.seen(row, self.time, name in there)
+        self._in_sight, scene = scene, self._able(scene)
         self._scene = scene
         plan, left = self._plans[-1], {foothold.id for foothold in scene.footholds}
         gone = {k for k, foothold in enumerate(plan.scene.footholds) if foothold.id not in left}
@@ -197,19 +275,49 @@ class ClimbLoop:
             if limb.state in CLOSED and limb.held in gone:
                 self._change(limb, Cause.HOLD_LOST)
             self._needs = self._needs or missing
-        before = plan.scene.bodies
-        if set(scene.bodies) != set(before) or any(scene.bodies[k] is not before[k] for k in before):
+        bodies = plan.scene.bodies
+        if set(scene.bodies) != set(bodies) or any(scene.bodies[k] is not bodies[k] for k in bodies):
             self._needs = self._needs or "the bodies of the scene are others"
         self._due = -inf
 
-    def redirect(self, reason: str) -> None:
+    def redirect(self, reason: str, at_once: bool = False) -> None:
         """The rest of the plan is not wanted any more: limbs in the air land, the robot comes to rest, and the planner
         is asked.
 
         Args:
-            reason: in words, for a run that ends there.
+            reason: in words, for a run that ends there. at_once: limbs do not land before that.
         """
-        self._turns, self._due = validation.name("reason", reason), -inf
+        self._turns = validation.name("reason", reason)
+        if at_once:
+            self._needs = self._needs or self._turns
+        self._grant_unavoidable()
+
+    def go_over(self, plan: ContactPlan) -> None:
+        """Another plan from this instant on, which begins where and as fast as the present one is; limbs in the air
+        stay there, and its moves of them begin at 0.
+
+        Raises:
+            ShapeError, RangeError: a plan that is none, or that does not begin so; or the loop is not :attr:`steady`.
+        """
+        _check_plan(plan)
+        off = float(np.abs(pin.difference(self.robot.model, self._q, np.asarray(plan.q[0], dtype=float))).max())
+        if not self.steady or off > CONTINUES or tuple(plan.start) != tuple(self._held):
+            raise RangeError("plan", off, "expected one that begins where the steady loop is, with its contacts")
+        self._begin(plan)
+
+    def stop(self, reason: str) -> None:
+        """The robot comes to rest along its plan and stays there until :meth:`carry_on`; limbs in the air rest where
+        they are, and none is lifted, unless its lift is so near that joints cannot stop before it.
+
+        Args:
+            reason: in words.
+        """
+        self._stopped = validation.name("reason", reason)
+        self._grant_unavoidable()
+
+    def carry_on(self) -> None:
+        """Go on after :meth:`stop`."""
+        self._stopped, self._due = "", -inf
 
     def fail(self, limb: str) -> None:
         """A limb holds no more, now and for the rest of the run; its joints still move. What is left of the plan is not
@@ -237,6 +345,48 @@ class ClimbLoop:
         return self._scene
 
     @property
+    def stopped(self) -> str:
+        """Why :meth:`stop` was called; "" where the run goes on."""
+        return self._stopped
+
+    @property
+    def still(self) -> bool:
+        """Whether the robot is at rest."""
+        return self._pace.rate <= 0.0 and bool(np.abs(self._state.v).max() < STILL)
+
+    @property
+    def steady(self) -> bool:
+        """Whether its plan goes on at its full rate, by velocities, and nothing keeps it from that."""
+        kept = self._needs or self._turns or self._stopped or self._other or self._late or self._torques
+        return not kept and self._pace.rate == 1.0 and self._outcome is None
+
+    @property
+    def reference(self) -> PlanReference:
+        """The motion of the plan that is carried out now."""
+        return self._reference
+
+    @property
+    def plan(self) -> ContactPlan:
+        """What is carried out now; limbs and footholds of moves are rows of its climber and scene."""
+        return self._plans[-1]
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Of each limb the row of the foothold in the plan's scene that it holds, or ``FREE_LIMB``."""
+        return tuple(self._held)
+
+    @property
+    def path_time(self) -> float:
+        """Of that plan [s]."""
+        return self._path_time
+
+    @property
+    def coming(self) -> tuple[ContactMove, ...]:
+        """Of each limb the move that is under way or comes next, by time of lift: their footholds are reserved."""
+        moves = [limb.coming for limb in self._limbs]
+        return tuple(sorted((move for move in moves if move is not None), key=lambda move: move.lift))
+
+    @property
     def ended(self) -> bool:
         """Whether the run is over."""
         return self._outcome is not None
@@ -245,6 +395,11 @@ class ClimbLoop:
     def time(self) -> float:
         """On the plant's clock [s]."""
         return float(self._state.time)
+
+    @property
+    def velocity(self) -> Array:
+        """As the plant reports it ``(nv)`` [m/s, rad/s]."""
+        return np.array(self._state.v)
 
     @property
     def states(self) -> list[LimbState]:
@@ -270,17 +425,24 @@ class ClimbLoop:
         dt = self.dt
         if self._turns and all(limb.state in STANDING for limb in self._limbs):
             self._needs, self._turns = self._needs or self._turns, ""
-        aimed = 0.0 if self._needs or self._waiting else self._followed()
-        if self._rate != aimed:
-            self._rate += min(max(aimed - self._rate, -dt / STOPPING), dt / STOPPING)
-        if self._needs and self._rate <= 0.0 and np.abs(self._state.v).max() < STILL:
+        stops = self._needs or self._late or self._stopped or self._other
+        aimed = 0.0 if stops else min(self._followed(), self._hand_overs.rate(self._path_time))
+        end = self._before_lifts() if self._turns or self.approve or aimed == 0.0 else inf
+        rate = self._pace.rate
+        if rate != aimed or end < inf:
+            rate = self._pace.go(self._path_time, aimed, end)
+        rests = rate <= 0.0 and (self._needs or self._other) and not self._stopped and self.still
+        if rests or self.time > self._ends_by:
             self._plan_anew()
             return
-        ahead = self._path_time + self._rate * dt
+        ahead = self._path_time + rate * dt
         if ahead >= self._due:
             ahead = self._advance_limbs(ahead)
             if self._outcome is not None:
                 return
+            if ahead in self._hand_overs.moving:
+                # A plan that was held up where it moves goes on from rest
+                self._pace.rate = min(rate, (ahead - self._path_time) / dt)
         q_next = self._reference.q(ahead)
         self._write(q_next)
         self._path_time, state = ahead, self._state
@@ -293,9 +455,59 @@ class ClimbLoop:
             command, wrenches = step.v, None
         state = self._state = self._connection.drive(command)
         motion = state.q, state.v, command
-        self._recorder.add((state.time, ahead), motion, self._logged(), self._states, step.status == "solved", wrenches)
-        if ahead >= self._reference.end and all(limb.coming is None for limb in self._limbs):
-            self._go_on()
+        self.step = step
+        if self._logs:
+            solved = step.status == "solved"
+            self._recorder.add((state.time, ahead), motion, self._logged(), self._states, solved, wrenches)
+        if self._grips is not None:
+            self._heed(state, command)
+        if self._torques:
+            self._given_way = 0 if step.status == "solved" else self._given_way + 1
+            if self._given_way * dt > OVERLOAD and not self._broken:
+                self._break(f"motors and contacts have given way for {OVERLOAD:g} s")
+        if ahead >= self._reference.end and not self._broken and all(limb.coming is None for limb in self._limbs):
+            # Motors at their limits, or a load that nobody knows, may have kept the body from where the plan ends
+            if self._followed() > ARRIVED:
+                self._go_on()
+            elif ahead > self._reference.end + self._patience:
+                away = float(np.linalg.norm(state.q[:3] - self._q[:3]))
+                self._end(ClimbOutcome.STOPPED, f"the body is {1e3 * away:.1f} mm off the end of the plan")
+
+    def _heed(self, state: PlantState, command: Array) -> None:
+        """What the plant has lost, and what of it fails."""
+        assert self._grips is not None
+        for frame in self._grips.lost():
+            limb = next(limb for limb in self._limbs if limb.frame == frame)
+            foothold = limb.torn()
+            self._noted.append((state.time, f"the foothold {foothold.id} of {limb.name} broke off"))
+            self.see(self._scene.without(foothold.id))
+            if not self._kept_still(state.q):
+                self._break(f"{self._noted.pop()[1]}, and what is left does not keep the body")
+                self._ends_by = self.time
+        if self._broken or self._felt is None or not self._motors.sends(command):
+            return
+        for dof in self._motors.see(state.q, state.v, self._felt.contact_torques):
+            share = max(float(self._motors.share[dof]), 0.0)
+            joint = self.robot.dof_names[dof]
+            gets = f"{joint} gets {share:.0%} of the torque asked of it"
+            self._break(f"{gets}: its motor is limp, or bears a load that nobody knows")
+        pin.forwardKinematics(self.robot.model, self._seen, state.q)
+        for limb in self._limbs:
+            slipped = limb.slipped(self._seen)
+            if slipped > SLIPS:
+                self._break(f"{limb.name} has slipped by {1e3 * slipped:.1f} mm on its foothold")
+
+    def _kept_still(self, q: Array) -> bool:
+        """Whether closed limbs fix the body while no joint moves."""
+        pin.computeJointJacobians(self.robot.model, self._seen, q)
+        rows = [limb.fixing(self._seen)[:, :6] for limb in self._limbs if limb.state in CLOSED]
+        return bool(rows) and int(np.linalg.matrix_rank(np.vstack(rows), FIXES)) == 6
+
+    def _break(self, text: str) -> None:
+        """Something of the plant has failed: the robot comes to rest, and the run ends."""
+        self._noted.append((self.time, text))
+        if not self._broken:
+            self._broken, self._needs, self._ends_by = text, text, self.time + RESTING
 
     def _followed(self) -> float:
         """At which rate the plan goes on for a body that is off it [1]: motors at their limits catch up meanwhile."""
@@ -337,18 +549,16 @@ class ClimbLoop:
         for limb in self._limbs:
             move = limb.coming
             if move is not None and move.lift < ahead and limb.state in STANDING:
-                if self._turns or self._needs:
-                    # Nothing lifts any more on a plan that is given up
-                    ahead = max(min(ahead, move.lift), self._path_time)
-                    continue
                 ready = limb.state is LimbState.FREE or limb.unloaded(now)
-                if not (ready and self._borne(limb, move)):
+                # A plan that is given up comes to rest behind that, as soon as joints can, the limb still held
+                if not self._needs and not (ready and self._may_lift(move) and self._borne(limb, move)):
                     ahead = max(min(ahead, move.lift), self._path_time)
-        self._waiting = False
+        self._late = False
         for limb in self._limbs:
             for _ in range(CHANGES):
                 move = limb.coming
-                cause = limb.cause(ahead, self._path_time, q, now, move is None or self._borne(limb, move))
+                may = move is None or (self._may_lift(move) and self._borne(limb, move))
+                cause = limb.cause(ahead, self._path_time, q, now, may)
                 if cause is None:
                     break
                 self._change(limb, cause)
@@ -356,7 +566,7 @@ class ClimbLoop:
                     # It bears for a tick at least, also where it is to lift again at once
                     break
             if limb.wait(self._path_time):
-                self._waiting = True
+                self._late = True
                 late = "" if self._needs else limb.too_late(q)
                 if late:
                     self._end(ClimbOutcome.STOPPED, late)
@@ -367,6 +577,50 @@ class ClimbLoop:
         """Whether all other limbs that are to have landed when this one lifts have."""
         return all(limb is lifted or limb.landed(move.lift) for limb in self._limbs)
 
+    def _may_lift(self, move: ContactMove) -> bool:
+        """Whether nothing keeps a limb that is not in the air from its next move."""
+        if self._needs:
+            return False
+        return id(move) in self._granted or not (self._turns or self._stopped or self._other or self.approve)
+
+    def _before_lifts(self) -> float:
+        """Time of the plan of the first lift that may not be made now [s]; whoever has a say is asked."""
+        first, self.waiting = inf, None
+        for limb in self._limbs:
+            move = limb.coming
+            if move is None or limb.state not in STANDING:
+                continue
+            lift = move.lift
+            if self.approve and id(move) not in self._granted and limb.state is not LimbState.UNLOADING:
+                lift -= self._unload
+                near = not self._pace.stops(self._path_time + 2.0 * self.dt, lift)
+                if near and not (self._needs or self._turns or self._stopped or self._other):
+                    self._ask(self.approve, move)
+            if self._late or not self._may_lift(move):
+                first = min(first, lift)
+        return first
+
+    def _ask(self, approve: Approve, move: ContactMove) -> None:
+        """Whether a limb may lift."""
+        answer = approve(move)
+        if answer is None:
+            self.waiting = self.waiting or move
+        elif answer:
+            self._other, self._asked = answer, move
+        else:
+            self._granted.add(id(move))
+            self._due = -inf
+
+    def _grant_unavoidable(self) -> None:
+        """Lifts before which the joints can no more come to rest are made."""
+        for limb in self._limbs:
+            move = limb.coming
+            if move is None or limb.state not in STANDING or self.approve:
+                continue
+            if move.lift >= self._path_time and not self._pace.stops(self._path_time, move.lift, self._pace.rate):
+                self._granted.add(id(move))
+        self._due = -inf
+
     def _change(self, limb: LimbMachine, cause: Cause) -> None:
         state = limb.change(cause, self._state.q, self._q, self.time)
         self._changes.append((self.time, limb.name, state, cause))
@@ -375,6 +629,7 @@ class ClimbLoop:
     def _look(self) -> None:
         """What every tick needs of the limbs' states."""
         self._held = [limb.held for limb in self._limbs]
+        self._aims = [limb.aim for limb in self._limbs]
         self._states = [int(limb.state) for limb in self._limbs]
         self._aloft = [limb for limb in self._limbs if limb.state not in CLOSED]
 
@@ -389,25 +644,39 @@ class ClimbLoop:
         self._log_rows = [rows[foothold.id] for foothold in plan.scene.footholds]
         reference = self._reference = PlanReference(plan, self.robot)
         ordered = sorted(plan.moves, key=lambda move: move.lift)
+        self._hand_overs = HandOvers(ordered, reference, self._unload)
         for row, limb in enumerate(self._limbs):
             limb.begin([move for move in ordered if move.limb == row], plan, reference, plan.start[row])
-        self._needs, self._turns, self._waiting, self._due = "", "", False, -inf
-        self._path_time, self._rate = 0.0, 1.0
+        self._needs, self._turns, self._late, self._due = "", "", False, -inf
+        self.waiting, self._other, self._aside = None, "", False
+        self._granted = set()
+        self._path_time = 0.0
+        self._pace.begin(reference, 1.0)
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._look()
 
     def _logged(self) -> list[int]:
-        """Contacts as the log has them: rows of the footholds of all plans, those of the first plan first."""
-        return [self._log_rows[row] if row >= 0 else row for row in self._held]
+        """Contacts and aims as the log has them: rows of the footholds of all plans, those of the first plan first."""
+        return [self._log_rows[row] if row >= 0 else row for row in (*self._held, *self._aims)]
+
+    def _check(self, plan: ContactPlan) -> None:
+        """Refuses a plan that is none, and under torques one that contacts or motors do not bear."""
+        _check_plan(plan)
+        if self._torques:
+            check_borne(plan)
 
     def _go_on(self) -> None:
         """A plan is done: what comes after it, if anything does."""
+        if self._aside:
+            self._needs = "another foothold was chosen"
+            self._plan_anew()
+            return
         after = None
         if self._onward is not None:
             try:
                 after = self._onward(self._scene, self.stance)
                 if after is not None:
-                    _check_plan(after)
+                    self._check(after)
             except WbcError as error:
                 self._end(ClimbOutcome.STOPPED, f"nothing comes after the plan; {error}")
                 return
@@ -418,18 +687,42 @@ class ClimbLoop:
 
     def _plan_anew(self) -> None:
         """The robot is at rest, and what is left of the plan cannot be done."""
+        if self._broken:
+            self._end(ClimbOutcome.PLANT_FAILED, f"{self._broken}, seen at {self._noted[-1][0]:.2f} s")
+            return
+        if self._other and not self._needs:
+            self._go_aside(self._asked, self._other)
+            return
         if self._replan is None:
             self._end(ClimbOutcome.STOPPED, f"{self._needs}, and no planner was given")
             return
         stance = self.stance
         try:
             plan = self._replan(self._scene, stance)
-            _check_plan(plan)
+            self._check(plan)
             if tuple(plan.start) != stance.contacts:
                 raise RangeError("plan.start", plan.start, f"expected the stance's contacts {stance.contacts}")
         except WbcError as error:
             self._end(ClimbOutcome.STOPPED, f"{self._needs}; {error}")
             return
+        self._begin_anew(plan)
+
+    def _go_aside(self, move: ContactMove, foothold: str) -> None:
+        """A limb goes to another foothold than its plan has, where it can; if not, the plan goes on waiting."""
+        self._other, stance = "", self.stance
+        try:
+            plan = self.place(self._scene, stance, self._limbs[move.limb].name, foothold)
+            _check_plan(plan)
+        except WbcError as error:
+            self.refused = str(error)
+            return
+        self.refused = ""
+        self._begin_anew(plan)
+        self._aside = True
+        self._granted.update(id(move) for move in plan.moves)
+
+    def _begin_anew(self, plan: ContactPlan) -> None:
+        """A plan, from where the robot is at rest."""
         for limb in self._limbs:
             if limb.state not in (LimbState.HELD, LimbState.FREE):
                 self._change(limb, Cause.NEW_PLAN)
@@ -448,6 +741,15 @@ class ClimbLoop:
 
     def _end(self, outcome: ClimbOutcome, reason: str) -> None:
         self._outcome, self._reason = outcome, reason
+
+
+def _place_by(climber: Climber) -> Placed:
+    def place(scene: ClimbScene, stance: Stance, limb: str, foothold: str) -> ContactPlan:
+        from wbc.climb.limb_work import plan_limb_work
+
+        return plan_limb_work(climber, scene, stance, limb, [foothold])
+
+    return place
 
 
 def _check_plan(plan: ContactPlan) -> None:

@@ -24,6 +24,7 @@ class LoopOptions:
         bandwidth: omega of a = a_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q), of torques [1/s].
         friction: share of the coefficients of friction on which torques count [1].
         delay: of the torques, which the loop knows [s].
+        log: whether ticks are logged; without, the log has the start alone.
         press: speed at which a foot that is late goes on against its foothold's normal, of torques [m/s].
 
     Raises:
@@ -39,6 +40,7 @@ class LoopOptions:
     friction: float = 0.75
     delay: float = 0.0
     press: float = 0.02
+    log: bool = True
 
     def __post_init__(self) -> None:
         if self.latch_distance is not None:
@@ -48,5 +50,6 @@ class LoopOptions:
         for name in ("unload", "delay", "press"):
             validation.scalar(f"LoopOptions.{name}", getattr(self, name), low=0.0)
         validation.scalar("LoopOptions.friction", self.friction, low=0.0, high=1.0, open_low=True)
+        validation.flag("LoopOptions.log", self.log)
         if self.period is not None:
             validation.scalar("LoopOptions.period", self.period, low=0.0, open_low=True, unit="s")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import pathlib
 from typing import Any
 
 import numpy as np
 
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.log import Log, TickRecorder
+from wbc.log import FileWriter, Log, TickRecorder
 from wbc.multibody import pin
 from wbc.validation import Array
 
@@ -17,13 +18,27 @@ from wbc.validation import Array
 WRENCH = {"fx": "N", "fy": "N", "fz": "N", "mx": "N m", "my": "N m", "mz": "N m"}
 #: Columns of a foothold in the table ``footholds``: position [m], quaternion x, y, z, w, friction
 FOOTHOLD_COLUMNS = 8
+#: Columns of the table ``presence``: row of a foothold, time [s], 1 where it came then, 0 where it vanished
+PRESENCE_COLUMNS = 3
+#: Ticks that are written to a file at once
+CHUNK = 50
 
 
 def scene_digest(scene: ClimbScene) -> str:
     """Hash of footholds, bodies and gravity."""
-    text = [f"{f.id} {f.on} {f.friction!r} {f.limbs}" for f in scene.footholds]
-    text += [f"{name} {_told(body.shape)}" for name, body in sorted(scene.bodies.items())]
-    poses = [f.pose for f in scene.footholds] + [body.placement for _, body in sorted(scene.bodies.items())]
+    text = [f"{f.id} {f.on} {f.friction!r} {f.limbs} {f.rolls}" for f in scene.footholds]
+    return _digest(scene, text, [f.pose for f in scene.footholds])
+
+
+def bodies_digest(scene: ClimbScene) -> str:
+    """Hash of bodies and gravity."""
+    return _digest(scene, [], [])
+
+
+def _digest(scene: ClimbScene, text: list[str], poses: list[pin.SE3]) -> str:
+    bodies = sorted(scene.bodies.items())
+    text = text + [f"{name} {_told(body.shape)}" for name, body in bodies]
+    poses = poses + [body.placement for _, body in bodies]
     numbers = np.concatenate([np.ravel(pose.homogeneous) for pose in poses] + [np.ravel(scene.gravity)])
     return hashlib.sha256("\n".join(text).encode() + numbers.tobytes()).hexdigest()[:32]
 
@@ -35,9 +50,13 @@ class ClimbRecorder:
         q.NAME             configuration after the tick [m, rad]; v.DOF the velocity that the plant reports
         u.DOF              what was commanded: velocities [m/s, rad/s], or torques [N m]
         contact.LIMB       row in the run's scene of the foothold that it is closed on, -1 for none
+        aim.LIMB           row of the foothold that it is on its way to through the air, -1 for none
         state.LIMB         a ``LimbState``
         wrench.LIMB.fx     ... mz: of a stack of torques what the contact bears, in the axes of the foothold [N, N m]
         kept               whether every row of the stack held
+
+    Its tables: ``footholds``, and of a run in which some vanished or came ``presence``: when, as of
+    :data:`PRESENCE_COLUMNS`.
 
     Args:
         plan: what is carried out. torques: whether torques are commanded.
@@ -55,7 +74,7 @@ class ClimbRecorder:
             for name, unit in zip(names, units, strict=True)
         }
         limbs = tuple(limb.name for limb in climber.limbs)
-        columns |= {f"{part}.{limb}": ("", "i8") for part in ("contact", "state") for limb in limbs}
+        columns |= {f"{part}.{limb}": ("", "i8") for part in ("contact", "aim", "state") for limb in limbs}
         if torques:
             columns |= {f"wrench.{limb}.{axis}": (unit, "f8") for limb in limbs for axis, unit in WRENCH.items()}
         columns["kept"] = ("", "?")
@@ -65,12 +84,12 @@ class ClimbRecorder:
             "command": "torque" if torques else "velocity", "footholds": [f.id for f in plan.scene.footholds],
         }  # fmt: skip
         self._recorder, self._row = TickRecorder(columns, meta), np.zeros((1, len(columns)))
-        self._ends = np.cumsum([2, robot.nq, robot.nv, robot.nv, len(limbs), len(limbs)]).tolist()
-        self._scene = plan.scene
+        self._ends = np.cumsum([2, robot.nq, robot.nv, robot.nv, 2 * len(limbs), len(limbs)]).tolist()
+        self._scene, self._presence = plan.scene, list[tuple[int, float, bool]]()
 
     def add(self, times: tuple[float, float], motion: tuple[Array, Array, Array], contacts: list[int],
             states: list[int], kept: bool, wrenches: Array | None) -> None:  # fmt: skip
-        """A tick: (clock, time of the plan), (q, v, command), and the rest as of the class."""
+        """A tick: (clock, time of the plan), (q, v, command), contacts with aims, and the rest as of the class."""
         row, (a, b, c, d, e, f) = self._row[0], self._ends
         row[:a], row[a:b], row[b:c], row[c:d] = times, *motion
         row[d:e], row[e:f] = contacts, states
@@ -78,11 +97,38 @@ class ClimbRecorder:
             row[f:-1] = wrenches
         row[-1] = kept
         self._recorder.extend(self._row)
+        if len(self._recorder) % CHUNK == 0:
+            self._recorder.send()
+
+    def seen(self, row: int, time: float, there: bool) -> None:
+        """A foothold came or vanished at a time [s]."""
+        self._presence.append((row, time, there))
+        self._recorder.send({"presence": self._tables()["presence"]})
+
+    def write_to(self, file: pathlib.Path) -> None:
+        """From now on ticks are written there as well, :data:`CHUNK` at once: of a run that is killed the file has what
+        was done until then.
+
+        Raises:
+            LogFileError: it cannot be written.
+        """
+        self._recorder.write_to(FileWriter(file, overwrite=True))
+        self._recorder.send(self._tables())
+
+    def close(self) -> None:
+        """The rest is written, and nothing more is."""
+        self._recorder.close()
 
     def log(self) -> Log:
         """All ticks, with the footholds as a table."""
+        return self._recorder.log(self._tables())
+
+    def _tables(self) -> dict[str, Array]:
         rows = [[*pin.SE3ToXYZQUAT(f.pose), f.friction] for f in self._scene.footholds]
-        return self._recorder.log({"footholds": np.array(rows).reshape(-1, FOOTHOLD_COLUMNS)})
+        out = {"footholds": np.array(rows).reshape(-1, FOOTHOLD_COLUMNS)}
+        if self._presence:
+            out["presence"] = np.array(self._presence, dtype=float).reshape(-1, PRESENCE_COLUMNS)
+        return out
 
 
 def _told(shape: object) -> str:

@@ -1,10 +1,7 @@
 /* What the planner of climbing asks for many times. */
+#include "along.h"
 #include "close.h"
-#include "moves.h"
-#include "spans.h"
-#include "swings.h"
 #include "time_law.h"
-#include "touch.h"
 
 long long wbc_step_size(void) { return (long long)sizeof(step_t); }
 long long wbc_limb_size(void) { return (long long)sizeof(limb_t); }
@@ -14,7 +11,7 @@ void wbc_touches(const limb_t *l, long n, const double *angle, double *out) {
     static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     placed_t placed;
     for (long k = 0; k < n; k++) {
-        place_limb(l, here, angle + k * l->angles, &placed);
+        place_steps(l, here, angle + k * l->angles, &placed);
         memcpy(out + 12 * k, placed.tip, sizeof placed.tip);
     }
 }
@@ -36,8 +33,8 @@ long long wbc_climb_size(void) { return (long long)sizeof(climb_t); }
 /* Frees what was kept of supports */
 void wbc_climb_forget(climb_t *c) {
     for (int k = 0; k < c->places; k++) free(c->support[k]);
-    free(c->support), free(c->work);
-    c->support = 0, c->work = 0, c->places = c->supports = c->largest = 0;
+    free(c->support), free(c->work), free(c->gap);
+    c->support = 0, c->work = c->gap = 0, c->places = c->supports = c->largest = 0;
 }
 
 /* The slack of contacts at a centre of mass and its bound over that, 4; `poses` of contacts: 0 for those of their places */
@@ -65,11 +62,23 @@ int wbc_stand(climb_t *c, const int *contact, const int *bears, double wanted, c
     wish_t wish = {1, {support_of(c, all)}, wanted, body[0], body[1], REST, {0}, 0, {{0}}};
     memcpy(wish.pose, body + 2, sizeof wish.pose);
     if (!wish.support[0]) return NOT_BORNE;
-    double from[12 + MOST_LIMBS * MOST_ANGLES];
+    double from[12 + MOST_LIMBS * MOST_ANGLES], far;
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     int how = posture(c, contact, &wish, state, state + 12, numbers, which);
-    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, 1, from, from + 12, state, state + 12, numbers, which);
+    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, 1, from, from + 12, state, state + 12, numbers, which, &far);
     return how;
+}
+
+/* How many limbs cannot lift off a state without touching something, each by itself */
+int wbc_stuck(climb_t *c, const int *contact, const double *state) {
+    int all[MOST_LIMBS], kept[MOST_LIMBS], which[2], count = 0;
+    padded(c, contact, all);
+    for (int l = 0; l < c->limbs; l++) {
+        memcpy(kept, all, sizeof kept);
+        kept[l] = -1;
+        count += all[l] >= 0 && (!can_rise(c, all, kept, state, state + 12) || clear_once_up(c, all, kept, state, which) < 0.0);
+    }
+    return count;
 }
 
 /* The slack, clearance and contact errors of a configuration as it is: 2 + limbs numbers */
@@ -152,31 +161,80 @@ void wbc_center(const climb_t *c, const double *state, double *center) {
     place_all(c, state, state + 12, placed, center);
 }
 
-int wbc_hold_spans(const limb_t *l, int count, const double *wanted, int at, const double *start, int tries, int most,
-                   const double *step, double *angles, int *first, int *last) {
-    return hold_spans(l, count, wanted, at, start, tries, most, step, angles, first, last);
+/* What is known of a way: `rest`: contact poses at rest, 12 each; `body`: its poses at `end` + 1 instants; `every`: samples from rough
+ * one to rough one; `numbers`: height and least instants of swings, least slack; `step`, `most`: of all angles, limb by limb */
+along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, int every, const double *numbers, const double *step,
+                   const double *most, int postures) {
+    along_t *a = calloc(1, sizeof *a);
+    if (!a) return 0;
+    if (setjmp(a->no_memory)) return forget_along(a), (along_t *)0;
+    a->climb = c, a->rest = rest, a->end = end, a->body = body, a->every = every;
+    a->samples = (end + LOOKS - 1) / LOOKS + 1;
+    a->height = numbers[0], a->shortest = (int)numbers[1], a->margin = numbers[2];
+    a->work = got(a, malloc(sizeof *a->work * (MOST_ANGLES + 1) * ((size_t)a->samples + 8)));
+    a->trunk = got(a, calloc((size_t)a->samples, 1));
+    begin_along(a, step, most, postures);
+    return a;
 }
 
-/* As swing */
-double wbc_swing(const limb_t *l, int count, int parts, const double *body, const double *from, const double *onto,
-                 const double *ends, double over, int straight, const double *most, double *angle, int *at) {
-    return swing(l, count, parts, body, from, onto, ends, over, straight, most, angle, at);
+void wbc_along_forget(along_t *a) { forget_along(a); }
+
+/* Adds a span that begins with some angles; its row, -1: there is none, or -2: no memory, as with those below */
+int wbc_along_begun(along_t *a, int limb, int place, const double *angle) {
+    if (setjmp(a->no_memory)) return -2;
+    const int row = a->spans;
+    spans_at(a, limb, place, 1, angle);
+    return a->spans > row ? row : -1;
 }
 
-/* As pieces_of */
-int wbc_pieces_of(const climb_t *c, int limb, long n, const double *angle, double *out) {
-    return pieces_of(c, limb, n, angle, out);
+/* Of each span the limb, the place, the first and last instant, and swings that are left (-1: it leads nowhere), 5 each; how many */
+int wbc_along_spans(along_t *a, int *out) {
+    if (!out) return a->spans;
+    count_swings(a);
+    for (int k = 0; k < a->spans; k++, out += 5) {
+        const span_t *s = a->span + k;
+        out[0] = s->limb, out[1] = s->place, out[2] = begins(a, s), out[3] = lasts(a, s), out[4] = isinf(s->left) ? -1 : (int)s->left;
+    }
+    return a->spans;
 }
 
-/* As mark_alone; `work`: 13 n numbers */
-void wbc_mark_alone(const climb_t *c, int limb, const double *pieces, const double *base, const int *contact, const double *off,
-                    long n, char *mark, double *work) {
-    mark_alone(c, limb, pieces, base, contact, off, n, mark, work);
+/* Begins anew, with so many standings kept, on the spans of `count` first ones */
+int wbc_along_begin(along_t *a, int width, int count, const int *row) {
+    if (setjmp(a->no_memory)) return -2;
+    drop_levels(a, 0);
+    a->width = width, a->alike = 1 + width / 32;
+    add_level(a);
+    for (int k = 0; k < count; k++) {
+        standing_t s = {{0}, 0, 0, -1, 0, 0, 0, 0, 0, 0, WAITS, 0, 0.0};
+        memcpy(s.row, row + (long)k * a->climb->limbs, sizeof(int) * a->climb->limbs);
+        add_standing(a, a->level, &s);
+    }
+    return keep_some(a, width);
 }
 
-/* As mark_limbs */
-void wbc_mark_limbs(const climb_t *c, int one, const double *pieces, int other, const double *others, long n, char *mark) {
-    mark_limbs(c, one, pieces, other, others, 0, n, mark);
+/* As along_way, with about so many standings looked at; of each standing its limb, lift, landing, and the place of each limb. How many */
+int wbc_along_way(along_t *a, long most, double *angles, int *out) {
+    if (setjmp(a->no_memory)) return -2;
+    if (!along_way(a, most, angles)) return 0;
+    standing_t *chain[a->levels];
+    chain_of(a, arrived(a), chain);
+    for (int d = 0; d < a->levels; d++) {
+        *out++ = chain[d]->limb, *out++ = chain[d]->lift - chain[d]->early, *out++ = chain[d]->now + chain[d]->late;
+        for (int l = 0; l < a->climb->limbs; l++) *out++ = a->span[chain[d]->row[l]].place;
+    }
+    return a->levels;
+}
+
+/* How far a way is known to lead, how many standings were looked at, and why others are none */
+void wbc_along_told(const along_t *a, long *out) {
+    *out++ = a->furthest, *out++ = a->looked;
+    memcpy(out, a->why, sizeof a->why);
+}
+
+int wbc_along_refuse(along_t *a, int level, int swings) {
+    if (setjmp(a->no_memory)) return -2;
+    refuse_found(a, level, swings);
+    return 0;
 }
 
 int wbc_fastest(long n, int rows, int sided, const double *s, const double *a, const double *b, const double *squared, double *x) {

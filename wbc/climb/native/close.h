@@ -26,7 +26,7 @@ static double close_once(const limb_t *limbs, const int *offset, int contacts, c
         if (!turned) limb.rows = 3;
         const int first = start[c];
         start[c + 1] = first + limb.rows;
-        place_limb(&limb, state, state + 12 + offset[which[c]], &placed);
+        place_steps(&limb, state, state + 12 + offset[which[c]], &placed);
         contact_error(&limb, placed.tip, wanted + 12 * c, r + first, E);
         limb_jacobian(&limb, &placed, J);
         error = fmax(error, largest_error(&limb, r + first));

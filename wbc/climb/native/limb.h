@@ -27,10 +27,9 @@ typedef struct {
     double tip[12], pose[MOST_STEPS][12], axis[MOST_STEPS][3], at[MOST_STEPS][3], mass[MOST_STEPS], moment[MOST_STEPS][3];
 } placed_t;
 
-/* Everything at some angles, along the axes of the frame in which the body is at `base`; masses and moments (mass times place)
- * are of a step and all after it */
-static void place_limb(const limb_t *l, const double *base, const double *angle, placed_t *out) {
-    double pose[12], next[12], R[9], by[3];
+/* Poses at some angles, along the axes of the frame in which the body is at `base` */
+static void place_steps(const limb_t *l, const double *base, const double *angle, placed_t *out) {
+    double pose[12], next[12], R[9];
     memcpy(pose, base, sizeof pose);
     for (int k = 0; k < l->steps; k++) {
         const step_t *s = l->step + k;
@@ -47,11 +46,20 @@ static void place_limb(const limb_t *l, const double *base, const double *angle,
         }
         copy3(next + 9, out->at[k]);
         memcpy(out->pose[k], pose, sizeof pose);
-        turn(pose, s->center, by);
-        out->mass[k] = s->mass;
-        for (int i = 0; i < 3; i++) out->moment[k][i] = s->mass * (by[i] + pose[9 + i]);
     }
     compose(pose, l->tip, out->tip);
+}
+
+/* The same with masses and moments (mass times place) of a step and all after it */
+static void place_limb(const limb_t *l, const double *base, const double *angle, placed_t *out) {
+    double by[3];
+    place_steps(l, base, angle, out);
+    for (int k = 0; k < l->steps; k++) {
+        const step_t *s = l->step + k;
+        turn(out->pose[k], s->center, by);
+        out->mass[k] = s->mass;
+        for (int i = 0; i < 3; i++) out->moment[k][i] = s->mass * (by[i] + out->pose[k][9 + i]);
+    }
     for (int k = l->steps - 2; k >= 0; k--) {
         out->mass[k] += out->mass[k + 1];
         for (int i = 0; i < 3; i++) out->moment[k][i] += out->moment[k + 1][i];

@@ -5,11 +5,15 @@
 #include "posture.h"
 
 /* Poses between two postures at which limbs that hold are followed */
-#define BETWEEN 4
+#define BETWEEN 8
 /* From this attempt on links may touch on the way of the body, which may then not be straight */
 #define LAST_ATTEMPT 3
 /* How far limbs that lift or land are to reach over their contact, but in that attempt [lengths of the limb] */
 #define RISEN 0.03
+/* Other postures are sought so often where links touch on the way, or as limbs rise; and what these are led apart further then, of what
+ * they lack */
+#define RISING 3
+#define FURTHER 1.5
 /* Farther from its even way no angle may have to go [rad, m] */
 #define JUMP 1.0
 /* How much lower and higher the body begins in other attempts [lengths of the robot] */
@@ -111,9 +115,9 @@ static int follow_whole(const climb_t *c, const int *contact, const double *base
 
 /* Follows limbs that hold while the body goes from one posture to another, whose angles become what is come to; the slack and
  * clearance there, on contacts `at_last`, are looked at again where these differ. `clear`: whether links of the body and of limbs
- * that hold are to be clear on the way */
+ * that hold are to be clear on the way; `far`: what links that touch lack there [m], below 0 */
 static int follow(climb_t *c, const int *contact, const int *at_last, const wish_t *wish, int clear, const double *base,
-                  const double *angle, const double *to, double *reached, double *slack, int *which) {
+                  const double *angle, const double *to, double *reached, double *slack, int *which, double *far) {
     double pose[BETWEEN][12], now[MOST_ANGLES], center[3], way[BETWEEN][MOST_LIMBS * MOST_ANGLES];
     placed_t placed[MOST_LIMBS];
     int other = 0, held[MOST_LIMBS];
@@ -137,28 +141,77 @@ static int follow(climb_t *c, const int *contact, const int *at_last, const wish
     }
     for (int k = 1; k < BETWEEN && clear; k++) {
         place_all(c, pose[k], way[k], placed, center);
-        if (link_clearance(c, held, pose[k], placed, which) < 0.0) return TOUCHES;
+        if ((*far = link_clearance(c, held, pose[k], placed, which)) < 0.0) return TOUCHES;
     }
     if (!other) return STANDS;
     place_all(c, to, reached, placed, center);
     *slack = INFINITY;
     for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
     if (*slack < wish->slack) return NOT_BORNE;
-    return link_clearance(c, at_last, to, placed, which) >= 0.0 ? STANDS : TOUCHES;
+    return (*far = link_clearance(c, at_last, to, placed, which)) >= 0.0 ? STANDS : TOUCHES;
+}
+
+/* Raises a limb off its contact with the body as it is; whether it reaches there */
+static int rise(const climb_t *c, int l, int contact, const double *base, double *angle) {
+    double wanted[12];
+    const double *at = c->foothold + 12 * contact, normal[3] = {at[2], at[5], at[8]};
+    memcpy(wanted, at, sizeof wanted);
+    along3(at + 9, RISEN * c->limb[l].length, normal, wanted + 9);
+    return reach_from(c->limb + l, base, wanted, angle);
 }
 
 /* Whether limbs that are not kept can rise off their contacts with the body as it is, or take it along */
 static int can_rise(const climb_t *c, const int *contact, const int *kept, const double *base, const double *angle) {
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0 || contact[l] == kept[l] || c->limb[l].angles < c->limb[l].rows) continue;
-        double wanted[12], now[MOST_ANGLES];
-        const double *at = c->foothold + 12 * contact[l], normal[3] = {at[2], at[5], at[8]};
-        memcpy(wanted, at, sizeof wanted);
-        along3(at + 9, RISEN * c->limb[l].length, normal, wanted + 9);
+        double now[MOST_ANGLES];
         memcpy(now, angle + c->offset[l], (size_t)c->limb[l].angles * sizeof *now);
-        if (!reach_from(c->limb + l, base, wanted, now)) return 0;
+        if (!rise(c, l, contact[l], base, now)) return 0;
     }
     return 1;
+}
+
+/* How clear links are once limbs that are not kept are up, at the least [m]; `which`: as of link_clearance */
+static double clear_once_up(climb_t *c, const int *contact, const int *kept, const double *state, int *which) {
+    placed_t placed[MOST_LIMBS];
+    double center[3], risen[12 + MOST_LIMBS * MOST_ANGLES];
+    memcpy(risen, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *risen);
+    for (int l = 0; l < c->limbs; l++)
+        if (contact[l] >= 0 && contact[l] != kept[l] && c->limb[l].angles >= c->limb[l].rows)
+            rise(c, l, contact[l], state, risen + 12 + c->offset[l]);
+    place_all(c, risen, risen + 12, placed, center);
+    return link_clearance(c, contact, risen, placed, which);
+}
+
+/* Keeps a pair that lacks some distance further apart */
+static void keep_apart(wish_t *wish, const int *which, double far) {
+    wish->aside -= FURTHER * far;
+    if (!is_avoided(wish, which)) memcpy(wish->avoid[wish->avoided++], which, sizeof wish->avoid[0]);
+}
+
+/* A posture near `state`, in place, to which limbs come from `from` on that hold all the time, `held`, and from which those that are
+ * not kept rise: links that touch on that way, or once those are up, are kept apart in another posture, if there is one. `strict`:
+ * whether limbs have to rise, and links that hold to be clear on the way */
+static int posture_from(climb_t *c, const int *contact, const int *kept, const int *held, const wish_t *given, int strict,
+                        const double *from, double *state, double *slack, int *which) {
+    wish_t wish = *given;
+    double own[12 + MOST_LIMBS * MOST_ANGLES], least, far;
+    const size_t size = (size_t)(12 + c->offset[c->limbs]) * sizeof *own;
+    int first = STANDS, stands = 0, pair[4];
+    memcpy(own, state, size);
+    for (int look = 0; look <= RISING; look++) {
+        int how = posture(c, contact, &wish, own, own + 12, &least, pair);
+        if (how == STANDS && strict && !can_rise(c, contact, kept, own, own + 12)) how = NOT_REACHED;
+        const int found = how == STANDS;
+        if (found) how = follow(c, held, contact, &wish, strict, from, from + 12, own, own + 12, &least, pair, &far);
+        if (how == STANDS || !look) memcpy(state, own, size), memcpy(which, pair, 2 * sizeof *pair), *slack = least;
+        if (!look) first = how;
+        stands |= how == STANDS;
+        if (!strict || !found || (how != STANDS && how != TOUCHES)) break;
+        if (how == STANDS && (far = clear_once_up(c, contact, kept, own, pair)) >= 0.0) break;
+        keep_apart(&wish, pair, far);
+    }
+    return stands ? STANDS : first;
 }
 
 /* Another beginning than the present state: the body as guessed and lower or higher, all limbs as from rest; in place */
@@ -183,17 +236,26 @@ static int lift_off(climb_t *c, const int *contact, const int *kept, double want
     if (!wish.support[0]) return NOT_BORNE;
     placed_t placed[MOST_LIMBS];
     double center[3], from[12 + MOST_LIMBS * MOST_ANGLES];
+    const size_t size = (size_t)(12 + c->offset[c->limbs]) * sizeof *from;
     place_all(c, state, state + 12, placed, center);
     *moves = 0;
     *slack = slack_of(c, wish.support[0], center, wanted);
-    if (*slack >= wanted) return attempt == LAST_ATTEMPT || can_rise(c, contact, kept, state, state + 12) ? STANDS : NOT_REACHED;
     if (*slack == -INFINITY) return NOT_BORNE;
+    memcpy(from, state, size);
+    if (*slack >= wanted) {
+        if (attempt == LAST_ATTEMPT) return STANDS;
+        if (!can_rise(c, contact, kept, state, state + 12)) return NOT_REACHED;
+        const double far = clear_once_up(c, contact, kept, state, which), had = *slack;
+        if (far >= 0.0) return STANDS;
+        keep_apart(&wish, which, far);
+        *moves = posture_from(c, contact, kept, contact, &wish, 1, from, state, slack, which) == STANDS &&
+                 clear_once_up(c, contact, kept, state, which) >= 0.0;
+        if (!*moves) memcpy(state, from, size), *slack = had;
+        return STANDS;
+    }
     *moves = 1;
-    memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     if (attempt) begin_anew(c, contact, touch, attempt, state);
-    int how = posture(c, contact, &wish, state, state + 12, slack, which);
-    if (how == STANDS && attempt < LAST_ATTEMPT && !can_rise(c, contact, kept, state, state + 12)) return NOT_REACHED;
-    return how == STANDS ? follow(c, contact, contact, &wish, attempt < LAST_ATTEMPT, from, from + 12, state, state + 12, slack, which) : how;
+    return posture_from(c, contact, kept, contact, &wish, attempt < LAST_ATTEMPT, from, state, slack, which);
 }
 
 /* From there, the posture at which limbs hold again or are at rest in the air; in place */
@@ -212,9 +274,7 @@ static int land_on(climb_t *c, const int *next, const int *kept, double wanted, 
             memcpy(now, c->limb[l].rest, (size_t)c->limb[l].angles * sizeof *now);
     }
     if (attempt) begin_anew(c, next, touch, attempt, state);
-    int how = posture(c, next, &wish, state, state + 12, slack, which);
-    if (how == STANDS && attempt < LAST_ATTEMPT && !can_rise(c, next, kept, state, state + 12)) return NOT_REACHED;
-    return how == STANDS ? follow(c, kept, next, &wish, attempt < LAST_ATTEMPT, from, from + 12, state, state + 12, slack, which) : how;
+    return posture_from(c, next, kept, kept, &wish, attempt < LAST_ATTEMPT, from, state, slack, which);
 }
 
 #endif

@@ -28,6 +28,7 @@ typedef struct {
     support_t *support[2];
     double slack, place, turn, rest, pose[12];
     int avoided, avoid[AVOIDED][2]; /* pairs, as of link_clearance, that are kept apart */
+    double aside;                   /* how much further than ASIDE [m] */
 } wish_t;
 
 enum { STANDS, NOT_REACHED, NOT_BORNE, TOUCHES, BREAKS };
@@ -175,7 +176,8 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
     for (int k = 0; k < wish->avoided; k++) {
         int count = 6;
         const double far = avoiding(c, contact, wish->avoid[k], base, placed, start, value, column, &count);
-        if (far < ASIDE * c->length) add_row(n, H, g, column, value, count, far - ASIDE * c->length, BEARS * unit);
+        const double short_of = far - ASIDE * c->length - wish->aside;
+        if (short_of < 0.0) add_row(n, H, g, column, value, count, short_of, BEARS * unit);
     }
     /* Angles at a limit against which they are pulled stay there */
     for (int l = 0; l < c->limbs; l++)

@@ -23,7 +23,7 @@ static int reach_from(const limb_t *l, const double *base, const double *wanted,
     double J[MOST_ANGLES][6], E[6][6], r[6], A[6][MOST_ANGLES], H[36], y[6], before = INFINITY;
     for (int k = 0; k < n; k++) angle[k] = fmin(fmax(angle[k], l->lower[k]), l->upper[k]);
     for (int iteration = 0; iteration < ITERATIONS; iteration++) {
-        place_limb(l, base, angle, &placed);
+        place_steps(l, base, angle, &placed);
         contact_error(l, placed.tip, wanted, r, E);
         double size = 0.0;
         for (int i = 0; i < m; i++) size += r[i] * r[i];
@@ -91,8 +91,8 @@ static long reach_each(const limb_t *l, long n, const double *wanted, int rows, 
     return n;
 }
 
-/* Numbers of the `TRIES` samples nearest to a wanted pose in the body's frame, nearest first; how many */
-static int nearest_samples(const limb_t *l, const double *wanted, int *out) {
+/* Numbers of the samples, at most TRIES, nearest to a wanted pose in the body's frame, nearest first; how many */
+static int nearest_samples(const limb_t *l, const double *wanted, int most, int *out) {
     double score[TRIES];
     int count = 0;
     for (int k = 0; k < l->samples; k++) {
@@ -100,12 +100,12 @@ static int nearest_samples(const limb_t *l, const double *wanted, int *out) {
         double by[3], far = 0.0, turned = 0.0;
         minus3(at + 9, wanted + 9, by);
         far = dot3(by, by);
-        if (count == TRIES && far >= score[TRIES - 1]) continue;
+        if (count == most && far >= score[most - 1]) continue;
         if (l->rows > 3) turned += 1.0 - at[2] * wanted[2] - at[5] * wanted[5] - at[8] * wanted[8];
         if (l->rows > 5) turned += 1.0 - at[0] * wanted[0] - at[3] * wanted[3] - at[6] * wanted[6];
         far += 0.1 * l->length * l->length * turned;
-        if (count == TRIES && far >= score[TRIES - 1]) continue;
-        int place = count < TRIES ? count++ : TRIES - 1;
+        if (count == most && far >= score[most - 1]) continue;
+        int place = count < most ? count++ : most - 1;
         for (; place > 0 && score[place - 1] > far; place--) score[place] = score[place - 1], out[place] = out[place - 1];
         score[place] = far, out[place] = k;
     }
@@ -121,7 +121,7 @@ static int postures(const limb_t *l, const double *wanted, const double *seed, i
     minus3(wanted + 9, at, by);
     if (dot3(by, by) > l->length * l->length) return 0;
     for (int k = first; count < most; k++) {
-        if (k == 0) last = nearest_samples(l, wanted, nearest);
+        if (k == 0) last = nearest_samples(l, wanted, TRIES, nearest);
         if (k >= 0 && k >= last) break;
         memcpy(angle, k < 0 ? seed : l->sample + (size_t)nearest[k] * l->angles, (size_t)l->angles * sizeof *angle);
         if (!reach_from(l, here, wanted, angle)) continue;

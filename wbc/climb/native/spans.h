@@ -6,6 +6,8 @@
 
 /* Steps of a posture towards rest */
 #define EASED 4
+/* After so many samples from which a pose is not reached, as it is not from rest, it is taken to be out of reach */
+#define HOPELESS 3
 
 /* Follows a contact from one wanted pose to the next, `count` of them `by` apart in memory, from the posture in `angle`, which
  * is at the first one; writes a row of angles each. No joint may move by more than `step` between two. How many were reached */
@@ -29,7 +31,7 @@ static void ease_to_rest(const limb_t *l, const double *base, const double *want
     placed_t placed;
     double J[MOST_ANGLES][6], E[6][6], r[6], A[6][MOST_ANGLES], H[36], y[6], next[MOST_ANGLES];
     for (int round = 0; round < EASED && n > m; round++) {
-        place_limb(l, base, angle, &placed);
+        place_steps(l, base, angle, &placed);
         contact_error(l, placed.tip, wanted, r, E);
         limb_jacobian(l, &placed, J);
         for (int i = 0; i < m; i++)
@@ -66,13 +68,15 @@ static int hold_spans(const limb_t *l, int count, const double *wanted, int at, 
                       const double *step, double *angles, int *first, int *last) {
     static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const int n = l->angles;
-    int nearest[TRIES], known = 0, spans = 0;
+    int nearest[TRIES], known = 0, spans = 0, reached = 0;
     double angle[MOST_ANGLES];
     for (int k = start ? -2 : -1; spans < most && k < (start ? -1 : tries); k++) {
-        if (k == 0) known = nearest_samples(l, wanted + 12 * at, nearest);
+        if (k == 0) known = nearest_samples(l, wanted + 12 * at, tries, nearest);
         if (k >= 0 && k >= known) break;
         memcpy(angle, k == -2 ? start : k < 0 ? l->rest : l->sample + (size_t)nearest[k] * n, (size_t)n * sizeof *angle);
+        if (k >= HOPELESS && !reached) break;
         if (!reach_from(l, here, wanted + 12 * at, angle)) continue;
+        reached = 1;
         if (k > -2) ease_to_rest(l, here, wanted + 12 * at, angle);
         int fresh = 1;
         for (int j = 0; j < spans && fresh; j++) {

@@ -48,7 +48,7 @@ typedef struct {
     const int *pair;          /* of pieces, 2 each */
     support_t **support;      /* hashed by contacts */
     int places, supports, largest;
-    double *work;
+    double *work, *gap;
     long programs, searches, sweeps, measured; /* linear programs, postures, their sweeps and distances so far */
 } climb_t;
 
@@ -190,11 +190,30 @@ static int left_out(const climb_t *c, const int *contact, int piece) {
     return c->piece[piece].limb >= 0 && contact[c->piece[piece].limb] == LEFT_OUT;
 }
 
-/* Shortest distance less what is kept [m] of links from bodies and each other, up to a positive one. `which`: piece, and body or
+/* A row for every piece and body, then for every pair: two poses, the second one of pairs only, and the distance at these; 0: there is
+ * no memory */
+#define GAP_ROW 25
+static double *gap_rows(climb_t *c) {
+    if (c->gap) return c->gap;
+    const size_t rows = (size_t)c->pieces * c->bodies + c->pairs;
+    if (!(c->gap = malloc((rows ? rows : 1) * GAP_ROW * sizeof *c->gap))) return 0;
+    for (size_t k = 0; k < rows; k++) c->gap[k * GAP_ROW + 24] = -INFINITY;
+    return c->gap;
+}
+
+/* How far no point of a ball round the origin of a pose moves on to another one [m] */
+static double moved_within(const double *from, const double *to, double radius) {
+    double turned = 0.0, by[3];
+    minus3(to + 9, from + 9, by);
+    for (int i = 0; i < 9; i++) turned += (to[i] - from[i]) * (to[i] - from[i]);
+    return sqrt(dot3(by, by)) + radius * sqrt(turned);
+}
+
+/* Least distance less what is kept [m] of links from bodies and each other, as far as it may be below 0. `which`: piece, and body or
  * -1 - piece; links of limbs that are left out do not count */
 static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
-    double pose[c->pieces ? c->pieces : 1][12], least = INFINITY;
+    double pose[c->pieces ? c->pieces : 1][12], least = INFINITY, *const known = gap_rows(c);
     for (int k = 0; k < c->pieces; k++) place_piece(c, k, base, placed, pose[k]);
     for (int k = 0; k < c->pieces + c->pairs; k++) {
         const int own = k >= c->pieces;
@@ -212,9 +231,17 @@ static double link_clearance(climb_t *c, const int *contact, const double *base,
                 const double sum = a->size[5] + b->size[5] + fmax(keep, 0.0);
                 if (dot3(apart, apart) > sum * sum) continue;
             }
+            /* Where neither has moved far since they were measured last they are not measured again */
+            double *last = known ? known + ((size_t)(own ? c->pieces * c->bodies + k - c->pieces : k * c->bodies + j)) * GAP_ROW : 0;
+            if (last && last[24] > keep) {
+                double far = last[24] - keep - moved_within(last, pose[i], a->size[5]) - how.tie;
+                if (own) far -= moved_within(last + 12, at, b->size[5]);
+                if (far > 0.0) continue;
+            }
             answer_t found;
             measure_shapes(&how, a, pose[i], b, at, &found);
             c->measured++;
+            if (last) memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
             if (found.gap - keep < least) least = found.gap - keep, which[0] = i, which[1] = own ? -1 - other : j;
             if (least < 0.0) return least;
         }

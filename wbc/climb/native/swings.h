@@ -36,7 +36,7 @@ static int reach_place(const limb_t *l, const double *wanted, int rows, const do
     for (int round = 0; round < SWING_ITERATIONS; round++) {
         double by[3], r[3], away = 0.0, step[MOST_ANGLES], longest = 0.0;
         char out[MOST_ANGLES] = {0};
-        place_limb(l, here, angle, &placed);
+        place_steps(l, here, angle, &placed);
         minus3(wanted, placed.tip + 9, by);
         limb_jacobian(l, &placed, J);
         for (int i = 0; i < rows; i++) {

@@ -12,12 +12,24 @@ static double gone(const shape_t *shape, const double *one, const double *other)
     return sqrt(dot3(by, by)) + shape->size[5] * sqrt(turned);
 }
 
+/* No more than the signed distance of two convex shapes, or of one from an endless cylinder: that along a direction in the world */
+static double gap_along(const shape_t *a, const double *A, const shape_t *b, const double *B, const double *normal) {
+    view_t v;
+    shape_t piece;
+    double own[3];
+    view_of(a, A, b, B, &v);
+    if (b->kind == ROD) beside_rod(&v, &piece);
+    turn_back(A, normal, own);
+    return clearance(&v, own) - a->size[4] - v.b->size[4];
+}
+
 /* Marks the instants at which two shapes are nearer than `keep` (of instant k: kept[kept_by * k]); their poses are `a_by` and `b_by`
  * numbers apart, 0: it stands */
 static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A, long a_by, const shape_t *b, const double *B,
                        long b_by, const double *kept, int kept_by, long n, char *mark) {
-    double gap = -INFINITY;
-    long last = 0;
+    const int known_way = convex(a) && (convex(b) || b->kind == ROD);
+    double gap = -INFINITY, normal[3];
+    long last = 0, measured = 0;
     for (long k = 0; k < n; k++) {
         const double *one = A + k * a_by, *other = B + k * b_by, keep = kept[kept_by * k];
         if (mark[k]) continue;
@@ -32,9 +44,11 @@ static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A
             gap = sqrt(dot3(apart, apart)) - a->size[5] - b->size[5];
             if (gap > fmax(keep, 0.0)) continue;
         }
+        if (known_way && measured && (gap = gap_along(a, one, b, other, normal)) > keep) continue;
         answer_t found;
         measure_shapes(how, a, one, b, other, &found);
-        gap = found.gap;
+        gap = found.gap, measured = 1;
+        copy3(found.normal, normal);
         mark[k] = gap < keep;
     }
 }
@@ -47,7 +61,7 @@ static int pieces_of(const climb_t *c, int limb, long n, const double *angle, do
     for (int k = 0; k < c->pieces; k++) count += c->piece[k].limb == limb;
     placed_t placed;
     for (long j = 0; out && j < n; j++) {
-        if (limb >= 0) place_limb(c->limb + limb, here, angle + j * c->limb[limb].angles, &placed);
+        if (limb >= 0) place_steps(c->limb + limb, here, angle + j * c->limb[limb].angles, &placed);
         for (int k = 0; k < c->pieces; k++) {
             if (c->piece[k].limb != limb) continue;
             compose(limb < 0 ? here : placed.pose[c->piece[k].step], c->piece[k].place, out);
@@ -79,30 +93,42 @@ static void mark_limbs(const climb_t *c, int a, const double *A, int b, const do
     }
 }
 
-/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold, as wbc/climb/clear.py has it */
+/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold: wbc/climb/clear.py proves
+ * it in steps, which are below it between the instants looked at too */
 static double tip_distance(const climb_t *c, const piece_t *p, double off) {
-    const double free = 0.5 * off - p->depth;
-    for (double share = 1.0; share > 0.2; share *= 0.5)
-        if (free >= share * c->clear) return share * c->clear;
-    return free >= 0.0 ? 0.0 : -p->depth;
+    return fmin(c->clear, 0.5 * off - p->depth);
 }
 
 /* Marks the instants at which pieces of a limb (-1: of the body) are too near to bodies of the scene, to the body, or to each other.
- * `base`: poses of the body; `contact`: places that the limb holds, or comes from or to, and -1; `off`: how far it is from there */
+ * `base`: poses of the body; `contact`: places that the limb holds, or comes from or to, and -1; `off`: how far it is from there; `stop`: whether one mark
+ * is enough */
 static void mark_alone(const climb_t *c, int limb, const double *A, const double *base, const int *contact, const double *off, long n,
-                       char *mark, double *work) {
+                       int stop, char *mark, double *work) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     const int count = pieces_of(c, limb, 0, 0, 0), trunk = pieces_of(c, -1, 0, 0, 0);
     double *kept = work, *pose = kept + n, own[trunk ? trunk : 1][12];
     for (int i = 0, row = 0; i < c->pieces; i++) {
         if (c->piece[i].limb != limb) continue;
-        for (long k = 0; k < n; k++) compose(base + 12 * k, A + (k * count + row) * 12, pose + 12 * k);
+        const piece_t *p = c->piece + i;
+        const shape_t *shape = c->shape + p->shape;
+        double middle[3] = {0}, around = 0.0, by[3];
+        for (long k = 0; k < n; k++) {
+            compose(base + 12 * k, A + (k * count + row) * 12, pose + 12 * k);
+            along3(middle, 1.0 / n, pose + 12 * k + 9, middle);
+        }
+        for (long k = 0; k < n; k++) {
+            minus3(pose + 12 * k + 9, middle, by);
+            around = fmax(around, sqrt(dot3(by, by)));
+        }
         row++;
         for (int j = 0; j < c->bodies; j++) {
-            const piece_t *p = c->piece + i;
+            const shape_t *body = c->shape + c->pieces + j;
+            minus3(c->body + 12 * j + 9, middle, by);
+            if (body->size[5] < 1e6 && sqrt(dot3(by, by)) > around + shape->size[5] + body->size[5] + c->clear) continue;
             for (long k = 0; k < n; k++)
                 kept[k] = p->tip && contact[k] >= 0 && c->on[contact[k]] == j ? tip_distance(c, p, off[k]) : c->clear;
-            mark_touch(&how, c->shape + c->piece[i].shape, pose, 12, c->shape + c->pieces + j, c->body + 12 * j, 0, kept, 1, n, mark);
+            mark_touch(&how, shape, pose, 12, body, c->body + 12 * j, 0, kept, 1, n, mark);
+            if (stop && memchr(mark, 1, (size_t)n)) return;
         }
     }
     mark_limbs(c, limb, A, limb, A, 0, n, mark);

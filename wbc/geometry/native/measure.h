@@ -7,11 +7,6 @@
 
 static inline int convex(const shape_t *a) { return a->kind < PLANE; }
 
-/* A capsule or a ball */
-static inline int is_round(const shape_t *a) {
-    return a->kind == SUM && a->size[0] == 0.0 && a->size[1] == 0.0 && a->size[3] == 0.0;
-}
-
 /* A and B: poses of the shapes' centres; the answer is in the world */
 static void measure_shapes(const tolerance_t *how, const shape_t *a, const double *A, const shape_t *b, const double *B,
                            answer_t *out) {

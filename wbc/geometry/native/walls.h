@@ -4,6 +4,11 @@
 
 #include "pair.h"
 
+/* A capsule or a ball */
+static inline int is_round(const shape_t *a) {
+    return a->kind == SUM && a->size[0] == 0.0 && a->size[1] == 0.0 && a->size[3] == 0.0;
+}
+
 /* Round outlines are taken as so many edges round them inside an endless cylinder: 8e-5 of their radius too large */
 #define EDGES 256
 
@@ -45,14 +50,37 @@ static void measure_tube(const view_t *v, answer_t *out) {
     out->doubtful = 0;
 }
 
-/* A piece of the endless cylinder beside the solid, so long that nothing leaves it by a lid */
-static void measure_rod(const tolerance_t *how, const view_t *v, answer_t *out) {
+/* Has a solid see, in place of the endless cylinder, a piece of it beside it, so long that nothing leaves it by a lid */
+static void beside_rod(view_t *v, shape_t *piece) {
     const double z[3] = {v->R[2], v->R[5], v->R[8]}, radius = v->b->size[3];
-    shape_t piece = {SUM, 0, {0.0, 0.0, 4.0 * (v->a->size[5] + radius), radius}};
-    piece.size[5] = hypot(piece.size[2], radius);
+    *piece = (shape_t){SUM, 0, {0.0, 0.0, 4.0 * (v->a->size[5] + radius), radius}};
+    piece->size[5] = hypot(piece->size[2], radius);
+    v->b = piece;
+    along3(v->t, -dot3(v->t, z), z, v->t);
+}
+
+/* A capsule or a ball beside an endless cylinder: their axes seen along the cylinder's are a segment and a point. Whether it is off the
+ * axis; all points of the segment are at least as far along the normal as the nearest one, so that it gives the depth too */
+static int measure_round_rod(const view_t *v, answer_t *out) {
+    const double z[3] = {v->R[2], v->R[5], v->R[8]}, half = v->a->size[2], along[3] = {-z[2] * z[0], -z[2] * z[1], 1.0 - z[2] * z[2]};
+    double off[3];
+    along3(v->t, -dot3(v->t, z), z, off);
+    const double at = along[2] > 1e-12 ? fmin(fmax(off[2] / along[2], -half), half) : 0.0;
+    along3(off, -at, along, off);
+    const double size = sqrt(dot3(off, off));
+    if (size < 1e-9 * v->b->size[3]) return 0;
+    for (int k = 0; k < 3; k++) out->normal[k] = off[k] / size, out->point[k] = v->a->size[4] * out->normal[k];
+    out->point[2] += at;
+    out->gap = size - v->b->size[3] - v->a->size[4];
+    out->doubtful = 0;
+    return 1;
+}
+
+static void measure_rod(const tolerance_t *how, const view_t *v, answer_t *out) {
+    if (is_round(v->a) && measure_round_rod(v, out)) return;
+    shape_t piece;
     view_t beside = *v;
-    beside.b = &piece;
-    along3(v->t, -dot3(v->t, z), z, beside.t);
+    beside_rod(&beside, &piece);
     measure_bounded(how, &beside, out);
 }
 

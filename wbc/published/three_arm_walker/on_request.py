@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Literal
 
 import numpy as np
 
-from wbc import style
-from wbc.errors import RangeError
+from wbc import style, validation
+from wbc.climb.grids import INCH, PITCH, RADIUS, GridPlace, cylinder_grid, grid_angle, grid_place
+from wbc.climb.scene import ClimbScene
+from wbc.errors import RangeError, ShapeError, UnknownNameError
 from wbc.published.three_arm_walker import PublishedLog, PublishedOutcome, PublishedWalker, WalkerCalibration
 from wbc.track.page import stretches
 from wbc.track.summary import Figure
-from wbc.walking.holds.built_in import PITCH, RADIUS, grid_angle
-from wbc.walking.holds.structure import Structure
-from wbc.walking.report.surroundings import arm_colour
-from wbc.walking.run.places import GridPlace
-from wbc.walking.run.request import PublishedRequest, Site
 
 FILE = "published.npz"
 PLOT = "holds.png"
 #: The body is there when it is this near [grid units]
 THERE = 0.2
+#: Speed when nothing is said: 4 in/s [m/s]
+SPEED = 4 * INCH
+#: Turn rate when nothing is said [rad/s]
+TURN_RATE = 0.05
+#: Of the body over the holds [m]
+HEIGHT = 52 * INCH
 #: By so much of what was asked for the body's speed may be above it, a cycle being an arc
 ROUNDING = 1e-3
 
@@ -31,35 +36,54 @@ class PublishedRun:
     """What the published walker did.
 
     Attributes:
+        scene: the published cylinder, less some holds. speed, turn_rate: that were asked for [m/s, rad/s].
         log: cycles of 0.1 s. outcomes: one a mode, in the order in which they ran.
         arrived: the body ended where it was to go. reason: why not, else "".
     """
 
-    request: PublishedRequest
-    structure: Structure
+    scene: ClimbScene
+    speed: float
+    turn_rate: float
     log: PublishedLog
     outcomes: tuple[PublishedOutcome, ...]
     arrived: bool
     reason: str
 
 
-def perform_published(request: PublishedRequest) -> PublishedRun:
-    """Walks as the source does: destination control, or velocity control from point to point at the speed.
+def perform_published(
+    scene: ClimbScene, places: Sequence[Any], objective: Literal["velocity", "destination"] = "velocity",
+    speed: float = SPEED, turn_rate: float = TURN_RATE,
+) -> PublishedRun:  # fmt: skip
+    """Walks as the source does.
+
+    Args:
+        scene: ``cylinder_grid``, less some footholds.
+        places: where the body begins, and where it goes: as of :func:`wbc.climb.grids.grid_place`.
+        objective: ``destination``: destination control; ``velocity``: velocity control from place to place.
+        speed, turn_rate: of velocity control [m/s, rad/s].
 
     Raises:
-        What the request's site and the walker raise.
+        UnknownNameError: another scene or objective. ShapeError, RangeError, NotFiniteError: fewer than two places, or
+            such as the grid has not, no speeds. What the walker raises.
     """
-    structure, whole = request.site.build(), Site().build()
-    points = [place for place in (request.start, *request.points) if isinstance(place, GridPlace)]
-    there = set(structure.ids)
-    removed = [tuple(int(part) for part in hold.split(",")) for hold in whole.ids if hold not in there]
-    walker = PublishedWalker(points[0][:2], points[0][2], removed=removed)
+    whole, footholds = cylinder_grid(), validation.instance("scene", scene, ClimbScene, "a ClimbScene").footholds
+    if scene.name != whole.name:
+        raise UnknownNameError("scene", scene.name, (whole.name,))
+    validation.one_of("objective", objective, ("velocity", "destination"))
+    speed = validation.scalar("speed", speed, low=0.0, open_low=True, unit="m/s")
+    turn_rate = validation.scalar("turn_rate", turn_rate, low=0.0, open_low=True, unit="rad/s")
+    points = [grid_place(f"place {k + 1}", place) for k, place in enumerate(validation.items("places", places))]
+    if len(points) < 2:
+        raise ShapeError("places", places, "expected where it begins and where it goes")
+    there = {foothold.id for foothold in footholds}
+    removed = [tuple(map(int, hold.id.split(","))) for hold in whole.footholds if hold.id not in there]
+    walker = PublishedWalker(points[0][:2], points[0].heading, removed=removed)
     outcomes = list[PublishedOutcome]()
-    if request.objective == "destination":
+    if objective == "destination":
         outcomes.append(walker.to(points[1:]))
     else:
         for point in points[1:]:
-            outcomes.append(_driven(walker, request, point))
+            outcomes.append(_driven(walker, point, speed, turn_rate))
             if outcomes[-1].reason != "time":
                 break
     off = np.hypot(walker.place[0] - points[-1][0], walker.place[1] - points[-1][1])
@@ -69,7 +93,7 @@ def perform_published(request: PublishedRequest) -> PublishedRun:
         if arrived
         else f"{outcomes[-1].message or outcomes[-1].reason} at (T, A) = ({walker.place[0]:.2f}, {walker.place[1]:.2f})"
     )
-    return PublishedRun(request, structure, walker.log, tuple(outcomes), arrived, reason)
+    return PublishedRun(scene, speed, turn_rate, walker.log, tuple(outcomes), arrived, reason)
 
 
 def published_figures(run: PublishedRun) -> list[Figure]:
@@ -79,17 +103,17 @@ def published_figures(run: PublishedRun) -> list[Figure]:
     last = float(run.log.times[-1]) if len(run.log.times) else 0.0
     time = sum(outcome.time for outcome in run.outcomes)
     speed, spin = _fastest(run.log)
-    over = speed > (1.0 + ROUNDING) * run.request.speed or spin > (1.0 + ROUNDING) * run.request.turn_rate
+    over = speed > (1.0 + ROUNDING) * run.speed or spin > (1.0 + ROUNDING) * run.turn_rate
     return [
         Figure("outcome", "outcome", "arrived" if run.arrived else "stopped", text),
         Figure("reason", "", run.reason, ""),
         Figure("planner", "planner", "published", "published, ideal tracking, wrist reach only"),
         Figure("robot", "robot", digest := WalkerCalibration().digest, f"published walker, calibration {digest}"),
         Figure(
-            "structure",
-            "structure",
-            {"name": run.structure.name, "digest": run.structure.digest, "holds": len(run.structure)},
-            f"{run.structure.name}, {len(run.structure)} holds, {run.structure.digest[:12]}",
+            "scene",
+            "scene",
+            {"name": run.scene.name, "footholds": len(run.scene.footholds)},
+            f"{run.scene.name}, {len(run.scene.footholds)} footholds",
         ),
         Figure(
             "speed",
@@ -123,7 +147,7 @@ def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path
             on, names = log.supporting[:, arm], log.places[:, arm]
             for start, end in stretches(on):
                 left, right = log.times[start], log.times[min(end, len(log.times) - 1)]
-                panel.barh(arm + 1, right - left, left=left, height=0.62, color=arm_colour(arm), lw=0)
+                panel.barh(arm + 1, right - left, left=left, height=0.62, color=style.CYCLE[arm], lw=0)
                 text = ",".join(str(n) for n in names[start])
                 panel.text((left + right) / 2, arm + 1, text, ha="center", va="center", color="white", fontsize=8.5)
         panel.set_yticks([1, 2, 3], ["arm 1", "arm 2", "arm 3"])
@@ -136,14 +160,14 @@ def save_published(run: PublishedRun, folder: pathlib.Path) -> list[pathlib.Path
     return [file, folder / PLOT]
 
 
-def _driven(walker: PublishedWalker, request: PublishedRequest, point: tuple[float, float, float]) -> PublishedOutcome:
+def _driven(walker: PublishedWalker, point: GridPlace, speed: float, turn_rate: float) -> PublishedOutcome:
     """Velocity control straight towards a point, for as long as that takes."""
     now = np.array(walker.place)
     off = np.array(point) - now
-    radius = RADIUS + 52 * 0.0254
+    radius = RADIUS + HEIGHT
     offset = np.array([(grid_angle(1.0) - grid_angle(0.0)) * radius * off[0], PITCH * off[1]])
     spin = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
-    time = max(float(np.linalg.norm(offset)) / request.speed, abs(spin) / request.turn_rate)
+    time = max(float(np.linalg.norm(offset)) / speed, abs(spin) / turn_rate)
     if time <= 0.0:
         raise RangeError("to", point, "the body is there already")
     return walker.drive([offset[0] / time, offset[1] / time, spin / time], time)

@@ -13,6 +13,7 @@ one, ``hand``; ``distance`` [m] and ``detail`` (the SRDF file's reason) are for 
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -25,6 +26,8 @@ from wbc.robot.robot import Robot
 
 _HEAD = ("robot", "samples", "seed", "clearance", "pairs")
 _FIELDS = ("links", "keep", "reason", "distance", "detail")
+#: Texts in quotes within a line
+_NAMES = re.compile(r""""([^"]*)"|'([^']*)'""")
 
 
 def save_self_pairs(found: SelfPairs, path: Any) -> None:
@@ -73,8 +76,9 @@ def read_self_pairs(path: Any, robot: Robot) -> SelfPairs:
     if not isinstance(rows, list):
         raise ShapeError(f"{file.name} pairs", rows, "expected a list of pairs")
     named: dict[frozenset[str], LinkPair] = {}
+    names = [{a or b for a, b in _NAMES.findall(line)} for line in text.splitlines()]
     for k, row in enumerate(rows):
-        where = f"{file.name}{_line(text, row)} pairs[{k}]"
+        where = f"{file.name}{_line(names, row)} pairs[{k}]"
         pair = _read_pair(where, row, robot)
         if frozenset(pair.links) in named:
             raise DuplicateNameError(f"{where} links", pair.links, "this pair stands in the file already")
@@ -125,15 +129,14 @@ def _read_pair(where: str, row: Any, robot: Robot) -> LinkPair:
     return LinkPair((links[0], links[1]), row["keep"], reason, distance, detail)
 
 
-def _line(text: str, row: Any) -> str:
-    """Where a pair stands in the text: the line with both of its links. A parsed file has no lines any more."""
+def _line(names: list[set[str]], row: Any) -> str:
+    """Where a pair stands in the text: the first line whose quoted names have both of its links. A parsed file has no
+    lines any more.
+    """
     links = row.get("links") if isinstance(row, Mapping) else None
-    if not isinstance(links, list) or not links:
+    if not isinstance(links, list) or not links or not all(isinstance(link, str) for link in links):
         return ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if all(isinstance(link, str) and (f'"{link}"' in line or f"'{link}'" in line) for link in links):
-            return f" line {number}"
-    return ""
+    return next((f" line {number}" for number, named in enumerate(names, start=1) if named.issuperset(links)), "")
 
 
 def _fields(pair: LinkPair) -> str:

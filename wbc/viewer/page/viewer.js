@@ -161,7 +161,7 @@ function show() {
   $("approve").hidden = !state.waits;
   if (state.walk) {
     if (document.activeElement !== $("arm")) $("arm").value = state.walk.arm;
-    $("approve").textContent = state.walk.waiting ? `Lift ${state.walk.waiting}` : "Lift the hand";
+    $("approve").textContent = state.walk.waiting ? `Lift ${state.walk.waiting}` : "Lift the limb";
     $("reason").textContent = state.walk.reason;
   }
   const now = performance.now();
@@ -264,7 +264,7 @@ setInterval(() => {
   rating = !!any;
   const most = (x) => Math.max(-1, Math.min(1, x));
   if (hello.walk && state && state.walk && state.walk.arm) { send({ type: "hand", rates: [most(-move[1]), most(move[0]), most(move[2]), most(turn)] }); return; }
-  if (hello.walk) { send({ type: "steer", rates: [most(-move[1]), most(move[0]), most(-turn)] }); return; }
+  if (hello.walk) { send({ type: "steer", rates: [most(-move[1]), most(move[0]), most(turn)] }); return; }
   const name = $("driven").value, item = hello.items.find((i) => i.name === name);
   if (!item) return;
   const target = item.inputs.find((i) => i.name === "target");

@@ -1,1 +1,0 @@
-"""Walks of the three-armed robot: speeds, spins, trenches and random layouts, all planned and carried out."""

@@ -1,0 +1,247 @@
+"""Faults of hands, wrenches, clocks and links that the checker of climbing finds; it shares no code with the loop."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wbc.climb.checker
+from tests.climb.by_hand import TRIPODS, gait
+from tests.climb.test_operator import walked
+from wbc.climb import ContactPlan, GripHand
+from wbc.climb.checker import CheckRules, check
+from wbc.climb.climber import Climber
+from wbc.climb.loop import ClimbLoop
+from wbc.climb.loop.records import WRENCH
+from wbc.log import Log
+from wbc.shapes import PlacedShape, Sphere
+
+Columns = dict[str, np.ndarray]
+#: What the checker may take from the package: what a log, a robot, a scene and shapes are
+SHARED = {
+    "wbc.climb.climber", "wbc.climb.scene", "wbc.clearance", "wbc.errors", "wbc.lazy", "wbc.log", "wbc.multibody",
+    "wbc.shapes", "wbc.validation",
+}  # fmt: skip
+
+
+@functools.cache
+def logged(name: str) -> tuple[ContactPlan, Log]:
+    plan = gait(TRIPODS) if name == "hexapod" else walked()
+    return plan, ClimbLoop(plan, backend="vm").run(most=4.0).log
+
+
+def _with_wrenches(log: Log, plan: ContactPlan) -> Columns:
+    """Each foot that holds bears its share of the weight."""
+    weight = 9.81 * pin.computeTotalMass(plan.climber.robot.model)
+    held = log.array("contact") >= 0
+    out = dict(log.columns)
+    for k, limb in enumerate(plan.climber.limbs):
+        for axis in WRENCH:
+            out[f"wrench.{limb.name}.{axis}"] = np.zeros(len(log))
+        out[f"wrench.{limb.name}.fz"] = np.where(held[:, k], weight / held.sum(axis=1), 0.0)
+    return out
+
+
+def _joint(climber: Climber, limb: int, back: int) -> str:
+    """Column of the joint so many before the last one of a limb."""
+    return f"q.{int(climber.robot.position_index[climber.joints(limb)[-1 - back]])}"
+
+
+def _tilted(c: Columns, climber: Climber) -> None:
+    c[_joint(climber, 1, 1)] += 0.05
+
+
+def _slid(c: Columns, climber: Climber) -> None:
+    c[f"wrench.{climber.limbs[3].name}.fx"][30:40] = 0.7 * c[f"wrench.{climber.limbs[3].name}.fz"][30:40]
+
+
+def _pulled(c: Columns, climber: Climber) -> None:
+    c[f"wrench.{climber.limbs[3].name}.fz"][30:40] *= -1.0
+
+
+def _lost_ticks(c: Columns, climber: Climber) -> None:
+    for name, values in c.items():
+        c[name] = np.delete(values, slice(100, 103))
+
+
+def _backwards(c: Columns, climber: Climber) -> None:
+    c["t"][100] = c["t"][98]
+
+
+def _hidden_loss(c: Columns, climber: Climber) -> None:
+    """Ticks are left out and the clock goes on as if they were not."""
+    clock = c["t"].copy()
+    for name, values in c.items():
+        c[name] = np.delete(values, slice(60, 80))
+    c["t"] = clock[:-20]
+
+
+def _moved_at_once(c: Columns, climber: Climber) -> None:
+    """The body is elsewhere from a tick on."""
+    c["q.0"][100:] += 0.01
+
+
+def _folded(c: Columns, climber: Climber) -> None:
+    """A limb in the air is in another one."""
+    aloft = int(np.flatnonzero(c["contact.limb1"] < 0)[0])
+    for dof in climber.joints(0):
+        c[f"q.{int(climber.robot.position_index[dof])}"][aloft : aloft + 3] += (2.4, -1.0, 1.5)[dof % 3]
+
+
+def _other_foothold(c: Columns, climber: Climber) -> None:
+    """A limb that holds is said to hold the next one."""
+    c["contact.limb2"][10:20] = 8
+
+
+FAULTS = (
+    ("walker", _tilted, "closed contact turned"), ("hexapod", _slid, "contact wrench outside its cone"),
+    ("hexapod", _pulled, "contact wrench outside its cone"), ("hexapod", _lost_ticks, "step of time"),
+    ("walker", _backwards, "step of time"), ("hexapod", _hidden_loss, "joint's rate"),
+    ("walker", _moved_at_once, "closed contact off its foothold"),
+    ("hexapod", _other_foothold, "closed contact off its foothold"), ("hexapod", _folded, "clearance of links"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "fault", "rule"), FAULTS, ids=[fault.__name__ for _, fault, _ in FAULTS])
+def test_a_fault_is_found(name: str, fault: Callable[[Columns, Climber], None], rule: str) -> None:
+    plan, log = logged(name)
+    columns = _with_wrenches(log, plan) if "wrench" in rule else dict(log.columns)
+    honest = dataclasses.replace(log, columns=dict(columns))
+    assert check(honest, plan.climber, plan.scene).clean, str(check(honest, plan.climber, plan.scene))
+    planted = {name: values.copy() for name, values in columns.items()}
+    fault(planted, plan.climber)
+    report = check(dataclasses.replace(log, columns=planted), plan.climber, plan.scene)
+    assert rule in {finding.rule for finding in report.violations}, str(report)
+
+
+def _lost(c: Columns, climber: Climber) -> None:
+    """A limb goes on holding what has vanished."""
+
+
+def _hurried(c: Columns, climber: Climber) -> None:
+    c["q.0"][60:80] += np.linspace(0.0, 0.012, 20)
+
+
+def _spun(c: Columns, climber: Climber) -> None:
+    c["q.5"][60:80] += np.linspace(0.0, 0.01, 20)
+
+
+def _hopped(c: Columns, climber: Climber) -> None:
+    c["q.0"][60:] += 0.0005
+
+
+def _twitched(c: Columns, climber: Climber) -> None:
+    c["q.5"][60:] += 0.0005
+
+
+ASKED = (
+    (_lost, "held after it vanished"), (_hurried, "body's speed"), (_spun, "body's turn rate"),
+    (_hopped, "jump of the body's speed"), (_twitched, "jump of the body's turn rate"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("fault", "rule"), ASKED, ids=[fault.__name__ for fault, _ in ASKED])
+def test_what_was_not_asked_for_is_found(fault: Callable[[Columns, Climber], None], rule: str) -> None:
+    plan, log = logged("hexapod")
+    body = np.linalg.norm(np.diff(log.array("q")[:, :3], axis=0), axis=1).max() / log.meta["period"]
+    rules = CheckRules(speed=float(body), turn_rate=0.01, jump=0.02, jump_turn=0.02)
+    # What limb1 left first has vanished since, and in the fault what limb2 holds
+    held, free = int(log["contact.limb2"][10]), int(log["contact.limb1"][0])
+    since = float(log["t"][np.flatnonzero((log.array("contact") == free).any(axis=1))[-1]])
+    honest = dataclasses.replace(log, tables={**log.tables, "presence": np.array([[free, since, 0.0]])})
+    assert check(honest, plan.climber, plan.scene, rules).clean, str(check(honest, plan.climber, plan.scene, rules))
+    planted = {name: values.copy() for name, values in log.columns.items()}
+    fault(planted, plan.climber)
+    gone = np.array([[held, 0.05, 0.0] if fault is _lost else [free, since, 0.0]])
+    told = dataclasses.replace(honest, columns=planted, tables={**log.tables, "presence": gone})
+    found = {finding.rule: finding for finding in check(told, plan.climber, plan.scene, rules).violations}
+    assert rule in found, str(check(told, plan.climber, plan.scene, rules))
+    if fault is _lost:
+        assert found[rule].where == f"limb2 on {plan.scene.footholds[held].id}"
+        back = np.vstack([gone, [[held, 0.06, 1.0]]])
+        again = dataclasses.replace(told, tables={**log.tables, "presence": back})
+        wrong = {f.rule: f.worst for f in check(again, plan.climber, plan.scene, rules).violations}
+        assert wrong[rule] < 0.011
+
+
+def test_a_hand_is_deep_near_footholds_of_its_way_alone() -> None:
+    """A hand in the air as deep as where it holds, over a foothold that it neither leaves nor comes to."""
+    plan, log = logged("walker")
+    limb, (first, last) = next(
+        (k, (ticks[0], ticks[-1])) for k in range(len(plan.climber.limbs))
+        if len(ticks := np.flatnonzero(log.array("contact")[:, k] < 0))
+    )  # fmt: skip
+    middle, name = (first + last) // 2, plan.climber.limbs[limb].name
+    tip = plan.climber.contact_pose(log.array("q")[middle], limb)
+    left = plan.scene.footholds[int(log[f"contact.{name}"][first - 1])]
+    normal = left.pose.rotation[:, 2]
+    below, center = (pin.SE3(left.pose.rotation, tip.translation - d * normal) for d in (0.004, 0.024))
+    there = dataclasses.replace(left, id="passed", pose=below, on="knob")
+    bodies = {**plan.scene.bodies, "knob": PlacedShape(Sphere(0.02), center)}
+    scene = dataclasses.replace(plan.scene, footholds=[*plan.scene.footholds, there], bodies=bodies)
+    columns = {column: values[[middle, middle, middle]] for column, values in log.columns.items()}
+    columns["t"] = log.meta["period"] * np.arange(3.0)
+    # It comes straight down from where it is said to hold what it left
+    columns[f"contact.{name}"] = np.array([plan.scene.footholds.index(left), -1, -1])
+    for axis in range(3):
+        columns[f"q.{axis}"][0] += 0.3 * normal[axis]
+    for aim, clear in ((-1, False), (len(plan.scene.footholds), True)):
+        columns[f"aim.{name}"] = np.array([-1, aim, aim])
+        report = check(dataclasses.replace(log, columns=columns), plan.climber, scene)
+        deep = [finding.where for finding in report.violations if finding.rule == "clearance of bodies"]
+        assert (not deep) is clear, deep
+
+
+def test_a_hand_that_fixes_its_turn_must_keep_it() -> None:
+    plan, log = logged("walker")
+    stiff = dataclasses.replace(plan.climber, limbs=tuple(
+        dataclasses.replace(limb, contact=GripHand()) for limb in plan.climber.limbs))  # fmt: skip
+    # Of hands that may roll the last joint of a closed one turns as the body goes
+    rolled = [f.rule for f in check(log, stiff, plan.scene).violations]
+    assert rolled == ["closed contact turned"]
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_links_that_pass_each_other_between_two_ticks_are_found(share: float) -> None:
+    """A grain on the way of a foot, at shares of the way between two ticks."""
+    plan, log = logged("hexapod")
+    machine, q = plan.climber, log.array("q")
+    columns = {name: values[::10] for name, values in log.columns.items()}
+    few = dataclasses.replace(log, columns=columns, meta={**log.meta, "period": 0.1})
+    k = int(np.flatnonzero(log["contact.limb1"] < 0)[0]) // 10 + 1
+    a, b = q[10 * k], q[10 * (k + 1)]
+    at = pin.integrate(machine.robot.model, a, share * pin.difference(machine.robot.model, a, b))
+    grain = PlacedShape(Sphere(2e-4), pin.SE3(np.eye(3), machine.contact_pose(at, 0).translation))
+    scene = dataclasses.replace(plan.scene, bodies={**plan.scene.bodies, "grain": grain})
+    violated = {finding.rule: finding.where for finding in check(few, machine, scene).violations}
+    assert violated["clearance of bodies"].endswith("and grain")
+
+
+def test_a_limb_that_leaves_its_foothold_as_the_log_begins_may_be_as_deep_as_it_was() -> None:
+    plan, log = logged("hexapod")
+    lifted = int(np.flatnonzero(log["contact.limb1"] < 0)[0])
+    later = dataclasses.replace(log, columns={name: values[lifted:] for name, values in log.columns.items()})
+    assert check(later, plan.climber, plan.scene).clean
+    deeper = {name: values.copy() for name, values in later.columns.items()}
+    deeper["q.2"] -= 0.004
+    found = check(dataclasses.replace(later, columns=deeper), plan.climber, plan.scene).violations
+    assert "contact's point in a body" in {finding.rule for finding in found}
+
+
+def test_the_checker_shares_nothing_with_planner_and_loop() -> None:
+    taken = set[str]()
+    for file in Path(wbc.climb.checker.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("wbc"):
+                named = [f"wbc.{alias.name}" for alias in node.names] if node.module == "wbc" else [node.module]
+                taken.update(named)
+            if isinstance(node, ast.Import):
+                taken |= {alias.name for alias in node.names if alias.name.startswith("wbc")}
+    assert {name for name in taken if not name.startswith("wbc.climb.checker")} <= SHARED

@@ -1,1 +1,0 @@
-"""Kinematics of the walkers' arms in closed form; they know no structure."""

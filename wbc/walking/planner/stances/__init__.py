@@ -1,1 +1,0 @@
-"""The search over stances: which hand goes where, and when."""

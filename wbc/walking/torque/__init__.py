@@ -1,1 +1,0 @@
-"""Torques under a walk: a loop that follows its rates on a robot with masses, and what may go wrong with it."""
