@@ -180,6 +180,10 @@ def test_a_climb_goes_on_from_its_log(run: ClimbRun, walker: Climber, scene: Cli
         assert (min(stance.contacts) < 0) == (at is aloft)
         ahead = walker.body_pose(stance.q).translation + [0.0, 0.0, -0.1]
         clean(ClimbLoop(plan_climb(walker, scene, stance, BodyPlace(ahead)), backend="vm").run(), walker, scene)
+    # A limb that had come to its foothold and was not closed yet holds it
+    contacts, t = run.log.array("contact"), run.log["t"]
+    row, limb = (int(k[0]) for k in np.nonzero((contacts[1:] >= 0) & (contacts[:-1] < 0)))
+    assert stance_in(run.log, walker, scene, float(t[row])).contacts[limb] == contacts[row + 1, limb]
     with pytest.raises(RangeError, match="the log is from"):
         stance_in(run.log, walker, scene, 1e3)
     with pytest.raises(ShapeError, match="its scene is another"):

@@ -23,13 +23,16 @@ from wbc.validation import Array
 #: How far a configuration of a log may be from the stance that it is taken for [m, rad]: limbs under torques close
 #: up to 7.5 mm beside their footholds
 NEAR_STANCE = 0.02
+#: A limb that has come this near to the foothold that it was going to holds it [m]
+COME_TO = 1e-3
 #: Time in which limbs in the air come to rest at least [s], and share of the joints' accelerations for that at most [1]
 COASTS = 0.25
 SLOWING = 0.5
 
 
 def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = None) -> Stance:
-    """The stance at an instant: closed limbs at their footholds, limbs in the air free, contacts closed exactly.
+    """The stance at an instant: closed limbs at their footholds, those that had come to theirs too, other limbs in the
+    air free, contacts closed exactly.
 
     Args:
         at: time [s]; None: the last one.
@@ -39,10 +42,16 @@ def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = 
         InfeasibleError: limbs that were closed then cannot be at their footholds.
     """
     row = _row(log, climber, scene, at)
-    when, q, contacts = log["t"][row], log.array("q")[row], tuple(int(k) for k in log.array("contact")[row])
+    when, q, contacts = log["t"][row], log.array("q")[row], [int(k) for k in log.array("contact")[row]]
     q = climber.robot.configuration(
         "log.q", q / np.r_[np.ones(3), np.full(4, np.linalg.norm(q[3:7])), np.ones(len(q) - 7)]
     )
+    for limb, aim in enumerate(log.array("aim")[row].astype(int).tolist()):
+        if aim == FREE_LIMB or aim >= len(scene.footholds) or aim in contacts:
+            continue
+        off = climber.contact_pose(q, limb).translation - scene.footholds[aim].pose.translation
+        if np.linalg.norm(off) < COME_TO:
+            contacts[limb] = aim
     held = {limb: held_pose(climber, scene, limb, hold, q) for limb, hold in enumerate(contacts) if hold != FREE_LIMB}
     if not held:
         raise InfeasibleError("at", when, "no limb held anything then")
@@ -52,7 +61,7 @@ def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = 
         raise InfeasibleError(
             "at", when, f"limbs that held then are {max(left, moved):.3g} m or rad off their footholds"
         )
-    return Stance(contacts, closed)
+    return Stance(tuple(contacts), closed)
 
 
 def coming_to_rest(
