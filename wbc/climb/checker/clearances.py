@@ -43,9 +43,8 @@ from wbc.validation import Array
 
 #: Distance beyond which nothing is measured [m]
 FAR = 0.05
-#: How much farther beside it than closed contacts are, at no height [m], and for each metre of height [1]: 60 degrees
+#: How far from a foothold, beside what closed contacts may be, a limb in the air counts as on it [m]
 ASIDE = 0.003
-LEAN = 1.75
 #: By which part of its distance it is at least less deep than at the foothold [1]
 RISES = 0.5
 #: Distance that is allowed of a tip and what it holds [m]
@@ -170,11 +169,8 @@ def _lower_near(
     row, first, last = way
     pose = climbed.scene.footholds[row].pose
     offs, normal = pose.translation - climbed.tips[0][first:last, limb], pose.rotation[:, 2]
-    heights = -(offs @ normal)
-    aside = np.linalg.norm(offs + heights[:, None] * normal, axis=1)
     beside = ASIDE + rules.hold_distance
-    near = (-rules.depth <= heights) & (aside <= beside + heights * LEAN)
-    for k in np.flatnonzero(near).tolist():
+    for k in np.flatnonzero(offs @ normal <= rules.depth).tolist():
         if around.distance(link, body, first + k) < rules.clearance:
             held = around.distance(link, body, first + k, offs[k])
             lowest = held + RISES * max(float(np.linalg.norm(offs[k])) - beside, 0.0) - rules.depth
