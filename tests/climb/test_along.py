@@ -11,26 +11,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along, planning
 from wbc.climb.checker import check
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.drive import ClimbDrive, standing_plan
-from wbc.climb.grids import cylinder_grid, grid_pose, remove_rows
+from wbc.climb.grids import INCH, cylinder_grid, remove_rows
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
 from wbc.climb.resume import stance_in
 from wbc.climb.scenes import draw, placed, size_of
 from wbc.climb.search import NoStancesError
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
-
-INCH = 0.0254
-
-
-def over(t: float, a: float, heading: float = 0.0) -> pin.SE3:
-    """The body over the published cylinder."""
-    return grid_pose(t, a, 152 * INCH, heading)
 
 
 @pytest.fixture(scope="module")

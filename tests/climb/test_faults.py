@@ -10,20 +10,19 @@ import numpy as np
 import pytest
 
 from tests.climb.by_hand import climber, gait
+from tests.climb.walkers import over
 from tests.refusals import assert_refused
 from wbc.climb import BodyPlace, ClimbOptions, ContactMove, ContactPlan, machines, plan_climb
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.checker import CheckRules, check
 from wbc.climb.faults import PlantFault
-from wbc.climb.grids import cylinder_grid, grid_pose
+from wbc.climb.grids import cylinder_grid
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions
 from wbc.climb.loop.hand_over import HandOvers
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.plants import PlantErrors, climb_plant
 from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
 
-#: Distance of the body from the cylinder's axis [m]
-RADIUS = 152 * 0.0254
 PLANTS = ("pinocchio", "mujoco")
 
 
@@ -113,7 +112,7 @@ def walk(gravity: float) -> ContactPlan:
     """The published walker goes on along its cylinder, gravity towards the holds."""
     options = ClimbOptions.by_torques()
     scene = dataclasses.replace(cylinder_grid(), gravity=np.array([0.0, -gravity, 0.0]))
-    way = BodyTrack([grid_pose(13.0, a, RADIUS) for a in (9.0, 10.5, 12.0)], 0.1016)
+    way = BodyTrack([over(13.0, a) for a in (9.0, 10.5, 12.0)], 0.1016)
     given = AlongOptions(options.motion, options.stances.margin)
     return plan_along(machines.climber("walker"), scene, way, None, given)
 

@@ -8,20 +8,19 @@ import numpy as np
 import pytest
 
 from tests.climb.by_hand import TRIPODS, gait
+from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactMove, ContactPlan, Stance, machines, plan_climb
 from wbc.climb.along import BodyTrack, plan_along
 from wbc.climb.checker import check
-from wbc.climb.grids import cylinder_grid, grid_pose
+from wbc.climb.grids import cylinder_grid
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, LimbState
-
-HEIGHT = 152 * 0.0254
 
 
 @functools.cache
 def walked() -> ContactPlan:
     """The published walker along its cylinder, fast."""
     scene = cylinder_grid()
-    ends = grid_pose(13, 8, HEIGHT), grid_pose(15, 15, HEIGHT)
+    ends = over(13, 8), over(15, 15)
     return plan_along(machines.climber("walker"), scene, BodyTrack(ends, 0.15))
 
 

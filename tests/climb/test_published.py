@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.climb.walkers import walker_with
+from tests.climb.walkers import over, walker_with
 from tests.repeats import repeats
 from wbc.climb import (
     BodyPlace,
@@ -25,7 +25,7 @@ from wbc.climb import (
 from wbc.climb.along import BodyTrack, plan_along
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
-from wbc.climb.grids import INCH, cylinder_grid, grid_pose, remove_columns, remove_rows
+from wbc.climb.grids import INCH, cylinder_grid, remove_columns, remove_rows
 from wbc.climb.loop import ClimbOutcome, ClimbRun
 from wbc.climb.time_law import MotionSpeeds
 
@@ -36,11 +36,6 @@ REGRASPS = 40
 #: Ways over 8 x 8 holds by their seed, and the fewest re-grasps of each as an exact search found them, which kept 2
 #: degrees of joint limits and 0.3 in of reach: at 61 a hand has to wait in the air, at 16 and 74 the last pose counts
 FEWEST = {0: 1, 1: 0, 3: 1, 6: 3, 7: 2, 16: 2, 61: 2, 74: 1, 76: 2, 144: 2}
-
-
-def over(t: float, a: float, heading: float = 0.0) -> pin.SE3:
-    """The body over the cylinder, 52 in above its holds."""
-    return grid_pose(t, a, 152 * INCH, heading)
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.climb.walkers import over
 from wbc.climb import watch
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace
-from wbc.climb.grids import INCH, cylinder_grid, grid_pose
+from wbc.climb.grids import cylinder_grid
 from wbc.climb.machines import climber
 from wbc.climb.motion import MoveError, Mover
 from wbc.climb.plan import ContactPlan
@@ -25,8 +26,8 @@ from wbc.errors import RangeError
 def planned(options: ClimbOptions) -> ContactPlan:
     """A walker on its cylinder, six footholds ahead."""
     robot, scene = climber("walker"), cylinder_grid()
-    start = first_stance(robot, scene, robot.with_body(robot.rest, grid_pose(13, 8, 152 * INCH)))
-    return plan_climb(robot, scene, start, BodyPlace(grid_pose(13, 14, 152 * INCH).translation), options)
+    start = first_stance(robot, scene, robot.with_body(robot.rest, over(13, 8)))
+    return plan_climb(robot, scene, start, BodyPlace(over(13, 14).translation), options)
 
 
 @pytest.fixture

@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
 from wbc.climb.along import BodyTrack, plan_along
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
 from wbc.climb.drive import ClimbDrive, standing_plan
-from wbc.climb.grids import cylinder_grid, grid_pose
+from wbc.climb.grids import cylinder_grid
 from wbc.climb.let_go import joined
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun
 from wbc.climb.motion import MoveError
@@ -62,7 +63,7 @@ def ground(name: str, family: str, seed: int) -> Ground:
     climber = machines.climber(name)
     if family == "cylinder_grid":
         scene = cylinder_grid()
-        begin, goal = grid_pose(13, 8 + seed % 3, 152 * 0.0254), grid_pose(13 + seed % 2, 13, 152 * 0.0254)
+        begin, goal = over(13, 8 + seed % 3), over(13 + seed % 2, 13)
         q, size = climber.with_body(climber.rest, begin), 1.5
         return Ground(climber, scene, first_stance(climber, scene, q), goal, size)
     size = size_of(climber)

@@ -1,16 +1,24 @@
-"""The published walker with other numbers of arms."""
+"""The published walker on its cylinder, and with other numbers of arms."""
 
 from __future__ import annotations
 
 import functools
 
+import pinocchio as pin
+
 from wbc.climb import Climber
 from wbc.climb.climber import ClimbLimb
 from wbc.climb.contacts import GripHand
+from wbc.climb.grids import INCH, grid_pose
 from wbc.climb.machines import FLIP
 from wbc.robots import walker
 from wbc.robots.walker_data import spaced_radius
 from wbc.robots.walker_masses import with_masses
+
+
+def over(t: float, a: float, heading: float = 0.0) -> pin.SE3:
+    """The body over the published cylinder, 52 in above its holds."""
+    return grid_pose(t, a, 152 * INCH, heading)
 
 
 @functools.cache
