@@ -188,6 +188,29 @@ def test_one_limb_is_moved_alone_and_closes_on_a_foothold(operated: Operated) ->
     assert operated.note["arm"] == ""
 
 
+@pytest.mark.parametrize("kind", ["hand", "go"])
+def test_limbs_in_the_air_land_before_another_one_is_moved_alone(operated: Operated, kind: str) -> None:
+    loop = operated.loop
+    operated.steered([0.0, 1.0, 0.0], 3000, until=lambda: FREE_LIMB in loop.held)
+    operated.ticks(20)
+    limb = next(k for k, held in enumerate(loop.held) if held != FREE_LIMB)
+    begin, foothold = operated.tip(limb), loop.plan.scene.footholds[loop.held[limb]].id
+    operated.obey("arm", name=operated.climber.limbs[limb].name)
+    operated.ticks(1)
+
+    def moved() -> bool:
+        return bool(np.linalg.norm(operated.tip(limb) - begin) > 0.002)
+
+    if kind == "go":
+        # Where it is already: the others land, and nothing is refused
+        operated.obey("go", hold=foothold)
+        operated.ticks(1500, until=lambda: FREE_LIMB not in loop.held)
+    else:
+        operated.steered([0.0, 0.0, 1.0, 0.0], 1500, "hand", moved)
+        assert moved(), operated.note
+    assert FREE_LIMB not in loop.held[:limb] + loop.held[limb + 1 :]
+
+
 def test_a_page_is_told_which_footholds_are_reserved_and_gone_and_how_a_limb_goes(operated: Operated) -> None:
     loop = operated.loop
     operated.steered([0.0, 1.0, 0.0], 2000, until=lambda: FREE_LIMB in loop.stance.contacts)

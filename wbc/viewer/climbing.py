@@ -193,7 +193,7 @@ class WalkOperation(Operation):
             return
         rates = self._limb_speed * parts
         self._aside.ask(partial(self.limb.by_rates, rates=rates) if parts.any() else None, again=True)
-        self._redirect("other rates were commanded", at_once=True)
+        self._redirect("other rates were commanded", at_once=self._alone)
 
     def _steer(self, parts: Array) -> None:
         """The body goes by parts of full speed."""
@@ -218,12 +218,18 @@ class WalkOperation(Operation):
             self._aside.ask(partial(self.limb.to_foothold, foothold=foothold))
         else:
             self._aside.ask(partial(self._body_to, foothold=foothold))
-        self._redirect("another destination was chosen", at_once=self.limb is not None)
+        self._redirect("another destination was chosen", at_once=self._alone)
 
     def _rest(self) -> None:
         """Nothing is asked for any more; limbs in the air come down."""
         self._parts, self._drive = np.zeros(0), None
         self._ask_drive(np.zeros(6))
+
+    @property
+    def _alone(self) -> bool:
+        """Whether one limb is moved while all others hold: those in the air land first, or they would not bear it."""
+        held = self.loop.held
+        return self.limb is not None and FREE_LIMB not in held[: self.limb.row] + held[self.limb.row + 1 :]
 
     def _redirect(self, reason: str, at_once: bool = False) -> None:
         if not self.loop.ended and not self.stopped:
