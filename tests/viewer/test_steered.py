@@ -188,6 +188,22 @@ def test_one_limb_is_moved_alone_and_closes_on_a_foothold(operated: Operated) ->
     assert operated.note["arm"] == ""
 
 
+def test_rates_last_until_there_is_a_plan_for_them_and_then_as_long_as_ever(operated: Operated) -> None:
+    begin, loop, operation = operated.body, operated.loop, operated.operation
+    with operation._aside.lock:
+        while not operation.planning:
+            operated.obey("steer", rates=[0.0, 1.0, 0.0])
+            operation.tick()
+            operated.now += loop.dt
+        for _ in range(20):
+            operated.now += RATE_LASTS
+            operation.tick()
+    operated.ticks(round(RATE_LASTS / loop.dt))
+    assert np.linalg.norm(operated.body - begin) > 0.05 * RATE_LASTS * operation.speed[0]
+    operated.ticks(500)
+    assert np.abs(loop.velocity).max() < 1e-3
+
+
 @pytest.mark.parametrize("kind", ["hand", "go"])
 def test_limbs_in_the_air_land_before_another_one_is_moved_alone(operated: Operated, kind: str) -> None:
     loop = operated.loop

@@ -71,6 +71,11 @@ class PlanAside:
         """Whether the planner is at work."""
         return self._planner is not None and self._work is not None and not self._work.done.is_set()
 
+    @property
+    def awaited(self) -> bool:
+        """Whether there is to be a plan, or one that no loop has taken yet."""
+        return self._planner is not None and self._work is not None
+
     def plan(self, scene: ClimbScene, stance: Stance) -> ContactPlan:
         """For a loop: the plan from a stance on if it is there, else one on which the robot stands."""
         work = self._work

@@ -166,8 +166,12 @@ class WalkOperation(Operation):
             PlantError: as of :meth:`wbc.climb.loop.ClimbLoop.tick`.
         """
         loop = self.loop
-        if self._parts.any() and self._now() > self._until:
-            self._take_rates(np.zeros(len(self._parts)))
+        if self._parts.any():
+            if self._aside.awaited and self._stands[1]:
+                # Nothing moves yet, and whoever renews the rates may be as busy as the planner
+                self._until = self._now() + RATE_LASTS
+            elif self._now() > self._until:
+                self._take_rates(np.zeros(len(self._parts)))
         if self._drive is not None and not self.stopped and not loop.ended:
             before = loop.plan
             self._drive.steer(self._twist, loop)
