@@ -10,6 +10,8 @@ from pathlib import Path
 from tests.project.layout import ROOT, relative, sources, tree
 
 FILES = sources("wbc", "tasks", "robots")
+#: A macro of C that is a number
+MACRO = re.compile(r"#define ([A-Z][A-Z0-9_]*) +([-+.0-9]\S*)")
 CLASS = re.compile(r"\s*class (\w+)[:([]")
 
 
@@ -36,6 +38,16 @@ def test_a_constant_means_one_thing_in_a_package() -> None:
         for name, value in _constants(file).items():
             meanings[file.parent.relative_to(ROOT), name].add(value)
     assert not [(str(package), name, *values) for (package, name), values in meanings.items() if len(values) > 1]
+
+
+def test_a_macro_means_one_thing_in_a_kernel() -> None:
+    """Headers of a folder are compiled as one file, in which the last meaning would count from there on."""
+    meanings: dict[tuple[Path, str], set[str]] = defaultdict(set)
+    for file in sorted((ROOT / "wbc").glob("**/native/*.[ch]")):
+        for name, value in MACRO.findall(file.read_text()):
+            meanings[file.parent.relative_to(ROOT), name].add(value)
+    assert len(meanings) > 100
+    assert not [(str(folder), name, *values) for (folder, name), values in meanings.items() if len(values) > 1]
 
 
 def test_a_class_name_is_used_once() -> None:

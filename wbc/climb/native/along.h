@@ -12,7 +12,7 @@
 #include "touch.h"
 
 /* Instants between samples, at which limbs that hold are looked at */
-#define LOOKS 3
+#define INTERVAL 3
 /* Samples of a limb's table from which postures are sought at a foothold */
 #define SPAN_TRIES 6
 /* Ways over that swings try: its height alone or straight over, then both higher, HIGHER times */
@@ -34,7 +34,7 @@
 #define LONGER 3
 #define LONGEST 1.5
 /* What time until limbs have to lift is worth, as a part of the way's, beside a swing; and what time that has passed costs */
-#define ROOM 1.0
+#define LEFT_OVER 1.0
 #define PASSED 0.5
 /* How many times more standings than are kept are looked at */
 #define MORE_LOOKED_AT 10
@@ -117,7 +117,7 @@ static void *more_room(const along_t *a, void *at, int count, int *room, size_t 
     return at;
 }
 
-static int instant_of(const along_t *a, int sample) { return sample * LOOKS < a->end ? sample * LOOKS : a->end; }
+static int instant_of(const along_t *a, int sample) { return sample * INTERVAL < a->end ? sample * INTERVAL : a->end; }
 static int begins(const along_t *a, const span_t *s) { return instant_of(a, s->first); }
 static int lasts(const along_t *a, const span_t *s) { return instant_of(a, s->last); }
 static const limb_t *limb_of(const along_t *a, const span_t *s) { return a->climb->limb + s->limb; }
@@ -170,7 +170,7 @@ static void spans_at(along_t *a, int limb, int place, int postures, const double
         minus3(w + 9, a->rest + 12 * limb + 9, by);
         if (dot3(by, by) < nearest) nearest = dot3(by, by), at = k;
     }
-    for (int i = 0; i < n; i++) step[i] = a->step[limb][i] * LOOKS * a->every;
+    for (int i = 0; i < n; i++) step[i] = a->step[limb][i] * INTERVAL * a->every;
     if (start) at = 0;
     const int many = at < 0 ? 0 : hold_spans(l, count, wanted, at, start, SPAN_TRIES, postures, step, angles, first, last);
     for (int j = 0; j < many; j++) {
@@ -205,7 +205,7 @@ static int follow_span(along_t *a, span_t *s) {
     got(a, wanted), got(a, mark);
     s->followed = 1, s->begin = s->first;
     s->angle = kept_memory(a, sizeof(double) * size * n);
-    for (int i = 0; i < n; i++) step[i] = a->step[s->limb][i] * LOOKS;
+    for (int i = 0; i < n; i++) step[i] = a->step[s->limb][i] * INTERVAL;
     for (int k = 0; k < size; k++) wanted_at(a, s, instant_of(a, s->first + k), wanted + 12 * k);
     int low = 0, high = -1;
     for (int r = 0, done = 0; r < s->roughs && (!r || !s->begun); r++) {
@@ -231,7 +231,7 @@ static int follow_span(along_t *a, span_t *s) {
 /* Angles of a span at an instant: cubics through those at the samples */
 static void angles_at(const along_t *a, const span_t *s, int instant, double *out) {
     const int n = limb_of(a, s)->angles;
-    int k = instant / LOOKS;
+    int k = instant / INTERVAL;
     k = k < s->first ? s->first : k >= s->last ? s->last - 1 : k;
     const int from = instant_of(a, k), to = instant_of(a, k + 1);
     const double x = fmin(fmax((double)(instant - from) / (to - from), 0.0), 1.0), *p = s->angle + (long)(k - s->begin) * n, *q = p + n;
@@ -244,7 +244,7 @@ static void angles_at(const along_t *a, const span_t *s, int instant, double *ou
 
 /* Of a span that may not be followed yet, about */
 static const double *about_angles(const along_t *a, const span_t *s, int instant) {
-    const int n = limb_of(a, s)->angles, sample = (instant + LOOKS / 2) / LOOKS;
+    const int n = limb_of(a, s)->angles, sample = (instant + INTERVAL / 2) / INTERVAL;
     if (s->followed) return s->angle + (long)((sample < s->first ? s->first : sample > s->last ? s->last : sample) - s->begin) * n;
     const int k = (sample + a->every / 2) / a->every - s->rough;
     return s->rough_angle + (long)(k < 0 ? 0 : k >= s->roughs ? s->roughs - 1 : k) * n;
@@ -268,7 +268,7 @@ static int touch_after(along_t *a, int one, int other, int sample) {
     }
     for (int k = sample > b->first ? sample - b->first : 0; k < b->count; k++)
         if (b->mark[k]) return b->first + k;
-    return INT_MAX / LOOKS;
+    return INT_MAX / INTERVAL;
 }
 
 /* The last instant to which limbs can hold together, from one on; `without`: one that does not count; -1: they cannot there */
@@ -283,7 +283,7 @@ static int until(along_t *a, const int *row, int now, int without) {
     for (int l = 0; l < a->climb->limbs; l++)
         for (int k = 0; k < l; k++) {
             if (l == without || k == without) continue;
-            const int end = LOOKS * (touch_after(a, row[k], row[l], (now + LOOKS - 1) / LOOKS) - 1);
+            const int end = INTERVAL * (touch_after(a, row[k], row[l], (now + INTERVAL - 1) / INTERVAL) - 1);
             if (end < last) last = end;
         }
     return last >= now ? last : -1;
@@ -399,7 +399,7 @@ static int can_be(along_t *a, int level, standing_t *s) {
         for (int k = 0; k <= LONGER; k++) {
             const int takes = s->now - s->lift;
             if (takes < 1) { used = INFINITY; break; }
-            parts = takes / LOOKS > 6 ? takes / LOOKS : takes < 6 ? takes : 6;
+            parts = takes / INTERVAL > 6 ? takes / INTERVAL : takes < 6 ? takes : 6;
             used = swing_between(a, from, onto, s->shape, s->lift, s->now, parts, 0, angle, at);
             if (used <= SHORT || used == INFINITY || k == LONGER) break;
             s->now = s->lift + (int)ceil(takes * fmin(used, LONGEST));
@@ -422,7 +422,7 @@ static int swing_takes(const along_t *a, int limb, const double *from, const dou
     double takes = a->shortest;
     for (int i = 0; i < n; i++) {
         const double size = fabs(onto[i] - from[i]), *most = a->most[limb];
-        takes = fmax(takes, fmax(1.875 * size / most[i], sqrt((5.0 * size + 4.0 / (RISING * RISING) * a->lifted[limb]) / most[n + i])));
+        takes = fmax(takes, fmax(1.875 * size / most[i], sqrt((5.0 * size + 4.0 / (COMING_UP * COMING_UP) * a->lifted[limb]) / most[n + i])));
     }
     return (int)ceil(takes);
 }
@@ -436,7 +436,7 @@ static double cost_of(const along_t *a, const standing_t *s) {
         end[k] = lasts(a, span);
     }
     for (int l = 0; l < a->climb->limbs; l++) cost -= end[l] / (l + 1.0);
-    cost *= ROOM / (a->end > 1 ? a->end : 1);
+    cost *= LEFT_OVER / (a->end > 1 ? a->end : 1);
     for (int l = 0; l < a->climb->limbs; l++) cost += a->span[s->row[l]].left;
     return cost;
 }
@@ -661,8 +661,8 @@ static void count_swings(along_t *a) {
 /* Parts a span where it fails: the rest of it is another one */
 static void part_span(along_t *a, int row, int wrong) {
     span_t rest = a->span[row];
-    rest.first = wrong / LOOKS + 1, rest.begun = 0, rest.beside = 0;
-    a->span[row].last = (wrong - 1) / LOOKS;
+    rest.first = wrong / INTERVAL + 1, rest.begun = 0, rest.beside = 0;
+    a->span[row].last = (wrong - 1) / INTERVAL;
     if (rest.last > rest.first) {
         a->span = more_room(a, a->span, a->spans, &a->span_room, sizeof *a->span);
         a->span[a->spans++] = rest;

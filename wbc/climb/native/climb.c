@@ -169,7 +169,7 @@ along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, 
     if (!a) return 0;
     if (setjmp(a->no_memory)) return forget_along(a), (along_t *)0;
     a->climb = c, a->rest = rest, a->end = end, a->body = body, a->every = every;
-    a->samples = (end + LOOKS - 1) / LOOKS + 1;
+    a->samples = (end + INTERVAL - 1) / INTERVAL + 1;
     a->height = numbers[0], a->shortest = (int)numbers[1], a->margin = numbers[2];
     a->work = got(a, malloc(sizeof *a->work * (MOST_ANGLES + 1) * ((size_t)a->samples + 8)));
     a->trunk = got(a, calloc((size_t)a->samples, 1));

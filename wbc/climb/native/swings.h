@@ -15,7 +15,7 @@
 /* Damping, as a share of the limb's squared length */
 #define SWING_DAMPED 1e-5
 /* Part of a swing in which a contact comes to its height, and comes down from it */
-#define RISING 0.4
+#define COMING_UP 0.4
 
 /* From 0 to 1 with even accelerations */
 static double risen(double x) {
@@ -89,7 +89,7 @@ static double swing(const limb_t *l, int count, int parts, const double *body, c
         const int k = (int)lround(count * even_part);
         const double x = (double)k / count, even = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
         const double early = x - x * x * x * (6.0 - 8.0 * x + 3.0 * x * x), late = x * x * x * (-4.0 + 7.0 * x - 3.0 * x * x);
-        const double up = over * fmin(risen(x / RISING), risen((1.0 - x) / RISING)), *at_body = body + 12 * k;
+        const double up = over * fmin(risen(x / COMING_UP), risen((1.0 - x) / COMING_UP)), *at_body = body + 12 * k;
         double near[MOST_ANGLES], normal[3], place[3], wanted[3], *now = angle + (long)j * n;
         for (int i = 0; i < n; i++) near[i] = a[i] + (b[i] - a[i]) * even + count * (first[i] * early + last[i] * late);
         for (int i = 0; i < 3; i++) normal[i] = (1.0 - even) * from[3 * i + 2] + even * onto[3 * i + 2];
