@@ -85,19 +85,6 @@ def test_the_stick_moves_the_walker_and_a_hand_is_moved_alone(browser: Chromium)
     )
     try:
         page = opened(browser, playing)
-        begin = page.evaluate("wbc.state.q.slice(0, 3)")
-        off = f"Math.hypot(...wbc.state.q.slice(0, 3).map((x, k) => x - {begin}[k]))"
-        x, y = middle(page, "#knob")
-        page.mouse("mouseMoved", x, y)
-        page.mouse("mousePressed", x, y, held=True)
-        page.mouse("mouseMoved", x, y - 50.0, held=True)
-        # Along the structure, with the hold of the next hand told as reserved
-        page.wait(f"{off} > 0.03", 60.0)
-        page.wait("wbc.state.walk.reserved.length > 0", 60.0)
-        time.sleep(1.0)
-        picture(page, "7 walker")
-        page.mouse("mouseReleased", x, y - 50.0)
-        page.wait("wbc.state.speed < 1e-4", 60.0)
         # One hand alone, chosen in one step: a state that comes in between writes the list back
         page.evaluate("(() => { const a = document.getElementById('arm'); a.value = 'arm1'; a.onchange(); })()")
         page.wait("wbc.state.walk.arm === 'arm1'", 60.0)
@@ -106,7 +93,22 @@ def test_the_stick_moves_the_walker_and_a_hand_is_moved_alone(browser: Chromium)
         time.sleep(2.0)
         page.key("KeyR", False)
         page.wait("wbc.state.speed < 1e-3", 60.0)
-        picture(page, "8 one hand")
+        picture(page, "7 one hand")
+        page.evaluate("(() => { const a = document.getElementById('arm'); a.value = ''; a.onchange(); })()")
+        page.wait("wbc.state.walk.arm === ''", 60.0)
+        begin = page.evaluate("wbc.state.q.slice(0, 3)")
+        off = f"Math.hypot(...wbc.state.q.slice(0, 3).map((x, k) => x - {begin}[k]))"
+        x, y = middle(page, "#knob")
+        page.mouse("mouseMoved", x, y)
+        page.mouse("mousePressed", x, y, held=True)
+        page.mouse("mouseMoved", x, y - 50.0, held=True)
+        # Along the structure once the hand holds again, with the hold of the next hand told as reserved
+        page.wait(f"{off} > 0.03", 60.0)
+        page.wait("wbc.state.walk.reserved.length > 0", 60.0)
+        time.sleep(1.0)
+        picture(page, "8 walker")
+        page.mouse("mouseReleased", x, y - 50.0)
+        page.wait("wbc.state.speed < 1e-4", 60.0)
         assert not [line for line in page.console if "Error" in line]
     finally:
         playing.end()

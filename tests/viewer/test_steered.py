@@ -204,6 +204,19 @@ def test_rates_last_until_there_is_a_plan_for_them_and_then_as_long_as_ever(oper
     assert np.abs(loop.velocity).max() < 1e-3
 
 
+def test_a_limb_whose_elbow_is_folded_leaves_its_foothold_away_from_the_body() -> None:
+    operated = Operated(standing(ClimberRequest("walker"), SceneRequest(scene="cylinder_grid")))
+    operated.steered([0.0, 1.0, 0.0], 530)
+    operated.ticks(800)
+    held, begin = operated.loop.stance.contacts, operated.tip(0)
+    assert FREE_LIMB not in held
+    operated.obey("arm", name=operated.climber.limbs[0].name)
+    operated.steered([0.0, 0.0, 1.0, 0.0], 150, "hand")
+    assert not operated.note["reason"]
+    assert operated.loop.stance.contacts == (FREE_LIMB, *held[1:])
+    assert np.linalg.norm(operated.tip(0) - begin) > 0.05
+
+
 @pytest.mark.parametrize("kind", ["hand", "go"])
 def test_limbs_in_the_air_land_before_another_one_is_moved_alone(operated: Operated, kind: str) -> None:
     loop = operated.loop

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,15 +18,36 @@ from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.surfaces import frame_on
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
+from wbc.validation import Array
 
 #: How far such a limb is lifted, as shares of the shortest limb's reach, the first that can be
 LIFTS = (0.08, 0.04, 0.12, 0.02)
+#: Directions of a lift: so much away from the body for one along the normal, as a folded elbow does not go straight up
+AWAY_FROM_BODY = (0.0, 1.0)
+
+
+def lifts(climber: Climber, q: Array, limb: int, normal: Array, shares: Sequence[float]) -> list[Array]:
+    """Displacements by which a limb may leave what it holds, d = l (n + a t), those along the normal n first; t points
+    away from the body along the surface.
+
+    Args:
+        q: configuration ``(nq)``. limb: its row. normal: of the surface ``(3)``.
+        shares: lengths l in shares of the shortest limb's reach.
+
+    Returns:
+        In the world ``(3)`` each [m].
+    """
+    away = climber.contact_pose(q, limb).translation - climber.body_pose(q).translation
+    away = away - (away @ normal) * normal
+    away = away / max(float(np.linalg.norm(away)), 1e-9)
+    reach = float(reaches(climber).min())
+    return [share * reach * (normal + part * away) for part in AWAY_FROM_BODY for share in shares]
 
 
 def let_go(
     climber: Climber, scene: ClimbScene, start: Stance, options: MotionOptions
 ) -> tuple[ContactPlan | None, Stance]:
-    """The motion on which limbs in the air that touch a body leave it along its normal, and where the robot is then.
+    """The motion on which limbs in the air that touch a body leave it, and where the robot is then.
 
     Returns:
         None and the start, where no limb in the air touches, or none can be lifted.
@@ -48,12 +70,12 @@ def let_go(
         return None, start
     freed = [limb for limb, at in enumerate(contacts) if at >= held]
     reach, first = LimbReach(climber), Stance(tuple(contacts), start.q)
-    for share in LIFTS:
+    ways = [lifts(climber, start.q, limb, left.normals[contacts[limb]], LIFTS) for limb in freed]
+    for lifted in zip(*ways, strict=True):
         q, solved = np.array(start.q), True
-        for limb in freed:
-            normal = left.normals[contacts[limb]]
+        for limb, lift in zip(freed, lifted, strict=True):
             pose = climber.contact_pose(start.q, limb)
-            pose = pin.SE3(pose.rotation, pose.translation + share * float(reaches(climber).min()) * normal)
+            pose = pin.SE3(pose.rotation, pose.translation + lift)
             wanted = place(climber.body_pose(q).actInv(pose))[None]
             angles, some = reach.postures(limb, wanted, climber.angles(q, limb)[None])
             solved = solved and bool(some[0, 0])

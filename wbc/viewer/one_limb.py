@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from wbc.climb.climber import Climber
+from wbc.climb.let_go import lifts
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.climb.scenes import size_of
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.steering import SurfaceSteering
 from wbc.errors import InfeasibleError, WbcError
@@ -19,7 +19,7 @@ from wbc.validation import Array
 #: How far ahead a motion by rates is planned; where that is not clear, less is tried [s]
 LIMB_AHEAD = (1.5, 0.8, 0.4)
 #: How far a limb that holds is lifted first, as shares of the shortest limb's reach, the first that is clear
-LIMB_LIFTS = (0.02, 0.04, 0.08)
+LIMB_LIFTS = (0.02, 0.03, 0.04, 0.06, 0.08)
 #: Speed at which it lifts at least [m/s]
 SLOWEST_LIFT = 0.01
 
@@ -56,9 +56,9 @@ class OneLimb:
         if stance.contacts[row] != FREE_LIMB:
             if rates[2] < 0.0:
                 raise InfeasibleError("limb", self.name, "it holds what it is to go into; lift it first")
-            lift = np.concatenate([max(float(np.abs(rates[:3]).max()), SLOWEST_LIFT) * normal, np.zeros(3)])
-            reach = size_of(climber)
-            ways = [(lift, share * reach / float(np.linalg.norm(lift))) for share in LIMB_LIFTS]
+            speed = max(float(np.abs(rates[:3]).max()), SLOWEST_LIFT)
+            leave = [(float(np.linalg.norm(way)), way) for way in lifts(climber, stance.q, row, normal, LIMB_LIFTS)]
+            ways = [(np.concatenate([speed / far * way, np.zeros(3)]), far / speed) for far, way in leave]
         for k, (way, seconds) in enumerate(ways):
             try:
                 plan = plan_limb_work(climber, scene, stance, self.name, moved_by(pose, way, seconds)[-1:])
