@@ -51,6 +51,12 @@ class Contender(ABC):
     def settle(self) -> None:  # noqa: B027 (most packages move their own state)
         """What is left to do after the timed call, such as moving a state that the package does not keep."""
 
+    def cycle(self, tick: int) -> None:
+        """Targets in, command out, and the state moves on: in one call, where the package has one."""
+        self.aim(tick)
+        self.call()
+        self.settle()
+
     def reference_error(self) -> float | None:
         """Largest difference [rad/s or m/s] between the package's answer to the QP of this tick and an exact
         solution of the same QP; None where the package does not show its QP.

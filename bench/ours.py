@@ -20,7 +20,7 @@ from wbc.tick.native import NativeTick
 
 
 class Ours(Contender):
-    """``controller.step(q)``; the velocity is integrated by whoever called it."""
+    """``controller.step(q)``, whose ``q_next`` is the configuration of the next tick."""
 
     def __init__(self, case: Case, calm: bool = True) -> None:
         """Declare and compile the stack; ``calm`` as there."""
@@ -58,13 +58,14 @@ class Ours(Contender):
         for name in [*(f"ball{k}" for k in range(len(problem.obstacles))), *clear]:
             self.controller[name].rate = problem.rate
         self.hand = self.controller[problem.frames[0]] if len(problem.frames) == 1 and not problem.com else None
+        self.targets = [self._targets(k) for k in range(case.ticks)]
         self.referee = Referee(case)
         self.reset()
 
     def reset(self) -> None:
         self.q = np.array(self.case.q0)
         self.controller.reset(self.q)
-        self.velocity: Array | None = None
+        self.step: wbc.Step | None = None
         self.tick = 0
 
     def aim(self, tick: int) -> None:
@@ -72,13 +73,15 @@ class Ours(Contender):
         if self.hand is not None:
             self.hand.target = self.case.poses[tick][0]
             return
+        self.controller.set(**self.targets[tick])
+
+    def _targets(self, tick: int) -> dict[str, Any]:
         targets: dict[str, Any] = dict(zip(self.problem.frames, self.case.poses[tick], strict=True))
-        if self.problem.com:
-            targets["com"] = self.case.com[tick]
-        self.controller.set(**targets)
+        return targets | ({"com": self.case.com[tick]} if self.problem.com else {})
 
     def call(self) -> None:
-        self.velocity = self.controller.step(self.q).v
+        self.step = self.controller.step(self.q)
+        self.velocity = self.step.v
 
     def native(self) -> int | None:
         tick = core_of(self.controller).tick
@@ -106,12 +109,15 @@ class Ours(Contender):
 
     def settle(self) -> None:
         # After a native call there is no step
-        velocity = self.controller.last_command if self.velocity is None else self.velocity
-        self.velocity = None
-        if self.problem.floating:
-            self.q = pin.integrate(self.robot.model, self.q, velocity * self.problem.dt)
-        else:
-            self.q = self.q + velocity * self.problem.dt
+        later = self.step and self.step.q_next
+        self.q = self.robot.integrate(self.q, self.controller.last_command, self.problem.dt) if later is None else later
+        self.step = None
+
+    def cycle(self, tick: int) -> None:
+        self.tick = tick
+        self.step = self.controller.step(self.q, **self.targets[tick])
+        self.velocity = self.step.v
+        self.settle()
 
     def state(self) -> Array:
         return self.q

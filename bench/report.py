@@ -17,7 +17,7 @@ CALLS = """\
 The call is `controller.step(q).v` for wbc, `solve_ik` and `integrate_inplace` for pink and mink, `update_kinematics` \
 and `solve(True)` for placo. The three peers move their own state within the call, because their kinematics are \
 computed there; wbc computes them in `step` and leaves the state to its caller. The whole cycle is targets, call and, \
-for wbc, the integration of the velocity."""
+for wbc, the next configuration: `controller.step(q, **targets)`, its `v` and `q_next`."""
 
 TERMS = """\
 All get the same description, targets, weights and limits, and correct an error within one tick. Obstacles: a barrier \

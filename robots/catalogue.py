@@ -19,7 +19,6 @@ from wbc.robot.robot import Robot
 from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
 from wbc.robot.sources.kinds import is_mjmodel, is_text
-from wbc.robot.sources.loop_file import read_loops
 from wbc.robot.sources.table import read_robot, read_table
 
 if TYPE_CHECKING:
@@ -171,6 +170,8 @@ def from_dh(
 def _loops(loops: Any) -> tuple[tuple[AnyLoop, ...], bool]:
     """(loops that are given, whether those of the description are kept)."""
     if isinstance(loops, (str, os.PathLike)):
+        from wbc.robot.sources.loop_file import read_loops
+
         return read_loops(pathlib.Path(loops)), True
     if isinstance(loops, Sequence):
         return tuple(loops), True

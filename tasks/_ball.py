@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
+from wbc.quick_dataclasses import dataclass
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import Pose

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.multibody import algebra
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
 from wbc.tasks.frames import frame_pose

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Row, Rows, SacrificeOrder, Values

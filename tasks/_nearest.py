@@ -5,9 +5,12 @@ Gradients are unit vectors everywhere. Where a distance has no direction one is 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import casadi as ca
 
-from wbc.shapes import Box, Cylinder
+if TYPE_CHECKING:
+    from wbc.shapes import Box, Cylinder
 
 #: Points closer than this [m] have no usable direction between them.
 COINCIDENT = 1e-10

@@ -14,13 +14,13 @@ parameterization and inverse kinematics of 7-DOF revolute manipulators", arXiv:2
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import rotations as rot
 
 Triple = tuple[float, float, float]

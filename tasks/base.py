@@ -21,9 +21,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-import pkgutil
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
@@ -33,6 +31,7 @@ from numpy.typing import NDArray
 
 from wbc import pickling
 from wbc.errors import RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
@@ -461,6 +460,8 @@ class Constraint(Item):
 
 def registry() -> dict[str, type[Item]]:
     """Every concrete task and constraint class by name, the user's own included."""
+    import pkgutil
+
     package = importlib.import_module(__package__)
     for module in pkgutil.iter_modules(package.__path__):
         importlib.import_module(f"{__package__}.{module.name}")

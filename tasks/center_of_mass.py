@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from wbc.errors import RangeError
 from wbc.multibody import algebra
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values

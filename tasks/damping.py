@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Row, Task, Values
 from wbc.tasks.frames import checked_weights, weights_of_rows

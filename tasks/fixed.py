@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
 from wbc import validation
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
 from wbc.tasks.base import Bounds, Constraint, Row, SacrificeOrder, Values

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
@@ -10,6 +9,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import NotFiniteError, RangeError, ShapeError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, get_args
 
 import casadi as ca
@@ -13,6 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.multibody import is_pose, own
+from wbc.quick_dataclasses import dataclass
 from wbc.shapes import FAR
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.robot import Limits
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection

@@ -15,7 +15,6 @@ from wbc.errors import MissingShapeError, RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.proximity import OBSTACLE, Body, PairSensor
 from wbc.shapes import Capsule, Convex, Shape, Solid, Sphere
-from wbc.shapes.solid import names_of_shapes
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies, _gap as gap
 from wbc.tasks._ball import BallRow
@@ -219,4 +218,6 @@ def _checked_shape(shape: object) -> Shape | tuple[Convex, ...]:
         return shape
     if isinstance(shape, (list, tuple)) and shape and all(isinstance(part, Convex) for part in shape):
         return tuple(shape)
+    from wbc.shapes.names import names_of_shapes
+
     raise ShapeError("Obstacle.shape", shape, "expected a shape, or the Convex parts of a mesh", names_of_shapes())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import casadi as ca
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import checked_weights, weights_of_rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -10,6 +9,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits
 from wbc.tasks._selection import joint_dofs, selection

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._contact import WRENCH_LABELS, WRENCH_UNITS, force_row
 from wbc.tasks._selection import selection

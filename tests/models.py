@@ -1,4 +1,4 @@
-"""Small arms built joint by joint, so that tests need no robot files."""
+"""Small arms built joint by joint, so that tests need no robot files, and where frames of any robot are."""
 
 from __future__ import annotations
 
@@ -31,6 +31,13 @@ def add_chain(
         here = pin.SE3(np.eye(3), np.array(offset, dtype=float))
     model.addFrame(pin.Frame(f"{prefix}tip", parent, 0, here, pin.FrameType.OP_FRAME))
     return parent
+
+
+def placement(robot: Robot, frame: str, q: np.ndarray) -> pin.SE3:
+    """Pose of a frame in the world, by Pinocchio."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return pin.SE3.Identity() if frame == "world" else data.oMf[robot.model.getFrameId(frame)].copy()
 
 
 def robot(name: str, model: pin.Model) -> Robot:

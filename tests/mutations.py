@@ -295,7 +295,7 @@ MUTATIONS = (
         ("climb/test_checker.py",),
     ),
     Mutation(
-        "wbc/climb/checker/check.py",
+        "wbc/climb/checker/checking.py",
         "moved - np.maximum(off[0] - off, 0.0)",
         "0.2 * moved",
         ("climb/test_checker.py",),

@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from tests.closed_loop.eyes import cross
-from tests.tasks.robots import placement, velocity
+from tests.models import placement
+from tests.tasks.robots import velocity
 from wbc.robot import Robot
 from wbc.tasks import (
     AxisAlign,

@@ -50,7 +50,7 @@ def test_message_names_field_value_and_choices(kind: type[WbcError]) -> None:
     error = make(kind)
     assert (error.field, error.value) == ("hand.alpha", -3.5)
     assert str(error).startswith("hand.alpha: ")
-    assert "(got -3.5)" in str(error)
+    assert f": {error.reason} (got -3.5)" in str(error)
     assert str(error).endswith(f"valid: {', '.join(error.choices)}")
     assert sorted(error.choices) == ["beta", "betas", "zeta"]
 

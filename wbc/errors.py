@@ -17,12 +17,14 @@ class WbcError(Exception):
     Attributes:
         field: what was wrong, as the caller spells it (``"q"``, ``"hand.target"``).
         value: the value that was given.
+        reason: why it was refused, without field and value.
         choices: the valid values, nearest first; empty where there is no list to choose from.
     """
 
     def __init__(self, field: str, value: Any, reason: str, choices: Iterable[str] = ()) -> None:
         self.field = field
         self.value = value
+        self.reason = reason
         self.choices = tuple(choices)
         text = f"{field}: {reason} (got {_short(value)})"
         if self.choices:

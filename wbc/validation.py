@@ -7,7 +7,6 @@ the field; nothing is changed when it raises.
 from __future__ import annotations
 
 import contextlib
-import decimal
 import math
 import os
 import pathlib
@@ -72,6 +71,8 @@ def bound_text(value: float, towards: int, digits: int = 6) -> str:
     text = f"{value:.{digits}g}"
     if towards * float(text) >= towards * value:
         return text
+    import decimal
+
     context = decimal.Context(prec=digits, rounding=decimal.ROUND_FLOOR if towards < 0 else decimal.ROUND_CEILING)
     return f"{float(context.create_decimal_from_float(float(value))):.{digits}g}"
 

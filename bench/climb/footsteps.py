@@ -1,6 +1,6 @@
 """``python -m bench.climb.footsteps``: processor time in which the contacts of a walk are found, in the same process.
 
-    python -m bench.climb.footsteps --robots g1,anymal_c --scenes stairs,rubble
+    python -m bench.climb.footsteps --robots talos,anymal_c --scenes stairs,rubble
 
 The first stance and compiled code are there; the least of some repetitions counts [ms], also in proportion to 30 moves.
 """
@@ -41,7 +41,7 @@ def row(robot: str, scene: str, repeats: int) -> tuple[str, ...]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m bench.climb.footsteps", description=__doc__)
-    parser.add_argument("--robots", default="g1,anymal_c,hexapod", help="names with commas")
+    parser.add_argument("--robots", default="talos,anymal_c,hexapod", help="names with commas")
     parser.add_argument("--scenes", default="stairs,rubble", help="names with commas")
     parser.add_argument("--repeats", type=int, default=5)
     given = parser.parse_args()

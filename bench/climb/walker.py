@@ -92,8 +92,8 @@ class Case:
     arms: int = 3
 
 
-def cases(part: str, count: int, arms: int | None) -> Iterator[Case]:
-    """Those of a part."""
+def cases(part: str, count: int, arms: int | None, first: int = 0) -> Iterator[Case]:
+    """Those of a part; of one that is drawn from seeds ``count`` from the ``first`` one on."""
     whole = cylinder_grid()
     if part == "demo":
         yield Case("demo", whole, _over((13, 6), (13, 18)), 4 * INCH)
@@ -111,12 +111,12 @@ def cases(part: str, count: int, arms: int | None) -> Iterator[Case]:
             less = remove_columns(whole, f"12-{11 + many}")
             yield Case(f"{many} columns", less, _over((7, 12), (min(17 + many, 22), 12)), 2 * INCH)
     elif part == "layouts":
-        for seed in range(count):
+        for seed in range(first, first + count):
             less = remove_fraction(whole, 0.1 + 0.5 * (seed % 10) / 10, seed)
             yield Case(f"layout {seed}", less, _over((13, 6), (13, 18)), 3 * INCH)
     else:
         families = list(OBSTRUCTED if part == "structures" else FAMILIES)
-        for k in range(count):
+        for k in range(first, first + count):
             family, seed = families[k % len(families)], k // len(families)
             many = arms or (ARMS[seed % len(ARMS)] if part == "structures" else 3)
             course = obstructed(family, seed) if part == "structures" else drawn(family, seed)

@@ -157,7 +157,7 @@ def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float]
     controller = stack.compile(backend="native")
     tick = core_of(controller).tick
     assert isinstance(tick, NativeTick)
-    spent, gap = np.full((ROUNDS, TICKS), np.inf), 0.0
+    spent, reached = np.full((ROUNDS, TICKS), np.inf), []
     for turn in range(ROUNDS):
         controller.reset(robot.neutral)
         q = robot.neutral
@@ -170,8 +170,9 @@ def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float]
             tick.step_function(tick.pointer)
             spent[turn, k] = perf_counter() - began
             q = pin.integrate(robot.model, q, controller.last_command * DT)
-            gap = max(gap, _gap(robot, q))
-    return 1e6 * float(np.median(spent.min(axis=0))), gap
+            reached.append(q)
+    # Afterwards: between ticks it would empty the processor's cache, of a robot with loops alone
+    return 1e6 * float(np.median(spent.min(axis=0))), max(_gap(robot, q) for q in reached)
 
 
 def _gap(robot: Robot, q: Array) -> float:

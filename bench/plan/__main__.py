@@ -2,6 +2,7 @@
 
     python -m bench.plan --peers-python .venv-plan/bin/python              # 300 problems: robots x scenes x seeds
     python -m bench.plan --robots panda --scenes shelf --seeds 5 --write bench/data/plan.json
+    python -m bench.plan --join panda.txt ur5.txt --write bench/data/plan.json    # what earlier runs printed
 
 The peers are ``pip install ompl roboplan coal`` in an environment of their own; without ``--peers-python`` they are
 left out. Times are of processors: planning and shortening from one configuration to another, without what is prepared
@@ -108,6 +109,7 @@ def main() -> None:
     parser.add_argument("--peers-python", default="")
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--constrained", action="store_true")
+    parser.add_argument("--join", nargs="+", type=pathlib.Path, default=())
     parser.add_argument("--write", type=pathlib.Path)
     options = parser.parse_args()
     os.sched_setaffinity(0, {options.core})
@@ -122,19 +124,21 @@ def main() -> None:
             options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")
         return
     peers = {n: Peer(options.peers_python, n, options.core) for n in CONTENDERS[1:]} if options.peers_python else {}
-    rows, begun = [], stamp()
+    begun, rows = stamp(), [json.loads(line) for file in options.join for line in file.open() if line.startswith("{")]
+    asked = [
+        (r, s, n) for r in options.robots.split(",") for s in options.scenes.split(",") for n in range(options.seeds)
+    ]
     try:
-        for robot in options.robots.split(","):
-            for scene in options.scenes.split(","):
-                for seed in range(options.seeds):
-                    rows.append(row(robot, scene, seed, peers))
-                    print(json.dumps(rows[-1]), flush=True)
+        for robot, scene, seed in () if rows else asked:
+            rows.append(row(robot, scene, seed, peers))
+            print(json.dumps(rows[-1]), flush=True)
     finally:
         for peer in peers.values():
             peer.close()
-    print(table(rows, ("wbc", *peers)))
-    if peers:
-        print(ratios(rows, tuple(peers)))
+    compared = tuple(name for name in CONTENDERS[1:] if name in rows[0])
+    print(table(rows, ("wbc", *compared)))
+    if compared:
+        print(ratios(rows, compared))
     print(f"load {os.getloadavg()[0]:.2f}")
     if options.write:
         options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")

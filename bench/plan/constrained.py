@@ -15,8 +15,9 @@ from wbc.plan import MotionPlanner
 from wbc.shapes import Box
 
 #: What is planned: a cup that stays level (Panda, UR5), a tray in two hands (PR2), a base that drives in the plane
-#: (TIAGo Pro), a parallel gripper with its closed loops
-KINDS = ("cup panda", "cup ur5", "tray pr2", "base tiago_pro", "gripper loop")
+#: (TIAGo Pro), a parallel gripper and a delta
+#: robot with their closed loops, and a G1 that stands on both feet and reaches from over a table to under it
+KINDS = ("cup panda", "cup ur5", "tray pr2", "base tiago_pro", "loop gripper", "loop delta", "feet g1")
 #: Rows hold within this on the smooth path [m, rad]
 HELD = 1e-5
 #: Samples of a smooth path
@@ -28,7 +29,8 @@ TRIES = 30
 def row(kind: str, seed: int, seconds: float) -> dict[str, Any]:
     """A problem and what became of it."""
     rng = np.random.default_rng([seed, KINDS.index(kind)])
-    planner, start, goal = MAKERS[kind.split()[0]](kind.split()[1], rng)
+    maker, name = kind.split()
+    planner, start, goal = MAKERS[maker](name, rng)
     begin = time.process_time()
     out: dict[str, Any] = {"kind": kind, "seed": seed, "solved": False, "off": None}
     try:
@@ -98,10 +100,10 @@ def _base(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]
     return planner, robot.neutral, _free(planner, robot.neutral, "base", place, np.array([0.5, 1.0, 0.0]), rng)
 
 
-def _gripper(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
+def _loop(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
     from tests.loops.mechanisms import NAMED
 
-    robot = wbc.robots.load(NAMED["gripper"])
+    robot = wbc.robots.load(NAMED[name])
     stack = wbc.Stack(robot, dt=0.01)
     stack.add(wbc.tasks.JointLimits())
     start = goal = robot.closed(robot.neutral)
@@ -109,6 +111,14 @@ def _gripper(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, A
     for _ in range(15):
         goal = robot.closed(robot.integrate(goal, 0.05 * np.sqrt(robot.nv) * way / np.linalg.norm(way)))
     return stack.planner(), start, goal
+
+
+def _feet(_: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
+    from tests.plan.scenes import standing_g1
+
+    stack, q, (over, under) = standing_g1(int(rng.integers(10**6)))
+    planner = stack.planner()
+    return planner, planner.coordinates.configuration(planner.branches(q, {"hand": over})[0]), {"hand": under}
 
 
 def _free(
@@ -125,7 +135,7 @@ def _free(
     raise RuntimeError(f"no free goal for {task}")
 
 
-MAKERS = {"cup": _cup, "tray": _tray, "base": _base, "gripper": _gripper}
+MAKERS = {"cup": _cup, "tray": _tray, "base": _base, "loop": _loop, "feet": _feet}
 
 
 def table(rows: list[dict[str, Any]]) -> str:

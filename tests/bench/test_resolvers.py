@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bench.resolvers.__main__ import line
 from bench.resolvers.drives import drive, methods
 
 
@@ -15,4 +14,3 @@ def test_methods_follow_the_tip_and_pairs_come_back() -> None:
         assert found[name].lost < 1e-9
     assert found["damped, 0.01"].lost > 1e-6
     assert found["rank reduction, joint 1"].away < 1e-4
-    assert line(found["weighted"]).startswith("| weighted | ")

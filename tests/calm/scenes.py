@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import wbc
+from tests.models import placement
 from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
@@ -37,9 +38,7 @@ def machine(name: str, accelerations: bool = True) -> Robot:
 
 def tip_pose(robot: Robot, q: Array, name: str) -> pin.SE3:
     """Pose of the hand."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return pin.SE3(data.oMf[robot.model.getFrameId(TIPS[name])])
+    return pin.SE3(placement(robot, TIPS[name], q))
 
 
 @dataclass(frozen=True, eq=False)

@@ -330,27 +330,24 @@ def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption() -> None:
         assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
-def test_a_body_that_rests_longer_than_it_may_is_seen() -> None:
-    tree = free_tree()
-    hand = SweptBody("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
-    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
-    motion = Motion.linear(tree, np.arange(9.0), np.zeros((9, 0)), np.tile([0, 0, 0.02, 0, 0, 0, 1.0], (9, 1)))
-    for since, until, clear in ((0.0, 8.0, True), (2.0, 6.0, False), (0.0, 7.0, False), (1.0, 8.0, False)):
-        held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
-        assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
+REST, DEEP = np.full(9, 0.02), np.array([1.0, 1.0, 0.04, 0.02, 0.02, 0.02, 0.04, 1.0, 1.0])
 
 
-def test_times_of_an_exemption_are_those_of_the_hold() -> None:
-    """A hand that rests deep from 2 to 6 s of 8 is looked at in pieces that end there."""
-    tree, times = free_tree(), np.arange(9.0)
+@pytest.mark.parametrize(
+    ("z", "since", "until", "clear"),
+    [
+        *((REST, *case) for case in ((0.0, 8.0, True), (2.0, 6.0, False), (0.0, 7.0, False), (1.0, 8.0, False))),
+        *((DEEP, *case) for case in ((2.0, 6.0, True), (3.0, 6.0, False), (2.0, 5.0, False), (0.0, 8.0, True))),
+    ],
+)
+def test_times_of_an_exemption_are_those_of_the_hold(z: Array, since: float, until: float, clear: bool) -> None:
+    """A hand that rests all the time, or deep from 2 to 6 s of 8, is looked at in pieces that end there."""
     hand = SweptBody("hand", Sphere(0.02), "universe", grasp=np.zeros(3))
-    scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
-    z = np.array([1.0, 1.0, 0.04, 0.02, 0.02, 0.02, 0.04, 1.0, 1.0])
+    scene = SweptScene(free_tree(), [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     poses = np.column_stack([0 * z, 0 * z, z, 0 * z, 0 * z, 0 * z, 0 * z + 1])
-    motion = Motion.linear(tree, times, np.zeros((9, 0)), poses)
-    for since, until, clear in ((2.0, 6.0, True), (3.0, 6.0, False), (2.0, 5.0, False), (0.0, 8.0, True)):
-        held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
-        assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
+    motion = Motion.linear(free_tree(), np.arange(9.0), np.zeros((9, 0)), poses)
+    held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
+    assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
 def test_a_body_that_stands_in_something_is_seen() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 import wbc
 from tests.cli.test_commands import run as wbc_command
+from tests.models import placement
 
 DOWN = "0.4,0.2,0.5,1,0,0,0"
 GOAL = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.4, 0.2, 0.5]))
@@ -21,10 +22,7 @@ run = functools.partial(wbc_command, "ik")
 
 
 def place(name: str, q: Any, frame: str) -> pin.SE3:
-    robot = wbc.robots.load(name)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, np.array(q, dtype=float))
-    return data.oMf[robot.model.getFrameId(frame)].copy()
+    return placement(wbc.robots.load(name), frame, np.array(q, dtype=float))
 
 
 def printed(out: str, label: str) -> list[float]:

@@ -23,15 +23,18 @@ from wbc.validation import Array
 ROBOTS = ("anymal_c", "octopod", "talos_hands", "hexapod_grips", "walker")
 
 
-def around(robot: Climber, rng: np.random.Generator, gravity: Array | None = None) -> ClimbScene:
-    """Footholds near the contacts at rest, tilted, with frictions of their own."""
+def around(
+    robot: Climber, rng: np.random.Generator, gravity: Array | None = None, lean: float = 0.5, most: float = np.inf
+) -> ClimbScene:
+    """Footholds near the contacts at rest, tilted, with frictions of their own up to the largest."""
     holds = []
     for limb in range(len(robot.limbs)):
         pose = robot.contact_pose(robot.rest, limb)
         if robot.fixed(limb) == "position":
             pose = pin.SE3(np.eye(3), pose.translation)
-        tilt = pin.SE3(pin.exp3(rng.uniform(-0.5, 0.5, 3)), rng.uniform(-0.1, 0.1, 3))
-        holds.append(Foothold(str(limb), pose * tilt, friction=float(rng.choice([0.3, 0.7, np.inf]))))
+        tilt = pin.SE3(pin.exp3(rng.uniform(-lean, lean, 3)), rng.uniform(-0.1, 0.1, 3))
+        frictions = [friction for friction in (0.3, 0.7, np.inf) if friction <= most]
+        holds.append(Foothold(str(limb), pose * tilt, friction=float(rng.choice(frictions))))
     return ClimbScene(holds, {}, np.array([0.0, 0.0, -9.81]) if gravity is None else gravity)
 
 

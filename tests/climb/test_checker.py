@@ -22,7 +22,6 @@ from wbc.errors import RangeError, ShapeError
 from wbc.log import Log
 from wbc.shapes import Box, PlacedShape, Sphere
 
-Columns = dict[str, np.ndarray]
 #: A tick in the first swing
 ALOFT = 50
 
@@ -33,70 +32,32 @@ def walked() -> tuple[ContactPlan, ClimbRun]:
     return plan, ClimbLoop(plan).run()
 
 
-def _changed(change: Callable[[Columns], None]) -> Log:
+#: Rule that a fault breaks -> columns, ticks, and what takes the place of their values
+Fault = tuple[tuple[str, ...], slice, Callable[[np.ndarray], object]]
+AT, FROM, ALL = slice(ALOFT, ALOFT + 1), slice(ALOFT, None), slice(None)
+KNEE = "q.8"
+IN_THE_AIR: Fault = (("contact.limb1",), AT, lambda foothold: 6)
+PLANTED: dict[str, Fault] = {
+    "step of time": (("t",), FROM, lambda t: t + 0.003),
+    "joint beyond its limit": ((KNEE,), ALL, lambda q: 2.5),
+    "joint's rate": (("q.7",), FROM, lambda q: q + 0.1),
+    "joint's acceleration": (("q.7",), FROM, lambda q: q + 0.02),
+    "closed contact slips": (("q.0",), ALL, lambda x: x + np.minimum(np.linspace(0.0, 0.006, len(x)), 0.0015)),
+    "closed contact off its foothold": (("q.1",), ALL, lambda y: y + 0.0025),
+    "contacts bear the robot at rest": (("contact.limb2", "contact.limb4", "contact.limb6"), AT, lambda foothold: -1),
+    "foothold that is another's": (("contact.limb1",), AT, lambda _: walked()[1].log.columns["contact.limb2"][ALOFT]),
+    "clearance of bodies": ((KNEE,), slice(ALOFT - 3, ALOFT + 3), lambda q: q + 0.4),
+    "contact's point in a body": ((KNEE,), slice(ALOFT - 3, ALOFT + 3), lambda q: q + 0.4),
+}
+
+
+def _changed(fault: Fault) -> Log:
     log = walked()[1].log
     columns = {name: values.copy() for name, values in log.columns.items()}
-    change(columns)
+    names, ticks, change = fault
+    for name in names:
+        columns[name][ticks] = change(columns[name][ticks])
     return dataclasses.replace(log, columns=columns)
-
-
-def _q(dof: int) -> str:
-    return f"q.{dof + 1}"
-
-
-def _clock(c: Columns) -> None:
-    c["t"][ALOFT:] += 0.003
-
-
-def _beyond(c: Columns) -> None:
-    c[_q(7)][:] = 2.5
-
-
-def _fast(c: Columns) -> None:
-    c[_q(6)][ALOFT:] += 0.1
-
-
-def _jerky(c: Columns) -> None:
-    c[_q(6)][ALOFT:] += 0.02
-
-
-def _slipping(c: Columns) -> None:
-    c["q.0"] += np.minimum(np.linspace(0.0, 0.006, len(c["t"])), 0.0015)
-
-
-def _off(c: Columns) -> None:
-    c["q.1"] += 0.0025
-
-
-def _let_go(c: Columns) -> None:
-    for limb in (2, 4, 6):
-        c[f"contact.limb{limb}"][ALOFT] = -1
-
-
-def _shared(c: Columns) -> None:
-    c["contact.limb1"][ALOFT] = c["contact.limb2"][ALOFT]
-
-
-def _digging(c: Columns) -> None:
-    c[_q(7)][ALOFT - 3 : ALOFT + 3] += 0.4
-
-
-def _closed_in_the_air(c: Columns) -> None:
-    c["contact.limb1"][ALOFT] = 6
-
-
-PLANTED = {
-    "step of time": _clock,
-    "joint beyond its limit": _beyond,
-    "joint's rate": _fast,
-    "joint's acceleration": _jerky,
-    "closed contact slips": _slipping,
-    "closed contact off its foothold": _off,
-    "contacts bear the robot at rest": _let_go,
-    "foothold that is another's": _shared,
-    "clearance of bodies": _digging,
-    "contact's point in a body": _digging,
-}
 
 
 def test_a_clean_climb_is_clean() -> None:
@@ -117,7 +78,7 @@ def test_a_fault_is_noticed_by_its_rule(rule: str) -> None:
 
 def test_a_contact_that_closes_in_the_air_is_off_its_foothold() -> None:
     plan, _ = walked()
-    report = check(_changed(_closed_in_the_air), plan.climber, plan.scene)
+    report = check(_changed(IN_THE_AIR), plan.climber, plan.scene)
     worst = {finding.rule: finding for finding in report.violations}["closed contact off its foothold"]
     assert worst.where == "limb1 on p6"
     assert worst.worst > 0.03
@@ -185,12 +146,7 @@ def test_without_weight_contacts_must_fix_the_body() -> None:
     plan, run = walked()
     scene = dataclasses.replace(plan.scene, gravity=np.zeros(3))
     assert check(run.log, plan.climber, scene).clean
-
-    def opened(c: Columns) -> None:
-        for limb in (1, 3, 4, 5):
-            c[f"contact.limb{limb}"][:] = -1
-
-    log = _changed(opened)
+    log = _changed((tuple(f"contact.limb{limb}" for limb in (1, 3, 4, 5)), ALL, lambda foothold: -1))
     assert "contacts fix the body" in {f.rule for f in check(log, plan.climber, scene).violations}
 
 

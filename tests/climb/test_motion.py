@@ -132,6 +132,10 @@ def test_a_swing_goes_over_what_is_in_the_way_or_is_refused_with_the_pair() -> N
 
 def test_what_a_stance_lacks_is_said() -> None:
     robot = climber("hexapod")
+    too_high = on_stones(robot, np.random.default_rng(1), 0.05)
+    with pytest.raises(MoveError, match="move 1: contact of limb") as refused:
+        Mover(robot, too_high[0], MotionOptions(lift=9.0, tries=0)).moved(*too_high[1].stances[:2])
+    assert str(refused.value).count("(got") == 1
     scene, stances = on_stones(robot, np.random.default_rng(1), 0.05)
     one, other = stances.stances[:2]
     low = other.q.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,14 +12,15 @@ from scipy.interpolate import CubicSpline
 
 from tests.climb.bearing import slack_by_scipy
 from tests.repeats import covering, repeats
-from wbc.climb import BodyPlace, ClimbOptions, ClimbScene, first_stance, plan_climb, scenes
+from wbc.climb import BodyPlace, ClimbOptions, ClimbScene, StanceOptions, find_stances, first_stance, plan_climb, scenes
 from wbc.climb.balance import Equilibrium
 from wbc.climb.climber import Climber
 from wbc.climb.loop import PlanReference
 from wbc.climb.machines import climber
-from wbc.climb.motion import MotionOptions
+from wbc.climb.motion import MotionOptions, Mover
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import Foothold
+from wbc.climb.stance import FREE_LIMB
 from wbc.climb.time_law import MotionSpeeds, fastest
 from wbc.trajectory.least_time.reachability import SpeedProgram
 from wbc.trajectory.least_time.rows import PathRows
@@ -130,3 +132,19 @@ def test_least_time_with_rows_of_one_side_is_that_of_linear_programs(count: int)
         wanted = SpeedProgram(s, rows, squared).fastest().speed
         np.testing.assert_allclose(fastest(s, a, b, squared, (c, d)), wanted, rtol=1e-6, atol=1e-7)
         assert (wanted < fastest(s, a, b, squared) * (1 - 1e-6)).any()
+
+
+def test_a_body_leans_over_the_foot_that_holds() -> None:
+    robot = climber("talos")
+    course = scenes.draw("stairs", scenes.size_of(robot))
+    start = first_stance(robot, course.scene, scenes.placed(robot, course.start))
+    goal = BodyPlace(robot.body_pose(scenes.placed(robot, course.goal)).translation)
+    stances = find_stances(robot, course.scene, start, goal, StanceOptions(apart=0.001)).stances
+    balance = Equilibrium(robot, course.scene)
+    mover, least = Mover(robot, course.scene, MotionOptions(), balance), np.inf
+    # On two of these three moves the straight way of the body is not borne
+    for one, other in itertools.pairwise(stances[13:17]):
+        timed, _ = mover.moved(one, other)
+        held = tuple(a if a == b else FREE_LIMB for a, b in zip(one.contacts, other.contacts, strict=True))
+        least = min(least, *(balance.margin(held, q) for q in timed.q))
+    assert least > 0.0

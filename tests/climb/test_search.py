@@ -188,6 +188,23 @@ def test_refusals_say_why_in_numbers() -> None:
         find_stances(robot, scene, Stance((0, 1), start.q), BodyPlace(at))
 
 
+def test_a_gap_wider_than_limbs_span_is_refused_before_the_search() -> None:
+    robot = climber("anymal_c")
+    scene, start = _field(robot, 6)
+    wide = 4.0 * size_of(robot)
+    width = float(np.ptp(scene.positions[:, 0]))
+    far = [
+        Foothold(f"far {hold.id}", pin.SE3(np.eye(3), np.array([width + wide, 0.0, 0.0])) * hold.pose)
+        for hold in scene.footholds
+    ]
+    both = ClimbScene([*scene.footholds, *far])
+    at = robot.body_pose(start.q).translation + [width + wide, 0.0, 0.0]
+    for goal in (BodyPlace(at), LimbAt("LF_FOOT", far[0].id)):
+        with pytest.raises(NoStancesError, match=rf"a gap of {wide:.3g} m, .* {len(far)} of {2 * len(far)} foot") as no:
+            find_stances(robot, both, start, goal, StanceOptions(moves=1))
+        assert no.value.cause == "goal"
+
+
 def _field(robot: Climber, half: int) -> tuple[ClimbScene, Stance]:
     """A flat field of footholds under a robot at rest."""
     step = size_of(robot) / 8

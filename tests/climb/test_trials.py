@@ -8,7 +8,8 @@ from tests.climb.trials import KINDS, wrong
 from tests.repeats import repeats
 
 #: Seeds of each kind that are tried first: the quick ones
-FIRST = {"drive": (0, 2), "resume": (3, 15), "vanish": (0, 23), "stop": (6, 0)}
+FIRST = {"drive": (0, 2), "resume": (3, 15), "vanish": (0, 23), "stop": (6, 0),
+         "layout": (0, 9), "structure": (1, 2), "six_arms": (1, 2), "other": (1, 2)}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,14 +1,17 @@
 """Trials of the loop from seeds, each judged by the checker: bodies driven by random rates, climbs that go on from
-their logs, footholds that vanish, limbs that fail, bodies that appear, stops.
+their logs, footholds that vanish, limbs that fail, bodies that appear, stops; walks of the benchmark of the published
+walker: layouts, structures, structures with six arms, and structures of other families.
 
-``python -m tests.climb.trials KIND FIRST COUNT`` prints one line a trial, and what all of them come to.
+``python -m tests.climb.trials KIND FIRST COUNT`` prints one JSON object a trial, and what all of them come to as one.
 """
 
 from __future__ import annotations
 
 import functools
+import json
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,6 +19,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from bench.climb.walker import cases, walked
 from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
 from wbc.climb.along import BodyTrack, plan_along
@@ -223,37 +227,64 @@ def judged(run: ClimbRun, at: Ground) -> dict[str, Any]:
     }  # fmt: skip
 
 
-KINDS: dict[str, Callable[[int], dict[str, Any]]] = {"drive": drive, "resume": resume, "vanish": vanish, "stop": stop}
+def walk(part: str, arms: int | None, seed: int) -> dict[str, Any]:
+    """A case of :mod:`bench.climb.walker`, planned, carried out and checked."""
+    record = walked(next(cases(part, 1, arms, seed)))
+    outcome = "refused" if not record["planned"] else "arrived" if record["arrived"] else "stopped"
+    return record | {"outcome": outcome, "violations": record.get("violations", [])}
+
+
+KINDS: dict[str, Callable[[int], dict[str, Any]]] = {
+    "drive": drive, "resume": resume, "vanish": vanish, "stop": stop,
+    "layout": functools.partial(walk, "layouts", None), "structure": functools.partial(walk, "structures", None),
+    "six_arms": functools.partial(walk, "structures", 6), "other": functools.partial(walk, "families", None),
+}  # fmt: skip
 
 
 def wrong(kind: str, record: dict[str, Any]) -> bool:
     """Whether a trial shows a fault: a violation, a run that does not end, a limb that is left in the air."""
     ended = str(ClimbOutcome.OUT_OF_TIME) != record["outcome"]
+    stops = kind not in ("resume", "vanish") and record["outcome"] == str(ClimbOutcome.STOPPED)
     arrives = kind in ("drive", "stop") and record["outcome"] != str(ClimbOutcome.ARRIVED)
-    return bool(record["violations"]) or not ended or arrives or (kind == "drive" and record["hanging"] > 0)
+    return bool(record["violations"]) or not ended or arrives or stops or (kind == "drive" and record["hanging"] > 0)
+
+
+def trial(kind: str, seed: int) -> dict[str, Any]:
+    """One of a kind, with what it took of the processor [s] and whether it shows a fault; a crash is one."""
+    spent = time.process_time()
+    try:
+        record = KINDS[kind](seed)
+    except Exception as error:  # noqa: BLE001 (what a trial looks for)
+        record = {"outcome": "crash", "reason": repr(error)[:500], "violations": ["crash"], "hanging": 0}
+    record["cpu"] = time.process_time() - spent
+    return {"kind": kind, "seed": seed, "fault": wrong(kind, record)} | record
+
+
+def summary(records: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of trials of one kind: how they ended, faults, time until a stick's motion [s], real time, processor time [s]."""
+    waits = [wait for record in records for wait in record.get("waits", ())]
+    rates = [record[key] for record in records for key in ("real_time", "real_time_planned") if key in record]
+    return {
+        "kind": records[0]["kind"], "trials": len(records), "faults": [r["seed"] for r in records if r["fault"]],
+        "outcomes": dict(Counter(record["outcome"] for record in records)),
+        "waits": {"median": np.median(waits), "95 %": np.quantile(waits, 0.95), "most": max(waits)} if waits else {},
+        "real_time": {"least": min(rates), "median": np.median(rates)} if rates else {},
+        "cpu": sum(record["cpu"] for record in records),
+    }  # fmt: skip
 
 
 def main(kind: str, first: int, count: int) -> None:
     """Trials one after another."""
-    waits, faults, rates = list[float](), 0, list[float]()
+    records = []
     for seed in range(first, first + count):
-        try:
-            record = KINDS[kind](seed)
-        except Exception as error:  # noqa: BLE001 (what a trial looks for)
-            record = {"outcome": "crash", "reason": repr(error)[:200], "violations": ["crash"], "hanging": 0}
-        mine = record.pop("waits", [])
-        waits += mine
-        rates += [record["real_time"]] if "real_time" in record else []
-        bad = wrong(kind, record)
-        faults += bad
-        median = f"{np.median(mine):.2f}" if mine else "-"
-        print("FAULT" if bad else "ok", kind, seed, *GROUNDS[seed % len(GROUNDS)], median,
-              {k: round(v, 3) if isinstance(v, float) else v for k, v in record.items()}, flush=True)  # fmt: skip
-    print(kind, count, "trials,", faults, "faults", end="")
-    if waits:
-        median, most = np.quantile(waits, [0.5, 0.95])
-        print(f"; stick to motion: median {median:.2f} s, 95 % within {most:.2f} s, largest {max(waits):.2f} s", end="")
-    print(f"; real time: least {min(rates):.1f}, median {np.median(rates):.1f}" if rates else "")
+        records.append(trial(kind, seed))
+        print(line(records[-1]), flush=True)
+    print(line(summary(records)))
+
+
+def line(record: dict[str, Any]) -> str:
+    """As JSON, with three decimals."""
+    return json.dumps(json.loads(json.dumps(record), parse_float=lambda text: round(float(text), 3)))
 
 
 if __name__ == "__main__":

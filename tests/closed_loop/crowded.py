@@ -123,22 +123,3 @@ def drive(name: str, seconds: float, seed: int = 0, method: str = "auto") -> Fou
         if d.min() < found.least:
             found.least, found.worst = float(d.min()), (k, *(str(n) for n in names[int(d.argmin())]))
     return found
-
-
-def main() -> None:
-    """Print what is found for robots by name: ``python -m tests.closed_loop.crowded SECONDS [ROBOT ...]``."""
-    import sys
-
-    for name in sys.argv[2:] or ROBOTS:
-        found = drive(name, float(sys.argv[1]))
-        ticks = found.status.total()
-        shares = ", ".join(f"{100 * n / ticks:.2f} % {status}" for status, n in found.status.items())
-        print(
-            f"{name}: {ticks} ticks, {found.overlaps} with an overlap, {found.near} within the margin, "
-            f"least {1e3 * found.least:.2f} mm at {found.worst}; {shares}",
-            flush=True,
-        )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """No shapes overlap, whatever is asked of the hands; the pairs that no posture brings apart are named.
 
-``WBC_REPEATS=120`` drives all robots for ten minutes each; ``python -m tests.closed_loop.crowded 600`` prints the same.
+``WBC_REPEATS=120`` drives all robots for ten minutes each.
 """
 
 from __future__ import annotations

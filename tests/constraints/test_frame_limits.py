@@ -12,7 +12,8 @@ import pytest
 
 import wbc
 from tests.evaluation import Numbers, numbers
-from tests.tasks.robots import FRAMES, placement, random_configuration, robot
+from tests.models import placement
+from tests.tasks.robots import FRAMES, random_configuration, robot
 from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.errors import BoundsError, NotFiniteError, ShapeError, UnknownNameError, WbcError

@@ -139,7 +139,7 @@ def test_step_reports_a_faded_limit() -> None:
 
 
 def name_of(item: Item) -> str:
-    return key(small.stack().add(item), "1", "vm")
+    return key(small.stack().add(item), "1")
 
 
 def tip(axes: str = "world") -> EndEffector:

@@ -8,6 +8,7 @@ import pytest
 
 from tests.constraints.robots import robot
 from tests.evaluation import probe
+from tests.models import placement
 from tests.refusals import assert_refused
 from wbc.errors import MissingShapeError, RangeError
 from wbc.shapes import Capsule, HalfSpace, PlacedShape, Sphere
@@ -23,9 +24,7 @@ def test_no_direction_is_no_number_at_coincident_centres(place: str) -> None:
     ball = PlacedShape(Sphere(0.05), pin.SE3.Identity())
     bot = bot.with_shapes({link: (rod, ball)})
     clear = probe(Obstacle(Sphere(0.1), links=link), bot)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    here = data.oMf[bot.model.getFrameId(link)]
+    here = placement(bot, link, q)
     for row, placed in enumerate((rod, ball)):
         offset = {
             "center": placed.placement.translation,
@@ -44,9 +43,7 @@ def test_gradient_is_continuous_where_the_nearest_point_reaches_an_end() -> None
     rod = PlacedShape(Capsule(0.05, 0.2), pin.SE3.Identity())
     bot = bot.with_shapes({"panda_hand": (rod,)})
     clear = probe(Obstacle(Sphere(0.1)), bot)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    here = data.oMf[bot.model.getFrameId("panda_hand")]
+    here = placement(bot, "panda_hand", q)
     rows = [
         clear(q, pose=pin.SE3(np.eye(3), here.act(np.array([0.3, 0.0, 0.1 + step]))))[1] for step in (-1e-9, 0.0, 1e-9)
     ]

@@ -10,6 +10,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from tests.models import placement
+
 # isort: split
 import pytest
 
@@ -55,9 +57,7 @@ def carrying(shape: Solid, name: str = "panda") -> tuple[Robot, str]:
 
 def where(bot: Robot, q: np.ndarray, link: str) -> pin.SE3:
     """Pose of the link's shape in the world."""
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    return data.oMf[bot.model.getFrameId(link)] * ASKEW
+    return placement(bot, link, q) * ASKEW
 
 
 def near(bot: Robot, q: np.ndarray, link: str, rng: np.random.Generator) -> pin.SE3:

@@ -13,6 +13,7 @@ from tests.closed_loop.collisions import ROCK
 from tests.closed_loop.eyes import Gaps
 from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
+from tests.models import placement
 from tests.refusals import assert_refused
 from wbc.api import Controller, Stack
 from wbc.controller import Status
@@ -201,9 +202,7 @@ def test_a_shape_in_the_middle_of_another_finds_a_way_out(solid: Any, shape: Any
     bot = robot("panda").with_shapes({"panda_hand": (PlacedShape(solid, pin.SE3.Identity()),)})
     stack = Stack(bot, 0.01).add(JointLimits(acceleration=False), name="limits").add(Obstacle(shape), name="thing")
     control, q = stack.compile(backend="vm"), bot.neutral
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    control["thing"].pose = data.oMf[bot.model.getFrameId("panda_hand")]
+    control["thing"].pose = placement(bot, "panda_hand", q)
     least, status = recovery(control, bot, q, "thing", 80)
     assert np.isfinite(least).all()
     assert Status.BRAKED not in status

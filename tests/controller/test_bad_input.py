@@ -124,6 +124,7 @@ STEP = {
     },
 }
 
+#: What the walk over the registry in test_switches_of_every_class.py does not ask
 VALUES = {
     "pose no rotation": Case(
         put("hand", "target"), pin.SE3(SKEWED, POSE.translation), RotationError, "hand.target", shown=SKEWED
@@ -138,46 +139,28 @@ VALUES = {
     "pose zero quaternion": Case(put("hand", "target"), np.zeros(7), RotationError, "hand.target", shown=np.zeros(4)),
     "pose NaN": Case(put("hand", "target"), pin.SE3(TURN, NAN[:3]), NotFiniteError, "hand.target", shown=NAN[:3]),
     "pose NaN matrix": Case(put("hand", "target"), np.full((4, 4), np.nan), NotFiniteError, "hand.target"),
-    "pose shape": Case(put("hand", "target"), np.eye(3), ShapeError, "hand.target"),
-    "pose None": Case(put("hand", "target"), None, ShapeError, "hand.target"),
-    "pose text": Case(put("hand", "target"), "up", ShapeError, "hand.target"),
-    "twist shape": Case(put("hand", "feedforward"), np.zeros(3), ShapeError, "hand.feedforward"),
-    "twist NaN": Case(put("hand", "feedforward"), NAN[:6], NotFiniteError, "hand.feedforward"),
-    "position shape": Case(put("place", "target"), np.zeros(2), ShapeError, "place.target"),
     "position inf": Case(put("place", "target"), (0.0, 0.0, np.inf), NotFiniteError, "place.target"),
     "rotation matrix": Case(put("turn", "target"), SKEWED, RotationError, "turn.target"),
     "rotation scaled": Case(put("turn", "target"), 2 * TURN, RotationError, "turn.target"),
     "rotation quaternion": Case(put("turn", "target"), (0, 0, 0, 0.99), RotationError, "turn.target"),
     "rotation NaN": Case(put("turn", "target"), NAN[:4], NotFiniteError, "turn.target"),
-    "rotation shape": Case(put("turn", "target"), np.zeros(3), ShapeError, "turn.target"),
     "angle shape": Case(put("plane", "target"), (1.0,), ShapeError, "plane.target"),
-    "angle NaN": Case(put("plane", "target"), float("nan"), NotFiniteError, "plane.target"),
-    "configuration shape": Case(put("posture", "target"), np.zeros(6), ShapeError, "posture.target"),
     "configuration inf": Case(put("posture", "target"), INF, NotFiniteError, "posture.target"),
-    "tangent shape": Case(put("posture", "feedforward"), np.zeros(6), ShapeError, "posture.feedforward"),
     "weight negative": Case(put("hand", "weight"), -1e-9, RangeError, "hand.weight"),
     "weight NaN": Case(put("hand", "weight"), np.nan, NotFiniteError, "hand.weight"),
     "weight inf": Case(put("hand", "weight"), np.inf, NotFiniteError, "hand.weight"),
     "weight vector": Case(put("hand", "weight"), np.ones(6), ShapeError, "hand.weight"),
     "gain negative": Case(put("hand", "gain"), -2, RangeError, "hand.gain"),
-    "gain NaN": Case(put("hand", "gain"), np.nan, NotFiniteError, "hand.gain"),
-    "gain text": Case(put("hand", "gain"), "high", ShapeError, "hand.gain"),
     "scale above 1": Case(put("limits", "velocity_scale"), 1.5, RangeError, "limits.velocity_scale"),
-    "margin negative": Case(put("ball", "margin"), -0.01, RangeError, "ball.margin"),
     "rate times dt": Case(put("ball", "rate"), 1.001 / (2 * DT), RangeError, "ball.rate"),
     "rate zero": Case(put("ball", "rate"), 0.0, RangeError, "ball.rate"),
-    "rate negative": Case(put("ball", "rate"), -1.0, RangeError, "ball.rate"),
-    "rate NaN": Case(put("ball", "rate"), np.nan, NotFiniteError, "ball.rate"),
-    "mask shape": Case(put("hand", "mask"), np.ones(5), ShapeError, "hand.mask"),
     "mask negative": Case(put("hand", "mask"), (1, 1, -1, 1, 1, 1), RangeError, "hand.mask[2]", shown=-1.0),
     "mask NaN": Case(put("hand", "mask"), NAN[:6], NotFiniteError, "hand.mask"),
     "mask one negative": Case(put("hand", "mask"), -0.5, RangeError, "hand.mask[0]", shown=-0.5),
     "mask of bounds": Case(put("limits", "mask"), (1, 1, 1, 0.5, 1, 1, 1), RangeError, "limits.mask[3]", shown=0.5),
     "mask of bounds negative": Case(put("limits", "mask"), -1, RangeError, "limits.mask[0]", shown=-1.0),
     "mask of margins": Case(put("ball", "mask"), 2, RangeError, "ball.mask[0]", shown=2.0),
-    "mask of margins shape": Case(put("ball", "mask"), np.ones((2, 2)), ShapeError, "ball.mask"),
     "enabled number": Case(put("hand", "enabled"), 0.5, ShapeError, "hand.enabled"),
-    "enabled text": Case(put("limits", "enabled"), "no", ShapeError, "limits.enabled"),
 }
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from tests.repeats import ALL, MORE, repeats
 from tests.tasks.robots import FRAMES, robot
 from wbc.api import Controller
@@ -91,18 +92,34 @@ def test_rows_are_those_of_the_expressions(name: str) -> None:
                 assert np.abs(ahead[0] - ahead[1]).max() < 1e-9
 
 
+@pytest.mark.parametrize("name", ROBOTS)
+def test_rows_are_how_fast_margins_change(name: str) -> None:
+    """By differences: both back ends compute rows of balls in the same C."""
+    rng, (native, vm), machine = np.random.default_rng(2), pair(name), stack(name).robot
+
+    def margins(q: np.ndarray) -> np.ndarray:
+        native.reset(q)
+        return np.concatenate([np.ravel(each) for each in native.step(q).margins.values()])
+
+    q = configuration(machine, rng)
+    scatter((native, vm), rng, 1.0, 0.5)
+    by = [1e-6 * each for each in np.eye(machine.nv)]
+    change = [(margins(machine.integrate(q, d, 1.0)) - margins(machine.integrate(q, -d, 1.0))) / 2e-6 for d in by]
+    margins(q)
+    rows = core_of(native).tick.qp().A[-len(change[0]) :]
+    assert np.abs(rows - np.transpose(change)).max() < 1e-7
+
+
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.07), (1e-9, 0.0, 0.02)])
 def test_a_ball_on_the_core_of_a_link_has_a_direction_to_leave_in(place: tuple[float, float, float]) -> None:
     """The same declared one in both."""
     controllers, machine = pair("panda"), stack("panda").robot
     q = machine.neutral
-    data = machine.model.createData()
-    pin.framesForwardKinematics(machine.model, data, q)
     for link, shapes in machine.shapes.items():
         for placed in shapes:
             if not _moved(machine, link):
                 continue
-            pose = data.oMf[machine.model.getFrameId(link)] * placed.placement
+            pose = placement(machine, link, q) * placed.placement
             matrices = []
             for controller in controllers:
                 controller["ball3"].set(pose=pin.SE3(np.eye(3), pose.act(np.array(place))), velocity=np.zeros(6))

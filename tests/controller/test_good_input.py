@@ -27,6 +27,7 @@ KINDS: dict[str, Callable[[np.ndarray], Any]] = {
     "list": lambda x: x.tolist(),
     "tuple": lambda x: tuple(x.tolist()),
     "list of numpy scalars": list,
+    "memory": memoryview,
     "every second": lambda x: np.repeat(x, 2)[::2],
     "reversed": lambda x: x[::-1].copy()[::-1],
     "column of a matrix": lambda x: np.column_stack([x, x])[:, 0],
@@ -70,6 +71,7 @@ def test_whole_numbers_are_welcome(kind: type, backend: str) -> None:
     controller["hand"].enabled, twin["hand"].enabled = 0, False
     controller["limits"].mask, twin["limits"].mask = np.ones(7, kind), np.ones(7)
     assert controller.step(q.astype(kind).tolist())._data == twin.step(q.astype(float))._data
+    assert controller.step(q.astype(kind))._data == twin.step(q.astype(float))._data
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

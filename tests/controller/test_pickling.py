@@ -38,7 +38,7 @@ def through_pickle(thing: Any) -> Any:
 
 def used(stack: Stack) -> Stack:
     """The stack after everything that a robot or item works out from itself was asked for."""
-    key(stack, "1", "vm")
+    key(stack, "1")
     for entry in stack.entries:
         entry.item.rows(stack.robot)
         entry.item.inputs(stack.robot)
@@ -62,7 +62,7 @@ def test_every_item_comes_out_as_it_went_in(class_name: str) -> None:
             assert other.declaration(machine) == item.declaration(machine)
             again = copied(stack)
             assert again.robot is not machine
-            assert key(again, "1", "vm") == key(stack, "1", "vm")
+            assert key(again, "1") == key(stack, "1")
             assert [(e.name, e.level, e.weight) for e in again.entries] == [
                 (e.name, e.level, e.weight) for e in stack.entries
             ]
@@ -213,7 +213,7 @@ def test_lambdas_without_cloudpickle_are_refused(monkeypatch: pytest.MonkeyPatch
             pickle.dumps(stack)
         assert caught.value.field == f"{name}.Expression.function"
         # a copy in this process needs no name
-        assert key(copy.deepcopy(stack), "1", "vm") == key(stack, "1", "vm")
+        assert key(copy.deepcopy(stack), "1") == key(stack, "1")
 
 
 def test_functions_that_hold_what_cannot_be_pickled() -> None:
@@ -250,4 +250,4 @@ def test_meshes() -> None:
     points = np.random.default_rng(0).normal(size=(200, 3))
     machine = robot("panda")
     stack = Stack(machine, 0.005).add(Obstacle([Convex(points), Convex(points + 1.0)]), name="mesh")
-    assert key(through_pickle(stack), "1", "vm") == key(stack, "1", "vm")
+    assert key(through_pickle(stack), "1") == key(stack, "1")

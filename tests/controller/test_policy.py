@@ -13,6 +13,7 @@ import wbc
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, arm, robot
 from tests.controller.test_sacrifice import within_actuators
+from tests.models import placement
 from tests.repeats import covering
 from wbc.api import Controller
 from wbc.controller import Policy, Status, core_of
@@ -40,9 +41,7 @@ def _fresh(tick: Controller) -> None:
     bot = robot("panda")
     tick.policy = Policy()
     tick.reset(bot.neutral)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, bot.neutral)
-    here = data.oMf[bot.model.getFrameId(FRAMES["panda"].tip)].copy()
+    here = placement(bot, FRAMES["panda"].tip, bot.neutral)
     tick["grip"].target, tick["grip"].gain, tick["grip"].enabled = here, 1.0, False
     here.translation[:] += [0.1, 0.2, -0.1]
     tick["hand"].target = here

@@ -14,6 +14,7 @@ from hypothesis import given, settings, strategies as st
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, near_limits, quarrel, robot
 from tests.controller.test_sacrifice import within_actuators
+from tests.models import placement
 from wbc.api import Stack
 from wbc.controller import Status, Step, core_of
 from wbc.shapes import Capsule, PlacedShape, Sphere
@@ -88,10 +89,8 @@ def test_degenerate_geometry(backend: str) -> None:
     stack.add(PitchPlane("panda_link3", "panda_link3", "panda_link5"), name="plane")
     stack.add(JointLimits(), name="limits").add(Obstacle(Sphere(0.05)), name="ball")
     tick = stack.compile(**way(backend))
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, bot.neutral)
-    link = data.oMf[bot.model.getFrameId("panda_link5")]
-    tip = data.oMf[bot.model.getFrameId(f.tip)]
+    link = placement(bot, "panda_link5", bot.neutral)
+    tip = placement(bot, f.tip, bot.neutral)
     tick["ball"].pose = pin.SE3(np.eye(3), link.translation)
     tick["hand"].target = pin.SE3(tip.rotation @ np.diag([-1.0, -1.0, 1.0]), tip.translation)
     step = tick.step(bot.neutral)

@@ -8,6 +8,7 @@ import pytest
 
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, inside, robot
+from tests.models import placement
 from wbc import Controller, Stack, Step
 from wbc.controller import core_of
 from wbc.shapes import HalfSpace
@@ -162,9 +163,7 @@ def test_residuals_have_units_and_labels() -> None:
     one.step(START)
     one["hand"].target, one["posture"].target = FAR, np.zeros(7)
     step = one.step(START)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, START)
-    tip = data.oMf[bot.model.getFrameId(FRAMES["panda"].tip)]
+    tip = placement(bot, FRAMES["panda"].tip, START)
     hand, posture = step.residuals["hand"], step.residuals["posture"]
     assert list(step.residuals) == ["hand", "posture"]
     assert hand.units == ("m",) * 3 + ("rad",) * 3

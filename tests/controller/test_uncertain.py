@@ -8,12 +8,10 @@ import pytest
 
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
-from tests.soak import machines, stacks
 from tests.soak.both import feasible
-from tests.soak.levels import with_levels
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 from wbc.qp.problem import QPSolution
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -161,25 +159,6 @@ def test_many_soft_rows_at_once(backend: str) -> None:
             assert step.v == pytest.approx(found.solution.x[:7], abs=step.certificate.error_bound + 1e-9)
         given = max(given, len(step.relaxed))
     assert given > 20
-
-
-def test_levels_are_within_their_bounds_on_both_back_ends() -> None:
-    rng = np.random.default_rng(505)
-    bot = machines.machine(rng)
-    declared = with_levels(stacks.random_stack(bot, rng), rng)
-    native, vm = declared.compile(backend=COMPILED), declared.compile(solver=IN_PYTHON)
-    for _ in range(12):
-        q, state = machines.configuration(bot, rng, False), rng.bit_generator.state
-        stacks.provoke(native, rng)
-        rng.bit_generator.state = state
-        stacks.provoke(vm, rng)
-        v = np.clip(rng.normal(0.0, 0.3, bot.nv), -bot.limits.velocity, bot.limits.velocity)
-        for _ in range(4):
-            one, other = native.step(q, v), vm.step(q, v)
-            if one.status is other.status is Status.SOLVED:
-                stated = one.certificate.error_bound + other.certificate.error_bound
-                assert np.abs(one.v - other.v).max() <= stated + 1e-10
-            q, v = pin.integrate(bot.model, q, one.v * DT), one.v
 
 
 def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.models import placement
 from wbc import WbcError
 from wbc.analysis.jacobians.numeric import NumericRows
 from wbc.coordinates import (
@@ -110,9 +111,7 @@ def test_rates_are_pinocchios(robot: Robot, rows: Any) -> None:
 def test_rate_of_the_pitch_plane_has_its_factor(robot: Robot, arm: str, pitch: int) -> None:
     """The rank analysis leaves 1/|r| out; a rate in rad/s does not."""
     rows, q = PitchPlaneRows(f"{arm}F3", f"{arm}F5"), states(robot)[0]
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    shoulder, wrist = (data.oMf[robot.model.getFrameId(f"{arm}{name}")] for name in ("F3", "F5"))
+    shoulder, wrist = (placement(robot, f"{arm}{name}", q) for name in ("F3", "F5"))
     axis, span = shoulder.rotation[:, pitch], wrist.translation - shoulder.translation
     length = np.linalg.norm(span - axis * (axis @ span))
     np.testing.assert_allclose(length * rates(rows, q, robot), NumericRows(robot).value([rows], q), atol=1e-11)
@@ -160,11 +159,9 @@ def test_three_points_stand_for_a_pose() -> None:
         spread = ca.Function("spread", [kin.q], [kin.expand(task.spread(ROBOT, kin))])(STATES[0]).full()
         assert [row.label for row in task.rows(ROBOT)][:4] == ["xx", "xy", "xz", "yx"]
         own = np.block([[3 * np.eye(3), -d * pin.skew(one)], [d * pin.skew(one), 2 * d * d * np.eye(3)]])
-        data = ROBOT.model.createData()
-        pin.framesForwardKinematics(ROBOT.model, data, STATES[0])
-        turn = data.oMf[ROBOT.model.getFrameId("tip")].rotation
+        turn = placement(ROBOT, "tip", STATES[0]).rotation
         if expressed:
-            turn = data.oMf[ROBOT.model.getFrameId(expressed)].rotation.T @ turn
+            turn = placement(ROBOT, expressed, STATES[0]).rotation.T @ turn
         both = np.kron(np.eye(2), turn)
         np.testing.assert_allclose(spread.T @ spread, both @ own @ both.T, atol=1e-12)
         if d == 1.0:

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.coordinates.test_any_arm import jacobian, random_arm
+from tests.models import placement
 from tests.published.arm_machine import STATE, Machine
 from wbc.coordinates import (
     BodyRows,
@@ -205,9 +206,7 @@ def test_a_cue_is_what_is_driven_and_no_motion_is_nearer(metric: float | None) -
     held = jacobian(robot, pair.constraint, STATE)
     free = np.linalg.svd(held)[2][4:].T
     task = jacobian(robot, (tip,), STATE)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, STATE)
-    turn = data.oMf[robot.model.getFrameId("tip")].rotation
+    turn = placement(robot, "tip", STATE).rotation
     if metric is None:
         weigh = np.diag([1.0 / robot.characteristic_length] * 3 + [1.0] * 3)
     else:

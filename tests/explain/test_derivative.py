@@ -8,6 +8,7 @@ import pytest
 
 from tests.backends import IN_PYTHON, way
 from tests.controller.stacks import FRAMES, arm, robot
+from tests.models import placement
 from wbc.api import Controller
 from wbc.errors import SolverError, UnknownNameError
 from wbc.tasks import Hold
@@ -35,9 +36,7 @@ Q, V = robot("panda").neutral + 0.02, np.array([0.01, 0.01, -0.01, 0.0, 0.01, 0.
 
 def tip(q: np.ndarray) -> pin.SE3:
     bot = robot("panda")
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    return data.oMf[bot.model.getFrameId(FRAMES["panda"].tip)].copy()
+    return placement(bot, FRAMES["panda"].tip, q)
 
 
 def shifted(kind: str, value: object, k: int, by: float) -> object:

@@ -14,6 +14,7 @@ import pytest
 
 from tests.backends import IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, robot
+from tests.models import placement
 from tests.torque.problems import controller
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -68,9 +69,7 @@ def _fresh(tick: Controller) -> None:
 
 def tip(q: np.ndarray) -> pin.SE3:
     bot = robot("panda")
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    return data.oMf[bot.model.getFrameId(TIP)].copy()
+    return placement(bot, TIP, q)
 
 
 def moved(by: list[float]) -> pin.SE3:

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.explore import Explorer
 from wbc.explore.pictures import save_pieces
@@ -50,9 +51,7 @@ def test_a_tick_has_the_rates_of_the_stack_among_its_choices() -> None:
     stack = pose_stack().add(wbc.tasks.Damping(), name="least", level=1)
     controller = stack.compile(backend="vm")
     controller.reset(Q)
-    data = PANDA.model.createData()
-    pin.framesForwardKinematics(PANDA.model, data, Q)
-    target = data.oMf[PANDA.model.getFrameId("panda_hand_tcp")] * pin.SE3(np.eye(3), np.array([0.01, 0.02, -0.01]))
+    target = placement(PANDA, "panda_hand_tcp", Q) * pin.SE3(np.eye(3), np.array([0.01, 0.02, -0.01]))
     controller["hand"].target = target
     v = controller.step(Q).v
     found = Explorer(stack, Q, values={"hand": {"target": target}}).tick(Q)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -162,6 +162,75 @@ def test_what_is_no_motion_is_refused(tmp_path: Path) -> None:
     robot = wbc.robots.load("ur5")
     assert_refused(lambda: motion.configurations(robot), UnknownNameError, "shoulder_pan_joint")
     assert motion.configurations(robot, ["a"]).tolist() == [robot.neutral.tolist()] * 2
+
+
+MOVED = {"translation": dict.fromkeys("xyz", 0.0), "rotation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        ("{", "JSONDecodeError"),
+        ("[]", "cannot be read"),
+        ("{}", "no attribute 'joints'"),
+        ('{"joints": []}', "neither joint states"),
+        ('{"joints": [{"name": null, "position": 1}]}', "no name"),
+        ('{"joints": [{"name": "a", "position": "far"}]}', "cannot be read"),
+        ('{"joints": [{"name": "a", "position": 1}, {"name": "a", "position": 2}]}', "two states"),
+        ('{"timestamp": {"sec": 1e400, "nsec": 0}, "joints": [{"name": "a", "position": 1}]}', "timestamp"),
+        ([MOVED | {"parent_frame_id": name, "child_frame_id": "b"} for name in "ac"], "second parent of 'b'"),
+    ],
+)
+def test_messages_of_strangers_are_refused_by_name(message: Any, reason: str, tmp_path: Path) -> None:
+    kind = "foxglove.JointStates" if isinstance(message, str) else "foxglove.FrameTransforms"
+    said = message if isinstance(message, str) else json.dumps({"transforms": message})
+    file = written(tmp_path / "x.mcap", [(0, kind, said)])
+    assert_refused(lambda: read_motion(file), FormatError, reason)
+
+
+def written(file: Path, messages: list[tuple[int, str, str]], **how: Any) -> Path:
+    """An MCAP file: time [s], type and text of each message."""
+    with file.open("wb") as stream:
+        writer = Writer(stream, **how)
+        writer.start()
+        channels: dict[str, int] = {}
+        for time, kind, text in messages:
+            if kind not in channels:
+                channels[kind] = writer.register_channel("", "json", writer.register_schema(kind, "jsonschema", b""))
+            writer.add_message(channels[kind], time * NANO, text.encode(), time * NANO)
+        writer.finish()
+    return file
+
+
+@pytest.mark.parametrize("how", [{"compression": kind} for kind in CompressionType] + [{"use_chunking": False}])
+def test_files_of_strangers_are_read_however_they_are_packed(how: Any, tmp_path: Path) -> None:
+    """Topics without a name, and messages in no order, of which of those at one time the last counts."""
+    times = [3, 1, 2, 0, 1]
+    messages = [(t, "foxglove.JointStates", json.dumps(state(a=10.0 * k + t))) for k, t in enumerate(times)]
+    motion = read_motion(written(tmp_path / "x.mcap", messages, **how))
+    assert (motion.t.tolist(), motion.q[:, 0].tolist()) == ([0.0, 1.0, 2.0, 3.0], [30.0, 41.0, 22.0, 3.0])
+
+
+def test_a_bag_whose_recorder_was_killed_is_read_as_far_as_it_came(tmp_path: Path) -> None:
+    """It has no metadata, and its file ends anywhere."""
+    rng = np.random.default_rng(0)
+    first = states(rng, ["a", "b"], 40)
+    folder = tmp_path / "mcap"
+    write_ros(tmp_path, "mcap", first, {})
+    whole = read_motion(folder)
+    (folder / "metadata.yaml").unlink()
+    file = next(folder.glob("*.mcap"))
+    data = file.read_bytes()
+    assert np.array_equal(read_motion(folder).q, whole.q)
+    for cut in rng.integers(0, len(data), 30):
+        file.write_bytes(data[:cut])
+        try:
+            some = read_motion(folder)
+        except FormatError:
+            continue
+        assert np.array_equal(some.q, whole.q[: len(some.q)])
+    file.unlink()
+    assert_refused(lambda: read_motion(folder), FormatError, "cannot be read")
 
 
 @pytest.mark.parametrize("seed", [0, 2])

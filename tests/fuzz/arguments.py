@@ -10,6 +10,7 @@ import pinocchio as pin
 
 import wbc
 from tests.fuzz.arm import CUBE, DT, HULL, MIDDLE, ONE, ROWS, TIP, Q, height, item, plain, robot, stack, stack_of_poses
+from tests.models import placement
 from wbc import shapes, tasks, trajectory
 from wbc.proximity import Body
 
@@ -166,7 +167,5 @@ def _zigzag() -> Any:
 
 def _short() -> Any:
     place = robot()
-    data = place.model.createData()
-    pin.framesForwardKinematics(place.model, data, Q)
-    start = data.oMf[place.model.getFrameId(TIP)]
+    start = placement(place, TIP, Q)
     return trajectory.geodesic_path(start, pin.SE3(start.rotation, start.translation + np.array([0.02, 0.0, 0.0])))

@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 
 import wbc
 from tests.distances import coal_distance
+from tests.models import placement
 from wbc.api import Stack
 from wbc.controller import core_of
 from wbc.ik import Ending, InverseKinematics
@@ -42,9 +43,7 @@ def solver(name: str = "panda", backend: str = "auto", kind: str = "pose") -> In
 
 
 def tip(robot: Robot, q: Array, frame: str) -> pin.SE3:
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return data.oMf[robot.model.getFrameId(frame)].copy()
+    return placement(robot, frame, q)
 
 
 def random_q(robot: Robot, rng: np.random.Generator) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wbc.errors import SolverError
 from wbc.qp.factor import ActiveRows, Factor, active_bounds
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 from wbc.qp.problem import QP, QPSolution
 
 _DIGITS = 60

@@ -9,6 +9,7 @@ import pytest
 from tests.backends import IN_PYTHON, way
 from tests.controller.test_policy import spread
 from tests.levels import arms
+from tests.models import placement
 from wbc.api import Controller
 from wbc.controller import Policy, Status
 from wbc.controller.policy import CHAIN
@@ -24,9 +25,7 @@ def tick(request: pytest.FixtureRequest) -> Controller:
 def put(tick: Controller, conflict: bool) -> None:
     """Wishes at every level; a ball that comes at the tip faster than the joints can yield, if there is to be one."""
     robot = tick.stack.robot
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, Q)
-    here = data.oMf[robot.model.getFrameId("tip")].translation.copy()
+    here = placement(robot, "tip", Q).translation.copy()
     tick.policy = Policy()
     tick.reset(Q)
     tick["tip"].target, tick["knee"].target = here + [0.05, 0.1, 0.0], [0.2, 0.5, 0.0]

@@ -22,6 +22,10 @@ TICKS = repeats(500)
 LINKAGES = min(repeats(6), 48)
 #: Ticks from one start towards random postures
 EPISODE = 2000
+#: What configurations are corrected by at most, 0.1 (1 + |v|) [rad/s]
+CORRECTED = 0.1 * (1.0 + 3.0)
+#: Of so many ticks MuJoCo looks at the torques of one
+SPARSE = 8
 
 
 def bounded(robot: Robot, seed: int) -> Robot:
@@ -72,8 +76,8 @@ def test_random_linkages(seed: int) -> None:
 
 
 def run_second_order(robot: Robot, text: str, command: str, count: int, seed: int) -> None:
-    """Every tick is solved and moves within limits; its accelerations keep loops closed up to the second order, and its
-    torques are those that MuJoCo says they need. What a plant keeps, the configuration between ticks, is closed here.
+    """Every tick is solved and leads to where loops are closed, by a velocity that keeps them closed, within limits;
+    torques are those that MuJoCo says its accelerations need.
     """
     stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
     controller, rng, limits, moved = stack.compile(command=command), np.random.default_rng(seed), robot.limits, 0.0
@@ -87,19 +91,19 @@ def run_second_order(robot: Robot, text: str, command: str, count: int, seed: in
         step = controller.step(q, v)
         assert step.status == "solved", (k, step)
         assert np.isfinite(step.a).all()
-        assert (np.abs(step.v) <= limits.velocity * (1.0 + 1e-6)).all(), k
-        assert (np.abs(step.a) <= limits.acceleration * (1.0 + 1e-6)).all(), k
-        if command == "torque":
+        assert (np.abs(step.v) <= limits.velocity * (1.0 + 1e-9)).all(), k
+        assert (np.abs(step.a) <= limits.acceleration * (1.0 + 1e-9)).all(), k
+        assert (np.abs(step.v - v) <= limits.acceleration * DT * (1.0 + 1e-9)).all(), k
+        if command == "torque" and k % SPARSE == 0:
             torques, missing = needed(robot, text, q, v, step.a)
             size = max(1.0, float(np.abs(torques).max()))
             assert np.abs(missing).max() < 1e-6 * size, k
             assert np.abs(step.torque[motors] - torques).max() < 1e-6 * size, k
         reached = pin.integrate(robot.model, q, (v + 0.5 * DT * step.a) * DT)
-        q = robot.closed(reached)
-        assert np.abs(robot.difference(reached, q)).max() < DT**2, k
-        rows, v = rows_at(robot, q), np.array(step.v)
-        v -= np.linalg.pinv(rows, 1e-7) @ rows @ v
+        q, v = np.array(step.q_next), np.array(step.v)
+        assert np.abs(robot.difference(reached, q)).max() < CORRECTED * DT, k
         assert max(robot.loop_gaps(q).values()) <= 1e-9, k
+        assert np.abs(rows_at(robot, q) @ v).max() <= 1e-9, k
         moved = max(moved, float(np.abs(step.v).max()))
     assert moved > 0.1, "nothing moved"
 
@@ -109,10 +113,10 @@ def run_second_order(robot: Robot, text: str, command: str, count: int, seed: in
 def test_mechanisms_of_second_order(name: str, command: str) -> None:
     text = with_motors(NAMED[name], MOTORS[name])
     robot = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=200.0)
-    run_second_order(robot, text, command, max(TICKS // 5, 60), 0)
+    run_second_order(robot, text, command, TICKS, 0)
 
 
 @pytest.mark.parametrize("seed", range(min(repeats(3), 24)))
 def test_random_linkages_of_second_order(seed: int) -> None:
     text, robot = linkage(seed)
-    run_second_order(robot, text, "torque" if seed % 2 else "acceleration", max(TICKS // 5, 60), seed)
+    run_second_order(robot, text, "torque" if seed % 2 else "acceleration", TICKS, seed)

@@ -49,6 +49,34 @@ def base_with_a_body() -> Robot:
     return robot.with_shapes({robot.frames["base"]: [body]})
 
 
+def standing_g1(seed: int) -> tuple[wbc.Stack, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """A G1 with its base free and both feet held before a table, where it stands, and places over and under the table
+    for its right hand.
+    """
+    rng, robot = np.random.default_rng(seed), wbc.robots.load("g1", shapes="fit")
+    pairs = wbc.robots.find_self_pairs(robot, samples=500).kept
+    arms = ("shoulder", "elbow", "wrist", "hand")
+    robot = robot.with_self_pairs([pair for pair in pairs if any(arm in link for link in pair for arm in arms)])
+    q = robot.neutral.copy()
+    for side in ("left", "right"):
+        for joint, angle in (("hip_pitch", -0.4), ("knee", 0.8), ("ankle_pitch", -0.4), ("elbow", 0.6)):
+            q[robot.position_index[robot.dof_names.index(f"{side}_{joint}_joint")]] = angle
+    feet = [robot.frames[f"{side}_foot"] for side in ("left", "right")]
+    sole = [(x, y, 0.0) for x in (-0.05, 0.1) for y in (-0.03, 0.03)]
+    stack = wbc.Stack(robot, dt=0.01)
+    for side, foot in zip(("left", "right"), feet, strict=True):
+        stack.add(wbc.tasks.Hold(foot), name=f"{side} foot")
+    stack.add(wbc.tasks.EndEffector(robot.frames["right_hand"], kind="position"), name="hand")
+    stack.add(wbc.tasks.JointLimits())
+    stack.add(wbc.tasks.SelfCollision(), name="self")
+    polygon = wbc.tasks.support_polygon(robot, dict.fromkeys(feet, sole), q, margin=0.01)
+    stack.add(polygon, name="polygon")
+    height = robot.pose(q, feet[0]).translation[2] + rng.uniform(0.62, 0.8)
+    stack.add(wbc.tasks.Obstacle(Box((0.36, 0.9, 0.03)), pose=at(0.47, -0.1, height), margin=0.003), name="table")
+    over, under = (np.array([*rng.uniform((0.32, -0.3), (0.42, 0.0)), height + rise]) for rise in (0.12, -0.18))
+    return stack, q, (over, under)
+
+
 class CoalJudge:
     """Distances of the bodies of a stack by Coal.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,59 @@ def test_an_obstacle_that_moves_into_the_path_makes_it_brake_and_plan_anew() -> 
     np.testing.assert_allclose(states[-1].q, goal, atol=1e-9)
     moved = CoalJudge(stack, {"box0": at(*POST[1])})
     assert min(moved.margin(state.q) for state in states[21:]) > -1.1e-4
+
+
+def braked(wait: bool) -> PathFollower:
+    """A follower that an obstacle has made brake a moment ago; the plan from where it will rest is made."""
+    stack = panda(((0.1, 0.1, 0.8), (0.5, 1.5, 0.4)))
+    start, goal = (stack.robot.neutral + np.array([a, 0.5, 0, 0.3, 0, 0, 0]) for a in (-0.9, 0.9))
+    planner = stack.planner()
+    follower = PathFollower(planner, planner.plan(start, goal), goal, wait=wait)
+    follower.advance(0.1)
+    planner["box0"].pose = at(*POST[1])
+    assert not follower.check()
+    return follower
+
+
+def test_a_path_is_planned_anew_while_it_brakes() -> None:
+    """From where it will rest; it stands where the plan takes longer, and does not wait."""
+    follower = braked(wait=False)
+    assert follower._next is not None
+    path, law = follower._next.result()
+    assert follower.time == 0.0
+    rest, _ = follower.path.configurations(follower.law, follower.law.duration)
+    np.testing.assert_allclose(path.q[0], rest, atol=1e-12)
+    planned, follower._next = follower._next, Future()
+    state = follower.advance(follower.law.duration)
+    for _ in range(3):
+        state = follower.advance(0.01)
+        np.testing.assert_allclose(state.q, rest, atol=1e-9)
+        assert (state.braking, state.arrived) == (True, False)
+    follower._next = planned
+    assert not follower.advance(0.01).braking
+    assert follower.law is law
+
+
+def test_a_new_path_that_is_blocked_before_it_begins_is_planned_again() -> None:
+    follower = braked(wait=True)
+    assert follower._next is not None
+    path, law = follower._next.result()
+    planner = follower._planner
+    # In the way, but clear of both ends
+    for share in np.linspace(0.3, 0.7, 9):
+        q, _ = path.configurations(law, share * law.duration)
+        place = planner.stack.robot.pose(q, "panda_hand").translation + np.array([0.05, 0.0, 0.3])
+        judge = CoalJudge(planner.stack, {"box0": at(*place)})
+        if judge.margin(q) < -0.01 and min(judge.margin(end) for end in path.q[[0, -1]]) > 0.02:
+            break
+    else:
+        raise AssertionError("no place is in the way of the path alone")
+    planner["box0"].pose = at(*place)
+    state = follower.advance(follower.law.duration)
+    assert follower.path is not path
+    while not state.arrived:
+        state = follower.advance(0.02)
+        assert judge.margin(state.q) > -1.1e-4
 
 
 def test_what_cannot_stop_in_time_says_so() -> None:

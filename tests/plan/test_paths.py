@@ -9,7 +9,7 @@ import pytest
 import wbc
 from tests.plan.scenes import SHELF, CoalJudge, at, base_with_a_body, panda, reaching
 from tests.repeats import repeats
-from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError, UnsupportedJointError
+from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.plan import MotionPlanner, NoPathError
 from wbc.shapes import Box, Cylinder, HalfSpace, Sphere
 
@@ -157,10 +157,6 @@ def test_bad_input_is_named(shelf: MotionPlanner) -> None:
         shelf.plan(q, q, seconds=0.0)
     with pytest.raises(UnknownNameError, match="keep"):
         panda().planner(keep=("cup",))
-    floating = wbc.Stack(wbc.robots.load("g1", shapes="none"), dt=0.01)
-    floating.add(wbc.tasks.Posture())
-    with pytest.raises(UnsupportedJointError, match="floating base"):
-        floating.planner()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -174,7 +170,7 @@ def test_an_edge_that_is_proven_is_clear_by_coal(seed: int) -> None:
     proven = missed = 0
     for _ in range(repeats(100)):
         one = rng.uniform(low, high)
-        other = np.clip(one + rng.normal(size=7) * rng.choice([0.02, 0.1, 0.3]), low, high)
+        other = np.clip(one + rng.normal(size=7) * rng.choice([0.02, 0.1, 0.3, 0.8]), low, high)
         margins = [judge.margin(one + share * (other - one)) for share in np.linspace(0.0, 1.0, 60)]
         assert native.margin(one) == pytest.approx(margins[0], abs=1e-6) or margins[0] < 0.0
         if native.free(one) and native.free(other) and native.edge(one, other):

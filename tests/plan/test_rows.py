@@ -10,7 +10,7 @@ import wbc
 from tests.loops.mechanisms import NAMED
 from tests.plan.scenes import CoalJudge, at, base_with_a_body
 from tests.repeats import repeats
-from wbc.errors import CommandError, InfeasibleError, UnsupportedJointError
+from wbc.errors import CommandError, InfeasibleError
 from wbc.plan import MotionPlanner, PlannedPath
 from wbc.shapes import Box
 
@@ -133,7 +133,7 @@ def test_without_a_compiler_rows_run_on_the_virtual_machine(monkeypatch: pytest.
     np.testing.assert_allclose(interpreted.points, compiled.points, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "gripper", "jansen", "parallelogram"])
+@pytest.mark.parametrize("name", list(NAMED))
 @pytest.mark.parametrize("seed", range(repeats(3)))
 def test_closed_loops_stay_closed(name: str, seed: int) -> None:
     """To a configuration that the mechanism can be moved to by small steps."""
@@ -146,14 +146,7 @@ def test_closed_loops_stay_closed(name: str, seed: int) -> None:
         goal = robot.closed(robot.integrate(goal, 0.05 * np.sqrt(robot.nv) * way / np.linalg.norm(way)))
     assert np.linalg.norm(robot.difference(start, goal)) > 0.1
     path = stack.plan(start, goal, seed=seed)
-    np.testing.assert_allclose(path.q[[0, -1]], [start, goal], atol=1e-9)
+    for end, wanted in ((path.q[0], start), (path.q[-1], goal)):
+        np.testing.assert_allclose(robot.difference(end, wanted), 0.0, atol=1e-9)
     for q in samples(path, 100):
         assert max(robot.loop_gaps(q).values()) < 1e-6
-
-
-@pytest.mark.parametrize("name", ["ankle", "delta"])
-def test_loops_with_ball_joints_are_refused(name: str) -> None:
-    stack = wbc.Stack(wbc.robots.load(NAMED[name]), dt=0.01)
-    stack.add(wbc.tasks.JointLimits())
-    with pytest.raises(UnsupportedJointError, match=r"joint '.*ball\d?'"):
-        stack.planner()

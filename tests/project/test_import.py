@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pathlib
 import subprocess
 import sys
 
@@ -71,3 +72,34 @@ def test_import_leaves_heavy_packages_alone(module: str) -> None:
 def test_version_is_that_of_the_distribution() -> None:
     code = "import wbc, importlib.metadata as m; print(wbc.__version__ == m.version('wbc'))"
     assert run(code).strip() == "True"
+
+
+#: What a first command does without: other descriptions of robots, shapes, levels, temporary files
+UNUSED = (
+    "concurrent.futures", "csv", "decimal", "importlib.resources", "platformdirs", "shutil", "tempfile", "tomllib",
+    "wbc.qp.levels", "wbc.robot.dead_points", "wbc.robot.geometry.styles", "wbc.shapes.box", "wbc.symbolic.gaps",
+    "wbc.symbolic.manipulability", "wbc.symbolic.two_velocities", "wbc.tick.levels",
+)  # fmt: skip
+
+
+def test_a_first_command_imports_what_it_uses(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is in the cache, and no compiler is there."""
+    monkeypatch.setenv("WBC_CACHE", str(tmp_path))
+    monkeypatch.setenv("WBC_CC", "")
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        '<robot name="arm"><link name="base"/><link name="tip"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>'
+    )
+    code = (
+        "import json, sys, wbc\n"
+        f"robot = wbc.robots.load({str(file)!r})\n"
+        "stack = wbc.Stack(robot, dt=0.01).add(wbc.tasks.EndEffector('tip')).add(wbc.tasks.JointLimits())\n"
+        "assert stack.compile().step([0.1]).status == 'solved'\n"
+        "print(json.dumps(list(sys.modules)))"
+    )
+    loaded = set(json.loads(run(code)))
+    assert "wbc.tick.generic" in loaded
+    assert not loaded & set(UNUSED)

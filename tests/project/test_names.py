@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import types
 
 import pytest
 
 import wbc
+from tests.project.layout import module_name, sources
 from wbc import lazy
 
 #: Everything that ``dir(wbc)`` shows
@@ -40,6 +42,21 @@ def test_late_names_are_there_and_hide_no_module(name: str) -> None:
 def test_modules_are_found_without_being_listed() -> None:
     assert wbc.ik is importlib.import_module("wbc.ik")
     assert "ik" not in dir(wbc)
+
+
+def test_no_name_of_a_package_is_that_of_a_module_in_it() -> None:
+    packages = [
+        path
+        for path in sources("wbc", "tasks", "robots")
+        if path.name == "__init__.py" and "lazy.attach" in path.read_text()
+    ]
+    assert len(packages) > 10
+    for path in packages:
+        package = importlib.import_module(module_name(path))
+        for name in package.__all__:
+            # Who imports the module makes it the package's attribute, in place of what has the name
+            there = importlib.util.find_spec(f"{package.__name__}.{name}")
+            assert there is None or getattr(package, name) is importlib.import_module(there.name), name
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

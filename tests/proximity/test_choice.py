@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.evaluation import random_configuration
-from tests.models import spherical_seven
+from tests.models import placement, spherical_seven
 from tests.proximity.world import NAMES, all_pairs, place, robot, sensor, set_pose
 from wbc.proximity import Body, distances, native
 from wbc.shapes import Sphere
@@ -88,9 +88,7 @@ def test_noise_does_not_swap_rows() -> None:
 def test_a_closer_pair_takes_the_row_by_the_stated_margin(nearer: float) -> None:
     """Two balls before a resting hand: the second takes the row where it is closer by the stated margin, not before."""
     bot = spherical_seven()
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, bot.neutral)
-    tip = np.array(data.oMf[bot.model.getFrameId("tip")].translation)
+    tip = np.array(placement(bot, "tip", bot.neutral).translation)
     hand = Body("hand", "tip", pin.SE3.Identity(), Sphere(0.02))
     rests = Body("rests", "world", pin.SE3(np.eye(3), tip + [0.53, 0.0, 0.0]), Sphere(0.01))
     comes = Body("comes", "obstacle", pin.SE3.Identity(), Sphere(0.01))

@@ -37,7 +37,7 @@ def truths(referee: Referee, pair: tuple[Body, Body], q: np.ndarray, pose: pin.S
     pin.framesForwardKinematics(referee.bot.model, referee.data, q)
     out = []
     for own, other in (pair, pair[::-1]):
-        if isinstance(other.shape, (Convex, HalfSpace)):
+        if isinstance(other.shape, Convex):
             continue
         center = own.shape.points.mean(axis=0) if isinstance(own.shape, Convex) else np.zeros(3)
         ball = own.shape.radius if isinstance(own.shape, Capsule) else 0.0
@@ -111,6 +111,21 @@ def test_a_slab_on_a_hinge_has_a_row_for_each_edge() -> None:
         assert numbers["distance"][1:] == pytest.approx(np.full(4, 0.1), abs=1e-6)
 
 
+def test_a_rod_of_many_corners_has_rows_at_both_of_its_ends() -> None:
+    """Of corners beside each other one has a row, so that the higher end has some, over a half-space."""
+    bot, turns = arm("hinge", [(Y, (0.0, 0.0, 0.0))]), np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = 0.01 * np.stack([np.zeros(12), np.cos(turns), np.sin(turns)], axis=1)
+    rod = Convex(np.concatenate([ring + np.array([x, 0.0, 0.0]) for x in (-0.1, 0.1)]))
+    ground = Body("ground", "world", pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.05])), HalfSpace())
+    sensing, numbers = made(bot, [(ground, Body("rod", "F1", pin.SE3.Identity(), rod))], 1, margin=0.1)
+    for tilt in (-1e-2, 1e-2):
+        sensing.sense(np.array([tilt]))
+        near = numbers["distance"][1:] < FAR
+        rows = rows_of(bot, numbers, np.array([tilt]))[1:, 0][near]
+        assert (np.sign(rows).min(), np.sign(rows).max()) == (-1.0, 1.0)
+        assert numbers["distance"][1:][near].min() == pytest.approx(numbers["distance"][0], abs=1e-12)
+
+
 def test_pairs_that_are_far_have_no_such_rows() -> None:
     bot = arm("hinge", [(Y, (0.0, 0.0, 0.0))])
     ball, slab = Sphere(0.05), Body("slab", "F1", pin.SE3.Identity(), Box((0.2, 0.2, 0.02)))
@@ -133,7 +148,7 @@ def test_balls_have_no_corners_and_overlaps_no_normals() -> None:
     here = pin.SE3.Identity()
     hull = Convex(0.1 * np.vstack([np.eye(3), -np.eye(3)]))
     box = Box((0.1, 0.1, 0.1))
-    for own, other in ((Sphere(0.1), Sphere(0.05)), (box, Box((1.0, 1.0, 1.0))), (hull, hull), (box, HalfSpace())):
+    for own, other in ((Sphere(0.1), Sphere(0.05)), (box, Box((1.0, 1.0, 1.0))), (hull, hull)):
         pair = (Body("own", "F1", here, own), Body("other", "world", here, other))
         sensing, numbers = made(bot, [pair], 1)
         sensing.sense(np.zeros(1))

@@ -1,6 +1,7 @@
 """Published facts about FSP and the IKOR driver (ORNL/TM-13096): machines, norms, constraints, files.
 
-Numbers marked "printed" stand in the report; the others were worked out from its equations.
+Numbers marked "printed" stand in the report; the others were worked out from its equations. Random Jacobians (4) and
+counts of patterns (20) are in tests/resolvers/test_fsp.py.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from wbc.published.ikor.cases import BETWEEN, unmatched
 from wbc.published.ikor.legacy import legacy_hermies
 from wbc.published.ikor.lines import euler_angles, rotation_of
 from wbc.published.ikor.settings import AXES
-from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal, parametric, pattern_counts
+from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal, parametric
 from wbc.teleop import Order
 
 #: Published runs that several tests look at
@@ -178,15 +179,6 @@ def test_3_first_and_last_printed_norm(trajectory: str, config: str, first: floa
     assert found[0] == pytest.approx(first, rel=1e-3)
     assert found[-1] == pytest.approx(last, rel=1e-3)
     assert printed()[trajectory, config].fsp[0] == first
-
-
-@pytest.mark.parametrize(("rows", "joints"), [(2, 4), (3, 4), (3, 7), (6, 7), (3, 10), (6, 10)])
-def test_4_random_jacobians(rows: int, joints: int) -> None:
-    rng = np.random.default_rng(rows * joints)
-    for _ in range(5):
-        J, x = rng.normal(size=(rows, joints)), rng.normal(size=rows)
-        for make in (blocked, orthogonal):
-            np.testing.assert_allclose(best(make(J, x)).v, np.linalg.pinv(J) @ x, atol=1e-9)
 
 
 @pytest.mark.parametrize("config", ["3x7", "3x10"])
@@ -616,11 +608,6 @@ def test_19_codes(tmp_path: Path) -> None:
     assert (found.code, found.stop) == (Code.OK, Stop.NOTHING)
 
 
-def test_20_counts_of_patterns() -> None:
-    """The report prints 840 261 910 994 for the last."""
-    assert [pattern_counts(m, n)[::2] for m, n in ((4, 2), (7, 6), (10, 3))] == [(6, 20), (7, 21), (120, 840261910995)]
-
-
 def test_21_a_line_in_published_increments() -> None:
     machine = hermies()
     place, rotation = machine.place(machine.home)
@@ -798,23 +785,15 @@ def obstacle_run(base: str = "none") -> tuple[Any, Trajectory, list[Any]]:
     return machine, path, spheres if base == "none" else [*spheres, (0.3, 0.62, 0.05, 0.2)]
 
 
-def test_obstacle_runs_keep_clear_where_the_published_method_went_in() -> None:
-    machine, path, spheres = obstacle_run()
+@pytest.mark.parametrize(("base", "ahead", "stack"), [("none", 0.004, 0.0015), ("holonomic", 0.0, 0.0)])
+def test_obstacle_runs_keep_clear_where_the_published_method_went_in(base: str, ahead: float, stack: float) -> None:
+    machine, path, spheres = obstacle_run(base)
     least = {name: run(machine, s, path, spheres) for name, s in SPHERE_AHEAD.items()}
-    assert all(found.stop is Stop.DONE and found.errors[-1] < 1e-4 for found in least.values())
+    assert all(found.stop is Stop.DONE and (base != "none" or found.errors[-1] < 1e-4) for found in least.values())
     assert least["as published"].clearance.min() < -1e-3
-    assert least["two-step, as published"].clearance.min() < 0.0
-    assert least["ahead"].clearance.min() > 0.004
-    assert least["stack"].clearance.min() > 0.0015
-
-
-def test_platform_keeps_clear_too() -> None:
-    machine, path, spheres = obstacle_run("holonomic")
-    least = {name: run(machine, s, path, spheres) for name, s in SPHERE_AHEAD.items()}
-    assert all(found.stop is Stop.DONE for found in least.values())
-    assert least["as published"].clearance.min() < -1e-3
-    assert least["ahead"].clearance.min() > 0.0
-    assert least["stack"].clearance.min() > 0.0
+    assert base != "none" or least["two-step, as published"].clearance.min() < 0.0
+    assert least["ahead"].clearance.min() > ahead
+    assert least["stack"].clearance.min() > stack
 
 
 def test_limit_runs_keep_within_where_the_published_method_went_out() -> None:

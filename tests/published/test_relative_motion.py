@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.published.relative_motion import (
@@ -60,9 +61,7 @@ def level() -> dict[int | None, LevelHand]:
 
 
 def pose(robot: Any, q: np.ndarray, frame: str = "tip") -> pin.SE3:
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return data.oMf[robot.model.getFrameId(frame)].copy()
+    return placement(robot, frame, q)
 
 
 def rms(values: np.ndarray) -> np.ndarray:

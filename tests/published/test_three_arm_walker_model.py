@@ -1,41 +1,19 @@
-"""Published facts about the arm and the holds of the three-armed walker (M. R. Patterson's thesis).
-
-Table II, equations (3-4) to (3-12), section 4.2.2 and the grid of the listings; lengths in inches.
+"""Published facts about the holds of the three-armed walker (M. R. Patterson's thesis), lengths in inches: section
+4.2.2 and the grid of the listings. Its arm is in test_three_arm_walker_arms.py and tests/robots/test_walker.py.
 """
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, radians, sin
+from math import cos, pi, radians, sin
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from wbc.climb.grids import cylinder_grid, grid_angle, grid_pose
 from wbc.climb.scene import FLIP
-from wbc.robots import walker
 from wbc.robots.walker_data import INCH
 
-WALKER = walker()
-DATA = WALKER.arm_data
 SCENE = cylinder_grid()
-
-
-def hand(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(position of the first arm's hand in inches, its rotation) in the arm's base; angles [rad]."""
-    model, arm = WALKER.robot.model, WALKER.arms[0]
-    data, q = model.createData(), WALKER.robot.neutral.copy()
-    q[7:13] = angles
-    pin.framesForwardKinematics(model, data, q)
-    body = data.oMi[1]
-    pose = (body * arm.base).actInv(data.oMf[model.getFrameId(arm.hand)])
-    return pose.translation / INCH, pose.rotation
-
-
-def wrist(angles: np.ndarray) -> np.ndarray:
-    """The wrist in inches, 6 in before the hand."""
-    position, rotation = hand(angles)
-    return np.asarray(position - 6.0 * rotation[:, 2])
 
 
 def zyz(alpha: float, beta: float, gamma: float) -> np.ndarray:
@@ -48,36 +26,6 @@ def zyz(alpha: float, beta: float, gamma: float) -> np.ndarray:
             [-sb * cg, sb * sg, cb],
         ]
     )
-
-
-def test_1_zero_posture_and_initial_posture() -> None:
-    position, rotation = hand(np.zeros(6))
-    np.testing.assert_allclose(position, [0, 6, 66], atol=1e-4)
-    np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
-    initial = np.array(DATA.initial_posture)
-    np.testing.assert_allclose(np.degrees(initial), [0, 90, -85, 0, -5, 0], atol=1e-12)
-    position, rotation = hand(initial)
-    np.testing.assert_allclose(position, [18.4816, 6, 48.9353], atol=1e-4)
-    np.testing.assert_allclose(rotation, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(wrist(initial), [18.4816, 6, 42.9353], atol=1e-4)
-
-
-def test_joint_limits_of_table_I() -> None:
-    degrees = np.degrees(WALKER.robot.limits.position_upper[6:12])
-    np.testing.assert_allclose(degrees, [160, 165, 135, 135, 105, 270], rtol=1e-13)
-
-
-def test_4_the_artificial_limits_cost_little_reach() -> None:
-    data = DATA
-    bent = hypot(
-        data.upper_arm_length + data.forearm_length * cos(data.elbow_limit), data.forearm_length * sin(data.elbow_limit)
-    )
-    lost = (data.upper_arm_length + data.forearm_length - bent) / INCH
-    assert lost < 0.01
-    assert lost == pytest.approx(0.0013, abs=5e-5)
-    # The wrist at the shoulder limit with the arm as long as it gets, against the shoulder's offset
-    q = np.array([0.0, -data.elbow_limit / 2 + data.shoulder_limit, data.elbow_limit, 0.0, 0.0, 0.0])
-    assert np.hypot(*wrist(q)[:2]) - 6 == pytest.approx(0.0293, abs=5e-5)
 
 
 @pytest.mark.parametrize(

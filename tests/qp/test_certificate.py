@@ -9,7 +9,7 @@ from tests.judges.exact_qp import reference
 from tests.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.repeats import covering, repeats
 from wbc.qp import QP, QPSolution, certify, make_solver
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 
 COUNT = {7: repeats(12), 12: repeats(5), 25: repeats(2), 38: repeats(1), 40: repeats(1)}
 

@@ -22,6 +22,7 @@ from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
 from wbc.log import FileWriter
 from wbc.record import recorder, recording as files
+from wbc.record.background import BackgroundWriter
 from wbc.record.recorder import INPUTS
 from wbc.record.recording import RecordingError
 from wbc.replaying import replayed
@@ -30,7 +31,7 @@ from wbc.tasks import Obstacle
 
 TOP = Path(__file__).parents[2]
 #: Ticks of the small stack in a chunk
-CHUNK = 420
+CHUNK = 381
 
 
 def history(one: Controller, rng: np.random.Generator, ticks: int) -> list[bytes]:
@@ -343,6 +344,7 @@ recorder = one.record(sys.argv[1])
 for k in range(int(sys.argv[2])):
     one.step((0.001 * k, 0.8))
 if sys.argv[3] == "kill":
+    recorder._writer.wait()
     os.kill(os.getpid(), signal.SIGKILL)
 if sys.argv[3] == "interrupt":
     os.kill(os.getpid(), signal.SIGINT)
@@ -380,6 +382,37 @@ def test_half_a_chunk_is_left_out(tmp_path: Path) -> None:
     assert counts == {*range(0, 2500, CHUNK), 2500}
 
 
+def test_what_a_thread_writes_is_in_order_and_its_errors_come_back() -> None:
+    """Memory that is short and a disk that is full alike; what was written before is counted."""
+
+    class Kept:
+        def __init__(self, error: Exception) -> None:
+            self.error, self.numbers = error, b""
+
+        def begin(self, about: object, attached: object) -> None:
+            pass
+
+        def write(self, numbers: bytes) -> None:
+            if len(self.numbers) == 24:
+                raise self.error
+            self.numbers += numbers
+
+    for error, reason in ((OSError(28, "No space left"), "No space left"), (MemoryError(), "memory")):
+        writer = BackgroundWriter(kept := Kept(error))  # type: ignore[arg-type]
+        writer.begin({}, {})
+        memory = bytearray(8)
+        for k in range(4):
+            # The loop's memory is used again at once
+            memory[:] = bytes([k] * 8)
+            writer.write(memoryview(memory))
+        with pytest.raises(OSError, match=reason):
+            writer.wait()
+        assert kept.numbers == bytes([0] * 8 + [1] * 8 + [2] * 8)
+        assert writer.written == 24
+        writer._thread.join(10.0)
+        assert not writer._thread.is_alive()
+
+
 def test_a_full_disk_does_not_stop_the_controller(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with pytest.raises(RecordingError, match="cannot be written: No space left"):
         small.stack().compile(backend="vm").record("/dev/full", overwrite=True)
@@ -393,9 +426,14 @@ def test_a_full_disk_does_not_stop_the_controller(tmp_path: Path, caplog: pytest
 
     for _ in range(recorder._chunk + 3):
         one.step(small.Q)
-    recorder._writer._put = full  # type: ignore[method-assign]
-    for _ in range(2 * recorder._chunk):
-        assert one.step(small.Q).status == "solved"
+    recorder._writer.wait()
+    recorder._writer.writer._put = full  # type: ignore[attr-defined]
+    for _ in range(2):
+        for _ in range(recorder._chunk):
+            assert one.step(small.Q).status == "solved"
+        # The thread that writes has met the full disk
+        if recorder._writer is not None:
+            recorder._writer._waiting.join()
     assert core_of(one).call is call
     assert [r.getMessage() for r in caplog.records] == [
         f"the recording {tmp_path / 'run.npz'} ends after {CHUNK} ticks: No space left on device"

@@ -69,7 +69,7 @@ def test_quadrupeds_follow_dogs_and_people(robot: str, name: str) -> None:
     found = motion(robot, name)
     # Thighs of a quadruped whose hips are led as low as a crawling person's
     check(found, depth=3e-3 if name == "crawl" else DEPTH)
-    assert found.errors.mean < 0.02
+    assert found.errors.mean < (1e-3 if name == "walk" else 0.02)
     assert all(marks.mean() > 0.2 for marks in found.stance.values())
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 SINGLE = ("revolute", "continuous", "prismatic")
+#: Joints that have both limits of position
+ENDED = ("revolute", "prismatic")
 #: Faults that a reader must refuse, and those that it must say
 REFUSED = ("zero axis", "two parents", "lost links", "negative mass", "mimic of planar", "circle of mimics")
 SAID = (
@@ -96,12 +100,17 @@ class RandomUrdf:
         found = self._of(*kinds)
         return found[int(self.rng.integers(len(found)))] if found else None
 
-    def _zero_axis(self) -> list[str]:
-        joint = self._one(*SINGLE, "planar")
+    def _spoiled(self, kinds: tuple[str, ...], *words: str, **changes: Callable[[Joint], Any]) -> list[str]:
+        """Change fields of a joint of these kinds; its name and the words, or nothing where there is none."""
+        joint = self._one(*kinds)
         if joint is None:
             return []
-        joint.axis = np.zeros(3)
-        return [joint.name]
+        for name, change in changes.items():
+            setattr(joint, name, change(joint))
+        return [joint.name, *words]
+
+    def _zero_axis(self) -> list[str]:
+        return self._spoiled((*SINGLE, "planar"), axis=lambda joint: np.zeros(3))
 
     def _two_parents(self) -> list[str]:
         child = int(self.rng.integers(1, len(self.links)))
@@ -128,38 +137,21 @@ class RandomUrdf:
         return [planar.name]
 
     def _circle_of_mimics(self) -> list[str]:
-        joint = self._one(*SINGLE)
-        if joint is None:
-            return []
-        joint.mimic = (joint.name, 1.0, 0.0)
-        return [joint.name]
+        return self._spoiled(SINGLE, mimic=lambda joint: (joint.name, 1.0, 0.0))
 
     def _swapped_limits(self) -> list[str]:
-        joint = self._one("revolute", "prismatic")
-        if joint is None:
-            return []
-        joint.limits |= {"lower": 0.625, "upper": -0.375}
-        return [joint.name, "0.625", "-0.375"]
+        limits = {"lower": 0.625, "upper": -0.375}
+        return self._spoiled(ENDED, "0.625", "-0.375", limits=lambda joint: joint.limits | limits)
 
     def _negative_effort(self) -> list[str]:
-        return self._negative("effort")
+        return self._spoiled(ENDED, "-1.5", limits=lambda joint: joint.limits | {"effort": -1.5})
 
     def _negative_velocity(self) -> list[str]:
-        return self._negative("velocity")
-
-    def _negative(self, key: str) -> list[str]:
-        joint = self._one("revolute", "prismatic")
-        if joint is None:
-            return []
-        joint.limits[key] = -1.5
-        return [joint.name, "-1.5"]
+        return self._spoiled(ENDED, "-1.5", limits=lambda joint: joint.limits | {"velocity": -1.5})
 
     def _limits_of_continuous(self) -> list[str]:
-        joint = self._one("continuous")
-        if joint is None:
-            return []
-        joint.limits = {"lower": -0.875, "upper": 0.125, "effort": 3.0, "velocity": 2.0}
-        return [joint.name, "-0.875", "0.125"]
+        limits = {"lower": -0.875, "upper": 0.125, "effort": 3.0, "velocity": 2.0}
+        return self._spoiled(("continuous",), "-0.875", "0.125", limits=lambda joint: limits)
 
     def _bad_inertia(self) -> list[str]:
         link = self.links[int(self.rng.integers(len(self.links)))]
@@ -176,11 +168,7 @@ class RandomUrdf:
         return [joint.name, fixed.name, "0.125"]
 
     def _mimic_of_nothing(self) -> list[str]:
-        joint = self._one(*SINGLE)
-        if joint is None:
-            return []
-        joint.mimic = ("nobody", 2.0, 0.125)
-        return [joint.name, "nobody"]
+        return self._spoiled(SINGLE, "nobody", mimic=lambda joint: ("nobody", 2.0, 0.125))
 
     def _loose_joint(self) -> list[str]:
         joint = self._one("fixed")

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.models import placement
 from tests.robots.files import DATA
 from wbc.errors import RobotFileError, UnknownNameError
 from wbc.robots import DHRow
@@ -42,9 +43,7 @@ def test_base_adds_its_degrees_of_freedom(source: str, base: str) -> None:
     frame = alone.frame_names[-1]
     poses = []
     for r in (alone, robot):
-        data = r.model.createData()
-        pin.framesForwardKinematics(r.model, data, r.neutral)
-        poses.append(data.oMf[r.model.getFrameId(frame)].homogeneous)
+        poses.append(placement(r, frame, r.neutral).homogeneous)
     np.testing.assert_allclose(poses[1], poses[0], atol=1e-12)
 
 

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.models import placement
 from tests.robots.files import DATA, example, joints
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 
@@ -62,9 +63,7 @@ def test_misspelt_leader_chain_and_lost_follower() -> None:
 def test_locking_one_end_of_a_pair_locks_the_other() -> None:
     robot = wbc.robots.load(DATA / "misspelt.urdf", lock={"follow": 0.5})
     assert robot.joint_names == ("lost",)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.neutral)
-    one = data.oMf[robot.model.getFrameId("one")].rotation
+    one = placement(robot, "one", robot.neutral).rotation
     np.testing.assert_allclose(one, pin.utils.rotate("z", -0.5), atol=1e-12)
 
 
@@ -81,9 +80,7 @@ def test_locked_joint_leaves_the_chain_where_it_is(value: float | None) -> None:
         np.testing.assert_array_equal(getattr(robot.limits, field), np.delete(getattr(whole.limits, field), 2))
     poses = []
     for r, at in ((whole, q), (robot, np.delete(q, 2))):
-        data = r.model.createData()
-        pin.framesForwardKinematics(r.model, data, at)
-        poses.append(data.oMf[r.model.getFrameId("panda_hand_tcp")].homogeneous)
+        poses.append(placement(r, "panda_hand_tcp", at).homogeneous)
     np.testing.assert_allclose(poses[1], poses[0], atol=1e-12)
 
 
@@ -93,13 +90,9 @@ def test_locking_an_unbounded_joint_takes_an_angle() -> None:
     assert (robot.nq, robot.nv) == (whole.nq - 2, whole.nv - 1)
     q = whole.neutral.copy()
     q[4:6] = np.cos(0.3), np.sin(0.3)
-    data = whole.model.createData()
-    pin.framesForwardKinematics(whole.model, data, q)
-    mine = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, mine, robot.neutral)
     tip = robot.frames["tip"]
     np.testing.assert_allclose(
-        mine.oMf[robot.model.getFrameId(tip)].homogeneous, data.oMf[whole.model.getFrameId(tip)].homogeneous, atol=1e-12
+        placement(robot, tip, robot.neutral).homogeneous, placement(whole, tip, q).homogeneous, atol=1e-12
     )
 
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.models import placement
 from wbc.errors import (
     BoundsError,
     DuplicateNameError,
@@ -107,9 +108,7 @@ def test_neutral_and_name() -> None:
 def test_added_frame_is_fixed_to_its_parent(panda: Robot) -> None:
     place = pin.SE3(pin.utils.rotate("y", 0.4), np.array([0.1, -0.2, 0.3]))
     robot = panda.with_frame("camera", "panda_hand", place).with_frame("lens", "camera", [0, 0, 0.1, 0, 0, 0, 1])
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.neutral)
-    hand, lens = (data.oMf[robot.model.getFrameId(n)] for n in ("panda_hand", "lens"))
+    hand, lens = (placement(robot, n, robot.neutral) for n in ("panda_hand", "lens"))
     wanted = hand * place * pin.SE3(np.eye(3), np.array([0, 0, 0.1]))
     np.testing.assert_allclose(lens.homogeneous, wanted.homogeneous, atol=1e-12)
     assert "camera" not in panda.frame_names

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.models import placement
 from tests.robots.files import DATA
 from wbc.errors import RobotFileError
 from wbc.extras import MissingPackageError
@@ -54,27 +55,7 @@ def test_shapes_of_the_file() -> None:
 def test_fixed_base_stands_where_the_file_draws_it() -> None:
     robot = wbc.robots.load(CRAWLER, base="fixed")
     assert (robot.base, robot.nv) == ("fixed", 7)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.neutral)
-    np.testing.assert_allclose(data.oMf[robot.model.getFrameId("trunk")].translation, [0, 0, 1], atol=1e-12)
-
-
-@pytest.mark.parametrize("angle", ["degree", "radian"])
-def test_defaults_limited_and_ref(tmp_path: Path, angle: str) -> None:
-    head = (
-        f'<compiler angle="{angle}"/><default><default class="s"><joint type="slide" range="-.1 .2"/></default>'
-        '<default class="h"><joint range="-9 4.5"/></default></default>'
-    )
-    body = (
-        '<joint name="a" class="s" axis="1 0 0"/><joint name="b" class="h" axis="0 1 0"/>'
-        '<joint name="c" class="h" limited="false" axis="1 0 0"/>'
-        '<joint name="d" class="s" ref="0.1" range="0 0.5" axis="0 0 1"/>'
-    )
-    robot = wbc.robots.load(write(tmp_path, body, head))
-    unit = math.pi / 180 if angle == "degree" else 1.0
-    np.testing.assert_allclose(robot.limits.position_lower, [-0.1, -9 * unit, -INF, 0.0], atol=1e-12)
-    np.testing.assert_allclose(robot.limits.position_upper, [0.2, 4.5 * unit, INF, 0.5], atol=1e-12)
-    np.testing.assert_array_equal(robot.neutral, np.zeros(4))
+    np.testing.assert_allclose(placement(robot, "trunk", robot.neutral).translation, [0, 0, 1], atol=1e-12)
 
 
 def test_joint_classes_by_childclass_include_and_autolimits(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from wbc import errors
 from wbc.motion_control.motion import mass_matrix
 from wbc.robots import operator_arm
@@ -31,9 +32,7 @@ def test_loads_by_name_and_comes_back_out_of_its_urdf(name: str, tmp_path: pathl
     poses = []
     for robot in (made.robot, read):
         q = np.array([angle[joint] for joint in robot.joint_names])
-        data = robot.model.createData()
-        pin.framesForwardKinematics(robot.model, data, q)
-        poses.append(data.oMf[robot.model.getFrameId(made.robot.frames["tip"])].homogeneous)
+        poses.append(placement(robot, made.robot.frames["tip"], q).homogeneous)
         for joint in robot.joint_names:
             assert np.isfinite(robot.limits.velocity[robot.dofs(joint)]).all()
     np.testing.assert_allclose(poses[0], poses[1], rtol=0, atol=1e-12)
@@ -107,6 +106,4 @@ def test_a_loaded_one_drives_a_stack() -> None:
         step = controller.step(q)
         assert step.status == "solved"
         q = pin.integrate(robot.model, q, step.v * 0.02)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    assert np.abs(data.oMf[robot.model.getFrameId("tip")].translation - goal.translation).max() < 2e-3
+    assert np.abs(placement(robot, "tip", q).translation - goal.translation).max() < 2e-3

@@ -1,11 +1,7 @@
-"""Arms of the table and chains at random, on servos at random: what they are told and what becomes of it.
-
-python -m tests.servo.random_servos 0 100        # judges told what was found beside told nothing, case by case
-"""
+"""Arms of the table and chains at random, on servos at random: what they are told and what becomes of it."""
 
 from __future__ import annotations
 
-import sys
 from collections import deque
 from dataclasses import dataclass
 
@@ -84,7 +80,6 @@ class Servos:
         self.delay = int(min(rng.integers(0, 9), 0.045 // dt))
         self.steps = max(1, round(dt / FINE))
         self.h, self.compensates = dt / self.steps, True
-        self.says = f"{kind}, {self.form}, delay {1e3 * self.delay * dt:.0f} ms"
         if self.form == "bodies":
             payload = rng.uniform(0, 0.05) * sum(one.mass for one in model.inertias[1:]) * rng.integers(0, 2)
             held = model.frames[model.getFrameId(frame)]
@@ -101,14 +96,12 @@ class Servos:
             elif kind == "velocity":
                 self.stiffness += weight / np.exp(rng.uniform(np.log(0.005), np.log(0.1)))
                 self.compensates = bool(rng.integers(0, 2))
-            self.says += f", payload {payload:.2g} kg, friction {self.coulomb:.2g} N m, {self.viscous:.2g} N m s"
         else:
             low, high = (0.005, 0.2) if kind == "position" else (0.002, 0.08)
             self.lag = _between(rng, low, high) * _each(rng, nv)
             self.sag = (0.01 if kind == "position" else 0.03) * rng.random() * rng.integers(0, 2) / weight
             self.rubs = rng.uniform(0, 2e-3 if kind == "position" else 1e-2) * rng.integers(0, 2)
             self.zeta = rng.uniform(0.5, 1.3) if self.form == "second" else 1.0
-        self.says += f", lag {1e3 * self.lag.mean():.0f} ms"
         self.noise = float(rng.choice([0.0, 1e-5, 1e-4])) if rng.random() < 0.5 else 0.0
         self.gives_velocity = bool(rng.integers(0, 2))
         self._seed, self._model, self._data = int(rng.integers(1 << 30)), model, model.createData()
@@ -227,19 +220,10 @@ class Case:
         return Outcome(float(np.percentile(off[round(SETTLED / self.dt) :], 95)), servos.top, reference, worst)
 
 
-def told_beside_untold(seed: int, seconds: float) -> tuple[Case, Outcome, Outcome, Servo, Servo]:
-    """One path with what was found on the other one, beside the same path told nothing."""
+def told_beside_untold(seed: int, seconds: float) -> tuple[Outcome, Outcome]:
+    """The same path told nothing, and beside it with what was found on the other one."""
     case = Case(seed)
     untold = case.servo()
     first = case.run(untold, case.paths[0], seconds)
-    told = case.servo(untold.response)
     beside = first if case.paths[0] is case.paths[1] else case.run(case.servo(), case.paths[1], seconds)
-    return case, beside, case.run(told, case.paths[1], seconds), untold, told
-
-
-if __name__ == "__main__":
-    for seed in range(*map(int, sys.argv[1:3])):
-        case, beside, outcome, untold, told = told_beside_untold(seed, 4.0)
-        print(f"{seed}: {case.robot.name}, {case.dt:g} s, {case.servos.says}; found {untold.response}")
-        print("  untold", beside, "\n  told", outcome)
-        print(f"  found: {untold.doubt or 'trusted'}; told: {told.doubt or 'trusted'}", flush=True)
+    return beside, case.run(case.servo(untold.response), case.paths[1], seconds)

@@ -8,6 +8,7 @@ import pytest
 
 import wbc
 from tests.climb.by_hand import climber, gait
+from tests.models import placement
 from tests.simulation.lagging import LaggingPlant
 from wbc import track
 from wbc.climb.checker import check
@@ -22,9 +23,7 @@ SERVO, QUICK = (0.02, 5, 2e-5), (0.01, 2, 1e-6)
 
 def test_a_tracked_path_lags_and_ends_where_it_ends() -> None:
     robot = wbc.robots.load("panda")
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.neutral)
-    start = data.oMf[robot.model.getFrameId("panda_hand_tcp")].copy()
+    start = placement(robot, "panda_hand_tcp", robot.neutral)
     there = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.1, -0.1]))
     plan = track.PathRun(
         robot, "panda_hand_tcp", track.SplinePath([0.0, 1.5], [start, there]), "line", robot.neutral, dt=0.01

@@ -49,19 +49,18 @@ def moved(placement: pin.SE3, scale: float) -> pin.SE3:
 
 def configuration(robot: Robot, q: np.ndarray, scale: float) -> np.ndarray:
     """q with sliding joints and the base's position times ``scale``; unlike ``dof_units``, by joint type."""
-    out = np.array(q)
-    for j in range(1, robot.model.njoints):
-        kind, start = robot.model.joints[j].shortname().removeprefix("JointModel"), int(robot.model.idx_qs[j])
-        lengths = 3 if kind == "FreeFlyer" else 2 if kind == "Planar" else 1 if kind.startswith("P") else 0
-        out[start : start + lengths] *= scale
-    return out
+    return _lengths_scaled(robot.model, q, robot.model.idx_qs, scale)
 
 
 def velocity(robot: Robot, v: np.ndarray, scale: float) -> np.ndarray:
     """v with sliding joints and the base's linear velocity times ``scale``; by joint type."""
-    out = np.array(v)
-    for j in range(1, robot.model.njoints):
-        kind, start = robot.model.joints[j].shortname().removeprefix("JointModel"), int(robot.model.idx_vs[j])
+    return _lengths_scaled(robot.model, v, robot.model.idx_vs, scale)
+
+
+def _lengths_scaled(model: pin.Model, values: np.ndarray, starts: list[int], scale: float) -> np.ndarray:
+    out = np.array(values)
+    for j in range(1, model.njoints):
+        kind, start = model.joints[j].shortname().removeprefix("JointModel"), int(starts[j])
         lengths = 3 if kind == "FreeFlyer" else 2 if kind == "Planar" else 1 if kind.startswith("P") else 0
         out[start : start + lengths] *= scale
     return out

@@ -42,7 +42,7 @@ def test_a_build_needs_no_package_but_casadi_and_platformdirs() -> None:
     script = f"import sys; sys.path[:0] = {sys.path!r}; import wbc.stack.ahead; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-S", "-c", script], capture_output=True, text=True, check=True)
     packages = {name.split(".")[0] for name in done.stdout.split()}
-    assert {"casadi", "platformdirs"} <= packages
+    assert "casadi" in packages
     assert not packages & {"pinocchio", "scipy", "daqp", "coal", "osqp", "typer", "rich", "matplotlib", "hpp"}
 
 

@@ -56,9 +56,9 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """No library is offered before this is set."""
     gate, finish = threading.Event(), behind._finish
 
-    def wait(child: subprocess.Popen[str]) -> None:
+    def wait(child: subprocess.Popen[str]) -> str:
         assert gate.wait(PATIENCE)
-        finish(child)
+        return finish(child)
 
     monkeypatch.setattr(behind, "_finish", wait)
     yield gate

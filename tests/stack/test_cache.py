@@ -7,12 +7,14 @@ import logging
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -26,7 +28,7 @@ from wbc.api import Stack
 from wbc.native import cache, toolchain
 from wbc.shapes import HalfSpace, PlacedShape, Sphere
 from wbc.stack import artifact
-from wbc.stack.key import key
+from wbc.stack.key import key, library_key
 from wbc.tasks import Damping, EndEffector, Expression, Hold, JointLimits, Obstacle, Posture
 from wbc.tasks.base import Row, Task
 
@@ -48,7 +50,8 @@ def entries(place: Folder) -> list[Folder]:
 
 
 def name_of(stack: Stack, version: str = "1", tools: str = "vm") -> str:
-    return key(stack, version, tools)
+    name = key(stack, version)
+    return name if tools == "vm" else library_key(name, tools)
 
 
 # The key
@@ -57,6 +60,12 @@ def name_of(stack: Stack, version: str = "1", tools: str = "vm") -> str:
 def with_shape(radius: float) -> Stack:
     robot = small.arm().with_shapes({"link2": [PlacedShape(Sphere(radius), pin.SE3.Identity())]})
     return small.stack(robot).add(Obstacle(HalfSpace()))
+
+
+def both(make: Callable[[Any], Stack], *values: Any) -> tuple[Callable[[], Stack], Callable[[], Stack]]:
+    """Stacks with one value and with another."""
+    one, other = values
+    return lambda: make(one), lambda: make(other)
 
 
 @dataclass(frozen=True)
@@ -72,67 +81,45 @@ class Reach(Task):
         return kin.q[0] - self.angle
 
 
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        pytest.param(small.stack, lambda: small.stack(small.arm(length=0.6)), id="a length of the robot"),
-        pytest.param(small.stack, lambda: small.stack(small.arm(velocity=2.0)), id="a limit of the robot"),
-        pytest.param(lambda: with_shape(0.1), lambda: with_shape(0.2), id="a shape of the robot"),
-        pytest.param(small.stack, lambda: small.stack().add(Damping()), id="one more item"),
-        pytest.param(small.stack, lambda: small.stack(axes="tip"), id="a parameter of a task"),
-        pytest.param(
-            lambda: small.stack().add(JointLimits(margin=0.1), name="b"),
-            lambda: small.stack().add(JointLimits(margin=0.2), name="b"),
-            id="a parameter of a constraint",
-        ),
-        pytest.param(
-            lambda: small.stack().add(Posture(), name="b"),
-            lambda: small.stack().add(Posture(), name="c"),
-            id="a name",
-        ),
-        pytest.param(
-            lambda: small.stack().add(Damping()).add(Posture(), name="b"),
-            lambda: small.stack().add(Posture(), name="b").add(Damping()),
-            id="the order of items",
-        ),
-        pytest.param(
-            lambda: small.stack().add(Expression(lambda kin, p: kin.q[0] - 1.0, units="rad")),
-            lambda: small.stack().add(Expression(lambda kin, p: kin.q[0] - 2.0, units="rad")),
-            id="a number within a user's expression",
-        ),
-        pytest.param(
-            lambda: small.stack().add(Reach(0.1)),
-            lambda: small.stack().add(Reach(0.2)),
-            id="a parameter of a user's class",
-        ),
-        pytest.param(
-            lambda: Stack(small.arm(), small.DT, damping=1e-8),
-            lambda: Stack(small.arm(), small.DT, damping=1e-6),
-            id="damping",
-        ),
-        pytest.param(
-            lambda: Stack(small.arm(), small.DT, length=1.0),
-            lambda: Stack(small.arm(), small.DT, length=2.0),
-            id="characteristic length",
-        ),
-    ],
-)
-def test_key_changes_with(one: Callable[[], Stack], other: Callable[[], Stack]) -> None:
+#: What differs -> two stacks whose keys do
+DIFFERENT: dict[str, tuple[Callable[[], Stack], Callable[[], Stack]]] = {
+    "a length of the robot": (small.stack, lambda: small.stack(small.arm(length=0.6))),
+    "a limit of the robot": (small.stack, lambda: small.stack(small.arm(velocity=2.0))),
+    "a shape of the robot": (lambda: with_shape(0.1), lambda: with_shape(0.2)),
+    "one more item": (small.stack, lambda: small.stack().add(Damping())),
+    "a parameter of a task": (small.stack, lambda: small.stack(axes="tip")),
+    "a parameter of a constraint": both(
+        lambda margin: small.stack().add(JointLimits(margin=margin), name="b"), 0.1, 0.2
+    ),
+    "a name": both(lambda name: small.stack().add(Posture(), name=name), "b", "c"),
+    "the order of items": (
+        lambda: small.stack().add(Damping()).add(Posture(), name="b"),
+        lambda: small.stack().add(Posture(), name="b").add(Damping()),
+    ),
+    "a number within a user's expression": (
+        lambda: small.stack().add(Expression(lambda kin, p: kin.q[0] - 1.0, units="rad")),
+        lambda: small.stack().add(Expression(lambda kin, p: kin.q[0] - 2.0, units="rad")),
+    ),
+    "a parameter of a user's class": both(lambda angle: small.stack().add(Reach(angle)), 0.1, 0.2),
+    "damping": both(lambda damping: Stack(small.arm(), small.DT, damping=damping), 1e-8, 1e-6),
+    "characteristic length": both(lambda length: Stack(small.arm(), small.DT, length=length), 1.0, 2.0),
+}
+
+
+@pytest.mark.parametrize("what", DIFFERENT)
+def test_key_changes_with(what: str) -> None:
+    one, other = DIFFERENT[what]
     assert name_of(one()) == name_of(one())
     assert name_of(one()) != name_of(other())
 
 
 @pytest.mark.parametrize(
-    "other",
-    [
-        pytest.param(lambda: Stack(small.arm(), 0.002).add(Posture()).add(Hold("tip")), id="time step"),
-        pytest.param(lambda: Stack(small.arm(), 0.01).add(Posture(), weight=7.0).add(Hold("tip")), id="weight"),
-        pytest.param(lambda: Stack(small.arm(), 0.01).add(Posture(gain=7.0)).add(Hold("tip")), id="gain of a task"),
-        pytest.param(lambda: Stack(small.arm(), 0.01).add(Posture()).add(Hold("tip", gain=7.0)), id="gain of a hold"),
-    ],
+    ("dt", "weight", "gain", "hold"),
+    [(0.002, 1.0, 1.0, 1.0), (0.01, 7.0, 1.0, 1.0), (0.01, 1.0, 7.0, 1.0), (0.01, 1.0, 1.0, 7.0)],
 )
-def test_key_stays_with(other: Callable[[], Stack]) -> None:
-    assert name_of(Stack(small.arm(), 0.01).add(Posture()).add(Hold("tip"))) == name_of(other())
+def test_key_stays_with_time_step_weight_and_gains(dt: float, weight: float, gain: float, hold: float) -> None:
+    other = Stack(small.arm(), dt).add(Posture(gain=gain), weight=weight).add(Hold("tip", gain=hold))
+    assert name_of(Stack(small.arm(), 0.01).add(Posture()).add(Hold("tip"))) == name_of(other)
 
 
 def test_key_changes_with_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,55 +239,19 @@ def code(entry: Folder) -> Folder:
     return next(p for p in entry.iterdir() if p.name in ("tick.so", "rows.casadi"))
 
 
+def manifest(entry: Folder) -> Folder:
+    return entry / cache.MANIFEST
+
+
 def corrupt(entry: Folder) -> None:
     content = bytearray(code(entry).read_bytes())
     content[len(content) // 2] ^= 0xFF
     overwrite(code(entry), bytes(content))
 
 
-def truncate(entry: Folder) -> None:
-    overwrite(code(entry), code(entry).read_bytes()[:100])
-
-
-def truncate_manifest(entry: Folder) -> None:
-    overwrite(entry / cache.MANIFEST, (entry / cache.MANIFEST).read_bytes()[:-5])
-
-
 def empty_manifest(entry: Folder) -> None:
-    overwrite(entry / cache.MANIFEST, b"{}")
+    overwrite(manifest(entry), b"{}")
     code(entry).unlink()
-
-
-def strange_manifest(entry: Folder) -> None:
-    overwrite(entry / cache.MANIFEST, json.dumps([[1], 2]).encode())
-
-
-def binary_manifest(entry: Folder) -> None:
-    overwrite(entry / cache.MANIFEST, bytes(range(256)))
-
-
-def no_manifest(entry: Folder) -> None:
-    (entry / cache.MANIFEST).unlink()
-
-
-def no_code(entry: Folder) -> None:
-    code(entry).unlink()
-
-
-def extra_file(entry: Folder) -> None:
-    (entry / "more.so").write_bytes(b"")
-
-
-def group_writes_code(entry: Folder) -> None:
-    code(entry).chmod(0o420)
-
-
-def others_write_manifest(entry: Folder) -> None:
-    (entry / cache.MANIFEST).chmod(0o402)
-
-
-def group_writes_folder(entry: Folder) -> None:
-    entry.chmod(0o770)
 
 
 def linked_code(entry: Folder) -> None:
@@ -316,9 +267,7 @@ def linked_entry(entry: Folder) -> None:
 
 
 def file_for_folder(entry: Folder) -> None:
-    for path in entry.iterdir():
-        path.unlink()
-    entry.rmdir()
+    shutil.rmtree(entry)
     entry.write_bytes(b"not a folder")
 
 
@@ -328,24 +277,24 @@ def folder_for_file(entry: Folder) -> None:
     path.mkdir()
 
 
-DAMAGES = [
-    corrupt,
-    truncate,
-    truncate_manifest,
-    empty_manifest,
-    strange_manifest,
-    binary_manifest,
-    no_manifest,
-    no_code,
-    extra_file,
-    group_writes_code,
-    others_write_manifest,
-    group_writes_folder,
-    linked_code,
-    linked_entry,
-    file_for_folder,
-    folder_for_file,
-]
+DAMAGES: dict[str, Callable[[Folder], object]] = {
+    "a changed byte": corrupt,
+    "half of the code": lambda entry: overwrite(code(entry), code(entry).read_bytes()[:100]),
+    "half of a manifest": lambda entry: overwrite(manifest(entry), manifest(entry).read_bytes()[:-5]),
+    "an empty manifest": empty_manifest,
+    "a strange manifest": lambda entry: overwrite(manifest(entry), json.dumps([[1], 2]).encode()),
+    "a binary manifest": lambda entry: overwrite(manifest(entry), bytes(range(256))),
+    "no manifest": lambda entry: manifest(entry).unlink(),
+    "no code": lambda entry: code(entry).unlink(),
+    "one more file": lambda entry: (entry / "more.so").write_bytes(b""),
+    "code that the group may write": lambda entry: code(entry).chmod(0o420),
+    "a manifest that others may write": lambda entry: manifest(entry).chmod(0o402),
+    "a folder that the group may write": lambda entry: entry.chmod(0o770),
+    "linked code": linked_code,
+    "a linked entry": linked_entry,
+    "a file for a folder": file_for_folder,
+    "a folder for a file": folder_for_file,
+}
 
 
 @pytest.fixture(scope="module")
@@ -370,45 +319,32 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return sound
 
 
-def rebuilt(
-    damage: Callable[[Folder], None], folder: Folder, backend: str, wanted: list[float], log: pytest.LogCaptureFixture
+@pytest.mark.parametrize(
+    ("damage", "backend"),
+    [*((damage, "vm") for damage in DAMAGES)]
+    + [(damage, "native") for damage in ("a changed byte", "linked code", "code that the group may write")],
+)
+def test_damaged_entries_are_built_again(
+    damage: str,
+    backend: str,
+    folder: Folder,
+    wanted: list[float],
+    loaded: list[bool],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     """Fill the cache, load nothing, damage it, compile, check."""
     artifact.compile_stack(small.stack(), backend, wbc.__version__)
     (entry,) = entries(folder)
-    damage(entry)
-    log.clear()
+    DAMAGES[damage](entry)
+    caplog.clear()
     controller = small.stack().compile(backend=backend)
     assert not controller.cached, "a damaged entry was used"
-    assert [r.name for r in log.records] == ["wbc"]
-    assert "building it again" in log.text
+    assert [r.name for r in caplog.records] == ["wbc"]
+    assert "building it again" in caplog.text
     assert np.abs(np.subtract(small.command(controller), wanted)).max() < 1e-9
     assert small.stack().compile(backend=backend).cached, "the entry was not mended"
     assert len(entries(folder)) == 1
     assert not entries(folder)[0].is_symlink()
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_entries_are_built_again(
-    damage: Callable[[Folder], None],
-    folder: Folder,
-    wanted: list[float],
-    loaded: list[bool],
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    rebuilt(damage, folder, "vm", wanted, caplog)
-    assert loaded == [True, True, True]
-
-
-@pytest.mark.parametrize("damage", [corrupt, linked_code, group_writes_code])
-def test_damaged_libraries_are_compiled_again(
-    damage: Callable[[Folder], None],
-    folder: Folder,
-    wanted: list[float],
-    loaded: list[bool],
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    rebuilt(damage, folder, "native", wanted, caplog)
     assert loaded == [True, True, True]
 
 
@@ -481,56 +417,36 @@ def test_of_two_finished_builds_the_first_stays(folder: Folder) -> None:
 # Unusable folders
 
 
-def below_a_file(place: Folder) -> None:
-    place.write_text("")
-
-
-def is_a_file(place: Folder) -> None:
-    place.write_text("")
-
-
-def others_write(place: Folder) -> None:
-    place.mkdir()
-    place.chmod(0o777)
-
-
-def of_somebody_else(place: Folder) -> None:
-    place.mkdir()
-
-
-def read_only(place: Folder) -> None:
-    place.mkdir()
-
-
 @pytest.mark.parametrize(
-    ("spoil", "reason"),
+    ("kind", "reason"),
     [
-        (below_a_file, "Not a directory"),
-        (is_a_file, "File exists"),
-        (others_write, "others may write to it"),
-        (of_somebody_else, "it belongs to another user"),
-        (read_only, "it cannot be written to"),
+        ("below a file", "Not a directory"),
+        ("a file", "File exists"),
+        ("others write", "others may write to it"),
+        ("of somebody else", "it belongs to another user"),
+        ("read-only", "it cannot be written to"),
     ],
 )
 def test_unusable_folders_are_replaced(
-    spoil: Callable[[Folder], None],
-    reason: str,
-    folder: Folder,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
+    kind: str, reason: str, folder: Folder, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    spoil(folder)
-    if spoil is below_a_file:
+    if kind.endswith("file"):
+        folder.write_text("")
+    else:
+        folder.mkdir()
+    if kind == "below a file":
         folder = folder / "below"
         monkeypatch.setenv("WBC_CACHE", str(folder))
-    if spoil is of_somebody_else:
+    if kind == "others write":
+        folder.chmod(0o777)
+    if kind == "of somebody else":
         user = os.getuid()
         monkeypatch.setattr(cache.os, "getuid", lambda: user + 1 if user else 12345)
         # its own new folders belong to the made-up user, too
         monkeypatch.setattr(cache, "_private", lambda path: True)
         if user == 0:
             os.chown(folder, 54321, -1)
-    if spoil is read_only:  # the superuser may write anywhere, so ask for the answer another user gets
+    if kind == "read-only":  # the superuser may write anywhere, so ask for the answer another user gets
         monkeypatch.setattr(cache.os, "access", lambda *arguments: False)
     before = set(folder.iterdir()) if folder.is_dir() else set()
     one = small.stack().compile(backend="vm")

@@ -23,7 +23,7 @@ from wbc.errors import (
     WbcError,
 )
 from wbc.robot import Robot
-from wbc.tasks import Damping, Elbow, EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Posture
+from wbc.tasks import Damping, EndEffector, Fixed, FrameVelocityLimit, JointLimits, Posture
 from wbc.tasks.mechanism import Mechanism
 
 
@@ -72,30 +72,6 @@ def test_refused(add: Callable[[Stack], Any], error: type[WbcError], field: str,
     assert len(stack.add(Damping(), name="next")) == 2, "the next good call works"
 
 
-@pytest.mark.parametrize(
-    ("item", "field"),
-    [
-        (EndEffector, "EndEffector.frame"),
-        (lambda frame: EndEffector("tip", relative_to=frame), "EndEffector.relative_to"),
-        (lambda frame: EndEffector("tip", axes=frame), "EndEffector.axes"),
-        (Elbow, "Elbow.frame"),
-        (Hold, "Hold.frame"),
-        (lambda frame: FrameVelocityLimit(frame, linear=1.0), "FrameVelocityLimit.frame"),
-    ],
-)
-@pytest.mark.parametrize(("wrong", "meant"), [("tpi", "tip"), ("Link2", "link2"), ("link_1", "link1")])
-def test_unknown_frames_list_the_nearest(item: Callable[[str], Any], field: str, wrong: str, meant: str) -> None:
-    stack = fresh()
-    with pytest.raises(UnknownNameError) as caught:
-        stack.add(item(wrong), name="x")
-    assert caught.value.field == field
-    assert caught.value.value == wrong
-    assert caught.value.choices[0] == meant
-    assert set(stack.robot.frame_names) <= set(caught.value.choices)
-    assert f"did you mean {meant!r}" in str(caught.value)
-    assert "x" not in stack
-
-
 def test_unknown_items_list_the_nearest() -> None:
     stack = fresh().add(EndEffector("tip"), name="hand").add(JointLimits(), name="limits")
     for names in (stack, stack.compile(backend="vm")):
@@ -138,16 +114,6 @@ def test_stack_arguments_are_checked(arguments: dict[str, Any], error: type[WbcE
 @pytest.mark.parametrize("damping", [1e-12, 1e-8, 1.0, 1])
 def test_damping_within_its_range(damping: float) -> None:
     assert Stack(small.arm(), 0.01, damping=damping).damping == damping
-
-
-@pytest.mark.parametrize(
-    ("option", "wrong", "meant"), [("solver", "dapq", "daqp"), ("solver", "opsq", "osqp"), ("backend", "VM", "vm")]
-)
-def test_compile_options_are_names(option: str, wrong: str, meant: str) -> None:
-    with pytest.raises(UnknownNameError) as caught:
-        fresh().compile(**{option: wrong})
-    assert caught.value.field == option
-    assert caught.value.choices[0] == meant
 
 
 def test_calls_chain_and_keep_their_order() -> None:
@@ -203,58 +169,3 @@ def loaded(name: str) -> Robot:
     if name != "panda_fingers":
         return robot(name)
     return wbc.robots.load("panda", lock=(), shapes="none")
-
-
-def consistent(bot: Robot, q: np.ndarray) -> np.ndarray:
-    """q with every follower where its leader puts it."""
-    out = np.array(q)
-    for c in bot.couplings:
-        here, there = (int(bot.position_index[i]) for i in (c.follower, c.leader))
-        out[here] = c.ratio * out[there] + c.offset
-    return out
-
-
-@pytest.mark.parametrize("name", ["tiago", "talos_full", "panda_fingers"])
-def test_mechanism_holds_on_the_command(name: str) -> None:
-    bot, rng = loaded(name), np.random.default_rng(5)
-    stack = Stack(bot, 0.005).add(Posture(gain=1.0), name="posture").add(JointLimits(acceleration=False))
-    tick = stack.compile(backend="vm")
-    spread = np.where(bot.position_index < 0, 0.5, 0.1)
-    moved, sideways = 0.0, 0.0
-    for _ in range(20):
-        q = consistent(bot, bot.neutral)
-        goal = pin.integrate(bot.model, q, spread * rng.uniform(-1.0, 1.0, bot.nv))
-        tick.reset()
-        tick["posture"].target = goal
-        step = tick.step(q)
-        assert step.status == "solved"
-        for c in bot.couplings:
-            assert abs(step.v[c.follower] - c.ratio * step.v[c.leader]) < 1e-9
-            moved = max(moved, abs(step.v[c.leader]))
-        wish = pin.difference(bot.model, q, goal)
-        for i in bot.locked_dofs:
-            assert abs(step.v[i]) < 1e-9
-            sideways = max(sideways, abs(wish[i]))
-    if bot.couplings:
-        assert moved > 1e-3, "leaders move, so followers had something to follow"
-    if bot.locked_dofs:
-        assert sideways > 0.1, "the posture did ask for sideways motion"
-
-
-def test_mechanism_brings_back_what_does_not_fit() -> None:
-    """A follower off its place returns at the declared gain."""
-    bot = loaded("panda_fingers")
-    (coupling,) = bot.couplings
-    here, there = (int(bot.position_index[i]) for i in (coupling.follower, coupling.leader))
-    q = consistent(bot, bot.neutral)
-    q[there], off = 0.02, 0.004
-    q = consistent(bot, q)
-    q[here] += off
-    tick = Stack(bot, 0.005).add(Damping()).compile(backend="vm")
-    v = tick.step(q).v
-    gain = tick["mechanism"].gain
-    assert gain > 0.0
-    assert v[coupling.follower] - coupling.ratio * v[coupling.leader] == pytest.approx(-gain * off, abs=1e-9)
-    tick["mechanism"].gain = 2.0 * gain
-    v = tick.step(q).v
-    assert v[coupling.follower] - coupling.ratio * v[coupling.leader] == pytest.approx(-2.0 * gain * off, abs=1e-9)

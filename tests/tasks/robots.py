@@ -64,13 +64,6 @@ def random_configuration(robot: Robot, rng: np.random.Generator) -> np.ndarray:
     return pin.integrate(robot.model, robot.neutral, spread * rng.uniform(-1.0, 1.0, robot.nv))
 
 
-def placement(robot: Robot, frame: str, q: np.ndarray) -> pin.SE3:
-    """Pose of a frame in the world, by Pinocchio."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return pin.SE3.Identity() if frame == "world" else data.oMf[robot.model.getFrameId(frame)].copy()
-
-
 def velocity(robot: Robot, frame: str, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Twist (linear; angular) of a frame at its origin, world axes, by Pinocchio."""
     if frame == "world":

@@ -62,6 +62,8 @@ INF, HERE = np.inf, pin.SE3.Identity()
 HAND, PLANE = "panda_hand", ("panda_link2", "panda_link4", "panda_link6")
 FIRST, *_, LAST = robot("panda").shapes
 #: A link without shapes
+#: What is named where a shape is refused
+SHAPES = "valid: Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpace, HeightMap, Sphere"
 BARE = next(n for n in robot("panda").frame_names if n.startswith("panda_link") and n not in robot("panda").shapes)
 PLACE = EndEffector(HAND, kind="position")
 
@@ -100,7 +102,9 @@ def test_every_field_refuses_what_it_cannot_take(class_name: str) -> None:
                     dataclasses.replace(item, **{field.name: bad}).validate(bot)
                 assert field.name in str(caught.value)
                 if isinstance(caught.value, UnknownNameError) and isinstance(bad, str):
+                    assert caught.value.value == bad
                     assert caught.value.choices[0] == getattr(item, field.name)
+                    assert f"did you mean {getattr(item, field.name)!r}" in str(caught.value)
 
 
 @pytest.mark.parametrize("class_name", ITEMS)
@@ -223,10 +227,10 @@ CASES: tuple[tuple[Callable[[], Any], type[WbcError], str], ...] = (
     (lambda: JointLimits(joints=("panda_joint1", "panda_joint1")), DuplicateNameError, "JointLimits.joints"),
     (lambda: JointLimits(joints=["panda_joint44"]), UnknownNameError, "did you mean 'panda_joint4'"),
     (lambda: JointLimits(margin=1.9, joints=("panda_joint6",)), RangeError, "panda_joint6"),
-    (lambda: Obstacle("ball"), ShapeError, "valid: Box, Convex, Cylinder"),
-    (lambda: Obstacle(PlacedShape(Sphere(0.1), HERE)), ShapeError, "valid: Box, Convex, Cylinder"),
-    (lambda: Obstacle([]), ShapeError, "valid: Box, Convex, Cylinder"),
-    (lambda: Obstacle([Sphere(0.1)]), ShapeError, "valid: Box, Convex, Cylinder"),
+    (lambda: Obstacle("ball"), ShapeError, SHAPES),
+    (lambda: Obstacle(PlacedShape(Sphere(0.1), HERE)), ShapeError, SHAPES),
+    (lambda: Obstacle([]), ShapeError, SHAPES),
+    (lambda: Obstacle([Sphere(0.1)]), ShapeError, SHAPES),
     (lambda: Obstacle(Sphere(0.1), closest=0), RangeError, "Obstacle.closest"),
     (lambda: Obstacle(Sphere(0.1), closest=1.5), RangeError, "Obstacle.closest"),
     (lambda: Obstacle(Sphere(0.1), closest=True), RangeError, "Obstacle.closest"),

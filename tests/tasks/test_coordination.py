@@ -12,8 +12,8 @@ import pytest
 
 import wbc
 from tests.evaluation import numbers, sample, slope
-from tests.models import X, Z, arm, robot as bare
-from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
+from tests.models import X, Z, arm, placement, robot as bare
+from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from tests.evaluation import numbers
-from tests.tasks.robots import placement, random_configuration, robot
+from tests.models import placement
+from tests.tasks.robots import random_configuration, robot
 from wbc.errors import (
     BoundsError,
     DuplicateNameError,

@@ -16,6 +16,7 @@ import pytest
 import wbc
 from tests.evaluation import sample, slope
 from tests.items import ITEMS
+from tests.models import placement
 from tests.repeats import MORE, repeats
 from tests.tasks.robots import NAMES, random_configuration, robot
 from wbc.errors import DuplicateNameError, RangeError, SolverError, UnknownNameError
@@ -276,9 +277,7 @@ def test_robot_and_frame_that_stand_together_need_no_command_and_defaults_are_th
     controller["table"].pose = pose
     step = controller.step(q)
     assert np.abs(step.v).max() < 1e-9
-    data = PANDA.model.createData()
-    pin.framesForwardKinematics(PANDA.model, data, q)
-    hand = data.oMf[PANDA.model.getFrameId("panda_hand_tcp")]
+    hand = placement(PANDA, "panda_hand_tcp", q)
     assert np.allclose(controller["hand"].target.homogeneous, pose.actInv(hand).homogeneous, atol=1e-12)
 
 

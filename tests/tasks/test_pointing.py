@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 import wbc
 from tests.evaluation import numbers, sample, slope
 from tests.items import ITEMS
+from tests.models import placement
 from tests.rates import axes, line_of_sight
-from tests.tasks.robots import FRAMES, NAMES, placement, random_configuration, robot
+from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
 from wbc.api import Controller
 from wbc.robot import Limits, Robot
 from wbc.tasks import AxisAlign, Distance, Item, LookAt, Momentum

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.models import placement
 from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
@@ -37,9 +38,7 @@ def session(compiled: Teleoperation) -> Teleoperation:
 
 
 def place(session: Teleoperation, q: np.ndarray, frame: str = "tip") -> pin.SE3:
-    data = session.robot.model.createData()
-    pin.framesForwardKinematics(session.robot.model, data, q)
-    return data.oMf[session.robot.model.getFrameId(frame)].copy()
+    return placement(session.robot, frame, q)
 
 
 def test_rates_hold_until_they_are_stale(session: Teleoperation) -> None:

@@ -13,8 +13,8 @@ from scipy.optimize import linprog
 from tests.torque.problems import DT, controller, robot
 from tests.torque.referee import Referee
 from wbc.api import Stack
-from wbc.errors import BoundsError, CommandError, RangeError, ShapeError, UnknownNameError
-from wbc.tasks import EndEffector, PointContact, RigidGrasp, SurfaceContact, TorqueLimits
+from wbc.errors import CommandError
+from wbc.tasks import EndEffector, PointContact, RigidGrasp, SurfaceContact
 
 
 def cone(item: SurfaceContact | PointContact) -> tuple[np.ndarray, np.ndarray]:
@@ -207,29 +207,6 @@ def test_velocity_and_acceleration_level_hold_the_frame() -> None:
         for name in ("torque", "forces"):
             with pytest.raises(CommandError, match="commands"):
                 getattr(step, name)
-
-
-@pytest.mark.parametrize(
-    ("make", "error"),
-    [
-        (lambda: RigidGrasp("a", force=-1.0), BoundsError),
-        (lambda: RigidGrasp("a", torque=(1.0, 2.0)), ShapeError),
-        (lambda: PointContact("a", friction=-0.1), RangeError),
-        (lambda: PointContact("a", edges=3), RangeError),
-        (lambda: PointContact("a", most=-1.0), RangeError),
-        (lambda: SurfaceContact("a", half_lengths=(0.1,)), ShapeError),
-        (lambda: SurfaceContact("a", half_lengths=(0.1, 0.0)), RangeError),
-        (lambda: TorqueLimits(()), ShapeError),
-        (lambda: Stack(robot("talos"), dt=DT).add(PointContact("left_sole")), UnknownNameError),
-        (lambda: Stack(robot("talos"), dt=DT).add(TorqueLimits("no_joint")), UnknownNameError),
-        (lambda: Stack(robot("talos"), dt=DT).add(TorqueLimits()).compile(), CommandError),
-        (lambda: Stack(robot("talos"), dt=DT).compile(command="power"), UnknownNameError),
-    ],
-)
-def test_bad_declarations_are_refused(make: object, error: type[Exception]) -> None:
-    assert callable(make)
-    with pytest.raises(error):
-        make()
 
 
 def test_robots_without_mass_have_no_torques() -> None:

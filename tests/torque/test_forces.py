@@ -8,9 +8,9 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
 
+from tests.models import placement
 from tests.torque.problems import DT, robot
 from wbc.api import Controller, Stack
-from wbc.errors import BoundsError, CommandError, RangeError, ShapeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.tasks import (
     CenterOfMass,
@@ -70,9 +70,7 @@ def test_torques_bear_what_slides_pushes_and_rubs(plane: str) -> None:
     q, v = bot.neutral.copy(), rng.uniform(-0.3, 0.3, bot.nv)
     tick.reset(q)
     J, twist = kinematics(bot, TIP, q, v)
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
-    tip = data.oMf[bot.model.getFrameId(TIP)]
+    tip = placement(bot, TIP, q)
     carried, pose = (np.zeros(6), pin.SE3.Identity())
     if plane == "table":
         carried, pose = (
@@ -120,11 +118,9 @@ def test_a_known_push_reaches_the_feet() -> None:
     assert step.status == "solved"
     assert step.forces["edge"].shape == (5,)
     assert step.forces["edge"][2] > 10.0
-    data = bot.model.createData()
-    pin.framesForwardKinematics(bot.model, data, q)
     total = kinematics(bot, "gripper_left_base_link", q, v)[0].T @ push
     for frame, name, axes in (("left_sole_link", "foot", range(6)), ("right_sole_link", "edge", (0, 1, 2, 4, 5))):
-        turn, w = data.oMf[bot.model.getFrameId(frame)].rotation, np.zeros(6)
+        turn, w = placement(bot, frame, q).rotation, np.zeros(6)
         w[list(axes)] = step.forces[name]
         total += kinematics(bot, frame, q, v)[0].T @ np.r_[turn @ w[:3], turn @ w[3:]]
     needed = pin.rnea(bot.model, bot.model.createData(), q, v, step.a) - total
@@ -148,22 +144,3 @@ def test_divergent_component_of_motion_converges_where_the_centre_of_mass_is_so_
     pin.centerOfMass(bot.model, data, q, v, step.a)
     xi, rate = data.com[0] + data.vcom[0] / omega, data.vcom[0] + data.acom[0] / omega
     assert rate == pytest.approx(-k * (xi - target), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("make", "error"),
-    [
-        (lambda: LineContact("a", half_length=0.0), RangeError),
-        (lambda: SlidingContact("a", slow=0.0), RangeError),
-        (lambda: SlidingContact("a", friction=-1.0), RangeError),
-        (lambda: JointFriction(viscous=-1.0), BoundsError),
-        (lambda: Stack(robot("panda"), dt=DT).add(JointFriction(coulomb=(1.0, 2.0))), ShapeError),
-        (lambda: Stack(robot("panda"), dt=DT).add(ExternalWrench("no_frame")), UnknownNameError),
-        (lambda: Stack(robot("panda"), dt=DT).add(ExternalWrench(TIP)).compile(), CommandError),
-        (lambda: Stack(robot("panda"), dt=DT).add(JointFriction()).compile(command="acceleration"), CommandError),
-    ],
-)
-def test_bad_declarations_are_refused(make: object, error: type[Exception]) -> None:
-    assert callable(make)
-    with pytest.raises(error):
-        make()

@@ -10,7 +10,6 @@ import pytest
 
 from tests.torque.problems import DT, robot
 from wbc.api import Controller, Stack
-from wbc.errors import BoundsError, RangeError, ShapeError, UnknownNameError
 from wbc.robot.transmission import Transmission
 from wbc.tasks import DriveTorqueLimits, EndEffector, JointLimits, Posture, TorqueLimits
 
@@ -92,21 +91,3 @@ def test_motors_that_cannot_carry_the_arm_are_named_in_newton_metres() -> None:
     assert (np.abs(step.torque) <= 0.05 * bot.limits.effort).all()
     assert (np.abs(WRIST.inverse.T @ step.torque[[5, 6]]) <= 0.5 + 1e-12).all()
     assert "motors/panda_joint4 by 17.7 N m" in str(step)
-
-
-@pytest.mark.parametrize(
-    ("make", "error"),
-    [
-        (lambda: TorqueLimits(slew=-1.0), BoundsError),
-        (lambda: Stack(robot("panda"), dt=DT).add(TorqueLimits(slew=(1.0, 2.0))), ShapeError),
-        (lambda: DriveTorqueLimits("wrist", 1.0), ShapeError),
-        (lambda: DriveTorqueLimits(WRIST, (1.0, 2.0, 3.0)), ShapeError),
-        (lambda: DriveTorqueLimits(WRIST, -1.0), BoundsError),
-        (lambda: Stack(robot("talos"), dt=DT).add(DriveTorqueLimits(WRIST, 1.0)), UnknownNameError),
-        (lambda: Transmission(("a", "b"), {"x": {"a": 1.0}, "y": {"a": 2.0}}), RangeError),
-    ],
-)
-def test_bad_declarations_are_refused(make: object, error: type[Exception]) -> None:
-    assert callable(make)
-    with pytest.raises(error):
-        make()

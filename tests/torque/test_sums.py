@@ -9,7 +9,7 @@ import pytest
 import wbc.robots
 from tests.torque.problems import DT, robot, stack
 from wbc.api import Stack
-from wbc.errors import CommandError, DuplicateNameError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import CommandError
 from wbc.tasks import (
     DivergentComponent,
     EndEffector,
@@ -115,24 +115,3 @@ def test_the_divergent_component_follows_its_target() -> None:
     assert rate == pytest.approx(np.array([0.1, 0.0, -0.2]) - 2.0 * (xi - target), abs=1e-6)
     with pytest.raises(CommandError, match="CenterOfMass"):
         made.compile()
-
-
-@pytest.mark.parametrize(
-    ("make", "error"),
-    [
-        (lambda: WrenchSum(()), ShapeError),
-        (lambda: WrenchSum(("a", "a")), DuplicateNameError),
-        (lambda: stack("walker").add(WrenchSum("grip 3")).commanding("torque"), UnknownNameError),
-        (lambda: stack("walker").add(WrenchSum("hand")).commanding("torque"), UnknownNameError),
-        (lambda: RollingContact("a", radius=0.0), RangeError),
-        (lambda: RollingContact("a", radius=0.1, axis=(0.0, 0.0, 0.0)), RangeError),
-        (lambda: RollingContact("a", radius=0.1, friction=-1.0), RangeError),
-        (lambda: Stack(robot("panda"), dt=DT).add(RollingContact("panda_hand_tcp", radius=0.1)), RangeError),
-        (lambda: Stack(robot("walker"), dt=DT).add(RollingContact("body", radius=0.1)), RangeError),
-        (lambda: DivergentComponent(omega=0.0), RangeError),
-    ],
-)
-def test_bad_declarations_are_refused(make: object, error: type[Exception]) -> None:
-    assert callable(make)
-    with pytest.raises(error):
-        make()

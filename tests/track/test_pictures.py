@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from tests.models import placement
+
 # isort: split
 import coal
 import pytest
@@ -91,9 +93,7 @@ def test_picture_and_plots_of_a_robot_without_meshes(tmp_path: Path) -> None:
     lying = pin.SE3(pin.utils.rotate("y", math.pi / 2), np.array([-0.2, 0.0, 0.0]))
     robot = robot.with_shapes({f"link{k}": [PlacedShape(Capsule(0.04, 0.4), lying)] for k in (1, 2, 3)})
     start = np.array([0.3, 0.5, 0.5])
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, start)
-    here = data.oMf[robot.model.getFrameId("tip")].copy()
+    here = placement(robot, "tip", start)
     there = pin.SE3(here.rotation, here.translation + np.array([0.0, -0.2, 0.0]))
     plan = track.PathRun(
         robot, "tip", track.SplinePath([0.0, 1.0], [here, there]), "down", start, dt=0.02, backend="vm"

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from wbc import track
 from wbc.errors import MissingShapeError, UnknownNameError, WbcError
 from wbc.log import LogFileError
@@ -46,9 +47,7 @@ def test_log_is_what_was_commanded() -> None:
     for k in range(len(log) - 1):
         np.testing.assert_allclose(q[k + 1], pin.integrate(robot.model, q[k], v[k] * 0.02), atol=1e-12)
     np.testing.assert_allclose(log.array("a")[1:], np.diff(v, axis=0) / 0.02, atol=1e-12)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q[100])
-    reached = pin.SE3ToXYZQUAT(data.oMf[robot.model.getFrameId("panda_hand_tcp")])
+    reached = pin.SE3ToXYZQUAT(placement(robot, "panda_hand_tcp", q[100]))
     np.testing.assert_allclose(log.array("pose")[100], reached, atol=1e-12)
     error = log.array("pose")[:, :3] - log.array("target")[:, :3]
     np.testing.assert_allclose(error, np.column_stack([log[f"error.hand.{axis}"] for axis in "xyz"]), atol=1e-9)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from wbc.errors import ContinuityError, InfeasibleError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
@@ -54,9 +55,7 @@ class Line(Path):
 
 
 def tip(q: np.ndarray) -> pin.SE3:
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, q)
-    return pin.SE3(data.oMf[ROBOT.model.getFrameId(TIP)])
+    return pin.SE3(placement(ROBOT, TIP, q))
 
 
 @cache

@@ -75,8 +75,7 @@ class BatchStep:
         self.command: Array = reports[:, : context.nv]
         self.v: Array = self.command
         if context.command != "velocity":
-            self.v = self._given("v_in")[:, : context.nv] + self._given("dt") * self.command
-            self.v.flags.writeable = False
+            self.v = self._part("next_v")
 
     def __len__(self) -> int:
         return len(self._reports)

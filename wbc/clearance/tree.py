@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -12,7 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import DuplicateNameError, UnsupportedJointError
 from wbc.multibody import pin
-from wbc.symbolic.joint_steps import JointKind, joint_steps, place
+from wbc.symbolic.joint_steps import JointKind, joint_steps, place, turns_for_quaternions
 from wbc.validation import Array
 
 SUPPORTED = ("revolute", "continuous", "prismatic", "helical", "universal", "free flyer", "fixed")
@@ -62,12 +62,20 @@ class Tree:
     links: dict[str, tuple[int, pin.SE3]] = field(repr=False)
 
     @classmethod
-    def of_model(cls, model: pin.Model, floating: bool = False, things: Sequence[str] = ()) -> Tree:
+    def of_model(
+        cls,
+        model: pin.Model,
+        floating: bool = False,
+        things: Sequence[str] = (),
+        orders: Mapping[int, tuple[int, int, int]] | None = None,
+    ) -> Tree:
         """The joints of a model; of a joint without end its angle is the scalar.
 
         Args:
             floating: the model has a base that is fixed, and that a free pose carries here.
             things: what moves beside the model, each a link with a free pose; in a motion they come last.
+            orders: of ball joints, and of free flyers, which then have three shifts and three turns in place of a free
+                pose: axes of the turns, by the place of the joint's quaternion in q.
 
         Raises:
             DuplicateNameError: a thing that is called as a link or as another thing.
@@ -85,12 +93,12 @@ class Tree:
         for joint in range(1, model.njoints):
             name, parent = str(model.names[joint]), last[int(model.parents[joint])]
             at = pin.SE3(model.jointPlacements[joint])
-            if model.joints[joint].shortname() == "JointModelFreeFlyer":
+            if orders is None and model.joints[joint].shortname() == "JointModelFreeFlyer":
                 frames.append(Frame(parent, at, Moves.FREE, len(free)))
                 free.append(name)
                 last[joint] = len(frames) - 1
                 continue
-            for step in joint_steps(model, joint):
+            for step in turns_for_quaternions(joint_steps(model, joint), orders or {}):
                 if step.kind == JointKind.PLACE:
                     at = at * pin.SE3(step.numbers[:9].reshape(3, 3), step.numbers[9:])
                     continue

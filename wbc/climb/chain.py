@@ -55,8 +55,9 @@ class LimbNumbers(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int) for name in ("steps", "angles", "rows", "samples")),
-        ("length", ctypes.c_double),
+        *((name, ctypes.c_double) for name in ("length", "near", "far")),
         ("tip", ctypes.c_double * 12),
+        ("wrist", ctypes.c_double * 3),
         *((name, ctypes.c_void_p) for name in ("step", "lower", "upper", "rest", "sample", "touch")),
     ]
 
@@ -221,4 +222,11 @@ class LimbTable:
         angles = np.ascontiguousarray(np.vstack([rest, low + spread * (high - low)]))
         touch = self.touch(limb, angles)
         self._kept += [angles, touch]
+        # Where a contact's whole pose is fixed, the place of the last joint is too
+        tip = np.array(row.tip)
+        wrist = -tip[:9].reshape(3, 3).T @ tip[9:] if row.rows == ROWS["pose"] else np.zeros(3)
+        row.wrist = tuple(wrist)
+        ends = touch[:, 9:] + touch[:, :9].reshape(-1, 3, 3) @ wrist
+        away = np.linalg.norm(ends - self.root(limb), axis=1)
+        row.near, row.far = float(away.min()), float(away.max())
         row.samples, row.sample, row.touch = len(angles), angles.ctypes.data, touch.ctypes.data

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
@@ -49,6 +50,26 @@ def ways_over_footholds(positions: Array, seeds: Array, stride: float) -> Array:
         away, nearest = cKDTree(positions[known]).query(positions[lost])
         out[lost] = out[known][nearest] + 3.0 * away
     return out
+
+
+def within_spans(positions: Array, sources: Array, span: float) -> NDArray[np.bool_]:
+    """Which footholds can be come to where those that are held at once are at most ``span`` apart [m].
+
+    Args:
+        positions: ``(n, 3)`` [m]. sources: rows that are held.
+
+    Returns:
+        ``(n)``, true at those.
+    """
+    reached = np.zeros(len(positions), dtype=bool)
+    reached[sources] = True
+    last = np.flatnonzero(reached)
+    while len(last):
+        waiting = np.flatnonzero(~reached)
+        away, _ = cKDTree(positions[last]).query(positions[waiting], distance_upper_bound=span)
+        last = waiting[np.isfinite(away)]
+        reached[last] = True
+    return reached
 
 
 def _long_steps(tree: cKDTree, stride: float) -> Array:

@@ -27,7 +27,7 @@ from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.climb.watch import PlanWatch
 from wbc.climb.world import LEFT_OUT, ClimbWorld, CloseLinks
-from wbc.errors import InfeasibleError, RangeError, ShapeError
+from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.validation import Array
 
 #: How far contacts of a stance may be from their footholds [m]
@@ -88,9 +88,14 @@ def _touch_error(touch: CloseLinks, part: float) -> _TouchError:
 
 def _touched(touch: _TouchError, move: int) -> MoveError:
     """The refusal of a move for links that are nearer than they may be."""
-    error = _refused(move, touch.value, str(touch), None)
+    error = _passed_on(move, touch)
     error.limbs = touch.limbs
     return error
+
+
+def _passed_on(move: int, error: WbcError) -> MoveError:
+    """The refusal of a move for an error that names what is in the way."""
+    return _refused(move, error.value, f"{error.field}: {error.reason}", None)
 
 
 def _refused(move: int, value: object, reason: str, nearest: Nearest | None, standing: bool = False) -> MoveError:
@@ -215,7 +220,8 @@ class Mover:
         refusals, known, unborne = list[tuple[float, float, MoveError]](), dict[BodyWay, Array | HeldError](), False
         bow, stuck = self._bow(one, other, row, known)
         look = None if self.closure.short else functools.partial(self._look, one, other)
-        for shape in self._shapes(one, other, bow):
+        shapes, leans = self._shapes(one, other, bow), 0
+        while (shape := next(shapes, None)) is not None:
             if refusals and self.watch.passed:
                 break
             # Where the contacts do not bear the robot another swing changes nothing, another way of the body may
@@ -228,7 +234,7 @@ class Mover:
                 continue
             except InfeasibleError as error:
                 stuck = stuck or isinstance(error, HeldError)
-                refusals.append((0.0, 0.0, _refused(row, error.value, str(error), None)))
+                refusals.append((0.0, 0.0, _passed_on(row, error)))
                 continue
             refusal, margin, loads = self._refused(path, one, other, row)
             if refusal is None:
@@ -236,6 +242,10 @@ class Mover:
             if margin is not None:
                 unborne = True
                 refusals.append((2.0, margin, refusal))
+                further = self._leant(shape, loads, self._needed(one, other)) if leans < BOWS else None
+                if further is not None:
+                    bow, shapes = further, self._shapes(one, other, further)
+                    unborne, leans = False, leans + 1
             elif refusal.nearest is not None:
                 refusals.append((1.0, refusal.nearest.distance - refusal.nearest.required, refusal))
         # The way that came nearest to be one: what lacks equilibrium, then what lacks clearance, then what is none
@@ -256,7 +266,7 @@ class Mover:
                 try:
                     q = held_way(self.closure, one, other, SwingShape(self.lift, bow=_three(bow), yields=stuck), known)
                 except HeldError as error:
-                    refusals.append(_refused(row, error.value, str(error), None))
+                    refusals.append(_passed_on(row, error))
                     if stuck:
                         break
                     stuck = True
@@ -268,8 +278,24 @@ class Mover:
                 refusals.append(_touched(_touch_error(touch, s), row))
                 if touch.away is None or not 0.0 < s < 1.0:
                     break
-                bow = bow + (touch.lacks + AWAY * self.lift) / (16.0 * (s * (1.0 - s)) ** 2) * touch.away
+                bow = bow + (touch.lacks + AWAY * self.lift) / SwingShape(0.0).bowed(np.array([s]))[0] * touch.away
         raise refusals[0]
+
+    def _leant(self, shape: SwingShape, loads: PathLoads | None, needed: float) -> tuple[float, float, float] | None:
+        """The bow of a way of the body on which contacts come nearer to bear the robot; None: there is none."""
+        if self.closure.short or loads is None:
+            return None
+        s, shift = loads.shift(needed)
+        far, part = float(np.linalg.norm(shift)), float(shape.bowed(np.array([s]))[0])
+        if far == 0.0 or part == 0.0 or loads.at_rest.min() >= needed:
+            return None
+        bow = np.array(shape.bow) + (1.0 + AWAY * self.lift / far) * shift / part
+        return _three(bow) if np.linalg.norm(bow) <= MOST_BOW * self.lift else None
+
+    def _needed(self, one: Stance, other: Stance) -> float:
+        """Slack at rest that contacts keep from stance to stance, where something weighs [weights]."""
+        # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
+        return max(LEAST, (SHIFTED if one.contacts == other.contacts else 1.0) * self.options.margin)
 
     def _rise(self, one: Stance, other: Stance) -> Array:
         """A lift along the mean normal of what is held ``(3)`` [m]."""
@@ -362,9 +388,7 @@ class Mover:
             # Second derivatives of a path are largest at its samples
             where = np.unique(np.concatenate([GRID, path.s]).round(9))
             loads = PathLoads(self.balance, path, held, where, self.options.inertia)
-            # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
-            share = SHIFTED if one.contacts == other.contacts else 1.0
-            margins, needed = loads.at_rest, max(LEAST, share * self.options.margin)
+            margins, needed = loads.at_rest, self._needed(one, other)
         else:
             picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
             where, margins = path.s[picked], np.array([self.balance.margin(held, q) for q in path.q[picked]])
@@ -375,7 +399,7 @@ class Mover:
                 (least, part), what = undriven, "motors of the limbs that hold"
         if least < needed:
             text = f"the {what} do not bear the robot at {part:.0f} % of the way: they lack"
-            return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, None
+            return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, loads
         return None, least, loads
 
     def _undriven(self, held: Sequence[int], path: MovePath, needed: float) -> tuple[float, float] | None:

@@ -68,6 +68,19 @@ class SwingShape:
     yields: bool = False
     bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    def body(self, s: Array) -> Array:
+        """How far the body is on its way at parts of the path [1]."""
+        low, high = self.window
+        if (low, high) == (0.0, 1.0):
+            return s
+        x = np.clip((s - low) / (high - low), 0.0, 1.0)
+        return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
+
+    def bowed(self, s: Array) -> Array:
+        """Share of the bow by which the body is off the straight line at parts of the path [1]."""
+        b = self.body(s)
+        return np.asarray(16.0 * (b * (1.0 - b)) ** 2)
+
 
 @dataclass(frozen=True, eq=False)
 class MovePath:
@@ -264,22 +277,14 @@ class _Moving:
         left = self.closure.bring(path.configurations(path.at(chosen)), curves, turned=False, steps=0)
         return float(left.max(initial=0.0))
 
-    def _body(self, s: Array) -> Array:
-        """How far the body is."""
-        low, high = self.shape.window
-        if (low, high) == (0.0, 1.0):
-            return s
-        x = np.clip((s - low) / (high - low), 0.0, 1.0)
-        return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
-
     def _between(self, s: Array) -> Array:
         """Body on the straight line, joints evenly."""
         robot, ends = self.climber.robot, (self.one.q, self.other.q)
         first, last = (self.climber.body_pose(q) for q in ends)
-        turn, b = pin.log3(first.rotation.T @ last.rotation), self._body(s)[:, None]
+        turn, b = pin.log3(first.rotation.T @ last.rotation), self.shape.body(s)[:, None]
         joints = joint_values(robot, ends[0][None]) + s[:, None] * pin.difference(robot.model, *ends)[6:]
         out = with_joint_values(robot, np.tile(ends[0], (len(s), 1)), joints)
-        bow = 16.0 * (b * (1.0 - b)) ** 2 * np.array(self.shape.bow)
+        bow = self.shape.bowed(s)[:, None] * np.array(self.shape.bow)
         positions = (1.0 - b) * first.translation + b * last.translation + bow
         for q, rotation, position in zip(out, first.rotation @ exponential(b * turn), positions, strict=True):
             q[:] = self.climber.with_body(q, pin.SE3(rotation, position))

@@ -244,8 +244,7 @@ class _SceneRow:
         try:
             return make()
         except WbcError as error:
-            reason = str(error).removeprefix(f"{error.field}: ").split(" (got ")[0]
-            raise self.error(column, error.value, reason) from error
+            raise self.error(column, error.value, error.reason) from error
 
 
 class _SceneReader:

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from wbc import validation
 from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import TOLERANCE
 from wbc.climb.climber import Climber
-from wbc.climb.foothold_graph import ways_over_footholds
+from wbc.climb.foothold_graph import ways_over_footholds, within_spans
 from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene
@@ -293,6 +294,8 @@ class StanceSearch:
             self.seen = 1
             if self._cannot_be():
                 raise self._refusal("goal")
+            if gap := self._gap():
+                raise no_stances("goal", self._told_goal(), gap, "goal", self._distance(first))
             self._push(first, self._moves(first))
         until, most = time.monotonic() + self.options.seconds, self.options.moves + sum(self.tried.values())
         while self._queue or self._again:
@@ -604,7 +607,7 @@ class StanceSearch:
         parts = counted(self.tried)
         saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
         which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"
-        goal = self.goal.position.round(3).tolist() if isinstance(self.goal, BodyPlace) else self.goal
+        goal = self._told_goal()
         if cause == "limit":
             reason = f"a limit of moves or time ended the search, which proves nothing: {saw}; {which}"
             return no_stances("goal", goal, reason, cause, nearest)
@@ -612,6 +615,9 @@ class StanceSearch:
             reason = f"no stance there is within reach: {lacking}; {saw}; {which}"
             return no_stances("goal", goal, reason, "goal", nearest)
         return no_stances("goal", goal, f"every stance that can be come to was seen: {saw}; {which}", cause, nearest)
+
+    def _told_goal(self) -> Any:
+        return self.goal.position.round(3).tolist() if isinstance(self.goal, BodyPlace) else self.goal
 
     def _so_far(self) -> str:
         away, tried = self._distance(self._nearest), sum(self.tried.values())
@@ -641,3 +647,26 @@ class StanceSearch:
         able = [limb for limb in range(len(self._names)) if limb not in self._lacking()]
         forces = [max(self.world.forces(limb), default=0) for limb in able]
         return sum(forces) < 6
+
+    def _gap(self) -> str:
+        """Why no foothold near the goal can be come to, as limbs that hold are near each other; or nothing."""
+        roots = np.array([self.world.limbs.root(limb) for limb in range(len(self._names))])
+        lengths = np.array([row.length for row in self.world.limbs.numbers])
+        held = [self._hold(at) for at in self.first.contacts if at >= 0]
+        if len(lengths) < 2 or not held:
+            return ""
+        apart = np.linalg.norm(roots[:, None] - roots, axis=2) + lengths[:, None] + lengths
+        span, positions = float(apart[~np.eye(len(lengths), dtype=bool)].max()), self.scene.positions
+        if isinstance(self.goal, BodyPlace):
+            reach = float((lengths + np.linalg.norm(roots, axis=1)).max()) + self.goal.within
+            wanted = np.linalg.norm(positions - self.goal.position, axis=1) <= reach
+        else:
+            wanted = np.arange(len(positions)) == self.scene.row(self.goal.foothold)
+        reached = within_spans(positions, np.array(held), span)
+        if (reached & wanted).any() or not wanted.any():
+            return ""
+        wide = cKDTree(positions[reached]).query(positions[~reached])[0].min()
+        return (
+            f"its footholds are beyond a gap of {wide:.3g} m, and limbs that hold at once are at most {span:.3g} m"
+            f" apart: {int(reached.sum())} of {len(positions)} footholds can be come to"
+        )

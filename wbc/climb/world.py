@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -384,42 +385,44 @@ class ClimbWorld:
 
         Footholds that say nothing of turns are held at ``TURNS`` of them where a limb fixes its turn.
         """
-        climber, poses, hold, turned = self.climber, [], [], []
+        climber, holds = self.climber, self.scene.footholds
         fixes = [climber.fixed(limb) == "pose" for limb in range(len(climber.limbs))]
-        for k, foothold in enumerate(self.scene.footholds):
-            count = (foothold.rolls or TURNS) if any(fixes) else 1
-            for turn in range(count):
-                spin = pin.SE3(pin.utils.rotate("z", 2.0 * np.pi * turn / count), np.zeros(3))
-                poses.append(place(foothold.pose * spin))
-                hold.append(k)
-                turned.append(turn > 0)
-        contacts = []
+        counts = np.array([(hold.rolls or TURNS) if any(fixes) else 1 for hold in holds], dtype=np.int32)
+        each = np.repeat(np.arange(len(holds), dtype=np.int32), counts)
+        turn = np.arange(len(each)) - np.repeat(np.cumsum(counts) - counts, counts)
+        angle = 2.0 * np.pi * turn / counts[each]
+        given = np.array([hold.pose.rotation for hold in holds]).reshape(-1, 3, 3)[each]
+        across, beside = given[:, :, 0], given[:, :, 1]
+        spun = given.copy()
+        spun[:, :, 0] = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * beside
+        spun[:, :, 1] = np.cos(angle)[:, None] * beside - np.sin(angle)[:, None] * across
+        contacts, turned = list[int](), list[int]()
         for limb, k in enumerate(() if start is None else start.contacts):
-            at = hold.index(k) if k >= 0 else FREE_LIMB
-            if start is not None and k >= 0 and fixes[limb]:
-                at = len(poses)
-                poses.append(place(held_pose(climber, self.scene, limb, k, start.q)))
-                hold.append(k)
-                turned.append(True)
-            contacts.append(at)
-        return np.array(poses), np.array(hold, dtype=np.int32), np.array(turned), tuple(contacts)
+            if k >= 0 and fixes[limb]:
+                contacts.append(len(each) + len(turned))
+                turned.append(limb)
+            else:
+                contacts.append(int(np.searchsorted(each, k)) if k >= 0 else FREE_LIMB)
+        poses = np.hstack([spun.reshape(-1, 9), self.scene.positions.reshape(-1, 3)[each]])
+        if start is not None and turned:
+            rows = [start.contacts[limb] for limb in turned]
+            held = [place(held_pose(climber, self.scene, limb, start.contacts[limb], start.q)) for limb in turned]
+            poses, each = np.vstack([poses, held]), np.append(each, rows)
+        moved = np.append(turn > 0, np.ones(len(turned), dtype=bool))
+        return np.ascontiguousarray(poses), each.astype(np.int32), moved, tuple(contacts)
 
     def _shapes_of_cones(self, turned: Array, share: float) -> tuple[Any, NDArray[np.int32]]:
         """Each cone once, and which of them each limb has at each place, -1 where it may not hold."""
         limbs, holds = self.climber.limbs, self.scene.footholds
         table = np.full((len(limbs), len(holds)), FREE_LIMB, dtype=np.int32)
-        known: dict[tuple[int, float], int] = {}
+        frictions = np.array([float(hold.friction) for hold in holds])
         self._slack_cones: list[SlackCone] = []
         for limb, one in enumerate(limbs):
-            own = float(getattr(one.contact, "friction", np.inf))
-            for k, hold in enumerate(holds):
-                if hold.limbs and one.name not in hold.limbs:
-                    continue
-                key = (limb, share * min(own, float(hold.friction)))
-                if key not in known:
-                    known[key] = len(self._slack_cones)
-                    self._slack_cones.append(SlackCone.of(_slipping(one.contact, key[1])))
-                table[limb, k] = known[key]
+            able = np.array([not hold.limbs or one.name in hold.limbs for hold in holds], dtype=bool)
+            own = share * np.minimum(float(getattr(one.contact, "friction", np.inf)), frictions)
+            for friction in dict.fromkeys(own[able].tolist()):
+                table[limb, able & (own == friction)] = len(self._slack_cones)
+                self._slack_cones.append(SlackCone.of(_slipping(one.contact, friction)))
         numbers = (_ConeNumbers * max(1, len(self._slack_cones)))()
         self._cone_arrays = []
         for row, cone in zip(numbers, self._slack_cones, strict=False):
@@ -435,41 +438,15 @@ class ClimbWorld:
 
     def _bodies(self, spare: float) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
         """Pieces of the robot with their links' names, all shapes, poses of the bodies, and pairs of pieces."""
-        climber, model = self.climber, self.climber.robot.model
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, climber.rest)
-        last_step = {
-            joint: (limb, steps - 1)
-            for limb, chain in enumerate(climber.chains)
-            for joint, steps in zip(chain, self.limbs.steps_to[limb], strict=True)
-        }
-        depths = {body.name: deepest(sink) - spare for tips in sunk_tips(climber) for body, sink in tips}
-        names = [body.name for body in bodies_of(climber.robot)]
-        found: list[tuple[int, int, pin.SE3]] = []
-        links: list[str] = []
-        shapes: list[Any] = []
-        for link, group in climber.robot.shapes.items():
-            frame = frame_index(model, link)
-            parent = int(model.frames[frame].parentJoint)
-            on = next((int(j) for j in reversed(list(model.supports[parent])) if int(j) in last_step), 1)
-            limb, step = last_step.get(on, (-1, -1))
-            for placed in group:
-                at = data.oMi[on].actInv(data.oMf[frame]) * _centre(placed)
-                found.append((limb, step, at))
-                links.append(link)
-                shapes.append(placed.shape)
-        pieces = (_PieceNumbers * max(1, len(found)))()
-        for k, (name, (limb, step, at)) in enumerate(zip(names, found, strict=True)):
-            pieces[k] = _PieceNumbers(limb, step, k, int(name in depths), depths.get(name, 0.0), tuple(place(at)))
+        robot = _pieces_of(self.climber, self.margin)
+        links, shapes = robot.links, list(robot.shapes)
+        pieces = (_PieceNumbers * max(1, len(links)))()
+        for k, (limb, step, sunk, at) in enumerate(robot.places):
+            pieces[k] = _PieceNumbers(limb, step, k, int(sunk is not None), 0.0 if sunk is None else sunk - spare, at)
         bodies = list(self.scene.bodies.values())
         shapes += [body.shape for body in bodies]
         poses = np.array([place(_centre(body)) for body in bodies]).reshape(-1, 12)
-        rows: dict[str, list[int]] = {}
-        for k, link in enumerate(links):
-            rows.setdefault(link, []).append(k)
-        chosen = climber.robot.self_pairs or ()
-        pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
-        return pieces, links, shapes, poses, np.array(pairs, dtype=np.int32).ravel()
+        return pieces, links, shapes, poses, robot.pairs
 
     def _at_rest(self) -> Array:
         """Contact poses at rest in the body's frame ``(limbs, 12)``."""
@@ -477,6 +454,51 @@ class ClimbWorld:
         body = climber.body_pose(climber.rest)
         poses = [body.actInv(climber.contact_pose(climber.rest, limb)) for limb in range(len(climber.limbs))]
         return np.ascontiguousarray([place(pose) for pose in poses])
+
+
+class _Pieces(NamedTuple):
+    """Shapes of a climber on its limbs.
+
+    Attributes:
+        links: of each shape. shapes: all. pairs: of shapes that may touch, one after the other ``(2 n)``.
+        places: limb and its step (-1, -1: the body), how deep the tip of a limb may be in what it holds [m], None:
+            it is no tip; the pose there, twelve numbers.
+    """
+
+    links: list[str]
+    shapes: list[Any]
+    pairs: NDArray[np.int32]
+    places: list[tuple[int, int, float | None, tuple[float, ...]]]
+
+
+@functools.lru_cache(maxsize=16)
+def _pieces_of(climber: Climber, margin: float) -> _Pieces:
+    """Those of a climber, made once."""
+    model, limbs = climber.robot.model, limb_table(climber, margin)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, climber.rest)
+    last_step = {
+        joint: (limb, steps - 1)
+        for limb, chain in enumerate(climber.chains)
+        for joint, steps in zip(chain, limbs.steps_to[limb], strict=True)
+    }
+    depths = {body.name: deepest(sink) for tips in sunk_tips(climber) for body, sink in tips}
+    names = iter(body.name for body in bodies_of(climber.robot))
+    found = _Pieces([], [], np.zeros(0, dtype=np.int32), [])
+    rows: dict[str, list[int]] = {}
+    for link, group in climber.robot.shapes.items():
+        frame = frame_index(model, link)
+        parent = int(model.frames[frame].parentJoint)
+        on = next((int(j) for j in reversed(list(model.supports[parent])) if int(j) in last_step), 1)
+        for placed in group:
+            at = data.oMi[on].actInv(data.oMf[frame]) * _centre(placed)
+            rows.setdefault(link, []).append(len(found.links))
+            found.places.append((*last_step.get(on, (-1, -1)), depths.get(next(names)), tuple(place(at))))
+            found.links.append(link)
+            found.shapes.append(placed.shape)
+    chosen = climber.robot.self_pairs or ()
+    pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
+    return found._replace(pairs=np.array(pairs, dtype=np.int32).ravel())
 
 
 def _slipping(kind: ContactKind, friction: float) -> ContactKind:

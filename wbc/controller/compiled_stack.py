@@ -51,6 +51,8 @@ class CompiledStack(Handles):
         self._q_shape, self._v_shape = (core.layout.nq,), (core.layout.nv,)
         self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.sensors)
         self._plans, self._cycle = core.together.plans, core.together.none.cycle
+        #: of the targets of the last step that had any, in one call
+        self._cycle_with_targets = self._cycle
         self._busy = False
 
     def step(self, q: Any, v: Any = None, dt: Any = None, **targets: Any) -> Step:
@@ -77,18 +79,11 @@ class CompiledStack(Handles):
         core = self._core
         if v is None and dt is None and not core.waits and core.call is core.plain_call:
             # In one call, with the interpreter's lock, so that no other thread is within
-            if not targets:
-                done = self._cycle(q)
-            elif (plan := self._plans.get(tuple(targets))) is None:
-                done = REFUSED
-            else:
-                done = plan.cycle(q, *targets.values())
-                if done == REFUSED:
-                    done = plan.cycle(q, *[x.homogeneous if is_pose(x) else x for x in targets.values()])
-                if core.first and (isinstance(done, bytes) or done >= 0):
-                    core.let_go(plan.slots)
-            if isinstance(done, bytes):
-                return Step(done, self._context)
+            done = (self._cycle_with_targets if targets else self._cycle)(q, targets)
+            if type(done) is int and done == REFUSED and targets:
+                done = self._cycle_as_planned(q, targets)
+            if type(done) is Step:
+                return done
             if done >= 0:
                 return self._finished(done, q)
         if targets:
@@ -115,6 +110,17 @@ class CompiledStack(Handles):
             return Step(self._snapshot(), self._context)
         finally:
             self._busy = False
+
+    def _cycle_as_planned(self, q: Any, targets: dict[str, Any]) -> Step | int:
+        """The same of other targets than those of the last step, or of poses that are no arrays."""
+        plan = self._plans.get(tuple(targets))
+        if plan is None:
+            return REFUSED
+        done: Step | int = plan.cycle(q, {name: x.homogeneous if is_pose(x) else x for name, x in targets.items()})
+        if isinstance(done, Step) or done >= 0:
+            self._core.let_go(plan.slots)
+            self._cycle_with_targets = plan.cycle
+        return done
 
     def _finished(self, flag: int, q: Any) -> Step:
         """A step after its tick."""

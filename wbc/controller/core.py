@@ -25,11 +25,11 @@ from wbc.tick.buffers import BAD_V
 from wbc.tick.context import Context
 from wbc.tick.generic import GenericTick
 from wbc.tick.native import CompiledTick, NativeTick
-from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.controller.escape import Escape
+    from wbc.tick.solved import SolvedTick
 
 
 def assembly_of(stack: Declaration, artifact: Artifact) -> CompiledTick:
@@ -90,8 +90,11 @@ class Core:
         layout = self.layout
         self.row_costs: Array = 1.0 / layout.row_scales(stack) ** 2
         self.assembly = assembly_of(stack, artifact) if assembly is None else assembly
-        solved = None if solver == "daqp" else SolvedTick(self.assembly, stack, layout, solver)
-        self.tick: CompiledTick | SolvedTick = solved or self.assembly
+        self.tick: CompiledTick | SolvedTick = self.assembly
+        if solver != "daqp":
+            from wbc.tick.solved import SolvedTick
+
+            self.tick = SolvedTick(self.assembly, stack, layout, solver)
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
         self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
         self._tick_call = self.call
@@ -99,14 +102,14 @@ class Core:
         self.may_change, self.assembly.wake = True, self._wake
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
-        self.snapshot: Callable[[], bytes] = self.tick.state.data.cast("B").tobytes
+        self.snapshot = self.assembly.snapshot
         self.resets, self.ramps = 0, Ramps()
         self.recording: pathlib.Path | None = None
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self.first: dict[Slot, str] = {}
         self.waiting: dict[Slot, str] = {}
         self.handles = {name: Handle(self, block) for name, block in layout.blocks.items()}
-        self.together = Together(self.handles, self.assembly)
+        self.together = Together(self.handles, self.context)
         #: where a pose waits to be taken, and what takes it
         self._poses: dict[Slot, tuple[memoryview, Callable[[], int]]] = {}
         self.directions = Directions(layout, self.tick, self.handles)
@@ -232,7 +235,7 @@ class Core:
         return True
 
     def _add_pose(self, slot: Slot) -> tuple[memoryview, Callable[[], int]]:
-        plan = Plan(self.assembly, [slot], [POSE])
+        plan = Plan(self.context, [slot], [POSE])
         self._poses[slot] = plan.places[0], plan.take
         return self._poses[slot]
 

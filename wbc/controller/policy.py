@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
+from wbc.quick_dataclasses import dataclass
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -23,8 +25,10 @@ from wbc.tick.buffers import (
     UNSOUND,
 )
 from wbc.tick.native import CompiledTick
-from wbc.tick.solved import SolvedTick
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.tick.solved import SolvedTick
 
 #: What to do with rows that cannot all hold
 CONFLICTS = ("elastic", "brake")
@@ -169,5 +173,7 @@ class Fallback:
 
                 self._links[name] = ElasticTick(assembly, stack, layout)
             else:
+                from wbc.tick.solved import SolvedTick
+
                 self._links[name] = SolvedTick(assembly, stack, layout, name)
         return self._links[name]

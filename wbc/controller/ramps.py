@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
+
+from wbc.quick_dataclasses import dataclass
 
 #: Share of the larger weight at which a weight of zero begins or ends
 _FLOOR = 1e-6

@@ -10,7 +10,6 @@ import numpy as np
 
 from wbc.errors import CommandError
 from wbc.qp.certificate import Certificate
-from wbc.robot import DeadPoint
 from wbc.stack.declaration import bends
 from wbc.stack.layout import CLOSED, rate_unit
 from wbc.tick.buffers import INFINITE
@@ -30,6 +29,7 @@ from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.explain import Explanation
+    from wbc.robot import DeadPoint
 
 _FLOAT = np.dtype(np.float64)
 _DOUBLE = struct.Struct("d").unpack_from
@@ -54,13 +54,25 @@ class Step:
     @property
     def v(self) -> Array:
         """Velocities [rad/s, m/s], nv, read-only: the command, or where the command is an acceleration the velocity
-        that it leads to until the next tick.
+        that it leads to until the next tick; of a robot with loops the nearest that keeps them closed at
+        :attr:`q_next`.
+        """
+        return self._context.v_of(self._data)
+
+    @property
+    def q_next(self) -> Array:
+        """Configuration that the command leads to until the next tick [nq], read-only: q (+) v dt, or
+        q (+) (v dt + a dt^2 / 2) of accelerations a, see :meth:`wbc.robot.Robot.integrate`; of accelerations of a robot
+        with loops the nearest that closes them.
         """
         context = self._context
-        if context.command == "velocity":
-            # As in `command`: every loop asks for this in every tick
-            return np.frombuffer(self._data, _FLOAT, context.nv)
-        later = self._part("v_in")[: self._context.nv] + self._number("dt") * self.command
+        if len(self._data) > context.size:
+            return context.q_next_of(self._data)
+        robot = context.stack.robot
+        if context.command != "velocity" and robot.loops:
+            return self._part("next_q")
+        mean = self.v if context.command == "velocity" else 0.5 * (self._part("v_in")[: context.nv] + self.v)
+        later = robot.integrate(self._part("q"), mean, self._number("dt"))
         later.flags.writeable = False
         return later
 
@@ -183,7 +195,7 @@ class Step:
     def lost(self) -> Mapping[str, Array]:
         """What equality rows lose at q (+) v dt, by item: how much further from its target than J v = -gain e says the
         item is then [m, rad]. Beyond 1e-3 of ``stack.length`` per second, or rad/s, rows are in ``relaxed`` with it.
-        docs/reach.md
+        docs/reach.md. Of accelerations what loops are open by at :attr:`q_next`.
         """
         values = self._part("lost")
         return {b.entry.name: values[b.span] for b in self._context.layout.of_form("rows") if bends(b.entry)}
@@ -298,4 +310,4 @@ def state_of(step: Step) -> bytes:
     """A step's copy of its tick: report and inputs, laid out as :class:`wbc.stack.memory.Memory` says. With the
     controller's :class:`Context` it is the step again, also in another process.
     """
-    return step._data
+    return step._data[: step._context.size]

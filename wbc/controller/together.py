@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
 from wbc.controller.handle import POSE, Handle
+from wbc.controller.step import Step
 from wbc.errors import ShapeError
 from wbc.stack.layout import Slot
-from wbc.tick.native import CompiledTick
+from wbc.tick.context import Context
 
 _POSE_SHAPE = (4, 4)
 
@@ -22,10 +23,10 @@ class Plan:
     Attributes:
         places: where each value's bytes wait. shapes: of its array. slots: of the inputs.
         take: check them all and write them; 0, and nothing written, where one is refused.
-        cycle: the same, and a tick, see :meth:`wbc.tick.native.CompiledTick.cycler`.
+        cycle: the same by ``names``, and a tick, see :meth:`wbc.tick.native.CompiledTick.cycler`.
     """
 
-    def __init__(self, assembly: CompiledTick, slots: list[Slot], kinds: list[int]) -> None:
+    def __init__(self, context: Context, slots: list[Slot], kinds: list[int], names: Sequence[str] = ()) -> None:
         self.slots = slots
         self.shapes = [_POSE_SHAPE if kind == POSE else (slot.size,) for slot, kind in zip(slots, kinds, strict=True)]
         sizes = [int(np.prod(shape)) for shape in self.shapes]
@@ -37,19 +38,21 @@ class Plan:
         ends = 8 * np.cumsum(sizes)
         whole = staged.data.cast("B")
         self.places = [whole[end - 8 * size : end] for end, size in zip(ends.tolist(), sizes, strict=True)]
+        assembly = context.assembly
+        assert assembly is not None
         self.take = assembly.taker(staged, table)
-        self.cycle = assembly.cycler(staged, table)
+        self.cycle = assembly.cycler(staged, table, names, Step, context)
 
 
 class Together:
     """Sets values of several items: quickly where one native call can check them, else one by one."""
 
-    def __init__(self, handles: Mapping[str, Handle], assembly: CompiledTick) -> None:
-        self._handles, self._assembly = handles, assembly
+    def __init__(self, handles: Mapping[str, Handle], context: Context) -> None:
+        self._handles, self._context = handles, context
         #: of names that were given together and can be taken quickly
         self.plans: dict[tuple[str, ...], Plan] = {}
         #: of no names
-        self.none = Plan(assembly, [], [])
+        self.none = Plan(context, [], [])
 
     def plan(self, values: Mapping[str, Any]) -> Plan | None:
         """How the targets of these items are taken quickly, from now on; None where they cannot be.
@@ -65,7 +68,7 @@ class Together:
         known = [kind for kind in kinds if kind is not None]
         if len(known) < len(kinds):
             return None
-        plan = self.plans[tuple(values)] = Plan(self._assembly, slots, known)
+        plan = self.plans[tuple(values)] = Plan(self._context, slots, known, tuple(values))
         return plan
 
     def carefully(self, values: Mapping[str, Any]) -> None:

@@ -54,7 +54,7 @@ class PastTick:
         self.stack, self.layout = stack, layout
         self.places = Memory(layout)
         self.tick = assembly.twin()
-        self.tick.state[:] = np.frombuffer(data)
+        self.tick.state[:] = np.frombuffer(data, count=self.tick.state.size)
         self.tick.v_last[:] = self.tick.v_in
         self.tick.use_v[0] = 0.0
         self.report = self.tick.report.copy()

@@ -57,7 +57,14 @@ def _sizes(snapshot: Snapshot) -> str:
 
 
 #: Sizes in the public header
-_MACROS = {"NV": "WBC_VARIABLES", "MT": "WBC_TASK_ROWS", "MC": "WBC_ROWS", "MH": "WBC_MARGINS", "DOFS": "WBC_NV"}
+_MACROS = {
+    "NV": "WBC_VARIABLES",
+    "MT": "WBC_TASK_ROWS",
+    "MC": "WBC_ROWS",
+    "MH": "WBC_MARGINS",
+    "DOFS": "WBC_NV",
+    "NQ": "WBC_NQ",
+}
 
 
 def _result(snapshot: Snapshot) -> str:

@@ -58,7 +58,7 @@ NEEDED = {"mcap": "formats", "rrd": "rerun", "lerobot": "recordings", "foxglove"
 
 
 def convert(
-    run: str | os.PathLike[str],
+    run: str | os.PathLike[str] | Run,
     to: str,
     out: str | os.PathLike[str] | None = None,
     *,
@@ -89,21 +89,19 @@ def convert(
     """
     validation.one_of("to", to, FORMATS)
     rate = validation.scalar("rate", rate, low=1e-3, high=1e4, unit="1/s")
-    source = run_of(run, trust)
-    place = pathlib.Path(out) if out is not None else source.path.with_suffix(f".{to}")
-    if to == "foxglove":
-        place = pathlib.Path(out or "")
-    elif out is None and place == source.path:
-        place = place.with_name(f"{place.stem}.converted.{to}")
+    source = run if isinstance(run, Run) else run_of(run, trust)
+    served = to == "foxglove"
+    beside = source.path.with_suffix(f".{to}" if source.path.suffix != f".{to}" else f".converted.{to}")
+    place = pathlib.Path(out or "") if served else _free(out or beside)
     # Written beside its place, but what another program shall read meanwhile
-    fresh = place if wait is not None or to == "foxglove" else place.with_name(f".{place.name}")
+    fresh = place if wait is not None or served else place.with_name(f".{place.name}")
     count = 0
     try:
-        if to != "foxglove" and place.exists():
-            raise FormatError("out", str(place), "there is such a file; choose another")
-        _remove(fresh) if fresh != place else None
-        sink = FORMATS[to](fresh)
-        try:
+        with contextlib.ExitStack() as undone:
+            if fresh != place:
+                _remove(fresh)
+                undone.callback(_remove, fresh)
+            sink = FORMATS[to](fresh)
             sink.begin(source)
             for log, seen in source.pieces(wait, rate):
                 sink.write(log, seen)
@@ -111,14 +109,18 @@ def convert(
                 if progress is not None:
                     progress(count)
             sink.close()
-        except BaseException:
-            _remove(fresh) if fresh != place else None
-            raise
-        if fresh != place:
-            fresh.replace(place)
+            if fresh != place:
+                fresh.replace(place)
     except OSError as error:
         raise FormatError("out", str(place), f"cannot be written: {error.strerror}") from error
     return place, source.remarks
+
+
+def _free(out: str | os.PathLike[str]) -> pathlib.Path:
+    place = pathlib.Path(out)
+    if place.exists():
+        raise FormatError("out", str(place), "there is such a file; choose another")
+    return place
 
 
 def _remove(place: pathlib.Path) -> None:
@@ -181,10 +183,7 @@ def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | N
     if to in NEEDED:
         extras.require(NEEDED[to], f"a run as {to}")
     path = validation.file_path("run", run)
-    place = path.with_suffix(f".{to}") if out is None else pathlib.Path(out)
-    if place.exists():
-        raise FormatError("out", str(place), "there is such a file; choose another")
-    return RunCopy(path, to, place)
+    return RunCopy(path, to, _free(out or path.with_suffix(f".{to}")))
 
 
 @contextlib.contextmanager
@@ -231,17 +230,14 @@ def main(run: str, to: str, out: str) -> None:
         time.sleep(LOOK)
         return running
 
-    path = pathlib.Path(run)
-    while not (path.is_file() and path.stat().st_size) and wait():
-        pass
     while True:
         try:
-            run_of(path)
+            source = run_of(run)
             break
         except WbcError:
             if not wait():
                 raise
-    convert(run, to, out, wait=wait)
+    convert(source, to, out, wait=wait)
 
 
 if __name__ == "__main__":

@@ -8,15 +8,13 @@ from typing import Any
 
 from wbc import extras
 from wbc.formats.errors import FormatError
-from wbc.formats.messages import SCHEMAS, TICK, Message, TickTree, of_scene, of_seen, of_ticks
-from wbc.formats.run import Run, SeenTick
-from wbc.log import Log
+from wbc.formats.messages import NANO, Message, MessageSink
 
 #: Port that Foxglove proposes
 PORT = 8765
 
 
-class FoxgloveSink:
+class FoxgloveSink(MessageSink):
     """A server on this machine, which plays a run at the speed at which it was, or as it is written.
 
     Args:
@@ -59,23 +57,15 @@ class FoxgloveSink:
         """Where it listens."""
         return int(self._server.port)
 
-    def begin(self, run: Run) -> None:
-        """Announce the topics."""
-        self._tree = TickTree(run.units)
-        for topic, schema in {TICK: self._tree.schema, **SCHEMAS}.items():
-            self._channels[topic] = self._foxglove.Channel(topic, schema=schema, context=self._context)
-        self._bodies = list(of_scene(run))
-        for message in self._bodies:
-            self._put(message)
+    def _open(self, topic: str, schema: dict[str, Any]) -> None:
+        self._channels[topic] = self._foxglove.Channel(topic, schema=schema, context=self._context)
 
-    def write(self, log: Log, seen: list[SeenTick]) -> None:
-        """Say each tick when its time has come."""
-        messages = [*of_ticks(log, self._tree), *(message for moment in seen for message in of_seen(moment))]
-        for message in sorted(messages, key=lambda message: message.time):
-            if self._began is None:
-                self._began = time.monotonic() - message.time * 1e-9
-            time.sleep(max(0.0, self._began + message.time * 1e-9 - time.monotonic()))
-            self._put(message)
+    def _say(self, message: Message) -> None:
+        seconds = message.time / NANO
+        if self._began is None:
+            self._began = time.monotonic() - seconds
+        time.sleep(max(0.0, self._began + seconds - time.monotonic()))
+        self._put(message)
 
     def _put(self, message: Message) -> None:
         self._channels[message.topic].log(message.data, log_time=message.time)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import pathlib
 import time
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from wbc import extras
-from wbc.formats.messages import SCHEMAS, TICK, Message, TickTree, of_scene, of_seen, of_ticks
+from wbc.formats.messages import TICK, Message, MessageSink
 from wbc.formats.run import Run, SeenTick
 from wbc.log import Log
 
@@ -22,7 +23,7 @@ CHUNK = 1 << 18
 OLD = 0.5
 
 
-class McapSink:
+class McapSink(MessageSink):
     """An MCAP file of JSON messages, in chunks compressed by zstd.
 
     Raises:
@@ -38,32 +39,30 @@ class McapSink:
         self._file, self._flushed = path.open("xb"), time.monotonic()
         self._writer: Writer = Writer(self._file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
         self._channels = dict[str, int]()
-        self._counts = dict[str, int]()
+        self._counts = Counter[str]()
 
     def begin(self, run: Run) -> None:
         """Schemas, what is said of the run, and bodies."""
         self._writer.start("", "wbc")
         self._writer.add_metadata("wbc", {"about": json.dumps(run.about), "remarks": "; ".join(run.remarks)})
-        self._tree = TickTree(run.units)
-        for topic, schema in {TICK: self._tree.schema, **SCHEMAS}.items():
-            number = self._writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
-            columns = {"columns": json.dumps(self._tree.names)} if topic == TICK else {}
-            self._channels[topic] = self._writer.register_channel(topic, "json", number, columns)
-        for message in of_scene(run):
-            self._put(message)
+        super().begin(run)
 
     def write(self, log: Log, seen: list[SeenTick]) -> None:
         """Ticks, and what is seen of some of them, by their times."""
-        messages = [*of_ticks(log, self._tree), *(message for moment in seen for message in of_seen(moment))]
-        for message in sorted(messages, key=lambda message: message.time):
-            self._put(message)
+        super().write(log, seen)
         if time.monotonic() > self._flushed + OLD:
             self._writer.flush()  # type: ignore[no-untyped-call]  # of the package
             self._flushed = time.monotonic()
 
+    def _open(self, topic: str, schema: dict[str, Any]) -> None:
+        number = self._writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
+        columns = {"columns": json.dumps(self._tree.names)} if topic == TICK else {}
+        self._channels[topic] = self._writer.register_channel(topic, "json", number, columns)
+
     def _put(self, message: Message) -> None:
-        count = self._counts[message.topic] = self._counts.get(message.topic, -1) + 1
+        self._counts[message.topic] += 1
         data: Any = self._encoder.encode(message.data)
+        count = self._counts[message.topic] - 1
         self._writer.add_message(self._channels[message.topic], message.time, data, message.time, count)
 
     def close(self) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ NANO = 1_000_000_000
 WORLD = "world"
 #: Length of the axes that mark a target [m]
 AXIS = 0.1
+#: Quaternions x, y, z, w that turn an arrow, which points along x, along each axis
+TURNS = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), (0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)))
 #: Members of a group that keep their names in each tick, at most
 NAMED = 3
 #: Level of foxglove.Log: rows gave way
@@ -73,12 +76,11 @@ class TickTree:
             group, _, member = name.partition(".")
             if member in joints and group in JOINT_PARTS:
                 continue
-            node, *path = nodes, *name.split(".")
-            for part in path[:-1]:
-                below = node.get(part)
-                # A column may be called as what others begin with
-                node[part] = node = below if isinstance(below, dict) else {} if below is None else {"": below}
-            node[path[-1]] = {**node[path[-1]], "": name} if isinstance(node.get(path[-1]), dict) else name
+            node = nodes
+            for part in name.split("."):
+                node = node.setdefault(part, {})
+            # A column may be called as what others begin with
+            node[""] = name
         self.names: list[str] = []
         self._units, self._make = units, list[tuple[str, Any]]()
         self.schema = schema_of({"status": ""}, TICK_SCHEMA)
@@ -86,24 +88,29 @@ class TickTree:
             self.schema["properties"][key], shape = self._laid_out(node)
             self._make.append((key, shape))
 
-    def _laid_out(self, node: Any) -> tuple[dict[str, Any], Any]:
+    def _laid_out(self, node: dict[str, Any]) -> tuple[dict[str, Any], Any]:
         """(schema, shape) of a node; a shape is a place, a slice, or shapes by key."""
-        if isinstance(node, str):
-            self.names.append(node)
-            unit = self._units[node]
-            return schema_of(0.0) | ({"description": f"[{unit}]"} if unit else {}), len(self.names) - 1
-        if len(node) > NAMED and all(isinstance(child, str) for child in node.values()):
-            begin = len(self.names)
-            self.names += node.values()
-            said = [f"{key} [{self._units[name]}]" if self._units[name] else key for key, name in node.items()]
+        begin, columns = len(self.names), {key: _column(below) for key, below in node.items()}
+        if "" in node and len(node) == 1:
+            self.names.append(node[""])
+            unit = self._units[node[""]]
+            return schema_of(0.0) | ({"description": f"[{unit}]"} if unit else {}), begin
+        if len(node) > NAMED and all(columns.values()):
+            self.names += columns.values()
+            said = [f"{key} [{unit}]" if (unit := self._units[name]) else key for key, name in columns.items()]
             return schema_of([0.0]) | {"description": ", ".join(said)}, slice(begin, len(self.names))
-        found = {key: self._laid_out(child) for key, child in node.items()}
-        schemas = {key: schema for key, (schema, _) in found.items()}
-        return {"type": "object", "properties": schemas}, {key: shape for key, (_, shape) in found.items()}
+        parts = {key: self._laid_out({"": below} if key == "" else below) for key, below in node.items()}
+        schemas = {key: schema for key, (schema, _) in parts.items()}
+        return {"type": "object", "properties": schemas}, {key: shape for key, (_, shape) in parts.items()}
 
     def tick(self, numbers: list[float]) -> dict[str, Any]:
         """The message of a tick, from its numbers in the order of :attr:`names`."""
         return {key: _filled(shape, numbers) for key, shape in self._make}
+
+
+def _column(node: Any) -> str:
+    """The column that a node is, or ""."""
+    return node if isinstance(node, str) else str(node.get("", "")) if len(node) == 1 else ""
 
 
 def _filled(shape: Any, numbers: list[float]) -> Any:
@@ -114,28 +121,13 @@ def _filled(shape: Any, numbers: list[float]) -> Any:
 
 def of_ticks(log: Log, tree: TickTree) -> Iterator[Message]:
     """Two messages for each tick: all its numbers, and its joints. What is not finite is null."""
-    rows = np.column_stack([log[name] for name in tree.names]).tolist()
-    joints, parts = _joints(log)
-    motions = [(part, log.array(group).tolist(), places) for part, group, places in parts]
-    turning = _unbounded(log.units)
-    angles = np.array([np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]) for name in turning]).T.tolist()
+    rows, joints = np.column_stack([log[name] for name in tree.names]).tolist(), _joints(log)
     codes = log["flag"].tolist() if "flag" in log else None
     for k, time in enumerate(nanoseconds(log["t"])):
-        tick = tree.tick(rows[k])
-        if codes is not None:
-            tick["status"] = str(STATUSES[codes[k]])
-        yield Message(TICK, time, tick)
-        if joints or turning:
-            states: list[dict[str, Any]] = [{"name": name} for name in joints]
-            for part, numbers, places in motions:
-                row = numbers[k]
-                for state, place in zip(states, places, strict=True):
-                    if place is not None:
-                        state[part] = row[place]
-            for j, name in enumerate(turning):
-                states.append({"name": name, "position": angles[k][j]})
-                if f"v.{name}" in log:
-                    states[-1]["velocity"] = float(log[f"v.{name}"][k])
+        said = {"status": str(STATUSES[codes[k]])} if codes else {}
+        yield Message(TICK, time, tree.tick(rows[k]) | said)
+        if joints:
+            states = [{"name": name} | {part: row[k] for part, row in parts.items()} for name, parts in joints.items()]
             yield Message("/joint_states", time, {"timestamp": stamp(time), "joints": states})
 
 
@@ -144,21 +136,17 @@ def _single(units: Mapping[str, str]) -> list[str]:
     return [name[2:] for name, unit in units.items() if name.startswith("q.") and unit in ("rad", "m")]
 
 
-def _unbounded(units: Mapping[str, str]) -> list[str]:
-    """Joints whose two coordinates are the cosine and sine of an angle."""
-    pairs = [name[2:-2] for name in units if name.startswith("q.") and name.endswith(".1")]
-    return [name for name in pairs if f"q.{name}.0" in units and f"q.{name}.2" not in units]
-
-
-def _joints(log: Log) -> tuple[list[str], list[tuple[str, str, list[int | None]]]]:
-    """(joints with one coordinate, (field of a joint's state, group of columns, its places in it) of each)."""
-    joints, parts = _single(log.units), []
+def _joints(log: Log) -> dict[str, dict[str, list[float]]]:
+    """Joint -> field of its state -> a number a tick; the two coordinates of one without end are an angle."""
+    out: dict[str, dict[str, list[float]]] = {name: {} for name in _single(log.units)}
+    for name in [name[2:-2] for name in log.units if name.startswith("q.") and name.endswith(".1")]:
+        if f"q.{name}.2" not in log:
+            out[name] = {"position": np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]).tolist()}
     for group, part in JOINT_PARTS.items():
-        names = [*log.group(group)]
-        places = [names.index(name) if name in names else None for name in joints]
-        if any(place is not None for place in places):
-            parts.append((part, group, places))
-    return joints, parts
+        for name, row in log.group(group).items():
+            if name in out:
+                out[name][part] = row.tolist()
+    return out
 
 
 def of_scene(run: Run, time: int = 0) -> Iterator[Message]:
@@ -176,14 +164,9 @@ def of_seen(seen: SeenTick) -> Iterator[Message]:
     placed |= {f"target/{name}": pose for name, pose in seen.targets.items()}
     placed |= {f"obstacle/{name}": pose for name, pose in seen.obstacles.items()}
     if placed:
+        place = {"timestamp": stamp(time), "parent_frame_id": WORLD}
         transforms = [
-            {
-                "timestamp": stamp(time),
-                "parent_frame_id": WORLD,
-                "child_frame_id": name,
-                "translation": _named(pose[:3]),
-                "rotation": _named(pose[3:]),
-            }
+            place | {"child_frame_id": name, "translation": _named(pose[:3]), "rotation": _named(pose[3:])}
             for name, pose in placed.items()
             if name != WORLD
         ]
@@ -214,11 +197,10 @@ def _named(numbers: Array) -> dict[str, float]:
 
 
 def _body(frame: str, mesh: DrawnMesh, time: int) -> dict[str, Any]:
-    r, g, b = (part / 255.0 for part in mesh.colour)
     surface = {
-        "pose": {"position": _named(np.zeros(3)), "orientation": _named(np.array([0.0, 0.0, 0.0, 1.0]))},
+        "pose": _pose(TURNS[0]),
         "points": [_named(point) for point in mesh.corners.round(5).astype(float)],
-        "color": {"r": r, "g": g, "b": b, "a": 1.0},
+        "color": _colour([part / 255.0 for part in mesh.colour]),
         "indices": mesh.triangles.ravel().tolist(),
     }
     return _entity(frame, f"body/{frame}", time) | {"triangles": [surface]}
@@ -226,26 +208,54 @@ def _body(frame: str, mesh: DrawnMesh, time: int) -> dict[str, Any]:
 
 def _target(name: str, time: int) -> dict[str, Any]:
     """The three axes of a target."""
-    half, arrows = float(np.sqrt(0.5)), []
-    # Arrows point along x
-    turns = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, half, half), (0.0, -half, 0.0, half))
-    for k, turn in enumerate(turns):
-        arrows.append(
-            {
-                "pose": {"position": _named(np.zeros(3)), "orientation": _named(np.array(turn))},
-                "shaft_length": 0.8 * AXIS,
-                "shaft_diameter": 0.05 * AXIS,
-                "head_length": 0.2 * AXIS,
-                "head_diameter": 0.1 * AXIS,
-                "color": {"r": float(k == 0), "g": float(k == 1), "b": float(k == 2), "a": 1.0},
-            }
-        )
-    return _entity(f"target/{name}", f"target/{name}", time) | {"arrows": arrows}
+    sizes = {"shaft_length": 0.8, "shaft_diameter": 0.05, "head_length": 0.2, "head_diameter": 0.1}
+    arrow = {name: AXIS * share for name, share in sizes.items()}
+    axes = [{"pose": _pose(turn)} | arrow | {"color": _colour(np.eye(3)[k])} for k, turn in enumerate(TURNS)]
+    return _entity(f"target/{name}", f"target/{name}", time) | {"arrows": axes}
+
+
+def _pose(turn: Sequence[float]) -> dict[str, Any]:
+    return {"position": _named(np.zeros(3)), "orientation": _named(np.array(turn))}
+
+
+def _colour(numbers: Iterable[float]) -> dict[str, float]:
+    return dict(zip("rgba", [*map(float, numbers), 1.0], strict=True))
 
 
 def _entity(frame: str, name: str, time: int) -> dict[str, Any]:
     still = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True}
     return {"timestamp": stamp(time), "frame_id": frame, "id": name} | still
+
+
+class MessageSink(ABC):
+    """A :class:`~wbc.formats.conversion.Sink` of messages by their times; who inherits has channels to put them in."""
+
+    def begin(self, run: Run) -> None:
+        """Schemas, and bodies."""
+        self._tree = TickTree(run.units)
+        for topic, schema in {TICK: self._tree.schema, **SCHEMAS}.items():
+            self._open(topic, schema)
+        self._bodies = list(of_scene(run))
+        for message in self._bodies:
+            self._put(message)
+
+    def write(self, log: Log, seen: list[SeenTick]) -> None:
+        """Ticks, and what is seen of some of them."""
+        messages = [*of_ticks(log, self._tree), *(message for moment in seen for message in of_seen(moment))]
+        for message in sorted(messages, key=lambda message: message.time):
+            self._say(message)
+
+    def _say(self, message: Message) -> None:
+        """Put a message of a tick; files wait for nothing."""
+        self._put(message)
+
+    @abstractmethod
+    def _open(self, topic: str, schema: dict[str, Any]) -> None:
+        """A channel."""
+
+    @abstractmethod
+    def _put(self, message: Message) -> None:
+        """Into its channel."""
 
 
 def _schemas() -> dict[str, dict[str, Any]]:

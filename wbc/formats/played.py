@@ -11,6 +11,7 @@ from wbc.api import Controller
 from wbc.formats.errors import FormatError
 from wbc.formats.motion import RecordedMotion
 from wbc.log import Log
+from wbc.record.recorder import names
 from wbc.robot import Robot
 from wbc.simulation import Command, CommandKind, PlantState
 from wbc.tick.outcome import Status
@@ -102,12 +103,9 @@ def answered(
         step = controller.step(state.q, state.v)
         rows.append(np.concatenate([[state.time, states.index(step.status)], state.q, state.v, step.command]))
         plant.advance(dt)
-    table = np.array(rows)
-    units, each = robot.dof_units, "/s" if controller.stack.command == "velocity" else "/s^2"
-    own = robot.nq == robot.nv
-    names = {f"q.{name}": units[k] if own else "" for k, name in enumerate(robot.dof_names if own else range(robot.nq))}
-    names |= {f"v.{name}": f"{unit}/s" for name, unit in zip(robot.dof_names, units, strict=True)}
-    names |= {f"command.{name}": f"{unit}{each}" for name, unit in zip(robot.dof_names, units, strict=True)}
-    columns = {"t": table[:, 0], "status": table[:, 1].astype(int)}
-    columns |= {name: table[:, 2 + k] for k, name in enumerate(names)}
-    return Log(columns, {"t": "s", "status": ""} | names, {"robot": robot.name, "dt": dt})
+    said, each = names(controller), zip(robot.dof_names, robot.dof_units, strict=True)
+    units = {"t": "s", "status": ""} | {f"q.{name}": unit for name, unit in said["q"]}
+    units |= {f"v.{name}": f"{unit}/s" for name, unit in each}
+    units |= {f"command.{name}": unit for name, unit in said["v"]}
+    columns = dict(zip(units, np.array(rows).T, strict=True))
+    return Log(columns | {"status": columns["status"].astype(int)}, units, {"robot": robot.name, "dt": dt})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from wbc import extras
 from wbc.formats.messages import AXIS
 from wbc.formats.run import Run, SeenTick
 from wbc.log import Log
-from wbc.validation import Array
 
 #: Ticks that are sent together
 TOGETHER = 5000
@@ -39,37 +39,31 @@ class RerunSink:
 
     def begin(self, run: Run) -> None:
         """Bodies, and what the curves are called."""
-        log, mesh = self._log, self._rerun.Mesh3D
+        rerun, log = self._rerun, self._log
         self._stream.send_blueprint(self._layout(run))
-        log("about", self._rerun.TextDocument(json.dumps(run.about, indent=1)), static=True)
-        log("scene", self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        bodies = {f"scene/robot/{name}": body for name, body in run.meshes.items()}
-        bodies |= {f"scene/obstacle/{name}": body for name, body in run.obstacles.items()}
-        for path, body in bodies.items():
-            surface = mesh(
-                vertex_positions=body.corners, triangle_indices=body.triangles, albedo_factor=[*body.colour, 255]
-            )
-            log(path, surface, static=True)
-        groups: dict[str, list[str]] = {}
-        for name in run.units:
-            group, _, member = name.partition(".")
-            groups.setdefault(group, []).append(member or group)
-        for group, names in groups.items():
-            log(f"tick/{group}", self._rerun.SeriesLines(names=names), static=True)
+        log("about", rerun.TextDocument(json.dumps(run.about, indent=1)), static=True)
+        log("scene", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for kind, bodies in (("robot", run.meshes), ("obstacle", run.obstacles)):
+            for name, body in bodies.items():
+                colour = [*body.colour, 255]
+                surface = rerun.Mesh3D(
+                    vertex_positions=body.corners, triangle_indices=body.triangles, albedo_factor=colour
+                )
+                log(f"scene/{kind}/{name}", surface, static=True)
+        for group, members in _groups(run.units).items():
+            names = [name.partition(".")[2] or group for name in members]
+            log(f"tick/{group}", rerun.SeriesLines(names=names), static=True)
 
     def _layout(self, run: Run) -> Any:
         """What the viewer shows: the scene beside binding rows, margins, residuals and reasons."""
         import rerun.blueprint as views
 
-        groups = {name.partition(".")[0] for name in run.units}
-        curves = [
-            views.TimeSeriesView(origin=f"tick/{group}", name=group) for group in ("v", "residual") if group in groups
-        ]
+        shown = [group for group in ("v", "residual") if group in _groups(run.units)]
+        curves = [views.TimeSeriesView(origin=f"tick/{group}", name=group) for group in shown]
         told = [views.TextDocumentView(origin="binding"), views.TimeSeriesView(origin="margin"), *curves]
         scene = views.Vertical(views.Spatial3DView(origin="scene"), views.TextLogView(origin="why"), row_shares=[3, 1])
-        return views.Blueprint(
-            views.Horizontal(scene, views.Vertical(*told), column_shares=[3, 2]), collapse_panels=True
-        )
+        whole = views.Horizontal(scene, views.Vertical(*told), column_shares=[3, 2])
+        return views.Blueprint(whole, collapse_panels=True)
 
     def _log(self, path: str, what: Any, static: bool = False) -> None:
         self._stream.log(path, what, static=static)
@@ -85,13 +79,11 @@ class RerunSink:
 
     def _show(self, seen: SeenTick) -> None:
         rerun = self._rerun
-        placed = {f"scene/robot/{name}": pose for name, pose in seen.frames.items()}
-        placed |= {f"scene/obstacle/{name}": pose for name, pose in seen.obstacles.items()}
-        for name, pose in seen.targets.items():
+        for name in seen.targets:
             self._log(f"scene/target/{name}", rerun.Arrows3D(vectors=AXIS * np.eye(3), colors=np.eye(3)))
-            placed[f"scene/target/{name}"] = pose
-        for path, pose in placed.items():
-            self._log(path, rerun.Transform3D(translation=pose[:3], quaternion=pose[3:]))
+        for kind, poses in (("robot", seen.frames), ("obstacle", seen.obstacles), ("target", seen.targets)):
+            for name, pose in poses.items():
+                self._log(f"scene/{kind}/{name}", rerun.Transform3D(translation=pose[:3], quaternion=pose[3:]))
         for name, margin in (seen.margins or {}).items():
             self._log(f"margin/{name}", rerun.Scalars(margin))
         if seen.binding != self._binding and seen.status:
@@ -105,11 +97,10 @@ class RerunSink:
         if not logs:
             return
         times = np.concatenate([log["t"] for log in logs])
-        columns: dict[str, list[Array]] = {}
-        for name in logs[0].columns:
-            columns.setdefault(name.partition(".")[0], []).append(np.concatenate([log[name] for log in logs]))
-        for group, members in columns.items():
-            numbers = np.column_stack(members).astype(np.float64)
+        for group, members in _groups(logs[0].columns).items():
+            numbers = np.concatenate(
+                [np.column_stack([log[name] for name in members]) for log in logs], dtype=np.float64
+            )
             scalars = self._rerun.Scalars.columns(scalars=numbers.ravel())
             self._stream.send_columns(
                 f"tick/{group}",
@@ -122,3 +113,11 @@ class RerunSink:
         self._send()
         self._stream.flush()
         self._stream.disconnect()
+
+
+def _groups(names: Iterable[str]) -> dict[str, list[str]]:
+    """What columns ``group.member`` begin with -> these columns."""
+    out: dict[str, list[str]] = {}
+    for name in names:
+        out.setdefault(name.partition(".")[0], []).append(name)
+    return out

@@ -7,19 +7,19 @@ import os
 import struct
 import time
 import weakref
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from wbc import extras
 from wbc.formats.errors import FormatError
+from wbc.formats.messages import NANO
 from wbc.validation import Array
 
-#: Nanoseconds of a second
-NANO = 1_000_000_000
 #: States that are kept until they are taken
 KEPT = 64
 STATE = "sensor_msgs/msg/JointState"
@@ -28,40 +28,38 @@ TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 ATTACHMENT = struct.Struct("<qqB16s")
 
 
-class Ros2Link(Protocol):
-    """Hears joint states and sends trajectories."""
-
-    def take(self) -> Sequence[Any]:
-        """The states that have come, with ``name``, ``position`` and ``velocity``."""
-
-    def send(self, joints: Sequence[str], q: Array, v: Array, seconds: float) -> None:
-        """A trajectory of one point: be at ``q`` with ``v`` in so many seconds."""
-
-
 def dds_name(kind: str) -> str:
     """``sensor_msgs/msg/JointState`` as DDS and Zenoh call it."""
     package, _, name = kind.split("/")
     return f"{package}::msg::dds_::{name}_"
 
 
-def types() -> Any:
-    """Definitions of messages, and their bytes."""
-    from rosbags.typesys import Stores, get_typestore
+class Ros2Link(ABC):
+    """Hears joint states and sends trajectories; who inherits knows over what."""
 
-    return get_typestore(Stores.ROS2_JAZZY)
+    def __init__(self) -> None:
+        from rosbags.typesys import Stores, get_typestore
+
+        self._store: Any = get_typestore(Stores.ROS2_JAZZY)
+
+    @abstractmethod
+    def take(self) -> Sequence[Any]:
+        """The states that have come, with ``name``, ``position`` and ``velocity``."""
+
+    def send(self, joints: Sequence[str], q: Array, v: Array, seconds: float) -> None:
+        """A trajectory of one point: be at ``q`` with ``v`` in so many seconds."""
+        made, none, whole = self._store.types, np.zeros(0), int(seconds)
+        span = made["builtin_interfaces/msg/Duration"](whole, round((seconds - whole) * NANO))
+        point = made["trajectory_msgs/msg/JointTrajectoryPoint"](q, v, none, none, span)
+        header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
+        self._put(bytes(self._store.serialize_cdr(made[TRAJECTORY](header, list(joints), [point]), TRAJECTORY)))
+
+    @abstractmethod
+    def _put(self, data: bytes) -> None:
+        """Send a trajectory."""
 
 
-def trajectory(store: Any, joints: Sequence[str], q: Array, v: Array, seconds: float) -> memoryview:
-    """The bytes of a trajectory of one point."""
-    made, none, whole = store.types, np.zeros(0), int(seconds)
-    span = made["builtin_interfaces/msg/Duration"](whole, round((seconds - whole) * NANO))
-    point = made["trajectory_msgs/msg/JointTrajectoryPoint"](q, v, none, none, span)
-    header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
-    data: memoryview = store.serialize_cdr(made[TRAJECTORY](header, list(joints), [point]), TRAJECTORY)
-    return data
-
-
-class DdsLink:
+class DdsLink(Ros2Link):
     """Over Cyclone DDS, in a domain, as ROS 2 has it by default: XCDR 1, topics under ``rt/``.
 
     Raises:
@@ -77,7 +75,8 @@ class DdsLink:
         from cyclonedds.sub import DataReader
         from cyclonedds.topic import Topic
 
-        self._store, known = types(), dict[str, Any]()
+        super().__init__()
+        known = dict[str, Any]()
         state, self._order = (_idl(self._store, kind, known) for kind in (STATE, TRAJECTORY))
         plain = Policy.DataRepresentation(use_cdrv0_representation=True)
         kept = Qos(Policy.Reliability.Reliable(NANO), Policy.History.KeepLast(1), plain)
@@ -94,9 +93,8 @@ class DdsLink:
         # What is said of an endpoint that is gone has no names
         return [message for message in self._reader.take(KEPT) if hasattr(message, "name")]
 
-    def send(self, joints: Sequence[str], q: Array, v: Array, seconds: float) -> None:
-        """See :class:`Ros2Link`."""
-        self._writer.write(self._order.deserialize(bytes(trajectory(self._store, joints, q, v, seconds))))
+    def _put(self, data: bytes) -> None:
+        self._writer.write(self._order.deserialize(data))
 
 
 def _idl(store: Any, kind: str, known: dict[str, Any]) -> Any:
@@ -120,7 +118,7 @@ def _idl(store: Any, kind: str, known: dict[str, Any]) -> Any:
     return known[kind]
 
 
-class ZenohLink:
+class ZenohLink(Ros2Link):
     """Over Zenoh, with the keys and attachments of rmw_zenoh; lists of topics, which it takes from tokens, lack it.
 
     Args:
@@ -134,8 +132,8 @@ class ZenohLink:
         extras.require("zenoh", "a robot of ROS 2 over Zenoh")
         import zenoh
 
-        store = self._store = types()
-        config = zenoh.Config()
+        super().__init__()
+        store, config = self._store, zenoh.Config()
         if locator:
             config.insert_json5("connect/endpoints", json.dumps([locator]))
         came = self._came = deque[Any](maxlen=KEPT)
@@ -153,11 +151,10 @@ class ZenohLink:
 
     def take(self) -> Sequence[Any]:
         """See :class:`Ros2Link`."""
-        states = [self._came.popleft() for _ in range(len(self._came))]
-        return [self._store.deserialize_cdr(bytes(state), STATE) for state in states]
+        came = range(len(self._came))
+        return [self._store.deserialize_cdr(bytes(self._came.popleft()), STATE) for _ in came]
 
-    def send(self, joints: Sequence[str], q: Array, v: Array, seconds: float) -> None:
-        """See :class:`Ros2Link`."""
+    def _put(self, data: bytes) -> None:
         self._sent += 1
         beside = ATTACHMENT.pack(self._sent, time.time_ns(), len(self._gid), self._gid)
-        self._publisher.put(bytes(trajectory(self._store, joints, q, v, seconds)), attachment=beside)
+        self._publisher.put(data, attachment=beside)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import pathlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -66,8 +67,9 @@ class Run:
     """A run's folder, a recording, or a log in any of this package's formats, whole or as far as it was written.
 
     Attributes:
-        path: what is read. robot: the robot, None where the run does not say which. meshes, obstacles: link, or item,
-            -> what is drawn there. remarks: what is not shown, and why.
+        path: what is read. about: what is said of the run: plain data. units: column -> unit. robot: the robot, None
+            where the run does not say which. meshes, obstacles: link, or item, -> what is drawn there. remarks: what is
+            not shown, and why.
 
     Raises:
         LogFileError: no such run, or damaged.
@@ -76,28 +78,28 @@ class Run:
     def __init__(self, path: pathlib.Path, trust: bool = False) -> None:
         recording = recording_in(path)
         self.path = path if recording is None else recording
-        self._file: LogFile | None = None
-        self._log: Log | None = None
-        self._controller: Controller | None = None
+        self.about: Mapping[str, Any]
+        self.units: Mapping[str, str]
         self.robot: Robot | None = None
         self.remarks: list[str] = []
         self.obstacles: dict[str, DrawnMesh] = {}
-        if recording is not None:
-            file = LogFile(recording)
-            self._file = Recording(recording) if "kinds" not in file.about else file
-        elif path.is_dir() and (part := _unfinished(path)) is not None:
-            self._file = LogFile(part)
-        elif path.suffix == ".part" and is_recording(path):
-            self._file = LogFile(path)
+        self._controller: Controller | None = None
+        self._due, self._said, self._said_at = -np.inf, "", -np.inf
+        file = recording or _unfinished(path)
+        read = load(path) if file is None else LogFile(file)
+        if isinstance(read, LogFile) and "kinds" not in read.about:
+            read = self._recording = Recording(read.path)
+            self.about, self.units, self._pieces = read.about, read.column_units, read.logs
+            self._read_stack(read, trust)
         else:
-            self._log = load(path)
-        if isinstance(self._file, Recording):
-            self._read_stack(self._file, trust)
-        else:
+            if isinstance(read, LogFile):
+                self.about, self.units = read.about["meta"], dict(read.about["units"])
+            else:
+                self.about, self.units = read.meta, read.units
+            self._pieces = functools.partial(_log_pieces, read)
             self._read_robot(path if path.is_dir() else path.parent)
         self.meshes: dict[str, DrawnMesh] = {} if self.robot is None else robot_meshes(self.robot)
         self._data: Any = None if self.robot is None else self.robot.model.createData()
-        self._due, self._said, self._said_at = -np.inf, "", -np.inf
 
     def _read_stack(self, recording: Recording, trust: bool) -> None:
         try:
@@ -127,24 +129,6 @@ class Run:
         else:
             self.remarks.append(f"the robot is not shown: the run has no stack and no {URDF}, and no robot is {name!r}")
 
-    @property
-    def about(self) -> Mapping[str, object]:
-        """What is said of the run: plain data."""
-        if self._log is not None:
-            return self._log.meta
-        assert self._file is not None
-        return self._file.about if isinstance(self._file, Recording) else self._file.about["meta"]
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Column -> unit."""
-        if self._log is not None:
-            return self._log.units
-        if isinstance(self._file, Recording):
-            return self._file.column_units
-        assert self._file is not None
-        return dict(self._file.about["units"])
-
     def pieces(
         self, wait: Callable[[], bool] | None = None, rate: float = RATE
     ) -> Iterator[tuple[Log, list[SeenTick]]]:
@@ -153,16 +137,8 @@ class Run:
         Args:
             wait: as of :meth:`wbc.log.LogFile.chunks`.
         """
-        if isinstance(self._file, Recording):
-            for log, rows in self._file.logs(wait):
-                yield log, [self._at(log, k, row=rows[k]) for k in self._shown(log, rate)]
-        elif self._file is not None:
-            for rows in self._file.chunks(wait):
-                log = log_of(self._file, rows)
-                yield log, [self._at(log, k) for k in self._shown(log, rate)]
-        else:
-            assert self._log is not None
-            yield self._log, [self._at(self._log, k) for k in self._shown(self._log, rate)]
+        for log, rows in self._pieces(wait):
+            yield log, [self._at(log, k, rows[k]) for k in self._shown(log, rate)]
 
     def _shown(self, log: Log, rate: float) -> Iterator[int]:
         for k, t in enumerate(log["t"].tolist()):
@@ -170,12 +146,11 @@ class Run:
                 self._due = max(self._due + 1.0 / rate, t) if np.isfinite(self._due) else t + 1.0 / rate
                 yield k
 
-    def _at(self, log: Log, k: int, row: Array | None = None) -> SeenTick:
+    def _at(self, log: Log, k: int, row: Array) -> SeenTick:
         t = float(log["t"][k])
-        if self._controller is None or row is None:
+        if self._controller is None:
             return SeenTick(t, self._frames(self._configuration(log, k)), {}, {})
-        core, recording = core_of(self._controller), self._file
-        assert recording is not None
+        core, recording = core_of(self._controller), self._recording
         # One tick alone: from no active set the answer is the same to rounding
         for name in recorded_inputs(core.layout):
             getattr(core.tick, name)[:] = row[recording.parts[name]]
@@ -188,13 +163,15 @@ class Run:
         if said != self._said and t >= self._said_at + EXPLAINED:
             self._said, self._said_at = said, t
             why = " ".join(sentences(step.explain()))
-        targets = {name: tick.world_pose(name, value) for name, value in self._places.items()}
-        obstacles = {name: tick.world_pose(name, "pose") for name in self.obstacles}
+        targets, obstacles = (
+            {name: seven(pose) for name, value in places.items() if (pose := tick.world_pose(name, value)) is not None}
+            for places in (self._places, dict.fromkeys(self.obstacles, "pose"))
+        )
         return SeenTick(
             t,
             self._frames(tick.q),
-            {name: seven(pose) for name, pose in targets.items() if pose is not None},
-            {name: seven(pose) for name, pose in obstacles.items() if pose is not None},
+            targets,
+            obstacles,
             str(step.status),
             binding,
             {name: float(values.min()) for name, values in step.margins.items() if len(values)},
@@ -207,8 +184,7 @@ class Run:
             return None
         robot, q = self.robot, self.robot.neutral.copy()
         model = robot.model
-        pose = [log[name][k] for name in log.columns if name.startswith("pose.")]
-        if robot.base == "floating" and len(pose) == 7:
+        if robot.base == "floating" and len(pose := log.array("pose")[k]) == 7:
             q[:7] = pose
         for name, first, size in zip(model.names[1:], model.idx_qs[1:], model.nqs[1:], strict=True):
             own = [f"q.{name}"] if size == 1 else [f"q.{name}.{j}" for j in range(size)]
@@ -228,10 +204,18 @@ class Run:
         }
 
 
-def _unfinished(folder: pathlib.Path) -> pathlib.Path | None:
-    """The log of a run that was killed, of a folder that has no whole one."""
-    there = [folder / name for name in FILES if (folder / name).is_file()]
-    return there[0] if there and there[0].suffix == ".part" else None
+def _log_pieces(read: Log | LogFile, wait: Callable[[], bool] | None) -> Iterator[tuple[Log, Array]]:
+    """Logs and rows, which a log alone has none of but its columns."""
+    if isinstance(read, LogFile):
+        yield from ((log_of(read, rows), rows) for rows in read.chunks(wait))
+    else:
+        yield read, read["t"]
+
+
+def _unfinished(path: pathlib.Path) -> pathlib.Path | None:
+    """The log of a run that was killed, itself or in a folder that has no whole one."""
+    files = [path / name for name in FILES if (path / name).is_file()] if path.is_dir() else [path]
+    return files[0] if files and files[0].suffix == ".part" and is_recording(files[0]) else None
 
 
 def seven(pose: pin.SE3) -> Array:

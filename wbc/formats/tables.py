@@ -25,14 +25,15 @@ class CsvSink:
     def write(self, log: Log, seen: list[SeenTick]) -> None:
         """Rows."""
         self._writer.writerows(zip(*(values.tolist() for values in log.columns.values()), strict=True))
+        self._file.flush()
 
     def close(self) -> None:
         """Nothing more comes."""
         self._file.close()
 
 
-class NpzSink:
-    """A log for :func:`wbc.log.load` and ``numpy.load``, with the same names in every run."""
+class WholeSink:
+    """What is written as a whole: it is kept until then, in memory."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self._path, self._logs = path, list[Log]()
@@ -42,11 +43,18 @@ class NpzSink:
         self._units, self._about = run.units, run.about
 
     def write(self, log: Log, seen: list[SeenTick]) -> None:
-        """Keep them: the file is written as a whole."""
+        """Keep them."""
         self._logs.append(log)
+
+    def whole(self) -> Log:
+        """All ticks."""
+        columns = {name: np.concatenate([log[name] for log in self._logs] or [np.zeros(0)]) for name in self._units}
+        return Log(columns, self._units, self._about, self._logs[-1].tables if self._logs else {})
+
+
+class NpzSink(WholeSink):
+    """A log for :func:`wbc.log.load` and ``numpy.load``, with the same names in every run."""
 
     def close(self) -> None:
         """Write the file."""
-        columns = {name: np.concatenate([log[name] for log in self._logs] or [np.zeros(0)]) for name in self._units}
-        tables = self._logs[-1].tables if self._logs else {}
-        save(Log(columns, self._units, self._about, tables), self._path.parent, "npz", self._path.stem)
+        save(self.whole(), self._path.parent, "npz", self._path.stem)

@@ -17,7 +17,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import InfeasibleError, UnsupportedJointError
-from wbc.identification.base_parameters import BaseParameters, base_parameters, identifiable
+from wbc.identification.parameter_base import BaseParameters, base_parameters, identifiable
 from wbc.identification.regression import Regression
 from wbc.multibody import pin
 from wbc.trajectory import Law, MotionLimits, Timing, spline_path

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError
-from wbc.identification.base_parameters import BaseParameters, base_parameters
+from wbc.identification.parameter_base import BaseParameters, base_parameters
 from wbc.identification.pseudo_inertia import (
     from_log_cholesky,
     is_body,

@@ -6,8 +6,10 @@ import ctypes
 from collections.abc import Callable
 from typing import Any
 
-#: ``METH_NOARGS`` and ``METH_FASTCALL``
+#: ``METH_NOARGS``, ``METH_O`` and ``METH_FASTCALL``
 _NO_ARGUMENTS = 4
+#: See _NO_ARGUMENTS
+_ONE_ARGUMENT = 8
 #: See _NO_ARGUMENTS
 _ARGUMENTS = 0x80
 
@@ -29,13 +31,19 @@ _make.restype, _make.argtypes = ctypes.py_object, [ctypes.POINTER(_MethodDef), c
 _methods: dict[int, _MethodDef] = {}
 
 
-def builtin(function: Any, argument: int) -> Callable[[], int]:
+def builtin(function: Any, argument: int) -> Callable[[], Any]:
     """A function of no arguments which calls ``PyObject *function(PyObject *argument, PyObject *)`` and holds the lock.
 
     Args:
         function: of a loaded library that is never unloaded.
     """
-    made: Callable[[], int] = _made(function, argument, _NO_ARGUMENTS)
+    made: Callable[[], Any] = _made(function, argument, _NO_ARGUMENTS)
+    return made
+
+
+def builtin_of_one(function: Any, argument: int) -> Callable[[Any], Any]:
+    """The same, of one argument: ``PyObject *function(PyObject *argument, PyObject *)``."""
+    made: Callable[[Any], Any] = _made(function, argument, _ONE_ARGUMENT)
     return made
 
 

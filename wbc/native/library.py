@@ -8,8 +8,8 @@ import hashlib
 import os
 import pathlib
 import sys
-import tempfile
 import threading
+from collections.abc import Iterator
 
 _loaded: dict[str, ctypes.PyDLL] = {}
 _lock = threading.Lock()
@@ -37,14 +37,23 @@ def load_library(path: pathlib.Path) -> ctypes.PyDLL:
 
 
 def _load_copy(content: bytes, path: pathlib.Path) -> ctypes.PyDLL:
-    for folder in (path.parent.parent, pathlib.Path(tempfile.gettempdir())):
+    for folder in _folders(path):
         with contextlib.suppress(OSError):
             # A name of its own: the loader takes two files of one name for the same
-            number, name = tempfile.mkstemp(prefix=".loading-", suffix=".so", dir=folder)
+            name = os.path.join(folder, f".loading-{os.getpid()}-{len(_loaded)}.so")
+            file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600)
             try:
-                with os.fdopen(number, "wb") as file:
-                    file.write(content)
+                with open(file, "wb") as copy:
+                    copy.write(content)
                 return ctypes.PyDLL(name)
             finally:
                 os.unlink(name)
     return ctypes.PyDLL(str(path))
+
+
+def _folders(path: pathlib.Path) -> Iterator[str]:
+    yield str(path.parent.parent)
+    # Not imported, and not looked for, where the first can be written to
+    import tempfile
+
+    yield tempfile.gettempdir()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from types import ModuleType
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,11 +14,89 @@ from wbc.clearance import Tree
 from wbc.errors import UnsupportedJointError
 from wbc.multibody import pin
 from wbc.robot import Robot
-from wbc.symbolic.joint_steps import JointKind, joint_steps
+from wbc.rotations import exponential, matrices
+from wbc.symbolic.joint_steps import JointKind, joint_steps, turns_for_quaternions
 from wbc.validation import Array
 
-#: What a planner has coordinates for
-PLANNED = ("revolute", "continuous", "prismatic", "helical", "universal", "planar base", "fixed base")
+#: Joints of which one may follow another
+COUPLED = ("revolute", "prismatic", "helical")
+#: Axes of the three turns of a ball joint, the usual order first
+ORDERS = ((2, 1, 0), (0, 2, 1), (1, 0, 2), (0, 1, 2), (1, 2, 0), (2, 0, 1))
+#: Another order of axes is taken where the sine of the second turn would be larger: at 1 two turns are about one axis
+STEEP = 0.8
+
+
+@dataclass(frozen=True)
+class BallTurns:
+    """Three turns for a ball joint, or for the rotation of a floating base:
+
+        R = exp(a [e_i]) exp(b [e_j]) exp(c [e_k])
+
+    Attributes:
+        number: of a among the coordinates; b and c follow. place: of the quaternion in q. order: (i, j, k).
+        carries: the three coordinates before a are the position of a floating base.
+    """
+
+    number: int
+    place: int
+    order: tuple[int, int, int]
+    carries: bool
+
+    @property
+    def span(self) -> slice:
+        """The three coordinates."""
+        return slice(self.number, self.number + 3)
+
+    def steep(self, q: Array, order: tuple[int, int, int]) -> float:
+        """|sin b| of the three turns in an order."""
+        return float(abs(matrices(q[self.place : self.place + 4])[order[0], order[2]]))
+
+    def angles(self, q: Array, near: Array) -> Array:
+        """(a, b, c) of a configuration, those nearest to ``near`` of all that there are."""
+        axes = np.eye(3)[list(self.order)]
+        sign = np.linalg.det(axes)
+        turned = axes @ matrices(q[self.place : self.place + 4]) @ axes.T
+        level = np.hypot(turned[1, 2], turned[2, 2]) > 1e-9
+        first = np.arctan2(-turned[1, 2], turned[2, 2]) if level else sign * near[0]
+        found = []
+        for a in (first, first + np.pi):
+            rest = exponential(np.array([[-a, 0.0, 0.0]]))[0] @ turned
+            x = sign * np.array([a, np.arctan2(rest[0, 2], rest[2, 2]), np.arctan2(rest[1, 0], rest[1, 1])])
+            found.append(x + 2.0 * np.pi * np.round((near - x) / (2.0 * np.pi)))
+        return min(found, key=lambda x: float(np.linalg.norm(x - near)))
+
+    def quaternion(self, x: Any, math: ModuleType) -> list[Any]:
+        """(x, y, z, w) at coordinates, in numpy or CasADi."""
+        first, second, third = (
+            self._turn(k, x[..., self.number + k] if math is np else x[self.number + k], math) for k in range(3)
+        )
+        return _product(_product(first, second), third)
+
+    def _turn(self, k: int, angle: Any, math: ModuleType) -> list[Any]:
+        out = [0.0 * angle] * 3 + [math.cos(0.5 * angle)]
+        out[self.order[k]] = math.sin(0.5 * angle)
+        return out
+
+    def angular_velocity(self, x: Array, rate: Array) -> Array:
+        """In the axes of what it carries [..., 3]."""
+        i, j, k = self.order
+        second, third = (self._turn(m, x[..., self.number + m], np) for m in (1, 2))
+        after = [matrices(np.stack(turns, axis=-1)) for turns in (_product(second, third), third)]
+        a, b, c = np.moveaxis(rate[..., self.span], -1, 0)
+        return np.asarray(
+            a[..., None] * after[0][..., i, :] + b[..., None] * after[1][..., j, :] + c[..., None] * np.eye(3)[k]
+        )
+
+
+def _product(p: list[Any], q: list[Any]) -> list[Any]:
+    """Of quaternions x, y, z, w."""
+    (x, y, z, w), (a, b, c, d) = p, q
+    return [
+        w * a + x * d + y * c - z * b,
+        w * b + y * d + z * a - x * c,
+        w * c + z * d + x * b - y * a,
+        w * d - x * a - y * b - z * c,
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +104,13 @@ class PlanningCoordinates:
     """Configurations q of a robot as vectors x of n numbers, without manifold:
 
         x_i = q_k of a joint with limits,  the angle of a joint without (q has its cosine and sine),
-        x, y and angle of a planar base;   followers of mimic joints follow: ratio x_leader + offset
+        x, y and angle of a planar base,   the position of a floating base,   three turns of it and of a ball joint;
+        followers of mimic joints follow: ratio x_leader + offset
 
     Attributes:
         robot: whose. tree: its frames, moved by x.
         names: of the degrees of freedom. units: rad or m. dofs: their numbers. places: where they stand in q.
-        circles: those that q has as cosine and sine.
+        circles: those that q has as cosine and sine. balls: ball joints and floating bases.
         followers: (place in q, number of the leader's coordinate, ratio, offset).
         scale: what counts as much as a radian, [n].
     """
@@ -41,25 +122,32 @@ class PlanningCoordinates:
     dofs: tuple[int, ...]
     places: tuple[int, ...]
     circles: frozenset[int]
+    balls: tuple[BallTurns, ...]
     followers: tuple[tuple[int, int, float, float], ...]
     scale: Array
 
     @classmethod
-    def of(cls, robot: Robot, length: float) -> PlanningCoordinates:
-        """Those of a robot, of which ``length`` [m] counts as much as a radian.
+    def of(cls, robot: Robot, length: float, q: Array | None = None) -> PlanningCoordinates:
+        """Those of a robot, of which ``length`` [m] counts as much as a radian; turns of ball joints are in an order in
+        which they are not steep at ``q``.
 
         Raises:
-            UnsupportedJointError: a base that floats, ball joints, or a coupling of joints without end.
+            UnsupportedJointError: a joint without a symbolic model, or a coupling of joints without end.
         """
         model = robot.model
-        tree = Tree.of_model(model)
         places, dofs, circles = list[int](), list[int](), list[int]()
+        balls, orders = list[BallTurns](), dict[int, tuple[int, int, int]]()
         for joint in range(1, model.njoints):
-            if model.joints[joint].shortname() == "JointModelFreeFlyer":
-                name = str(model.names[joint])
-                raise UnsupportedJointError(f"joint {name!r}", "floating base", "a planner has no coordinates", PLANNED)
-            seen = 0
-            for step in joint_steps(model, joint):
+            seen, steps = 0, joint_steps(model, joint)
+            for step in steps:
+                if step.kind == JointKind.QUATERNION:
+                    floats = model.joints[joint].shortname() == "JointModelFreeFlyer"
+                    ball = BallTurns(len(places) + 3 * floats, step.q, ORDERS[0], floats)
+                    if q is not None and ball.steep(q, ball.order) > STEEP:
+                        ball = replace(ball, order=min(ORDERS, key=lambda order: ball.steep(q, order)))
+                    balls.append(ball)
+                    orders[step.q] = ball.order
+            for step in turns_for_quaternions(steps, orders):
                 if step.kind == JointKind.PLACE or step.q in places:
                     continue
                 if step.kind == JointKind.CIRCLE:
@@ -67,12 +155,13 @@ class PlanningCoordinates:
                 places.append(step.q)
                 dofs.append(int(model.idx_vs[joint]) + seen)
                 seen += 1
+        tree = Tree.of_model(model, orders=orders)
         at = {dof: k for k, dof in enumerate(dofs)}
         leaders = {at[c.follower]: c for c in robot.couplings}
         for k, coupling in leaders.items():
             if k in circles or at[coupling.leader] in circles:
                 raise UnsupportedJointError(
-                    f"joint {robot.dof_names[coupling.follower]!r}", "continuous", "a planner couples none", PLANNED
+                    f"joint {robot.dof_names[coupling.follower]!r}", "continuous", "a planner couples none", COUPLED
                 )
         own = [k for k in range(len(places)) if k not in leaders]
         number = {k: i for i, k in enumerate(own)}
@@ -88,7 +177,11 @@ class PlanningCoordinates:
                 )
             elif frame.moves in (1, 2):
                 frames[f] = replace(frame, coordinate=number[frame.coordinate])
-        names = tuple(robot.dof_names[dofs[k]] for k in own)
+        labels = [robot.dof_names[dof] for dof in dofs]
+        for ball in balls:
+            owner = labels[ball.number].rpartition(".")[0]
+            labels[ball.number : ball.number + 3] = [f"{owner}.r{'xyz'[axis]}" for axis in ball.order]
+        names = tuple(labels[k] for k in own)
         units = tuple(robot.dof_units[dofs[k]] for k in own)
         return cls(
             robot,
@@ -98,6 +191,7 @@ class PlanningCoordinates:
             tuple(dofs[k] for k in own),
             tuple(places[k] for k in own),
             frozenset(number[k] for k in circles),
+            tuple(replace(ball, number=number[ball.number]) for ball in balls),
             tuple((places[k], number[at[c.leader]], c.ratio, c.offset) for k, c in leaders.items()),
             np.array([length if unit == "m" else 1.0 for unit in units]),
         )
@@ -107,31 +201,46 @@ class PlanningCoordinates:
         """How many there are."""
         return len(self.names)
 
-    @cached_property
-    def _circle(self) -> np.ndarray:
-        return np.array(sorted(self.circles), dtype=int)
+    def suits(self, q: Array) -> bool:
+        """Whether no turns of a ball joint are steep at a configuration."""
+        return all(ball.steep(q, ball.order) <= STEEP for ball in self.balls)
 
     def of_configuration(self, q: Array, near: Array | None = None) -> Array:
-        """x of a configuration [nq], or of several; angles of joints without end are those nearest to ``near``."""
-        x = np.asarray(q)[..., list(self.places)].copy()
+        """x of a configuration [nq]; angles of joints without end are those nearest to ``near``."""
+        x, near = np.asarray(q)[list(self.places)], np.zeros(self.count) if near is None else near
         for k in self.circles:
-            place = self.places[k]
-            x[..., k] = np.arctan2(q[..., place + 1], q[..., place])
-            if near is not None:
-                x[..., k] += 2.0 * np.pi * np.round((near[k] - x[..., k]) / (2.0 * np.pi))
-        return np.asarray(x)
+            angle = np.arctan2(q[self.places[k] + 1], q[self.places[k]])
+            x[k] = angle + 2.0 * np.pi * np.round((near[k] - angle) / (2.0 * np.pi))
+        for ball in self.balls:
+            x[ball.span] = ball.angles(q, near[ball.span])
+        return x
 
     def configuration(self, x: Array) -> Array:
         """The configuration [nq] of x, or of several."""
         x = np.asarray(x, dtype=np.float64)
-        q = np.tile(self.robot.neutral, (*x.shape[:-1], 1)) if x.ndim > 1 else self.robot.neutral.copy()
-        for k, place in enumerate(self.places):
-            q[..., place] = np.cos(x[..., k]) if k in self.circles else x[..., k]
-            if k in self.circles:
-                q[..., place + 1] = np.sin(x[..., k])
-        for place, leader, ratio, offset in self.followers:
-            q[..., place] = ratio * x[..., leader] + offset
+        q = np.tile(self.robot.neutral, (*x.shape[:-1], 1))
+        for place, value in self._numbers(x, np):
+            q[..., place] = value
         return q
+
+    def expression(self, x: ca.SX) -> ca.SX:
+        """The configuration as an expression of x."""
+        q = ca.SX(ca.DM(self.robot.neutral))
+        for place, value in self._numbers(x, ca):
+            q[place] = value
+        return q
+
+    def _numbers(self, x: Any, math: ModuleType) -> Iterator[tuple[int, Any]]:
+        """Places in q and what stands there, in numpy or CasADi."""
+        column: Callable[[int], Any] = (lambda k: x[..., k]) if math is np else (lambda k: x[k])
+        for k, place in enumerate(self.places):
+            yield place, math.cos(column(k)) if k in self.circles else column(k)
+            if k in self.circles:
+                yield place + 1, math.sin(column(k))
+        for ball in self.balls:
+            yield from enumerate(ball.quaternion(x, math), ball.place)
+        for place, leader, ratio, offset in self.followers:
+            yield place, ratio * column(leader) + offset
 
     def velocity(self, x: Array, rate: Array) -> Array:
         """The velocity [nv] of the configuration at x, where x changes at ``rate``; or of several."""
@@ -142,26 +251,36 @@ class PlanningCoordinates:
         for place, leader, ratio, _ in self.followers:
             v[..., dofs[place]] = ratio * rate[..., leader]
         if self.robot.base in ("planar", "differential"):
-            # The base's velocity is along its own axes
+            # A base's velocity is along its own axes
             c, s = np.cos(x[..., 2]), np.sin(x[..., 2])
             v[..., 0], v[..., 1] = c * rate[..., 0] + s * rate[..., 1], c * rate[..., 1] - s * rate[..., 0]
+        for ball in self.balls:
+            dof = self.dofs[ball.number]
+            v[..., dof : dof + 3] = ball.angular_velocity(x, rate)
+            if ball.carries:
+                rotation = matrices(np.stack(ball.quaternion(x, np), axis=-1))
+                v[..., dof - 3 : dof] = np.einsum(
+                    "...ij,...i->...j", rotation, rate[..., ball.number - 3 : ball.number]
+                )
         return v
 
-    def expression(self, x: ca.SX) -> ca.SX:
-        """The configuration as an expression of x."""
-        q = ca.SX(ca.DM(self.robot.neutral))
-        for k, place in enumerate(self.places):
-            q[place] = ca.cos(x[k]) if k in self.circles else x[k]
-            if k in self.circles:
-                q[place + 1] = ca.sin(x[k])
-        for place, leader, ratio, offset in self.followers:
-            q[place] = ratio * x[leader] + offset
-        return q
+    def rates(self, limits: Array) -> Array:
+        """Limits of the rates of x [n] at which no degree of freedom exceeds its own [nv], wherever axes point."""
+        out = limits[list(self.dofs)].copy()
+        if self.robot.base in ("planar", "differential"):
+            out[:2] = out[:2].min() / np.sqrt(2.0)
+        for ball in self.balls:
+            # The turns are not about axes at right angles
+            out[ball.span] = out[ball.span].min() / 3.0
+            if ball.carries:
+                shifts = slice(ball.number - 3, ball.number)
+                out[shifts] = out[shifts].min() / np.sqrt(3.0)
+        return out
 
     def limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Limits of x of those of the degrees of freedom [nv]; infinite where there is none."""
         low, high = lower[list(self.dofs)].copy(), upper[list(self.dofs)].copy()
-        for k in self.circles:
+        for k in (*self.circles, *(k for ball in self.balls for k in range(3 + ball.number)[ball.span])):
             low[k], high[k] = -np.inf, np.inf
         dofs = {place: dof for dof, place in enumerate(self.robot.position_index)}
         for place, leader, ratio, offset in self.followers:

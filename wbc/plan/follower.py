@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from wbc import validation
 from wbc.errors import InfeasibleError
 from wbc.plan.path import PlannedPath, motion_of
 from wbc.plan.planner import MotionPlanner, PlanningOptions
-from wbc.trajectory import PolynomialPath, time_optimal
+from wbc.trajectory import Law, PolynomialPath, time_optimal
 from wbc.validation import Array
 
 #: Shares of what is left of a path on which braking is tried, the shortest first
@@ -42,35 +43,64 @@ class PathFollower:
             q = robot.integrate(q, controller.step(q).v, dt)
 
     After run-time values of the planner have changed, as the pose of an obstacle, :meth:`check` proves what is left of
-    the path again.
+    the path again. Where it brakes, a thread plans from where it will rest; the planner is for nothing else meanwhile.
 
     Args:
         goal: of the path, for plans from elsewhere; options: of these.
+        wait: at rest it waits for a plan that is not there yet; False: it stands until it is.
 
     Raises:
         as :meth:`PlannedPath.law`.
     """
 
     def __init__(
-        self, planner: MotionPlanner, path: PlannedPath, goal: Any, options: PlanningOptions | None = None
+        self,
+        planner: MotionPlanner,
+        path: PlannedPath,
+        goal: Any,
+        options: PlanningOptions | None = None,
+        *,
+        wait: bool = True,
     ) -> None:
         self._planner, self._goal = validation.instance("planner", planner, MotionPlanner, "a MotionPlanner"), goal
-        self._options = options
-        self._take(validation.instance("path", path, PlannedPath, "a PlannedPath"))
+        self._options, self._wait = options, validation.flag("wait", wait)
+        self._threads = ThreadPoolExecutor(1, "planner")
+        self._next: Future[tuple[PlannedPath, Law]] | None = None
+        self._take(validation.instance("path", path, PlannedPath, "a PlannedPath"), path.law())
 
-    def _take(self, path: PlannedPath) -> None:
-        self.path, self.law, self.time, self.braking = path, path.law(), 0.0, False
+    def _take(self, path: PlannedPath, law: Law) -> None:
+        self.path, self.law, self.time, self.braking = path, law, 0.0, False
+
+    def _plan(self) -> Future[tuple[PlannedPath, Law]]:
+        """A path from where it rests."""
+        q, _ = self.path.configurations(self.law, self.law.duration)
+
+        def planned() -> tuple[PlannedPath, Law]:
+            path = self._planner.plan(q, self._goal, self._options)
+            return path, path.law()
+
+        return self._threads.submit(planned)
 
     def advance(self, dt: float) -> FollowedState:
-        """The state ``dt`` later [s]. At rest after braking it plans anew.
+        """The state ``dt`` later [s]. At rest after braking it takes the new path, if that is still clear.
 
         Raises:
             RangeError: dt is no positive number. InfeasibleError, NoPathError: there is no path from where it rests.
         """
         self.time += validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         if self.braking and self.time >= self.law.duration:
-            self._take(self._planner.plan(self.state().q, self._goal, self._options))
+            self._go_on()
         return self.state()
+
+    def _go_on(self) -> None:
+        while (planned := self._next or self._plan()).done() or self._wait:
+            self._next = None
+            path, law = planned.result()
+            scene = self._planner.scene(path.coordinates)
+            if scene.violation(motion_of(path.coordinates, path.smooth)) is None:
+                self._take(path, law)
+                return
+        self._next = planned
 
     def state(self) -> FollowedState:
         """The present one."""
@@ -83,7 +113,7 @@ class PathFollower:
         Raises:
             InfeasibleError: no braking ends before the obstacle; it brakes as hard as it may.
         """
-        scene = self._planner.scene()
+        scene = self._planner.scene(self.path.coordinates)
         left = self._left(1.0)
         if self.braking or left is None or scene.violation(motion_of(self.path.coordinates, left)) is None:
             return True
@@ -99,6 +129,8 @@ class PathFollower:
             self.law, self.time, self.braking = law, 0.0, True
             hit = scene.violation(motion_of(self.path.coordinates, part))
             break
+        if self.braking:
+            self._next = self._plan()
         if hit is not None:
             raise InfeasibleError("path", hit.distance, f"it cannot come to rest before {hit}")
         return False

@@ -27,10 +27,10 @@ POINTS = 20_000
 FULL = -1
 #: Numbers of a ``drift_t`` of ``native/plan.h``
 _DRIFT = 10
-#: Pairs that are looked at together
+#: Places that are looked at together
 LANES = 8
-#: and numbers of each
-_LANE = 16
+#: Numbers that an ``outline_t`` takes the room of
+_OUTLINE = 4
 #: Pairs that were too near last and are looked at first
 RECENT = 3
 
@@ -52,10 +52,12 @@ class _PlanStruct(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("sweep", "drifts", "gone", "radius", "balls", "normals")),
         *((name, ctypes.c_double) for name in ("half", "open")),
-        *((name, ctypes.c_void_p) for name in ("lanes", "first_block", "block_pairs", "loose_pairs")),
+        *((name, ctypes.c_void_p) for name in ("boxes", "reaches", "offs", "lane_pose", "lane_centre")),
+        *((name, ctypes.c_void_p) for name in ("outlines", "near")),
+        ("near_count", ctypes.c_int * LANES),
         ("recent", ctypes.c_int * RECENT),
         *((name, ctypes.c_void_p) for name in ("x", "y", "low", "high", "sample_low", "sample_high", "weight")),
-        *((name, ctypes.c_int) for name in ("n", "pairs", "loose", "capacity", "seeds")),
+        *((name, ctypes.c_int) for name in ("n", "pairs", "capacity", "seeds")),
         ("count", ctypes.c_int * 2),
         *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "longest")),
         ("random", ctypes.c_ulonglong),
@@ -70,13 +72,15 @@ class _PlanStruct(ctypes.Structure):
 
 
 @functools.cache
-def library() -> ctypes.PyDLL:
+def library() -> ctypes.CDLL:
     """The compiled code.
 
     Raises:
         CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
-    found = checked(load_library(kernel(_SOURCES / "plan.c", SWEEP, HEADERS)), wbc_plan_size=_PlanStruct)
+    held = checked(load_library(kernel(_SOURCES / "plan.c", SWEEP, HEADERS)), wbc_plan_size=_PlanStruct)
+    # Other threads run meanwhile
+    found = ctypes.CDLL(held._name, handle=held._handle)
     place, number = ctypes.c_void_p, ctypes.c_int
     kinds: dict[str, Sequence[object]] = {
         "prepare": (), "free": (place,), "margin": (place,), "edge": (place, place), "project": (place,),
@@ -129,13 +133,14 @@ class NativePlanner:
         it.sweep, it.pairs = sweep.address, len(scene.pairs)
         bodies, pairs = len(scene.bodies), len(scene.pairs)
         depth = max([1, *(len(chain) for chain in swept.chain)])
-        blocks = pairs // LANES + bodies + 1
+        frames = len(coordinates.tree.frames)
         self._normals = np.zeros((pairs, 3))
         self._arrays: dict[str, Array] = {
-            "drifts": np.zeros((bodies, depth + 1, _DRIFT)), "gone": np.zeros(len(coordinates.tree.frames)),
-            "radius": np.zeros(bodies), "balls": np.zeros((bodies, 4)), "normals": self._normals,
-            "lanes": np.zeros((blocks, _LANE, LANES)), "first_block": np.zeros(bodies + 1, dtype=np.int32),
-            "block_pairs": np.zeros((blocks, LANES), dtype=np.int32), "loose_pairs": np.zeros(pairs, dtype=np.int32),
+            "drifts": np.zeros((bodies, depth + 1, _DRIFT)), "gone": np.zeros(frames), "radius": np.zeros(bodies),
+            "balls": np.zeros((bodies, 4)), "normals": self._normals, "boxes": np.zeros((bodies, 15)),
+            "reaches": np.zeros((bodies, depth)), "offs": np.zeros((bodies, depth + 1)),
+            "lane_pose": np.zeros((frames, 12, LANES)), "lane_centre": np.zeros((bodies, 3, LANES)),
+            "outlines": np.zeros((pairs, _OUTLINE)), "near": np.zeros((LANES, pairs), dtype=np.int32),
         }  # fmt: skip
         for name, array in self._arrays.items():
             setattr(it, name, array.ctypes.data)

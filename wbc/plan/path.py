@@ -160,12 +160,7 @@ class PlannedPath:
     def motion_limits(self) -> tuple[Array, Array]:
         """Speeds and accelerations of the coordinates [n]."""
         coordinates, limits = self.coordinates, self.stack.robot.limits
-        dofs = list(coordinates.dofs)
-        fast, brisk = limits.velocity[dofs].copy(), limits.acceleration[dofs].copy()
-        if self.stack.robot.base in ("planar", "differential"):
-            # Along the axes of the base, wherever these point
-            for rates in (fast, brisk):
-                rates[:2] = rates[:2].min() / np.sqrt(2.0)
+        fast, brisk = coordinates.rates(limits.velocity), coordinates.rates(limits.acceleration)
         fast = np.where(np.isfinite(fast), fast, UNLIMITED * coordinates.scale)
         return fast, np.where(np.isfinite(brisk), brisk, fast / RAMP)
 

@@ -41,10 +41,10 @@ RANGE = 0.07
 RANGES = (1.0, 0.5, 2.0)
 #: Descents to configurations that meet a target
 DESCENTS = 100
-#: Of the cuts, the share by which every path is shortened; the shortest one then has all of them
-CANDIDATE = 4
-#: Rounds at most in which corners of the shortest path are pulled in and cut off
-ROUNDS = 3
+#: Searches end with a path that is no longer than this, against the straight line to its goal
+DETOUR = 1.5
+#: Rounds at most in which corners of a path are pulled in and cut off
+ROUNDS = 2
 #: Goals of one target at most: those nearest to the start
 BRANCHES = 4
 #: Goals nearer to each other than this are one [rad, or characteristic lengths]
@@ -63,7 +63,7 @@ class PlanningOptions:
         seed: of the samples. The path is a function of it, of start, goal and run-time values where the time does not
             end the search.
         seconds: after which it is over [s].
-        paths: searched before the shortest is returned.
+        paths: searched at most before the shortest is returned; fewer where one leads nearly straight to the goal.
         cuts: tries to cut a path short, for each of them.
         range: edges of the trees are no longer [rad, or characteristic lengths]; None: a share of the space.
         step: of edges that are projected onto equality rows [rad, or characteristic lengths].
@@ -121,7 +121,7 @@ class MotionPlanner(Handles):
         keep: tasks whose errors stay 0 on the whole path: a level cup, a tray between two hands.
 
     Raises:
-        UnknownNameError: no such task. UnsupportedJointError: a floating base or ball joints.
+        UnknownNameError: no such task. UnsupportedJointError: a joint without a symbolic model.
         CommandError: a hard constraint on velocities. CompileError: no compiler, and nothing was compiled ahead.
     """
 
@@ -135,16 +135,12 @@ class MotionPlanner(Handles):
             for name in ((keep,) if isinstance(keep, str) else validation.strings("keep", keep))
         )
         self.stack = declared
-        self.coordinates = PlanningCoordinates.of(declared.robot, declared.length)
         light = without_distances(declared)
         self._controller = CompiledStack(light, compile_stack(light, "vm", __version__), "daqp")
         self._core = core_of(self._controller)
         super().__init__(self._core.handles, light)
-        _, lower, upper = stops(declared, self._core.layout)
-        self._limits = self.coordinates.limits(lower, upper)
-        self._builder = RowsBuilder(self._core, self.coordinates, self.kept)
-        self._rows: dict[tuple[Any, ...], PlanningRows] = {}
-        self._native: NativePlanner | None = None
+        self._stops = stops(declared, self._core.layout)[1:]
+        self._use(PlanningCoordinates.of(declared.robot, declared.length))
         self._switches: tuple[bool, ...] = ()
         self._places = PlanningScene.places_of(self._core)
 
@@ -191,12 +187,21 @@ class MotionPlanner(Handles):
         search.find_goals(goals)
         return np.array(search.goals)
 
+    def _use(self, coordinates: PlanningCoordinates) -> None:
+        self.coordinates = coordinates
+        self._limits = coordinates.limits(*self._stops)
+        self._builder = RowsBuilder(self._core, coordinates, self.kept)
+        self._rows: dict[tuple[Any, ...], PlanningRows] = {}
+        self._native: NativePlanner | None = None
+
     def _search(
         self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]
     ) -> tuple[_Search, tuple[Goal, ...]]:
         chosen = replace(PlanningOptions() if options is None else options, **changes)
         q = self.stack.robot.configuration("q0", q0)
         goals = goals_of(self._core, goal)
+        if not self.coordinates.suits(q):
+            self._use(PlanningCoordinates.of(self.stack.robot, self.stack.length, q))
         # Of tasks that count for nothing no value is taken
         named = {name for target in goals if isinstance(target, TargetGoal) for name in target.names}
         idle = {entry.name for entry in self.stack.tasks} - named - set(self.kept)
@@ -214,9 +219,9 @@ class MotionPlanner(Handles):
         """All run-time values, as :meth:`rows` take them."""
         return self._core.tick.p
 
-    def scene(self) -> PlanningScene:
-        """The bodies that are kept apart, at the present run-time values."""
-        return PlanningScene.of(self._core, self.coordinates)
+    def scene(self, coordinates: PlanningCoordinates | None = None) -> PlanningScene:
+        """The bodies that are kept apart, at the present run-time values; moved by other coordinates where given."""
+        return PlanningScene.of(self._core, coordinates or self.coordinates)
 
     def rows(self, goals: tuple[str, ...] = ()) -> PlanningRows:
         """Rows of every configuration of a path, and of tasks that are met at its end besides.
@@ -406,13 +411,15 @@ class _Search:
                 best, shortest = points, length
             if attempt == 0 and self.nodes == (0, 0):
                 return points
+            if shortest <= DETOUR * self._distance(points[0], points[-1]):
+                break
         if best is None:
             raise self._nothing()
-        return self._shortened(best, options.cuts, ROUNDS)
+        return best
 
-    def _shortened(self, points: Array, cuts: int, rounds: int) -> Array:
+    def _shortened(self, points: Array) -> Array:
         begin = process_time()
-        points = self.native.shortened(points, cuts, rounds)
+        points = self.native.shortened(points, self.options.cuts, ROUNDS)
         self.shortening += process_time() - begin
         return points
 
@@ -441,8 +448,7 @@ class _Search:
             return None
         points = native.path()
         ends = [float(np.abs(points[-1] - self.last[k]).max()) for k in roots]
-        points = self._shortened(points, options.cuts // CANDIDATE, 0)
-        return self._ended(points, roots[int(np.argmin(ends))])
+        return self._shortened(self._ended(points, roots[int(np.argmin(ends))]))
 
     def _ended(self, points: Array, goal: int) -> Array:
         """A path between what is near start and goal, with both."""

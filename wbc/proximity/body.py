@@ -10,7 +10,8 @@ from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError
 from wbc.multibody import pin
 from wbc.shapes import Shape
-from wbc.shapes.solid import names_of_shapes, why_apart
+from wbc.shapes.names import names_of_shapes
+from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ is a corner (the centre of a ball, for round ends) and b its nearest point of B,
 that is close the nearest of these have rows; for other pairs they are too far to matter (``native/corners.h``).
 
 Corners are those of boxes and hulls, the centres of the balls at a capsule's ends, and points on a cylinder's rims;
-spheres have none. Hulls and half-spaces are not the other body of a corner: that is a sphere, capsule, box or cylinder,
+spheres have none. Hulls are not the other body of a corner: that is a sphere, capsule, box, cylinder or half-space,
 whose nearest point has a closed form.
 """
 

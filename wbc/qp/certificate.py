@@ -15,7 +15,6 @@ damping of 10^-8, the rounding of lam to double alone would be worth 0.1 rad/s.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from wbc.qp.factor import ROUNDOFF, WIDE_ROUNDOFF, ActiveRows, Factor, Wide, active_bounds
 from wbc.qp.problem import QP, QPSolution
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 _CORRECTIONS = 4

@@ -12,12 +12,11 @@ The set and the minimiser are unchanged; the multipliers of the given rows follo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.problem import QP, QPSolution
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 Index = NDArray[np.intp]

@@ -11,13 +11,14 @@ lam (positive where an upper bound pushes, negative where a lower bound pushes) 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import BoundsError, NotFiniteError, RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 Flag = Literal["solved", "infeasible", "failed"]

@@ -14,7 +14,7 @@ The least-violation problem has no unique v; it is solved by a proximal sequence
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from wbc.errors import BoundsError
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, Prepared
 from wbc.qp.solvers.daqp import Daqp
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 #: Weight of the proximal term, steps at most, and the change of s at which the sequence ends

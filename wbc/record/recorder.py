@@ -12,11 +12,13 @@ import os
 import pickle
 import platform
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 from wbc import extras, validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
-from wbc.log.file import FileWriter, LogWriter
+from wbc.log.file import Columns, FileWriter
+from wbc.record.background import BackgroundWriter
 from wbc.record.recording import FORMAT, RecordingError
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
@@ -40,7 +42,7 @@ UNKNOWN = -1
 COLD = struct.pack("d", 1.0)
 #: The part ``reset`` of a tick that begins warm
 WARM = struct.pack("d", 0.0)
-#: Size of a chunk [bytes]: writing it takes a loop some 0.1 ms, and its memory is not asked of the system each time
+#: Size of a chunk [bytes]; its memory is not asked of the system each time
 CHUNK = 1 << 17
 #: Ticks of a chunk at least
 FEWEST = 16
@@ -48,6 +50,39 @@ FEWEST = 16
 MOST = 1024
 #: Packages whose version decides the bits of a command
 PACKAGES = ("casadi", "pin", "daqp", "osqp", "numpy")
+
+
+class TickRow:
+    """The parts of a tick side by side, and from where in its memory each is copied.
+
+    Attributes:
+        sizes: part -> how many numbers, in their order.
+    """
+
+    def __init__(self, state: memoryview) -> None:
+        self._state, self.sizes = state, dict[str, int]()
+
+    @property
+    def size(self) -> int:
+        """Of all parts so far [bytes]."""
+        return 8 * sum(self.sizes.values())
+
+    def add(self, places: Mapping[str, slice]) -> list[tuple[int, int, memoryview]]:
+        """Lay out parts by their places in memory: (begin and end in the row [bytes], the memory) of each piece that is
+        copied at once. Parts that touch, but for one number that C has more, are a piece with it.
+        """
+        pieces: list[tuple[int, slice]] = []
+        for name, place in sorted(places.items(), key=lambda pair: (pair[1].start, pair[1].stop)):
+            begin, piece = pieces[-1] if pieces else (0, slice(-2, -2))
+            if place.start == piece.stop + 1:
+                self.sizes[f"before {name}"] = 1
+            elif place.start != piece.stop:
+                begin, piece = self.size, slice(place.start, place.start)
+                pieces.append((begin, piece))
+            pieces[-1] = begin, slice(piece.start, place.stop)
+            self.sizes[name] = place.stop - place.start
+        spans = [(begin, 8 * piece.start, 8 * piece.stop) for begin, piece in pieces if piece.start != piece.stop]
+        return [(begin, begin + stop - start, self._state[start:stop]) for begin, start, stop in spans]
 
 
 class Recorder:
@@ -71,25 +106,21 @@ class Recorder:
         self.count = 0
         self._core = core = core_of(controller)
         self._tick = core.tick
-        views = {name: getattr(self._tick, name) for name in recorded_inputs(core.layout)}
-        layout = core.layout
-        sizes = {name: view.size for name, view in views.items()} | {"reset": 1, "v": layout.nv}
-        if layout.variables > layout.nv:
-            sizes["others"] = layout.variables - layout.nv
-        sizes["flag"] = 1
-        told = [self._tick.report[core.context.memory[name]] for name in TOLD]
-        sizes |= {name: part.size for name, part in zip(TOLD, told, strict=True)}
-        self._told = [part.data.cast("B") for part in told if part.size]
-        self._given = [view.data.cast("B") for view in views.values() if view.size]
-        begin = 8 * sum(views[name].size for name in INPUTS[: INPUTS.index("p")])
-        self._values, self._place = views["p"].data.cast("B"), slice(begin, begin + 8 * views["p"].size)
-        # the report begins with the command and the flag
-        self._command = self._tick.report.data.cast("B")[: 8 * (layout.variables + 1)]
+        layout, places = core.layout, core.context.memory
+        state = core.tick.state.data.cast("B")
+        row = TickRow(state)
+        self._given = row.add({name: places[name] for name in recorded_inputs(layout)})
+        p = Columns.of(row.sizes)["p"]
+        self._values = 8 * p.start, 8 * p.stop, state[8 * places["p"].start : 8 * places["p"].stop]
+        self._reset, row.sizes["reset"] = row.size, 1
+        others = {"others": slice(layout.nv, layout.variables)} if layout.variables > layout.nv else {}
+        told = {"v": slice(0, layout.nv)} | others
+        self._told = row.add(told | {name: places[name] for name in ("flag", *TOLD)})
         pickled, problem = _pickled(controller.stack)
-        text = about(controller) | {"sizes": sizes, "not_pickled": problem}
-        self._writer: LogWriter | None = FileWriter(self.path, overwrite, RecordingError)
+        text = about(controller) | {"sizes": row.sizes, "not_pickled": problem}
+        self._writer: BackgroundWriter | None = BackgroundWriter(FileWriter(self.path, overwrite, RecordingError))
         self._writer.begin(text, {} if pickled is None else {"stack.pickle": pickled})
-        self._size = 8 * sum(sizes.values())
+        self._size = row.size
         self._chunk, self._process = max(FEWEST, min(MOST, CHUNK // self._size)), os.getpid()
         # Ticks that are not written yet, in memory that is kept: what asks the system for more waits where it is short
         self._memory, self._end = memoryview(bytearray(self._chunk * self._size)), 0
@@ -113,7 +144,7 @@ class Recorder:
             try:
                 self._writer.close()
             except OSError as error:
-                self._fail(error)
+                self._fail(self._writer, error)
             self._detach()
         problem, self._problem = self._problem, None
         if problem is not None:
@@ -121,7 +152,16 @@ class Recorder:
             raise RecordingError("path", str(self.path), reason) from problem
 
     def flush(self) -> None:
-        """Write the ticks that are only in memory."""
+        """Write the ticks that are only in memory, and wait until they are written."""
+        self._send()
+        if self._writer is not None:
+            try:
+                self._writer.wait()
+            except OSError as error:
+                self._fail(self._writer, error)
+
+    def _send(self) -> None:
+        """Have the ticks written that are only in memory."""
         if self._writer is None:
             return
         if self._process != os.getpid():
@@ -132,10 +172,7 @@ class Recorder:
             try:
                 self._writer.write(self._memory[: self._end])
             except OSError as error:
-                self.count -= self._end // self._size
-                self._fail(error)
-                self._writer.abandon()
-                self._detach()
+                self._fail(self._writer, error)
             self._end = 0
 
     def _leave(self) -> None:
@@ -143,9 +180,11 @@ class Recorder:
         with contextlib.suppress(RecordingError):
             self.close()
 
-    def _fail(self, error: OSError) -> None:
-        self._problem = error
+    def _fail(self, writer: BackgroundWriter, error: OSError) -> None:
+        self._problem, self.count = error, writer.written // self._size
         log.warning("the recording %s ends after %d ticks: %s", self.path, self.count, error.strerror)
+        writer.abandon()
+        self._detach()
 
     def _detach(self) -> None:
         self._writer = None
@@ -165,8 +204,9 @@ def _recorded(recorder: Recorder) -> int:
     if seen == UNKNOWN:
         # the first one, or the one before was interrupted between its call and its record
         recorder._tick.reset()
-    # joining bytes is several times as fast as copying as many numpy arrays
-    given = b"".join(recorder._given)
+    memory, begin = recorder._memory, recorder._end
+    for first, last, numbers in recorder._given:
+        memory[begin + first : begin + last] = numbers
     recorder._seen = UNKNOWN
     flag = recorder._call()
     if flag:
@@ -177,15 +217,17 @@ def _recorded(recorder: Recorder) -> int:
     if recorder._core.resets != resets:
         # found again from other rows, which are sensed inputs, and from no active set
         resets = recorder._core.resets
-        given = b"".join((given[: recorder._place.start], recorder._values, given[recorder._place.stop :]))
-    row = b"".join((given, WARM if resets == seen else COLD, recorder._command, *recorder._told))
-    end = recorder._end + recorder._size
-    recorder._memory[recorder._end : end] = row
-    recorder._end = end
+        first, last, numbers = recorder._values
+        memory[begin + first : begin + last] = numbers
+    first = begin + recorder._reset
+    memory[first : first + len(COLD)] = WARM if resets == seen else COLD
+    for first, last, numbers in recorder._told:
+        memory[begin + first : begin + last] = numbers
+    end = recorder._end = begin + recorder._size
     recorder._seen = resets
     recorder.count += 1
     if end == len(recorder._memory):
-        recorder.flush()
+        recorder._send()
     return flag
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         find_clips as find_clips,
         retarget_clips as retarget_clips,
     )
-    from wbc.retarget.held import Support as Support, held as held
+    from wbc.retarget.holding_forces import Support as Support, held as held
     from wbc.retarget.live import LiveRetargeter as LiveRetargeter
     from wbc.retarget.options import RetargetOptions as RetargetOptions, RetargetWeights as RetargetWeights
     from wbc.retarget.outputs import write_lerobot as write_lerobot, write_motion as write_motion

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
-import casadi as ca
 import numpy as np
 
 from wbc import robots, tasks
 from wbc.api import Controller, Stack
 from wbc.controller.compiled_stack import core_of
 from wbc.controller.handle import InputGroup
-from wbc.controller.step import Step
 from wbc.multibody import pin
 from wbc.retarget.clip import Array
 from wbc.retarget.options import RetargetOptions
-from wbc.retarget.plan import MotionPlan, balanced, logarithms
+from wbc.retarget.plan import ContactGrip, MotionPlan, balanced, logarithms
 from wbc.retarget.robot_body import RobotBody, with_frame
+from wbc.retarget.still_contact import StillContact
 from wbc.robot import Robot
-from wbc.rotations import exponential
 from wbc.shapes import Convex, HalfSpace, PlacedShape
-from wbc.symbolic.tracer import Tracer
-from wbc.tasks.base import Values
+from wbc.tasks.base import Task
 from wbc.tick.outcome import Status
 
 #: Gain of tasks, as share of one over the time of a tick
 GAIN = 0.5
 #: Gain of tasks at most: what is far off comes back without swinging the robot about [1/s]
 FASTEST = 15.0
-#: Gain of held contacts, as share of one over the time of a tick
-HOLD_GAIN = 0.9
 #: What links that come nearer to each other, or to the ground, than their clearance cost
 CLEARANCE_PRICE = 1e4
 #: How many pairs of links have rows at a time
@@ -42,7 +37,7 @@ NEIGHBOURS = 3
 PAIR_SAMPLES = 2000
 #: Corners of the hull of a link besides feet and hands, at most: more than have rows of their own, so that they are
 #: measured before a tick, which is faster
-LINK_CORNERS = 96
+LINK_CORNERS = 500
 #: Fewer do where they are within this of it [m]
 NEAR_ENOUGH = 1e-5
 #: Half the thickness of what is drawn as a plane [m]
@@ -59,18 +54,18 @@ GROUND_RATE = 0.5
 LANDING = 0.1
 #: After so many ticks it is tried again
 AGAIN = 3
-#: What a held contact moves by, beyond what was foreseen, before its tick is done again [m]
-MATTERS = 1.5e-5
-#: What a held contact moves by within a tick and more is no second order [m]
-FORESEEN = 1e-3
 #: Distance from a sole's middle at which its turns are counted [m]
 LEVER = 0.12
 #: A foot is held from where it is this near to its place [m]
-FOOT_ENGAGED = 1e-2
+FOOT_ENGAGED = 3e-3
 #: A hand, which its task draws less [m]
 HAND_ENGAGED = 3e-2
+#: How much more the height of a hand that lies on the ground counts than that of one in the air [1]
+LYING = 1e3
+#: Rows of the ground that give way by more ask hands to rise [m/s]
+PUSHED = 0.02
 #: Ticks that bring the robot to the first frame
-SETTLING = 400
+SETTLING = 80
 #: The first frame is reached when no joint moves faster [rad/s]
 SETTLED = 1e-3
 
@@ -87,30 +82,25 @@ def limited(robot: Robot, options: RetargetOptions) -> Robot:
 
 
 @dataclass(frozen=True)
-class _StillContact(tasks.Hold):
-    """A contact at rest, as rows at q alone: what a tick loses at second order the next one makes up for."""
+class _PlanFollower:
+    """An item of the stack that follows a plan.
 
-    abstract: ClassVar[bool] = True
-
-    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """None: its rows are not bent."""
-        return None
-
-
-@dataclass(frozen=True)
-class _Leading:
-    """Columns of a plan's rows: item, input, and how many numbers."""
+    Attributes:
+        place, turn: names of the position and the rotation that it follows; "" where it follows none.
+        stands: it is a contact, which is at the next target a tick later.
+    """
 
     item: str
-    name: str
-    size: int
+    place: str = ""
+    turn: str = ""
+    stands: bool = False
 
 
 class Engine:
     """The compiled stack of a robot that follows a plan, tick by tick.
 
     Attributes:
-        robot: with its limits. controller: of the stack. columns: what a row of :meth:`rows` holds.
+        robot: with its limits. controller: of the stack.
     """
 
     def __init__(
@@ -123,50 +113,44 @@ class Engine:
         stack = Stack(self.robot, dt=dt, calm=False)
         gain = min(GAIN / dt, FASTEST)
         free = self.robot.base != "fixed"
-        self.columns: list[_Leading] = []
-
-        def led(item: str, *sizes: tuple[str, int]) -> None:
-            self.columns += [_Leading(item, name, size) for name, size in sizes]
-
+        followers: list[_PlanFollower] = []
         if free:
             six = (weights.pelvis,) * 3 + (weights.turn,) * 3
             stack.add(tasks.EndEffector(body.pelvis, weights=six, gain=gain), name="pelvis")
-            led("pelvis", ("target", 12), ("feedforward", 6))
-        self._chest = body.plan.upright and body.plan.chest != body.plan.pelvis
-        if self._chest:
+            followers.append(_PlanFollower("pelvis", "pelvis", "pelvis"))
+        if body.plan.upright and body.plan.chest != body.plan.pelvis:
             stack.add(tasks.EndEffector(body.chest, "orientation", gain=gain), name="chest", weight=weights.chest)
-            led("chest", ("target", 9), ("feedforward", 3))
-        self._head = head and bool(body.head)
-        if self._head:
+            followers.append(_PlanFollower("chest", turn="chest"))
+        if head and body.head:
             stack.add(tasks.EndEffector(body.head, "orientation", gain=gain), name="head", weight=weights.head)
-            led("head", ("target", 9), ("feedforward", 3))
+            followers.append(_PlanFollower("head", turn="head"))
         if options.balance and free:
             # Over the contacts, wherever their height
             mass = tasks.CenterOfMass(weights=(1.0, 1.0, 0.0), gain=gain)
             stack.add(mass, name="balance", weight=options.balance)
-            led("balance", ("target", 3), ("feedforward", 3))
+            followers.append(_PlanFollower("balance", "balance"))
         for name in self._limbs:
-            self._add_limb(stack, name, gain, led)
+            followers += self._add_limb(stack, name, gain)
         stack.add(tasks.Posture(start="neutral", gain=1.0), name="posture", weight=weights.posture)
         stack.add(tasks.JointLimits(shortest_dt=dt), name="limits")
-        feet = [name for name in body.limbs if self.is_foot(name)]
-        for name in feet:
-            ground = tasks.Obstacle(HalfSpace(), links=(body.limbs[name].end,), pose=_below(DEPTH), closest=1)
-            stack.add(ground, name=f"{name} above ground", soft=GROUND_PRICE)
         if options.clearance is not None:
             clear = tasks.SelfCollision(margin=options.clearance, closest=CLOSEST, method="sensed")
             stack.add(clear, name="clearance", soft=CLEARANCE_PRICE)
-        links = (*self._links, *(limb.end for name, limb in body.limbs.items() if name not in feet))
-        if free and links:
-            ground = tasks.Obstacle(HalfSpace(), links=links, pose=_below(DEPTH), closest=NEAREST)
-            stack.add(ground, name="above ground", soft=GROUND_PRICE)
+        if free:
+            self._add_ground(stack)
         self.stack = stack
         self.controller: Controller = stack.compile()
-        for item in (*(f"{name} above ground" for name in feet), *(["above ground"] if free and links else [])):
-            self.controller[item].rate = GROUND_RATE / dt
-        self._group = InputGroup(core_of(self.controller), [(c.item, c.name, None) for c in self.columns])
-        self._held: dict[str, bool] = {}
-        self._items = {column.item for column in self.columns}
+        if free:
+            for item in self._ground:
+                self.controller[item].rate = GROUND_RATE / dt
+        inputs = [(f.item, part, None) for f in followers for part in ("target", "feedforward")[: 1 if f.stands else 2]]
+        self._group = InputGroup(core_of(self.controller), inputs)
+        self._places = tuple(dict.fromkeys(("pelvis", *(f.place for f in followers if f.place))))
+        self._turns = tuple(dict.fromkeys(("pelvis", "", *(f.turn for f in followers))))
+        self._order = np.array([column for f in followers for column in self._columns_of(f)])
+        self._held: dict[str, ContactGrip] = {}
+        self._data = self.robot.model.createData()
+        self._tasks = [entry.name for entry in stack.entries if isinstance(entry.item, Task)]
 
     def _shaped(self, robot: Robot) -> Robot:
         """The robot with balls around what it may touch the ground with, and where clearances are asked for with shapes
@@ -178,9 +162,20 @@ class Engine:
             found = robots.find_self_pairs(robot, samples=PAIR_SAMPLES).kept
             pairs = tuple(pair for pair in found if _joints_between(robot, *pair) > NEIGHBOURS)
         ends = self.body.limbs.values()
-        shapes = {limb.end: [_solid(limb.surface)] for limb in ends}
+        shapes: dict[str, list[PlacedShape]] = {}
         last = {limb.joints[-1] for limb in ends}
         self._links: list[str] = []
+        for name, limb in self.body.limbs.items():
+            ball = np.linalg.norm(limb.surface, axis=1) <= limb.radius + NEAR_ENOUGH
+            if not self.body.is_foot(name) or limb.contact == "flat" or ball.all() or not ball.any():
+                shapes[limb.end] = [_solid(limb.surface)]
+                continue
+            # A point foot's ball is off the ground however its leg turns, what is above the ball is not
+            end = robot.model.frames[robot.model.getFrameId(limb.end)]
+            frame = f"retarget_ground_{name}"
+            robot = with_frame(robot, frame, int(end.parentJoint), end.placement)
+            shapes |= {limb.end: [_solid(limb.surface[ball])], frame: [_solid(limb.surface[~ball])]}
+            self._links.append(frame)
         for joint, balls in self.body.balls.items() if robot.base != "fixed" else ():
             if joint not in last:
                 frame = f"retarget_ground_{joint}"
@@ -189,99 +184,125 @@ class Engine:
                 self._links.append(frame)
         return robot.with_shapes({**robot.shapes, **shapes}).with_self_pairs(pairs)
 
-    def is_foot(self, name: str) -> bool:
-        """Whether a limb walks."""
-        free = self.robot.base != "fixed"
-        return free and (name.endswith("leg") or not self.body.plan.upright)
+    def _add_ground(self, stack: Stack) -> None:
+        """Rows of the ground: one for each foot, which ends while it is held, and one for hands and other links.
 
-    def _add_limb(self, stack: Stack, name: str, gain: float, led: Callable[..., None]) -> None:
+        A foot that is held comes down to its place on the ground as fast as the plan says. A row that lets it come down
+        slower would be served by turns of its leg, which lift corners of its hull.
+        """
+        ends = {name: limb.end for name, limb in self.body.limbs.items()}
+        held = self._limbs if self.options.hold else []
+        self._own_ground = {name: f"{name} above ground" for name in held if self.body.is_foot(name)}
+        for name, item in self._own_ground.items():
+            ground = tasks.Obstacle(HalfSpace(), links=(ends.pop(name),), pose=_below(DEPTH))
+            stack.add(ground, name=item, soft=GROUND_PRICE)
+        self._ground = [*self._own_ground.values()]
+        if links := (*ends.values(), *self._links):
+            closest = min(len(self.body.limbs) + NEAREST, len(links))
+            ground = tasks.Obstacle(HalfSpace(), links=links, pose=_below(DEPTH), closest=closest)
+            stack.add(ground, name="above ground", soft=GROUND_PRICE)
+            self._ground.append("above ground")
+
+    def _add_limb(self, stack: Stack, name: str, gain: float) -> list[_PlanFollower]:
+        """Add what follows a limb's targets."""
         body, weights, limb = self.body, self.options.weights, self.body.limbs[name]
-        if body.plan.upright and limb.middle:
-            stack.add(
-                tasks.EndEffector(limb.middle, "position", gain=gain), name=f"{name} middle", weight=weights.middle
-            )
-            led(f"{name} middle", ("target", 3), ("feedforward", 3))
-        if self.is_foot(name):
-            if limb.contact == "flat":
-                six = (weights.foot,) * 3 + (weights.sole,) * 3
-                stack.add(tasks.EndEffector(limb.end, weights=six, gain=gain), name=name)
-                led(name, ("target", 12), ("feedforward", 6))
-            else:
-                stack.add(tasks.EndEffector(limb.end, "position", gain=gain), name=name, weight=weights.foot)
-                led(name, ("target", 3), ("feedforward", 3))
-        else:
-            if limb.wrist:
-                stack.add(
-                    tasks.EndEffector(limb.wrist, "position", gain=gain), name=f"{name} wrist", weight=weights.wrist
-                )
-                led(f"{name} wrist", ("target", 3), ("feedforward", 3))
-            stack.add(tasks.EndEffector(limb.end, "position", gain=gain), name=name, weight=0.1 * weights.wrist)
-            led(name, ("target", 3), ("feedforward", 3))
+        flat, foot = limb.contact == "flat", self.body.is_foot(name)
+        points = [(f"{name} middle", limb.middle, weights.middle)] if body.plan.upright else []
+        if not foot:
+            points += [(f"{name} wrist", limb.wrist, weights.wrist), (name, limb.end, 0.1 * weights.wrist)]
+        elif not flat:
+            points.append((name, limb.end, weights.foot))
+        followers = []
+        for item, frame, weight in points:
+            if frame:
+                stack.add(tasks.EndEffector(frame, "position", gain=gain), name=item, weight=weight)
+                followers.append(_PlanFollower(item, item))
+        if foot and flat:
+            six = (weights.foot,) * 3 + (weights.sole,) * 3
+            stack.add(tasks.EndEffector(limb.end, weights=six, gain=gain), name=name)
+            followers.append(_PlanFollower(name, name, name))
         if self.robot.base != "fixed" and self.options.hold:
-            kind: Literal["pose", "position"] = "pose" if limb.contact == "flat" else "position"
-            stack.add(_StillContact(limb.end, kind, gain=HOLD_GAIN / self.dt), name=f"{name} stands")
-            led(f"{name} stands", ("target", 12))
+            kind: Literal["pose", "position"] = "pose" if flat else "position"
+            stack.add(StillContact(limb.end, kind, gain=1.0 / self.dt), name=f"{name} stands")
+            followers.append(_PlanFollower(f"{name} stands", name, name if flat else "", stands=True))
+        return followers
 
-    def rows(self, plan: MotionPlan) -> Array:
-        """Numbers of all inputs over ticks [ticks, numbers]."""
-        dt = plan.dt
-        turn, pelvis = plan.turn, plan.pelvis
-        parts: dict[tuple[str, str], Array] = {}
-        if self.robot.base != "fixed":
-            parts["pelvis", "target"] = _pose(turn, pelvis)
-            parts["pelvis", "feedforward"] = np.hstack([_rate(pelvis, dt), _turn_rate(turn, dt)])
-        if self._chest:
-            parts["chest", "target"], parts["chest", "feedforward"] = _columns(plan.chest), _turn_rate(plan.chest, dt)
-        if self._head and plan.head is not None:
-            parts["head", "target"], parts["head", "feedforward"] = _columns(plan.head), _turn_rate(plan.head, dt)
-        if self.options.balance and self.robot.base != "fixed":
-            over = balanced(plan)
-            parts["balance", "target"], parts["balance", "feedforward"] = over, _rate(over, dt)
+    def _columns_of(self, follower: _PlanFollower) -> list[int]:
+        """Which of the numbers of :meth:`rows`, before they are put in order, an item's inputs are."""
+        places, turns = 3 * len(self._places), 9 * len(self._turns)
+        place = 3 * self._places.index(follower.place) if follower.place else None
+        turn = 9 * self._turns.index(follower.turn) if follower.turn or follower.stands else None
+        ahead = 1 if follower.stands else 0
+        target = [] if turn is None else list(range(turn + ahead * turns, turn + ahead * turns + 9))
+        first = 2 * turns + ahead * places
+        target += [] if place is None else list(range(first + place, first + place + 3))
+        if follower.stands:
+            return target
+        first = 2 * turns + 2 * places
+        rates = [] if place is None else list(range(first + place, first + place + 3))
+        first += places
+        return target + rates + ([] if turn is None else list(range(first + turn // 3, first + turn // 3 + 3)))
+
+    def targets(self, plan: MotionPlan) -> tuple[Array, Array]:
+        """Positions [ticks, places, 3] and rotations [ticks, turns, 3, 3] that the stack follows."""
+        places = {"pelvis": plan.pelvis}
+        turns = {"pelvis": plan.turn, "chest": plan.chest, "": np.broadcast_to(np.eye(3), (plan.ticks, 3, 3))}
+        if plan.head is not None:
+            turns["head"] = plan.head
+        if "balance" in self._places:
+            places["balance"] = balanced(plan)
         for name in self._limbs:
-            limb, flat = plan.limbs[name], self.body.limbs[name].contact == "flat" and self.is_foot(name)
-            for item, values in ((f"{name} middle", limb.middle), (f"{name} wrist", limb.wrist), (name, limb.end)):
-                if item in self._items:
-                    parts[item, "target"], parts[item, "feedforward"] = values, _rate(values, dt)
-            ahead = limb.end + (_next(limb.end) - limb.end) / HOLD_GAIN
-            rotation = np.broadcast_to(np.eye(3), (plan.ticks, 3, 3))
-            if flat and limb.rotation is not None:
-                turned = _turn_rate(limb.rotation, dt)
-                parts[name, "target"] = _pose(limb.rotation, limb.end)
-                parts[name, "feedforward"] = np.hstack([parts[name, "feedforward"], turned])
-                # What a hold must be given so that a frame on one target is on the next one a tick later
-                rotation = exponential(turned * (dt / HOLD_GAIN)) @ limb.rotation
-            parts[f"{name} stands", "target"] = _pose(rotation, ahead)
-        return np.ascontiguousarray(np.hstack([parts[c.item, c.name] for c in self.columns]))
+            limb = plan.limbs[name]
+            places |= {f"{name} middle": limb.middle, f"{name} wrist": limb.wrist, name: limb.end}
+            if limb.rotation is not None:
+                turns[name] = limb.rotation
+        return np.stack([places[name] for name in self._places], 1), np.stack([turns[name] for name in self._turns], 1)
 
-    def start(self, plan: MotionPlan, rows: Array) -> Array:
-        """Bring the robot to the first frame, with the velocity with which the clip goes on; its configuration."""
+    def rows(self, places: Array, turns: Array) -> Array:
+        """Numbers of all inputs over ticks [ticks, numbers], of :meth:`targets`."""
+        ticks, dt = len(places), self.dt
+        next_places, next_turns = _next(places), _next(turns)
+        steps = next_turns @ np.swapaxes(turns, -1, -2)
+        numbers = (
+            np.swapaxes(turns, -1, -2), np.swapaxes(next_turns, -1, -2), places, next_places,
+            (next_places - places) / dt, logarithms(steps.reshape(-1, 3, 3)) / dt,
+        )  # fmt: skip
+        columns = np.concatenate([values.reshape(ticks, -1) for values in numbers], axis=1)
+        return np.ascontiguousarray(columns[:, self._order])
+
+    def start(self, places: Array, turns: Array, held: Mapping[str, ContactGrip]) -> Array:
+        """Bring the robot to the first of some targets, with the velocity with which they go on; its configuration.
+
+        Args:
+            held: limb -> how its contact is held at first.
+        """
         robot, controller = self.robot, self.controller
         q = robot.neutral.copy()
         if robot.base != "fixed":
             now = self.body.robot.pose(q, self.body.pelvis)
-            target = pin.SE3(plan.turn[0], plan.pelvis[0])
+            target = pin.SE3(turns[0, 0], places[0, 0])
             root = robot.model.joints[1]
             base = pin.SE3(pin.XYZQUATToSE3(q[:7])) if root.nq == 7 else pin.SE3.Identity()
             q[:7] = pin.SE3ToXYZQUAT(target * now.inverse() * base)
             q[3:7] /= np.linalg.norm(q[3:7])
-        still = rows.copy()[:2]
-        at = 0
-        for column in self.columns:
-            if column.name == "feedforward":
-                still[:, at : at + column.size] = 0.0
-            at += column.size
-        self._hold(dict.fromkeys(self._limbs, False))
-        q = self._settled(q, still[0], SETTLING)
+        first, second = (self.rows(places[[k]], turns[[k]])[0] for k in (0, min(1, len(places) - 1)))
+        self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
+        gains = {item: self.controller[item].gain for item in self._tasks}
+        self._set_gains(dict.fromkeys(gains, GAIN / self.dt))
+        q = self._settled(q, first, SETTLING)
         # What is held jumps to its place, so it is brought there before
-        self._hold({name: bool(plan.limbs[name].held[0]) for name in self._limbs})
-        q = self._settled(q, still[0], SETTLING // 4)
-        if plan.ticks < 2:
-            return q
-        after = self._settled(q, still[1], SETTLING // 4)
+        self._hold(held)
+        q = self._settled(q, first, SETTLING // 4)
+        after = self._settled(q, second, SETTLING // 4)
+        self._set_gains(gains)
         v = pin.difference(robot.model, q, after) / self.dt
         limit = robot.limits.velocity
         controller.reset(q, np.clip(v, -limit, limit))
         return q
+
+    def _set_gains(self, gains: dict[str, float]) -> None:
+        for item, gain in gains.items():
+            self.controller[item].gain = gain
 
     def _settled(self, q: Array, row: Array, most: int) -> Array:
         controller, model = self.controller, self.robot.model
@@ -294,19 +315,19 @@ class Engine:
                 break
         return q
 
-    def _hold(self, wanted: dict[str, bool]) -> None:
-        for name, on in wanted.items():
-            if self.options.hold and self.robot.base != "fixed" and self._held.get(name) != on:
-                self.controller[f"{name} stands"].enabled = on
-                # A foot that is held is where it was asked for; rows of the ground would say the same again
-                if self.is_foot(name) and self.body.limbs[name].contact == "flat":
-                    self.controller[f"{name} above ground"].enabled = not on
-                self._held[name] = on
-
-    def tick(self, q: Array, row: Array) -> Step:
-        """One tick at q for one row of :meth:`rows`."""
-        self._group.write(row)
-        return self.controller.step(q)
+    def _hold(self, wanted: Mapping[str, ContactGrip]) -> None:
+        """Hold contacts, or let them go."""
+        for name, grip in wanted.items():
+            if self.options.hold and self.robot.base != "fixed" and self._held.get(name) is not grip:
+                contact = self.controller[f"{name} stands"]
+                if not self.body.is_foot(name):
+                    # The hull of a hand that lies on the ground may ask it to be higher, by the rows of the ground
+                    contact.mask = (1.0, 1.0, 1.0 if grip is ContactGrip.FIRM else 0.0)
+                    self.controller[name].mask = (1.0, 1.0, LYING if grip is ContactGrip.LEVEL else 1.0)
+                contact.enabled = grip is not ContactGrip.FREE
+                if name in self._own_ground:
+                    self.controller[self._own_ground[name]].enabled = grip is ContactGrip.FREE
+                self._held[name] = grip
 
     def run(self, plan: MotionPlan) -> tuple[Array, list[tuple[int, tuple[str, ...]]]]:
         """All ticks of a plan.
@@ -314,8 +335,9 @@ class Engine:
         Returns:
             Configurations [ticks, nq], and the ticks at which rows gave way with the names of their items.
         """
-        rows = self.rows(plan)
-        q = self.start(plan, rows)
+        places, turns = self.targets(plan)
+        rows = self.rows(places, turns)
+        q = self.start(places, turns, {name: plan.limbs[name].grip(0) for name in self._limbs})
         out = np.empty((plan.ticks, self.robot.nq))
         out[0] = q
         model, dt = self.robot.model, self.dt
@@ -324,53 +346,74 @@ class Engine:
         #: limb -> the first tick in which it may be held again
         not_before = dict.fromkeys(self._limbs, 0)
         waiting: list[str] = []
+        risen: set[str] = set()
         gave: list[tuple[int, tuple[str, ...]]] = []
         v = np.array(self.controller.last_command)
         write, step_of, solved = self._group.write, self.controller.step, Status.SOLVED
-        losses = _Losses(self, plan, rows)
         for k in range(plan.ticks - 1):
             if k in changing or waiting:
                 asked = [name for name, on in zip(self._limbs, held[k], strict=True) if on]
-                waiting = [name for name in asked if not self._held.get(name)]
-                there = losses.near([name for name in waiting if k >= not_before[name]], q, k)
-                self._hold({name: name in asked and (name in there or name not in waiting) for name in self._limbs})
+                waiting = [name for name in asked if self._held.get(name, ContactGrip.FREE) is ContactGrip.FREE]
+                there = self._near(plan, [name for name in waiting if k >= not_before[name]], q, k)
+                kept = [name for name in asked if name in there or name not in waiting]
+                risen &= set(kept)
+                self._hold({n: self._grip(plan, n, k, risen) if n in kept else ContactGrip.FREE for n in self._limbs})
                 waiting = [name for name in waiting if name not in there]
             write(rows[k])
             step = step_of(q)
             if step.status is not solved and (landing := self._landing(plan, k)):
                 # Feet that come to stand give way before those that stand
-                self._hold(dict.fromkeys(landing, False))
+                self._hold(dict.fromkeys(landing, ContactGrip.FREE))
                 not_before |= dict.fromkeys(landing, k + AGAIN)
                 waiting += landing
+                step = step_of(q, v)
+            lying = [n for n, limb in plan.limbs.items() if limb.lies[k] and self._held.get(n) is ContactGrip.FIRM]
+            if lying and any(slack.item == "above ground" and slack.amount > PUSHED for slack in step.relaxed):
+                # Hands that lie on the ground rise where their links would sink
+                risen |= set(lying)
+                self._hold(dict.fromkeys(lying, ContactGrip.LEVEL))
                 step = step_of(q, v)
             if step.status is not solved:
                 gave.append((k, tuple(dict.fromkeys(slack.item for slack in step.relaxed)) or (str(step.status),)))
             after = pin.integrate(model, q, step.v * dt)
-            if losses.look(after, k + 1, self._held) and step.status is solved:
-                # What was not foreseen is made up for in a second tick from the same state
-                losses.correct(k)
-                write(rows[k])
-                again = step_of(q, v)
-                if again.status is solved:
-                    step, after = again, pin.integrate(model, q, again.v * dt)
-                    losses.look(after, k + 1, self._held)
-            losses.learn(k + 1)
             v, q = step.v, after
             out[k + 1] = q
         return out, gave
 
-    def follow(self, plan: MotionPlan, q: Array) -> Array:
-        """The ticks of a plan that goes on from q; the configuration after the last."""
-        rows = self.rows(plan)
-        self._hold({name: bool(limb.held[0]) for name, limb in plan.limbs.items()})
-        for row in rows[:-1]:
-            q = pin.integrate(self.robot.model, q, self.tick(q, row).v * self.dt)
+    def _grip(self, plan: MotionPlan, name: str, tick: int, risen: Set[str]) -> ContactGrip:
+        """How a limb is held: a hand in place until it has to rise."""
+        grip = plan.limbs[name].grip(tick)
+        return ContactGrip.FIRM if grip is ContactGrip.LEVEL and name not in risen else grip
+
+    def follow(self, places: Array, turns: Array, held: Mapping[str, ContactGrip], q: Array) -> Array:
+        """Ticks from q along some of :meth:`targets`; the configuration after the last."""
+        self._hold(held)
+        for row in self.rows(places, turns)[:-1]:
+            self._group.write(row)
+            q = pin.integrate(self.robot.model, q, self.controller.step(q).v * self.dt)
         return q
+
+    def _near(self, plan: MotionPlan, names: list[str], q: Array, tick: int) -> list[str]:
+        """Those of some limbs whose contacts are so near to their targets that they can be held from here on."""
+        model, data, out = self.robot.model, self._data, []
+        if names:
+            pin.forwardKinematics(model, data, q)
+        for name in names:
+            limb = plan.limbs[name]
+            pose = pin.updateFramePlacement(model, data, model.getFrameId(self.body.limbs[name].end))
+            away = pose.translation - limb.end[tick]
+            off = float(np.linalg.norm(away[:2] if limb.grip(tick) is ContactGrip.LEVEL else away))
+            if limb.rotation is not None and self.body.limbs[name].contact == "flat":
+                off = float(np.hypot(off, LEVER * np.linalg.norm(pin.log3(pose.rotation @ limb.rotation[tick].T))))
+            if off < (FOOT_ENGAGED if self.body.is_foot(name) else HAND_ENGAGED):
+                out.append(name)
+        return out
 
     def _landing(self, plan: MotionPlan, tick: int) -> list[str]:
         """Limbs that are held and whose stance has not begun long ago."""
         first = max(tick - round(LANDING / self.dt), 0)
-        return [name for name, on in self._held.items() if on and tick > 0 and not plan.limbs[name].stands[first]]
+        held = [name for name, grip in self._held.items() if grip is not ContactGrip.FREE]
+        return [name for name in held if tick > 0 and not plan.limbs[name].stands[first]]
 
 
 def _solid(corners: Array) -> PlacedShape:
@@ -398,117 +441,5 @@ def _below(depth: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([0.0, 0.0, -depth]))
 
 
-class _Losses:
-    """Held contacts move at second order within a tick; their targets make up for what is foreseen of it.
-
-    Errors are of position, and of a sole's rotation about its ankle's axes times :data:`LEVER` [m].
-    """
-
-    def __init__(self, engine: Engine, plan: MotionPlan, rows: Array) -> None:
-        model = engine.robot.model
-        self._model, self._data, self._rows = model, model.createData(), rows
-        #: limb -> its frame, its targets, and where its hold begins in a row
-        self._places: dict[str, tuple[int, Array, Array | None, int]] = {}
-        self._engaged: dict[str, float] = {}
-        #: limb -> how far it was off before, and what its target makes up for now
-        self._before: dict[str, Array] = {}
-        self._made_up: dict[str, Array] = {}
-        #: limb -> what the last tick lost
-        self._lost: dict[str, Array] = {}
-        #: limb -> how far it is off now
-        self._errors: dict[str, Array] = {}
-        at = 0
-        for column in engine.columns:
-            if column.item.endswith(" stands"):
-                name = column.item.removesuffix(" stands")
-                limb, flat = plan.limbs[name], engine.body.limbs[name].contact == "flat"
-                frame = int(model.getFrameId(engine.body.limbs[name].end))
-                self._engaged[name] = FOOT_ENGAGED if engine.is_foot(name) else HAND_ENGAGED
-                self._places[name] = frame, limb.end, limb.rotation if flat else None, at
-            at += column.size
-
-    def look(self, q: Array, tick: int, held: dict[str, bool]) -> bool:
-        """See where held contacts are; whether one lost more than was foreseen and than matters."""
-        self._errors = {}
-        if not any(held.values()):
-            return False
-        pin.forwardKinematics(self._model, self._data, q)
-        worst = 0.0
-        for name in self._places:
-            if held.get(name):
-                self._errors[name] = error = self._error(name, tick)
-                missed = self._missed(name, error)
-                size = float(missed @ missed)
-                worst = max(worst, size if size < FORESEEN**2 else 0.0)
-        return worst > MATTERS**2
-
-    def near(self, names: list[str], q: Array, tick: int) -> list[str]:
-        """Those of some limbs whose contacts are so near to their targets that they can be held from here on."""
-        if names:
-            pin.forwardKinematics(self._model, self._data, q)
-        return [name for name in names if float(np.linalg.norm(self._error(name, tick))) < self._engaged[name]]
-
-    def _error(self, name: str, tick: int) -> Array:
-        frame, targets, rotations, _ = self._places[name]
-        pose = pin.updateFramePlacement(self._model, self._data, frame)
-        error = np.zeros(6)
-        error[:3] = pose.translation - targets[tick]
-        if rotations is not None:
-            error[3:] = LEVER * pin.log3(pose.rotation @ rotations[tick].T)
-        return error
-
-    def _missed(self, name: str, error: Array) -> Array:
-        before = self._before.get(name)
-        return np.zeros(6) if before is None else np.asarray(error - (1.0 - HOLD_GAIN) * before)
-
-    def _make_up(self, name: str, tick: int, lost: Array) -> None:
-        """Move a target against what is lost."""
-        _, _, rotations, at = self._places[name]
-        row = self._rows[tick]
-        row[at + 9 : at + 12] -= lost[:3] / HOLD_GAIN
-        if rotations is not None:
-            turned = pin.exp3(-lost[3:] / (LEVER * HOLD_GAIN)) @ row[at : at + 9].reshape(3, 3).T
-            row[at : at + 9] = turned.T.ravel()
-
-    def correct(self, tick: int) -> None:
-        """Have the same tick make up for what it lost."""
-        for name, error in self._errors.items():
-            missed = self._missed(name, error)
-            self._make_up(name, tick, missed)
-            self._made_up[name] = self._made_up.get(name, 0.0) + missed
-
-    def learn(self, tick: int) -> None:
-        """Foresee what the next tick loses: what this one did, and as much more as it lost more than the one before."""
-        for name in [name for name in self._before if name not in self._errors]:
-            for kept in (self._before, self._made_up, self._lost):
-                kept.pop(name, None)
-        for name, error in self._errors.items():
-            if name in self._before:
-                loss = self._missed(name, error) + self._made_up.get(name, 0.0)
-                ahead = 2.0 * loss - self._lost.get(name, loss)
-                self._lost[name] = loss
-                ahead = ahead if float(ahead @ ahead) < FORESEEN**2 else np.zeros(6)
-                self._make_up(name, tick, ahead)
-                self._made_up[name] = ahead
-            self._before[name] = error
-
-
-def _pose(rotation: Array, position: Array) -> Array:
-    return np.hstack([_columns(rotation), position])
-
-
-def _columns(rotation: Array) -> Array:
-    return np.asarray(np.swapaxes(rotation, 1, 2).reshape(-1, 9))
-
-
 def _next(values: Array) -> Array:
     return np.concatenate([values[1:], values[-1:]])
-
-
-def _rate(values: Array, dt: float) -> Array:
-    return np.asarray((_next(values) - values) / dt)
-
-
-def _turn_rate(rotations: Array, dt: float) -> Array:
-    """Angular velocity in the world that leads from one rotation to the next."""
-    return np.asarray(logarithms(_next(rotations) @ np.swapaxes(rotations, 1, 2)) / dt)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.multibody import pin
+from wbc.retarget.poses import frame_poses
 from wbc.retarget.solids import surface_points
 from wbc.robot import Robot
 from wbc.validation import Array
@@ -77,21 +78,16 @@ def _touching(
     robot: Robot, q: Array, feet: Mapping[str, NDArray[np.bool_]], ground: float | None, balls: Collection[str]
 ) -> dict[str, Any]:
     """Depths below the ground, and slides of soles."""
-    model = robot.model
-    data = model.createData()
     surfaces = surface_points(robot)
-    frames = {name: int(model.getFrameId(name)) for name in {*surfaces, *feet}}
+    names = tuple({*surfaces, *feet})
     soles = {foot: np.zeros((1, 3)) if foot in balls else _own_points(robot, foot, surfaces) for foot in feet}
+    rotations, positions = frame_poses(robot, names, q)
+    poses = {name: (rotations[:, k], positions[:, k]) for k, name in enumerate(names)}
     lowest = np.full(len(q), np.inf)
-    tracks = {foot: np.empty((len(q), len(soles[foot]), 3)) for foot in feet}
-    for k, row in enumerate(q):
-        pin.framesForwardKinematics(model, data, row)
-        for name, points in surfaces.items():
-            pose = data.oMf[frames[name]]
-            lowest[k] = min(lowest[k], float((points @ pose.rotation[2]).min()) + float(pose.translation[2]))
-        for foot, track in tracks.items():
-            pose = data.oMf[frames[foot]]
-            track[k] = soles[foot] @ pose.rotation.T + pose.translation
+    for name, points in surfaces.items():
+        turn, place = poses[name]
+        lowest = np.minimum(lowest, (turn[:, 2] @ points.T).min(axis=1) + place[:, 2])
+    tracks = {foot: soles[foot] @ np.swapaxes(poses[foot][0], 1, 2) + poses[foot][1][:, None] for foot in feet}
     slides = {foot: _slide(track, np.asarray(feet[foot])) for foot, track in tracks.items()}
     out: dict[str, Any] = {"slide": max(slides.values(), default=0.0), "slides": slides}
     if ground is not None and surfaces:

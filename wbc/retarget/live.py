@@ -14,6 +14,7 @@ from wbc.retarget.correspondence import Correspondence
 from wbc.retarget.engine import Engine
 from wbc.retarget.mapping import LimbPlaces, Mapper, Places
 from wbc.retarget.plan import (
+    BEFORE,
     BLEND,
     LimbPlan,
     MotionPlan,
@@ -71,7 +72,7 @@ class LiveRetargeter:
         """Forget all frames: the next one is the first."""
         self._limbs: dict[str, _LiveLimb] = {}
         self._ankle: dict[str, float] = {}
-        self._last: MotionPlan | None = None
+        self._last: tuple[Array, Array] | None = None
         self._with_turns = False
         self._low = 0.0
         self.q: Array | None = None
@@ -92,12 +93,12 @@ class LiveRetargeter:
         self._with_turns = turns is not None
         self._look(given)
         places = self._mapper.places(given[None], None if rotations is None else rotations[None], self._ankle)
-        now = self._targets(places)
+        plan = self._plan(places)
+        now, held = self._engine.targets(plan), {name: limb.grip(0) for name, limb in plan.limbs.items()}
         if self._last is None or self.q is None:
-            self.q = self._engine.start(now, self._engine.rows(now))
+            self.q = self._engine.start(*now, held)
         else:
-            plan = _between(self._last, now, self._every, self._engine.dt)
-            self.q = self._engine.follow(plan, self.q)
+            self.q = self._engine.follow(*_between(self._last, now, self._every), held, self.q)
         self._last = now
         return self.q.copy()
 
@@ -120,7 +121,7 @@ class LiveRetargeter:
             near = LEVEL if match.source.endswith("leg") else HAND_HEIGHT
             limb.stands = limb.slow and float(limb.ends[:, 2].min()) < lowest + near * self._leg
 
-    def _targets(self, places: Places) -> MotionPlan:
+    def _plan(self, places: Places) -> MotionPlan:
         """Targets of this frame, as a plan of one tick."""
         body = self._match.body
         limbs = {name: self._limb(name, limb) for name, limb in places.limbs.items()}
@@ -132,42 +133,35 @@ class LiveRetargeter:
     def _limb(self, name: str, limb: LimbPlaces) -> LimbPlan:
         """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
         robot, state = self._match.body.limbs[name], self._limbs[name]
-        end, rotation = raised(robot, limb)
-        flat = rotation is not None and robot.contact == "flat"
         stands = state.stands
         if stands and state.share >= 1.0:
             state.place, state.heading = standing_place(robot, limb, 0, 1)
         step = 1.0 / (BLEND * self.rate)
         state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
-        share = float(minimum_jerk(np.array(state.share)))
-        end = state.place + share * (end - state.place) if share < 1.0 else end
-        if flat and rotation is not None and state.heading is not None and share < 1.0:
-            rotation = state.heading @ exponential(share * logarithms(state.heading.T @ rotation))
-        held = np.array([stands and state.share <= 0.0])
-        return LimbPlan(limb.middle, limb.wrist, end, rotation, held, held)
+        flat = limb.rotation is not None and robot.contact == "flat"
+        if state.share <= 0.0:
+            end, rotation = (
+                state.place[None],
+                state.heading[None] if flat and state.heading is not None else limb.rotation,
+            )
+        else:
+            end, rotation = raised(robot, limb)
+            share = float(minimum_jerk(np.array(state.share)))
+            if share < 1.0:
+                end = state.place + share * (end - state.place)
+            if flat and rotation is not None and state.heading is not None and share < 1.0:
+                rotation = state.heading @ exponential(share * logarithms(state.heading.T @ rotation))
+        held = np.array([stands and state.share * BLEND <= BEFORE])
+        lies = np.array([not self._match.body.is_foot(name) and bool(state.place[2] <= robot.radius)])
+        return LimbPlan(limb.middle, limb.wrist, end, rotation, held, held, lies)
 
 
-def _between(last: MotionPlan, now: MotionPlan, every: int, dt: float) -> MotionPlan:
-    """A plan of the ticks from one frame to the next."""
-    shares = np.linspace(0.0, 1.0, every + 1)
-
-    def line(a: Array, b: Array) -> Array:
-        return np.asarray(a + shares[:, None] * (b - a))
-
-    def turn(a: Array, b: Array) -> Array:
-        if every == 1:
-            return np.concatenate([a, b])
-        return np.asarray(a @ exponential(shares[:, None] * logarithms(np.swapaxes(a, 1, 2) @ b)))
-
-    limbs = {}
-    for name, b in now.limbs.items():
-        a = last.limbs[name]
-        rotation = None if a.rotation is None or b.rotation is None else turn(a.rotation, b.rotation)
-        held = np.repeat(b.held, every + 1)
-        limbs[name] = LimbPlan(
-            line(a.middle, b.middle), line(a.wrist, b.wrist), line(a.end, b.end), rotation, held, held
-        )
-    head = None if last.head is None or now.head is None else turn(last.head, now.head)
-    return MotionPlan(
-        dt, line(last.pelvis, now.pelvis), turn(last.turn, now.turn), turn(last.chest, now.chest), head, limbs
+def _between(last: tuple[Array, Array], now: tuple[Array, Array], every: int) -> tuple[Array, Array]:
+    """Positions and rotations of the ticks from one frame to the next, both included."""
+    if every == 1:
+        return np.concatenate([last[0], now[0]]), np.concatenate([last[1], now[1]])
+    shares = np.linspace(0.0, 1.0, every + 1)[:, None, None]
+    turned = shares * logarithms(np.swapaxes(last[1][0], 1, 2) @ now[1][0])
+    return last[0] + shares * (now[0] - last[0]), last[1] @ exponential(turned.reshape(-1, 3)).reshape(
+        every + 1, -1, 3, 3
     )

@@ -88,6 +88,11 @@ class Mapper:
         self._still = {}
         #: of the robot's limbs: base to middle, middle to wrist, wrist to contact [m]
         self._lengths = {}
+        #: heights of the robot's ankles, or of the centres of point feet, above the ground that they stand on [m]
+        self._heights = {}
+        for name, limb in body.limbs.items():
+            over = float((limb.places[2] - limb.places[3]) @ body.axes[:, 2])
+            self._heights[name] = limb.radius + over * (limb.contact == "flat")
         for name, one in match.limbs.items():
             bones = np.diff(rest[[one.base, one.middle, one.end, one.tip]], axis=0)
             self._still[name] = bones / np.maximum(np.linalg.norm(bones, axis=1, keepdims=True), 1e-9)
@@ -153,7 +158,7 @@ class Mapper:
         head = turns[:, match.head] @ axes if turns is not None and match.head >= 0 and body.head else None
         legs = [m for name, m in match.limbs.items() if name.endswith("leg")]
         ground = min((ankle[m.source] for m in legs), default=0.0)
-        lift = self._ankle_height("left_leg") if "left_leg" in body.limbs else 0.0
+        lift = self._heights.get("left_leg", 0.0)
         place = scale * (hips - np.array([0.0, 0.0, ground])) + np.array([0.0, 0.0, lift])
         heading = _headings(pelvis)
         if body.robot.base == "fixed":
@@ -162,12 +167,6 @@ class Mapper:
             name: self._limb(name, (points, turns), place, (pelvis, chest, heading), ankle) for name in match.limbs
         }
         return Places(place, pelvis, chest, head, limbs)
-
-    def _ankle_height(self, name: str) -> float:
-        """Height of a robot's ankle, or of the centre of its point foot, above the ground that it stands on [m]."""
-        limb = self.match.body.limbs[name]
-        up = self.match.body.axes[:, 2]
-        return limb.radius + float((limb.places[2] - limb.places[3]) @ up) * (limb.contact == "flat")
 
     def _limb(
         self,
@@ -192,10 +191,10 @@ class Mapper:
         upper, lower, hand = self._lengths[name]
         middle = base + upper * bones[:, 0]
         rotation = self._rotation(match, points, turns, pelvis, limb.contact == "flat")
-        if self.match.body.robot.base != "fixed" and (name.endswith("leg") or not self.match.body.plan.upright):
+        if self.match.body.is_foot(name):
             end = points[:, match.end]
             shift = self._shifts[name]
-            height = self._ankle_height(name)
+            height = self._heights[name]
             wrist = self._scale * (end - np.array([0.0, 0.0, ankle[match.source]])) + np.array([0.0, 0.0, height])
             wrist[:, :2] += (heading @ shift)[:, :2]
             if limb.contact == "flat":

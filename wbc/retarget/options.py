@@ -24,8 +24,6 @@ class RetargetWeights:
     #: feet in the air: position and turn
     foot: float = 1000.0
     sole: float = 30.0
-    #: turn of hands
-    hand: float = 0.05
     #: joints towards ``robot.neutral``
     posture: float = 1e-3
 
@@ -53,7 +51,7 @@ class RetargetOptions:
     """
 
     rate: float | None = None
-    tick_rate: float = 60.0
+    tick_rate: float = 50.0
     scale: float | None = None
     acceleration: float = 480.0
     velocity: float = 20.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -36,6 +37,17 @@ SHIFT = 0.08
 BEFORE = 0.05
 
 
+class ContactGrip(Enum):
+    """How a contact is held."""
+
+    #: not at all
+    FREE = 0
+    #: along the ground that it lies on: its hull says how high it is
+    LEVEL = 1
+    #: in place
+    FIRM = 2
+
+
 @dataclass(frozen=True)
 class LimbPlan:
     """A limb's targets over ticks.
@@ -43,6 +55,7 @@ class LimbPlan:
     Attributes:
         middle, wrist, end: positions [ticks, 3] [m]. rotation: [ticks, 3, 3]; None: free.
         stands: in stance. held: in stance or shortly before one [ticks].
+        lies: it is a hand on the ground where it is held [ticks].
     """
 
     middle: Array
@@ -51,6 +64,11 @@ class LimbPlan:
     rotation: Array | None
     stands: Marks
     held: Marks
+    lies: Marks
+
+    def grip(self, tick: int) -> ContactGrip:
+        """How it is held at a tick."""
+        return (ContactGrip.LEVEL if self.lies[tick] else ContactGrip.FIRM) if self.held[tick] else ContactGrip.FREE
 
 
 @dataclass(frozen=True)
@@ -123,7 +141,9 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
     dt = float(times[1] - times[0]) if len(times) > 1 else 1.0 / rate
     frame = np.clip(np.rint(times * rate).astype(int), 0, len(places.pelvis) - 1)
     limbs = {
-        name: _limb_plan(body.limbs[name], _limb_resampled(limb, rate, times), marks[name][frame], dt)
+        name: _limb_plan(
+            body.limbs[name], _limb_resampled(limb, rate, times), marks[name][frame], dt, hand=not body.is_foot(name)
+        )
         for name, limb in sorted(places.limbs.items(), key=lambda item: LIMBS.index(item[0]))
     }
     pelvis = resampled(places.pelvis, rate, times)
@@ -139,12 +159,12 @@ def _limb_resampled(limb: LimbPlaces, rate: float, times: Array) -> LimbPlaces:
     return LimbPlaces(middle, wrist, end, rotation)
 
 
-def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float) -> LimbPlan:
+def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
     """A limb's targets with its stances at rest."""
     end, rotation = raised(robot, limb)
     raw, raw_rotation = end.copy(), None if rotation is None else rotation.copy()
     stances = [(a, b, *standing_place(robot, limb, a, b)) for a, b in intervals(stands)]
-    held = stands.copy()
+    held, lies = stands.copy(), np.zeros(len(stands), dtype=bool)
     count = len(stands)
     for number, (a, b, place, heading) in enumerate(stances):
         end[a:b] = place
@@ -166,8 +186,10 @@ def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float) -> 
             if rotation is not None and raw_rotation is not None and heading is not None:
                 off = logarithms(heading.T @ raw_rotation[span])
                 rotation[span] = heading @ exponential(share[:, None] * off)
-        held[max(a - round(BEFORE / dt), last if number else 0) : a] = True
-    return LimbPlan(limb.middle, limb.wrist, end, rotation, stands, held)
+        before = max(a - round(BEFORE / dt), last if number else 0)
+        held[before:a] = True
+        lies[before:b] = hand and bool(place[2] <= robot.radius)
+    return LimbPlan(limb.middle, limb.wrist, end, rotation, stands, held, lies)
 
 
 def raised(robot: RobotLimb, limb: LimbPlaces) -> tuple[Array, Array | None]:
@@ -232,7 +254,7 @@ def lowering(body: RobotBody, pelvis: Array, turn: Array, limbs: dict[str, LimbP
     need = np.zeros(len(pelvis))
     for name, plan in limbs.items():
         robot = body.limbs[name]
-        if not (name.endswith("leg") or not body.plan.upright):
+        if not body.is_foot(name):
             continue
         hip = pelvis + turn @ ((robot.base - body.places[0]) @ body.axes)
         up = np.array([0.0, 0.0, float(np.linalg.norm(robot.places[2] - robot.places[3]))])

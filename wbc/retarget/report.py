@@ -84,7 +84,7 @@ def write_report(
     figures["error"] = motion.errors.mean
     figures["errors"] = {name: {"mean": float(far.mean()), "largest": float(far.max())} for name, far in points.items()}
     if support and motion.robot.base != "fixed":
-        from wbc.retarget.held import held
+        from wbc.retarget.holding_forces import held
 
         at_rest = held(motion)
         figures |= {"held_at_rest": at_rest.share, "support": str(at_rest)}

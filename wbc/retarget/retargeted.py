@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from wbc.multibody import pin
 from wbc.retarget.clip import Array, Clip
 from wbc.retarget.figures import motion_figures
 from wbc.retarget.plan import MotionPlan
+from wbc.retarget.poses import frame_poses
 from wbc.retarget.robot_body import RobotBody
 from wbc.retarget.stances import Marks
 from wbc.robot import Robot
@@ -120,16 +120,3 @@ class Retargeted:
             name: np.linalg.norm(positions[:, i] - target[:: self.every], axis=1)
             for i, (name, (_, target)) in enumerate(targets.items())
         }
-
-
-def frame_poses(robot: Robot, names: tuple[str, ...], q: Array) -> tuple[Array, Array]:
-    """Rotations [frames, names, 3, 3] and positions [frames, names, 3] of frames of a robot."""
-    model, data = robot.model, robot.model.createData()
-    numbers = [int(model.getFrameId(name)) for name in names]
-    rotations, positions = np.empty((len(q), len(names), 3, 3)), np.empty((len(q), len(names), 3))
-    for k, configuration in enumerate(q):
-        pin.forwardKinematics(model, data, configuration)
-        for i, number in enumerate(numbers):
-            pose = pin.updateFramePlacement(model, data, number)
-            rotations[k, i], positions[k, i] = pose.rotation, pose.translation
-    return rotations, positions

@@ -16,7 +16,8 @@ from wbc.retarget.live import LiveRetargeter
 from wbc.retarget.mapping import Mapper
 from wbc.retarget.options import RetargetOptions
 from wbc.retarget.plan import MotionPlan, plan_motion
-from wbc.retarget.retargeted import GivenUp, Retargeted, frame_poses
+from wbc.retarget.poses import frame_poses
+from wbc.retarget.retargeted import GivenUp, Retargeted
 from wbc.retarget.robot_body import RobotBody, body_of
 from wbc.retarget.stances import Marks, Stances, find_stances, intervals
 from wbc.robot import Robot

@@ -44,7 +44,7 @@ HAND = 0.25
 #: A point foot's ball is no larger than this many times that of its collision body [1]
 BALL = 1.4
 #: Corners of the hull of a limb's end, at most
-CORNERS = 96
+CORNERS = 500
 #: Fewer do where they are within this of it [m]
 EXACT = 1e-5
 #: Where a sole begins and ends before the ankle and beside it, of which no body is known [m]
@@ -121,6 +121,10 @@ class RobotBody:
     def axes(self) -> Array:
         """Forward, left and up at rest in the world, as columns [3, 3]."""
         return self.plan.axes
+
+    def is_foot(self, name: str) -> bool:
+        """Whether a limb walks."""
+        return _is_foot(name, self.plan, self.robot.base == "fixed")
 
 
 def joint_tree(robot: Robot, balls: dict[int, LinkBalls] | None = None) -> tuple[PointTree, pin.Data]:

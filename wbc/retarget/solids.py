@@ -22,7 +22,7 @@ log = logging.getLogger("wbc")
 #: Corners about the rim of a cylinder
 RIM = 16
 #: Directions in which hulls are compared [1]
-DIRECTIONS = 600
+DIRECTIONS = 1500
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,16 @@ class LinkBalls:
         reach = self.centers @ ways + self.radii[:, None]
         far = reach.argmax(axis=0)
         points = self.centers[far] + ways.T * self.radii[far, None]
-        own, lacking = points @ ways, np.full(DIRECTIONS, np.inf)
+        # All corners and what stands out of them of the balls, where that is not too much
+        every = np.unique(np.concatenate([self.centers[self.radii == 0.0], points[self.radii[far] > 0.0]]), axis=0)
+        if len(every) <= count:
+            return every
+        own, most = points @ ways, reach.max(axis=0)
         chosen: list[int] = []
+        lacking = np.full(DIRECTIONS, np.inf)
         while len(chosen) < count and float(lacking.max()) > exact:
             chosen.append(int(np.argmax(lacking)))
-            lacking = reach.max(axis=0) - own[chosen].max(axis=0)
+            lacking = np.minimum(lacking, most - own[chosen[-1]])
         return np.asarray(np.unique(points[chosen], axis=0))
 
 

@@ -1,10 +1,17 @@
 """Robot models (floor 2)."""
 
-from wbc.robot.dead_points import DeadPoint
-from wbc.robot.limits import Limits
-from wbc.robot.loops import JointCurve, Loop, LoopError
-from wbc.robot.recipe import Recipe
-from wbc.robot.robot import Coupling, Robot
-from wbc.robot.sources.dh import DHRow
+from __future__ import annotations
 
-__all__ = ["Coupling", "DHRow", "DeadPoint", "JointCurve", "Limits", "Loop", "LoopError", "Recipe", "Robot"]
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.robot.dead_points import DeadPoint as DeadPoint
+    from wbc.robot.limits import Limits as Limits
+    from wbc.robot.loops import JointCurve as JointCurve, Loop as Loop, LoopError as LoopError
+    from wbc.robot.recipe import Recipe as Recipe
+    from wbc.robot.robot import Coupling as Coupling, Robot as Robot
+    from wbc.robot.sources.dh import DHRow as DHRow
+else:
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

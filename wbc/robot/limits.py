@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from wbc import pickling, validation
 from wbc.errors import BoundsError, NotFiniteError, RangeError
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 

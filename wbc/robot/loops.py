@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
@@ -14,6 +14,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import WbcError
 from wbc.multibody import pin
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.limits import Limits
 from wbc.robot.shortest_steps import CLOSED, DEPENDENT, ShortestSteps
 from wbc.symbolic.evaluation import SingleState

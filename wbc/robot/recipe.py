@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.multibody import own
+from wbc.quick_dataclasses import dataclass
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 

@@ -6,17 +6,17 @@ import hashlib
 import itertools
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cached_property
 from math import hypot
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wbc import pickling, validation
 from wbc.errors import DuplicateNameError, RangeError, RobotFileError, RotationError, ShapeError, UnsupportedJointError
 from wbc.multibody import CONVERTED, algebra, in_pinocchio, own, pin, to_pin
-from wbc.robot.dead_points import DeadPoint, DeadPointSearch
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.limits import Limits
 from wbc.robot.loops import AnyLoop, Closing, JointCurve, Loop, LoopError, LoopRows
 from wbc.robot.motor_space import MotorSpace
@@ -24,6 +24,9 @@ from wbc.robot.shortest_steps import CLOSED
 from wbc.shapes import PlacedShape
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.robot.dead_points import DeadPoint, DeadPointSearch
 
 _ARRAY = np.ndarray
 _FLOAT = np.dtype(np.float64)
@@ -367,6 +370,8 @@ class Robot:
 
     @cached_property
     def _dead_points(self) -> DeadPointSearch:
+        from wbc.robot.dead_points import DeadPointSearch
+
         units = np.where(np.array(self.dof_units) == "m", self.characteristic_length, 1.0)
         sizes = np.array([self.characteristic_length if unit == "m" else 1.0 for _, unit in self.loops.rows])
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 #: A residual below this is 0 [m, rad]: rounding of poses metres from the origin

@@ -23,7 +23,7 @@ FLAT = 1e-6
 #: Points of hulls that ``geometry/native/shapes.h`` takes at a time
 LANES = 8
 #: A hull has at most this many corners for rows, those farthest from each other
-CORNERS = 16
+CORNERS = 48
 
 
 @dataclass(frozen=True, eq=False)

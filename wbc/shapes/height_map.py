@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from wbc import pickling, validation
 from wbc.errors import RangeError, ShapeError
+from wbc.quick_dataclasses import dataclass
 from wbc.shapes.solid import Kind, Solid, Stored
 from wbc.shapes.surfaces import between_rows
 from wbc.validation import Array

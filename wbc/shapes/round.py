@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbc import validation
 from wbc.multibody import pin
+from wbc.quick_dataclasses import dataclass
 from wbc.shapes.solid import Kind, Solid
 from wbc.shapes.surfaces import turned
 from wbc.validation import Array

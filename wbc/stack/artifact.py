@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import pathlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from wbc import validation
 from wbc.errors import CompileError
 from wbc.native import cache, toolchain
+from wbc.quick_dataclasses import dataclass
 from wbc.stack import codegen
 from wbc.stack.behind import NativeBehind
 from wbc.stack.compiling import FUNCTION, LIBRARY, functions_in
 from wbc.stack.declaration import Declaration
-from wbc.stack.key import key
+from wbc.stack.key import key, library_key
 from wbc.stack.layout import Layout
 from wbc.stack.program import TickProgram, build, loaded
 
@@ -76,7 +77,7 @@ def compile_stack(stack: Declaration, backend: str, version: str, search: bool =
             if backend == "native":
                 raise
             toolchain.fall_back(str(error))
-    return _virtual(stack, layout, version)[0]
+    return _virtual(stack, layout, key(stack, version))[0]
 
 
 def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> Artifact:
@@ -86,17 +87,13 @@ def _native(stack: Declaration, layout: Layout, version: str, search: bool) -> A
         program = build(stack, layout)
         toolchain.compile_tick(codegen.sources(stack, layout, program, moves=search), folder / LIBRARY, search)
 
-    name, what = _named(stack, version, search), _said(stack)
+    name = library_key(key(stack, version), toolchain.identity() + ("\nsearch" if search else ""))
+    what = _said(stack)
     folder, cached = cache.fetch(name, fill, library=True, what=what, advice="wait=False answers meanwhile")
     return Artifact(layout, folder / LIBRARY, None, cached)
 
 
-def _named(stack: Declaration, version: str, search: bool = False) -> str:
-    """Name of a stack's library in the cache."""
-    return key(stack, version, toolchain.identity() + ("\nsearch" if search else ""))
-
-
-def _virtual(stack: Declaration, layout: Layout, version: str) -> tuple[Artifact, pathlib.Path]:
+def _virtual(stack: Declaration, layout: Layout, name: str) -> tuple[Artifact, pathlib.Path]:
     """The functions for the virtual machine, built or from the cache, and their folder, which is all that
     :mod:`wbc.stack.compiling` needs.
     """
@@ -109,7 +106,7 @@ def _virtual(stack: Declaration, layout: Layout, version: str) -> tuple[Artifact
         for name, text in codegen.tables(stack, layout, made[0]).items():
             (folder / name).write_text(text)
 
-    folder, cached = cache.fetch(key(stack, version, "vm"), fill, what=_said(stack))
+    folder, cached = cache.fetch(name, fill, what=_said(stack))
     program = made[0] if made else loaded(stack, layout, functions_in(folder))
     return Artifact(layout, None, program, cached), folder
 
@@ -118,13 +115,16 @@ def _at_once(stack: Declaration, layout: Layout, version: str) -> Artifact:
     """The library where it is in the cache; else the functions for the virtual machine, and behind them the library,
     where a compiler is.
     """
+    name = key(stack, version)
     if not toolchain.available():
-        return _virtual(stack, layout, version)[0]
-    name = _named(stack, version)
-    if (folder := cache.find(name, library=True)) is not None:
-        return Artifact(layout, folder / LIBRARY, None, cached=True)
-    out, folder = _virtual(stack, layout, version)
-    return replace(out, behind=NativeBehind(folder, name, _said(stack)))
+        return _virtual(stack, layout, name)[0]
+    # Which compiler this is takes two processes, and only says which of its libraries is the right one
+    if cache.holds(f"{name}-"):
+        found = cache.find(library_key(name, toolchain.identity()), library=True)
+        if found is not None:
+            return Artifact(layout, found / LIBRARY, None, cached=True)
+    out, folder = _virtual(stack, layout, name)
+    return replace(out, behind=NativeBehind(folder, _said(stack)))
 
 
 def _said(stack: Declaration) -> str:

@@ -30,9 +30,9 @@ _LOW = 10
 _CHILD = """
 import pathlib, signal, sys
 signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended"))
-sys.path += sys.argv[3:]
+sys.path += sys.argv[2:]
 from wbc.stack.compiling import compile_behind
-compile_behind(pathlib.Path(sys.argv[1]), sys.argv[2])
+print(compile_behind(pathlib.Path(sys.argv[1])))
 """
 
 
@@ -92,15 +92,15 @@ class NativeBehind:
     process goes on with what it has, and compiles for itself where it is asked to wait.
 
     Args:
-        folder: see :func:`wbc.stack.compiling.compile_behind`. name: of the cache's entry. what: it is, for the log.
+        folder: see :func:`wbc.stack.compiling.compile_behind`. what: it is, for the log.
 
     Attributes:
         ended: set when it is there, or has failed.
     """
 
-    def __init__(self, folder: Path, name: str, what: str) -> None:
+    def __init__(self, folder: Path, what: str) -> None:
         self.ended = threading.Event()
-        self._folder, self._name, self._what, self._owner = folder, name, what, 0
+        self._folder, self._what, self._owner = folder, what, 0
         self._made: tuple[Path, ctypes.PyDLL] | None = None
         self._ticks: list[weakref.ref[Changing]] = []
 
@@ -127,7 +127,7 @@ class NativeBehind:
         begun, child = _work.turn.acquire(blocking=False), None
         try:
             with contextlib.suppress(OSError, CompileError):
-                child = _start(self._folder, self._name) if begun else None
+                child = _start(self._folder) if begun else None
             thread = threading.Thread(target=self._run, args=(begun, child), name="wbc-behind", daemon=True)
             _work.threads.add(thread)
             thread.start()
@@ -141,7 +141,7 @@ class NativeBehind:
             _work.turn.acquire()
         try:
             if child is not None or any(tick() is not None for tick in self._ticks):
-                self._make(child or _start(self._folder, self._name))
+                self._make(child or _start(self._folder))
         except (CompileError, OSError) as error:
             if not _work.ends.is_set():
                 log.warning("%s stays on CasADi's virtual machine: %s", self._what, error)
@@ -151,12 +151,9 @@ class NativeBehind:
             _work.threads.discard(threading.current_thread())
 
     def _make(self, child: subprocess.Popen[str] | None) -> None:
-        if child is not None:
-            _finish(child)
-        else:
-            compile_behind(self._folder, self._name)
-        path = cache.base_of(self._name, library=True) / self._name / LIBRARY
-        if cache.find(self._name, library=True) is None:
+        name = compile_behind(self._folder) if child is None else _finish(child)
+        path = cache.base_of(name, library=True) / name / LIBRARY
+        if cache.find(name, library=True) is None:
             raise CompileError("library", str(path), "is not what was compiled")
         made = path, load_library(path)
         self._made = made
@@ -166,8 +163,8 @@ class NativeBehind:
         log.info("%s: native code is there, and controllers change over with their next tick", self._what)
 
 
-def _start(folder: Path, name: str) -> subprocess.Popen[str] | None:
-    """The process that makes an entry of the cache; None where there is no interpreter to start.
+def _start(folder: Path) -> subprocess.Popen[str] | None:
+    """The process that makes a library from what a folder has, and prints its name; None without an interpreter.
 
     Raises:
         CompileError: this process ends. OSError: it cannot be started.
@@ -178,9 +175,9 @@ def _start(folder: Path, name: str) -> subprocess.Popen[str] | None:
         raise CompileError("compiler", None, "the process ends")
     paths = [path for path in sys.path if path]
     child = _work.child = subprocess.Popen(
-        [sys.executable, "-P", "-c", _CHILD, str(folder), name, *paths],
-        env={**os.environ, "WBC_CACHE": str(cache.base_of(name, library=True))},
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
+        [sys.executable, "-P", "-c", _CHILD, str(folder), *paths],
+        env={**os.environ, "WBC_CACHE": str(cache.base_of(f"{folder.name}-", library=True))},
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace",
         start_new_session=True,
     )  # fmt: skip
     with contextlib.suppress(OSError, AttributeError):
@@ -190,8 +187,8 @@ def _start(folder: Path, name: str) -> subprocess.Popen[str] | None:
     return child
 
 
-def _finish(child: subprocess.Popen[str]) -> None:
-    """Wait for it.
+def _finish(child: subprocess.Popen[str]) -> str:
+    """Wait for it: the name of what it made.
 
     Raises:
         CompileError: the compiler failed.
@@ -199,8 +196,9 @@ def _finish(child: subprocess.Popen[str]) -> None:
     with child:
         if _work.ends.is_set():
             _stop(child)
-        _, errors = child.communicate()
+        printed, errors = child.communicate()
         _work.child = None
     if child.returncode != 0:
         lines = errors.strip().splitlines() or [f"exit status {child.returncode}, no message"]
         raise CompileError("compiler", sys.executable, lines[-1])
+    return printed.splitlines()[-1]

@@ -86,6 +86,8 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
                 "ELASTIC": int(layout.elastic),
                 "REDUCED": taken_out(stack, layout),
                 "REDUCED_NV": layout.variables if taken_out(stack, layout) else 0,
+                "CLOSING": 0 if program.arrival is None else program.arrival.numel_out("opened"),
+                "CLOSING_FIRST": 0 if layout.mechanism is None else layout.mechanism.start,
                 "COMMAND": COMMANDS.index(stack.command),
                 "UNITS": len(units),
                 "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),

@@ -10,6 +10,7 @@ from pathlib import Path
 import casadi as ca
 
 from wbc.native import cache, toolchain
+from wbc.stack.key import library_key
 from wbc.stack.sources import completed
 
 #: The library in its entry of the cache, and what files of functions end with in theirs
@@ -23,8 +24,8 @@ def functions_in(folder: Path) -> dict[str, ca.Function]:
     return {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob(f"*{FUNCTION}"))}
 
 
-def compile_behind(folder: Path, name: str) -> None:
-    """Make the cache's entry ``name``, a stack's library, from what ``folder`` has of the stack.
+def compile_behind(folder: Path) -> str:
+    """Make the cache's entry of a stack's library from ``folder``, which has its functions; the entry's name.
 
     Raises:
         CompileError: as of :func:`wbc.native.toolchain.compile_tick`.
@@ -34,4 +35,6 @@ def compile_behind(folder: Path, name: str) -> None:
         tables = {path.name: path.read_text() for path in folder.glob("*.h")}
         toolchain.compile_tick(completed(functions_in(folder), tables), place / LIBRARY)
 
+    name = library_key(folder.name, toolchain.identity())
     cache.fetch(name, fill, library=True)
+    return name

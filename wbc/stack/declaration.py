@@ -6,7 +6,6 @@ import copy
 import dataclasses
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -22,6 +21,7 @@ from wbc.errors import (
     UnknownNameError,
 )
 from wbc.multibody import algebra
+from wbc.quick_dataclasses import dataclass
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.stack.commands import COMMANDS

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.symbolic.kinematics import Kinematics, frame_index

@@ -15,27 +15,26 @@ from __future__ import annotations
 import pathlib
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from importlib import resources
+from dataclasses import field
 
 from wbc.native import kernel, toolchain
+from wbc.quick_dataclasses import dataclass
 from wbc.stack.commands import COMMANDS
 from wbc.stack.memory import (
     INPUTS,
     LEVEL_NUMBERS,
-    LEVEL_REPORT,
     QP_FIELDS,
-    REPORT,
     REST_INPUTS,
-    TORQUE_REPORT,
     Field,
+    reported,
 )
 
 #: Whole sizes of ``stack.h``, and real ones
 SIZES = (
     "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "ELASTIC", "UNITS",
     "LAST_ORDER", "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST",
-    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED", "REDUCED", "REDUCED_NV",
+    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED", "REDUCED", "REDUCED_NV", "CLOSING",
+    "CLOSING_FIRST",
 )  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING", "FAR")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
@@ -52,19 +51,31 @@ REAL_TABLES = (
     "task_scale", "row_reach", "segment_half",
 )  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
-FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost")
+FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost", "arrival")
 COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)")], "lost": [(1, "moved", "DOFS")]}
+COPIED["arrival"] = [(0, "start", "NQ"), (1, "way", "DOFS")]
 #: Arrays that only C knows and the functions write
-WRITTEN = ("jt", "at", "bound_low", "bound_high", "curvature_entries", "segment", "screw", "segment_ahead")
+WRITTEN = (
+    "jt",
+    "at",
+    "bound_low",
+    "bound_high",
+    "curvature_entries",
+    "segment",
+    "screw",
+    "segment_ahead",
+    "opened",
+    "closing_rows",
+)
 #: What the tick compiled for the stack does in place of what is here, once there is one
 FORWARDED = (
-    "wbc_tick_assemble", "wbc_tick_certify", "wbc_tick_check", "wbc_tick_curvature", "wbc_tick_find_lost",
-    "wbc_tick_look_ahead", "wbc_tick_reset", "wbc_tick_resume", "wbc_tick_safe_step", "wbc_tick_solve", "wbc_tick_step",
-    "wbc_tick_suspend", "wbc_tick_take", "wbc_tick_task_rows", "wbc_tick_torques",
+    "wbc_tick_arrive", "wbc_tick_assemble", "wbc_tick_certify", "wbc_tick_check", "wbc_tick_curvature",
+    "wbc_tick_find_lost", "wbc_tick_look_ahead", "wbc_tick_reset", "wbc_tick_resume", "wbc_tick_safe_step",
+    "wbc_tick_solve", "wbc_tick_step", "wbc_tick_suspend", "wbc_tick_take", "wbc_tick_task_rows", "wbc_tick_torques",
 )  # fmt: skip
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")
-_ALWAYS = ("MH", "KEPT", "BENDING", "NNZK", "BALLS", "SENSED")
+_ALWAYS = ("MH", "KEPT", "BENDING", "CLOSING", "NNZK", "BALLS", "SENSED")
 
 #: What makes the sources of the files in ``native``
 MAKERS = ("generic.py", "memory.py", "commands.py")
@@ -84,8 +95,7 @@ class Variant:
 
     def fields(self) -> tuple[tuple[Field, ...], tuple[Field, ...]]:
         """The report, and what follows it, of :class:`wbc.stack.memory.Memory`."""
-        report = REPORT + LEVEL_REPORT * self.levels + TORQUE_REPORT * (self.command == "torque")
-        return report, (*INPUTS, *REST_INPUTS * (self.command != "velocity"), *QP_FIELDS)
+        return reported(self.command, self.levels), (*INPUTS, *REST_INPUTS * (self.command != "velocity"), *QP_FIELDS)
 
 
 @dataclass
@@ -151,7 +161,7 @@ def origins(variant: Variant) -> dict[str, str]:
 
 def sources(variant: Variant) -> dict[str, str]:
     """File name -> text; ``generic.c`` is what is compiled."""
-    native = resources.files("wbc.stack") / "native"
+    native = pathlib.Path(__file__).parent / "native"
     left_out = ("converge.h", "converge.c", "many.h", "library.c")
     found = [f for f in native.iterdir() if f.name.endswith((".c", ".h")) and f.name not in left_out]
     texts = {file.name: file.read_text() for file in found}
@@ -296,7 +306,7 @@ def _context(variant: Variant) -> str:
         "#include <string.h>",
         f"#define COMMAND {COMMANDS.index(variant.command)}",
         f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
-        *(f"#define {name} 0" for name in ("HANDED", "WORK_W", "WORK_IW")),
+        *(f"#define {name} 0" for name in ("HANDED", "HANDED_TO_LOST", "WORK_W", "WORK_IW")),
         *(f"#define HAS_{name} {int(there)}" for name, there in chosen.items()),
         *(f"#define HAS_{name} 1" for name in _ALWAYS),
         "/* Of eight bytes each, in the order that Python writes them in */",

@@ -2,35 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import casadi as ca
 
 _GIVEN = (ca.OP_INPUT, ca.OP_CONST)
 
 
-def hand_over(first: ca.Function, second: ca.Function, place: int) -> tuple[ca.Function, ca.Function]:
+def hand_over(
+    first: ca.Function, second: ca.Function, place: int, name: str = "handed", others: Collection[str] = ()
+) -> tuple[ca.Function, ca.Function]:
     """Two functions of the same first inputs, of which the second is evaluated after the first, at the same numbers.
 
+    Args:
+        place: the output of ``first`` that stands behind the new one. name: of this. others: inputs whose numbers are
+            not the same.
+
     Returns:
-        ``first`` with one output more, ``handed`` [n], before output ``place``; ``second``, which takes it as its last
-        input. Both compute by the same operations as before.
+        ``first`` with one output more, ``name`` [n]; ``second``, which takes it as its last input. Both compute by the
+        same operations as before.
     """
-    symbols = [ca.SX.sym(second.name_in(k), second.sparsity_in(k)) for k in range(second.n_in())]
-    own = symbols[: first.n_in()]
+    given_to_second = [ca.SX.sym(second.name_in(k), second.sparsity_in(k)) for k in range(second.n_in())]
+    own = [
+        ca.SX.sym(first.name_in(k), first.sparsity_in(k)) if first.name_in(k) in others else given_to_second[k]
+        for k in range(first.n_in())
+    ]
+    symbols = given_to_second + [own[k] for k in range(first.n_in()) if first.name_in(k) in others]
     outputs = [first.name_out(k) for k in range(first.n_out())]
-    results = ca.cse([*first.call(own), *second.call(symbols)])
+    results = ca.cse([*first.call(own), *second.call(given_to_second)])
     both = ca.Function("both", symbols, results)
     depends, ends = _graph(both)
     early = _needed([k for k, (output, _) in ends.items() if output < len(outputs)], depends)
     late = _needed(ends, depends) - early
     handed = sorted({d for k in late for d in depends[k] if d in early and both.instruction_id(d) not in _GIVEN})
-    given = ca.SX.sym("handed", len(handed))
+    given = ca.SX.sym(name, len(handed))
     known = dict(zip(handed, ca.vertsplit(given), strict=True)) if handed else {}
     values = _evaluated(both, symbols, depends, sorted(late), known)
     expressions = both.instructions_sx()
     results.insert(place, ca.vertcat(ca.SX(0, 1), *(expressions[k] for k in handed)))
-    outputs.insert(place, "handed")
+    outputs.insert(place, name)
     # The symbols of a function are its own
     early_results = ca.Function("early", both.sx_in(), results[place : place + 1]).call(symbols)
     results[place] = early_results[0]
@@ -40,7 +50,7 @@ def hand_over(first: ca.Function, second: ca.Function, place: int) -> tuple[ca.F
     ]
     return (
         ca.Function(first.name(), own, ca.cse(results[: len(outputs)]), first.name_in(), outputs),
-        ca.Function(second.name(), [*symbols, given], found, [*second.name_in(), "handed"], second.name_out()),
+        ca.Function(second.name(), [*given_to_second, given], found, [*second.name_in(), name], second.name_out()),
     )
 
 

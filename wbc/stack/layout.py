@@ -8,11 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from wbc.errors import ShapeError
+from wbc.robot import Robot
 from wbc.stack.declaration import HIGHEST_PRICE, Declaration, Entry, soft_rows
 from wbc.tasks import inputs
 from wbc.tasks._contact import Contact, ContactWrench, force_sizes
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Constraint, Form, Input, Row, Task
+from wbc.tasks.mechanism import Mechanism
 from wbc.tasks.torque_limits import TorqueLimits
 from wbc.tasks.wrench_sum import WrenchSum
 
@@ -59,6 +61,15 @@ class Block:
         return slice(self.margin_start, self.margin_start + len(self.rows))
 
 
+def _moves(robot: Robot) -> list[tuple[bool, int, int]]:
+    """See :attr:`Layout.moves`."""
+    joints = [joint for joint in list(robot.tree.joints)[1:] if joint.nq > 0]
+    free = ["FreeFlyer" in joint.shortname() for joint in joints]
+    if robot.loops or not all(base or (joint.nq, joint.nv) == (1, 1) for base, joint in zip(free, joints, strict=True)):
+        return []
+    return [(base, int(joint.idx_q), int(joint.idx_v)) for base, joint in zip(free, joints, strict=True)]
+
+
 class Layout:
     """Blocks, tasks by level and else in stack order, and the sizes of all buffers.
 
@@ -71,6 +82,7 @@ class Layout:
         command: what is commanded. nv: degrees of freedom. variables: of the QP; what comes after the velocities, or
             accelerations, are shares of scaled tasks, or the wrenches of contacts.
         elastic: limits of motion are rows, and they and what is held give way at prices and not in order.
+        moves: of each joint whether it is a free base, and its places in q and v; empty where q (+) v dt is not for C.
         forces: where the wrench of each contact is among the variables, by the contact's name.
         loop_forces: where the forces in loops are among the variables, one a row of :attr:`loop_rows`.
         share_rows: task row -> the share of a scaled task; such a row counts for nothing, and its error is the speed
@@ -84,6 +96,7 @@ class Layout:
         robot = stack.robot
         self.nq, self.nv = robot.nq, robot.nv
         self.command = stack.command
+        self.moves = _moves(robot) if self.command == "velocity" else []
         self.elastic = stack.command == "torque" and bool(robot.unactuated)
         self.variables = self.nv
         self.forces: dict[str, slice] = {}
@@ -187,6 +200,11 @@ class Layout:
     def of_form(self, *forms: Form) -> list[Block]:
         """Blocks of the given forms, in row order."""
         return [b for b in self.blocks.values() if b.form in forms]
+
+    @property
+    def mechanism(self) -> Block | None:
+        """That of couplings and loops; None of a robot without."""
+        return next((block for block in self.of_form("rows") if isinstance(block.entry.item, Mechanism)), None)
 
     def level_rows(self, place: int) -> slice:
         """Task rows of a level, by its index in ``levels``."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wbc.errors import CompileError
+from wbc.quick_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from wbc.stack.layout import Layout
@@ -91,6 +91,11 @@ LEVEL_REPORT = (
     Field("pushes", ("NV + MC",), "index of the level that a row pushes against first, -1: none", True),
     Field("levels", ("LEVELS + 1", "LEVEL_NUMBERS"), f"{', '.join(LEVEL_NUMBERS)}; last the least velocity"),
 )
+#: Of accelerations and torques
+REST_REPORT = (
+    Field("next_v", ("DOFS",), "velocity at the end of the tick; of a robot with loops one that keeps them closed"),
+    Field("next_q", ("NQ",), "configuration there, of a robot with loops", True),
+)
 #: Of torques
 TORQUE_REPORT = (Field("torque", ("DOFS",), "torques of the joints [N m, N]"),)
 INPUTS = (
@@ -147,7 +152,13 @@ def sizes(layout: Layout) -> dict[str, int]:
 
 def report_fields(layout: Layout) -> tuple[Field, ...]:
     """What a tick reports."""
-    return REPORT + (LEVEL_REPORT if layout.cascade else ()) + (TORQUE_REPORT if layout.command == "torque" else ())
+    return reported(layout.command, layout.cascade)
+
+
+def reported(command: str, levels: bool) -> tuple[Field, ...]:
+    """What a tick with such a command reports, and whether it has strict levels."""
+    rest, torque = REST_REPORT * (command != "velocity"), TORQUE_REPORT * (command == "torque")
+    return REPORT + LEVEL_REPORT * levels + rest + torque
 
 
 def input_fields(layout: Layout) -> tuple[Field, ...]:

@@ -20,7 +20,8 @@ inputs advanced by their rates. ``curvature(q, v, p, dt, force)`` is the upper t
 curvature of the errors of the first level's tasks, then of those that equality rows keep, for a weight ``force`` on
 each row, as far as it comes from the robot's links; see :mod:`wbc.symbolic.curvature`. ``lost(q, v, p, dt)`` is by how
 much the errors that equality rows A v = b keep change until q (+) v dt, e(q (+) v dt) - e, one entry a general row:
-without (A v) dt it is how far they bend. Rates of what moves beside are taken from it.
+without (A v) dt it is how far they bend. Rates of what moves beside are taken from it. ``arrival(q, v, p, dt)``, of
+accelerations with loops, is q (+) v dt with the residuals and rows of the mechanism there.
 
 Of a stack that commands accelerations or torques the variables are a, and the wrenches of contacts, in place of v: see
 :mod:`wbc.stack.second`. Then ``torque(q, v, p, dt, x, enabled)`` are the torques of the joints, and ``ahead`` takes the
@@ -36,7 +37,7 @@ entries, and ``low`` and ``margin`` are 0. Sensed rows have no entries either (`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -44,6 +45,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import ShapeError
+from wbc.quick_dataclasses import dataclass
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration, bends
 from wbc.stack.distances import Balls, Sensed
@@ -58,6 +60,7 @@ from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
+from wbc.tasks.mechanism import Mechanism
 
 ROWS_OUTPUTS = (
     "error",
@@ -78,7 +81,7 @@ ROWS_OUTPUTS = (
 class TickProgram:
     """The compiled-to-be functions of a stack; ``ahead`` is None where there are no margins, ``curvature`` where no
     task has any or the stack does not want it; ``torque`` where none is commanded; ``lost`` where no equality row
-    bends; ``balls`` and ``sensed`` are rows that are left to loops.
+    bends, ``arrival`` where a tick closes no loops; ``balls`` and ``sensed`` are rows that are left to loops.
     """
 
     rows: ca.Function
@@ -88,12 +91,13 @@ class TickProgram:
     balls: Balls = field(default_factory=Balls)
     sensed: Sensed = field(default_factory=Sensed)
     lost: ca.Function | None = None
+    arrival: ca.Function | None = None
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
         every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
-        every["lost"] = self.lost
+        every |= {"lost": self.lost, "arrival": self.arrival}
         return {name: function for name, function in every.items() if function is not None}
 
 
@@ -110,7 +114,7 @@ def left_to_loops(stack: Declaration, layout: Layout) -> tuple[Balls, Sensed]:
 def loaded(stack: Declaration, layout: Layout, functions: Mapping[str, ca.Function]) -> TickProgram:
     """The program of a stack whose functions were built before."""
     balls, sensed = left_to_loops(stack, layout)
-    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost")}
+    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost", "arrival")}
     return TickProgram(functions["rows"], **others, balls=balls, sensed=sensed)
 
 
@@ -342,6 +346,18 @@ class _ProgramBuilder:
         later = ca.Function("kept", [self.kinematics.q, self.p], [kept])(self.later, self.advanced(block, self.dt))
         return ca.sparsify(keeps * (later - kept - rest * self.dt))
 
+    def arrival(self) -> list[ca.SX]:
+        """q (+) v dt, there the residuals of the mechanism's rows, and these rows transposed."""
+        block = self.layout.mechanism
+        assert block is not None
+        assert isinstance(block.entry.item, Mechanism)
+        tracer, inputs = self.tracer(block), self.values(block)
+        kept = block.entry.item.residual(self.stack.robot, tracer, inputs)
+        rows = block.entry.item.velocity_rows(self.stack.robot, tracer, inputs, self.dt)
+        assert kept is not None
+        outputs = [ca.densify(part) for part in tracer.expanded(kept, rows.matrix.T)]
+        return [self.later, *ca.Function("kept", [self.kinematics.q, self.p], outputs)(self.later, self.p)]
+
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
         """Rows of sensed pairs, see :meth:`Constraint.sensed_rows`."""
         line = ca.reshape(self.p[block.slots["line"].span], 6, count).T
@@ -427,7 +443,10 @@ def build(stack: Declaration, layout: Layout) -> TickProgram:
         torque = checked_function("torque", [*inputs, b.second.x, enabled], found, ["torque"])
     bent = ca.vertcat(ca.SX(0, 1), *[b.lost(block) for block in layout.of_form("margins", "rows")])
     lost = checked_function("lost", inputs, [ca.densify(bent)], ["lost"]) if bent.nnz() else None
-    return TickProgram(rows, ahead, second, torque, balls, sensed, lost)
+    arrival = None
+    if b.second is not None and stack.robot.loops:
+        arrival = checked_function("arrival", inputs, b.arrival(), ["next_q", "opened", "closing_rows"])
+    return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import pathlib
 import re
 from collections.abc import Mapping
-from importlib import resources
 
 import casadi as ca
 
@@ -21,15 +21,17 @@ def completed(functions: Mapping[str, ca.Function], tables: Mapping[str, str]) -
         functions: of :attr:`wbc.stack.program.TickProgram.functions`, with ``move`` for what follows ticks in C.
         tables: of :func:`wbc.stack.codegen.tables`.
     """
-    native = resources.files("wbc.stack") / "native"
+    native = pathlib.Path(__file__).parent / "native"
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
-    compiled, handed = {name: _shared(function) for name, function in functions.items()}, 0
-    if "curvature" in compiled:
-        place = sum(name not in _LAST for name in compiled["rows"].name_out())
-        compiled["rows"], compiled["curvature"] = hand_over(compiled["rows"], compiled["curvature"], place)
-        handed = compiled["rows"].numel_out("handed")
-    sizes = {
-        "HANDED": handed,
+    compiled = {name: _shared(function) for name, function in functions.items()}
+    place = sum(name not in _LAST for name in compiled["rows"].name_out())
+    sizes = {"HANDED": 0, "HANDED_TO_LOST": -1}
+    # In the order of the outputs; of what is lost, v is a command and not the last one
+    for name, output, others in (("lost", "handed_to_lost", ("v",)), ("curvature", "handed", ())):
+        if name in compiled:
+            compiled["rows"], compiled[name] = hand_over(compiled["rows"], compiled[name], place, output, others)
+            sizes[output.upper()] = compiled["rows"].numel_out(output)
+    sizes |= {
         "WORK_W": max(function.sz_w() for function in compiled.values()),
         "WORK_IW": max(function.sz_iw() for function in compiled.values()),
     }

@@ -121,8 +121,8 @@ def give_order(stack: Declaration, layout: Layout, at: ca.Sparsity) -> list[int]
     """
     if not taken_out(stack, layout):
         return list(range(layout.nv))
-    spans = [block.span for block in layout.of_form("rows") if isinstance(block.entry.item, Mechanism)]
-    own = {row for span in spans for row in range(span.start, span.stop)}
+    block = layout.mechanism
+    own = set() if block is None else {*range(block.span.start, block.span.stop)}
     counts = Counter(variable for variable, row in zip(*at.get_triplet(), strict=True) if row in own)
     passive = set(stack.robot.passive)
     return sorted(range(layout.nv), key=lambda dof: (dof not in passive, counts[dof], dof))

@@ -1,9 +1,16 @@
 """Symbolic kinematics and dynamics from a ``pin.Model`` (floor 1: imports nothing above it)."""
 
-from wbc.symbolic.dynamics import Centroidal, Dynamics
-from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
-from wbc.symbolic.tracer import Tracer
-from wbc.symbolic.two_velocities import TwoVelocityDynamics
-from wbc.symbolic.velocity import Velocities
+from __future__ import annotations
 
-__all__ = ["WORLD", "Centroidal", "Dynamics", "Kinematics", "Pose", "Tracer", "TwoVelocityDynamics", "Velocities"]
+from typing import TYPE_CHECKING
+
+from wbc import lazy
+
+if TYPE_CHECKING:
+    from wbc.symbolic.dynamics import Centroidal as Centroidal, Dynamics as Dynamics
+    from wbc.symbolic.kinematics import WORLD as WORLD, Kinematics as Kinematics, Pose as Pose
+    from wbc.symbolic.tracer import Tracer as Tracer
+    from wbc.symbolic.two_velocities import TwoVelocityDynamics as TwoVelocityDynamics
+    from wbc.symbolic.velocity import Velocities as Velocities
+else:
+    __getattr__, __dir__, __all__ = lazy.attach(__name__, __file__)

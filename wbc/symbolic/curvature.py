@@ -14,11 +14,11 @@ It is the part of the second derivative of an error that one step along a Jacobi
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 import casadi as ca
 
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic.kinematics import Kinematics
 
 

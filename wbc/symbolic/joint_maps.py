@@ -13,12 +13,12 @@ For a joint with coordinates ``q`` (nq numbers) and velocity ``v`` (nv numbers),
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import rotations as rot
 
 Vector = NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -65,6 +66,20 @@ def joint_steps(model: own.Model, joint: int) -> list[JointStep]:
     # Pinocchio lets a joint without end be followed by such a joint only
     kind = JointKind.SHIFT if not turns else (JointKind.TURN if leader == 1 else JointKind.FOLLOW)
     return [_step(kind, start, axis, scaling, offset)]
+
+
+def turns_for_quaternions(steps: list[JointStep], orders: Mapping[int, tuple[int, int, int]]) -> list[JointStep]:
+    """The same steps, with three turns of numbers a, b, c in place of a quaternion at q:
+
+    R = exp(a [e_i]) exp(b [e_j]) exp(c [e_k]),   (i, j, k) = orders[q],   at q, q + 1 and q + 2
+    """
+    axes, out = np.eye(3), list[JointStep]()
+    for step in steps:
+        if step.kind == JointKind.QUATERNION and step.q in orders:
+            out += [_step(JointKind.TURN, step.q + k, axes[axis]) for k, axis in enumerate(orders[step.q])]
+        else:
+            out.append(step)
+    return out
 
 
 def _step(kind: JointKind, q: int, axis: Vector, scale: float = 1.0, offset: float = 0.0) -> JointStep:

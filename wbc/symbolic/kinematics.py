@@ -8,13 +8,13 @@ which is the referee in the tests.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
 from wbc.errors import UnknownNameError
 from wbc.multibody import algebra, own
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import kernels, rotations as rot
 from wbc.symbolic.joints import SymbolicJoint, mimic_joint, symbolic_joint
 

@@ -14,19 +14,22 @@ moving obstacle) go through the same expression and give its partial derivative 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache, partial
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from wbc.errors import UnknownNameError
+from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce
-from wbc.symbolic.gaps import Gap, gap_jacobian
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
-from wbc.symbolic.manipulability import manipulability, manipulability_curvature
 from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.rotations import rotation_rate
+
+if TYPE_CHECKING:
+    from wbc.symbolic.gaps import Gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,6 +278,8 @@ class Tracer:
 
         Inputs in the distances are held: what they move is for the caller to add.
         """
+        from wbc.symbolic.gaps import gap_jacobian
+
         count, kinematics = len(gaps), self.kinematics
         carried = ca.vertcat(ca.SX(0, 1), *[self._carried_gap(gap) for gap in gaps])
         if self.carrier is not None:
@@ -301,6 +306,8 @@ class Tracer:
         Raises:
             UnknownNameError: no such frame.
         """
+        from wbc.symbolic.manipulability import manipulability, manipulability_curvature
+
         kinematics, symbol = self.kinematics, ca.SX.sym(f"w_{frame}_{base}")
         for name in (frame, base):
             kinematics.frame(name)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 #: Flag of a tick: every hard row holds

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,13 @@ from wbc.stack.memory import Memory
 from wbc.tick.native import CompiledTick
 from wbc.validation import Array
 
+_Part = Callable[[bytes], Array]
+
+
+def _part(first: int, count: int) -> _Part:
+    """As :meth:`CompiledTick.part`."""
+    return partial(np.frombuffer, dtype=np.float64, count=count, offset=8 * first)
+
 
 class Context:
     """What all steps of a controller share: names and offsets."""
@@ -23,10 +31,19 @@ class Context:
         self.nv, self.command = layout.nv, layout.command
         self.memory = Memory(layout)
         self.flag_offset = 8 * self.memory.flag
+        #: bytes of a step without q (+) v dt, which a batch leaves out
+        self.size = 8 * self.memory.state
+        #: Step.v of a step's data, and Step.q_next where that is in it
+        self.v_of, self.q_next_of = self._parts(_part if assembly is None else assembly.part)
+
+    def _parts(self, part: Callable[[int, int], _Part]) -> tuple[_Part, _Part]:
+        v = self.memory["v" if self.command == "velocity" else "next_v"].start
+        return part(v, self.nv), part(self.memory.state, self.layout.nq)
 
     def __getstate__(self) -> dict[str, Any]:
         # the memory of a process; a step from a pickle tells everything but its explanation
-        return vars(self) | {"assembly": None}
+        v_of, q_next_of = self._parts(_part)
+        return vars(self) | {"assembly": None, "v_of": v_of, "q_next_of": q_next_of}
 
     def variable(self, number: int) -> str:
         """Name of a variable of the QP."""

@@ -149,6 +149,8 @@ class GenericTick(CompiledTick):
         sizes_of_copies = (
             ("mean", layout.nv),
             ("moved", layout.nv),
+            ("start", layout.nq),
+            ("way", layout.nv),
             ("force", layout.task_rows + layout.general_rows),
         )
         copies = {name: np.zeros(max(1, count)) for name, count in sizes_of_copies}
@@ -169,6 +171,10 @@ class GenericTick(CompiledTick):
         if program.curvature is not None:
             entries = self._written("curvature_entries", program.curvature.nnz_out(0))
             calls["curvature"] = program.curvature, [*state, copies["force"]], [entries]
+        if program.arrival is not None:
+            written = [field("next_q"), self._written("opened", program.arrival.nnz_out(1))]
+            written.append(self._written("closing_rows", program.arrival.nnz_out(2)))
+            calls["arrival"] = program.arrival, [copies["start"], copies["way"], p, dt], written
         if program.torque is not None:
             calls["torque"] = program.torque, [*state, field("v"), field("enabled")], [field("torque")]
         self._bound: list[Any] = [copies]

@@ -5,20 +5,24 @@ from __future__ import annotations
 import ctypes
 import functools
 import pathlib
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wbc.errors import SolverError
-from wbc.native.builtin import builtin, builtin_of_some
+from wbc.native.arrays import ARRAY_MAKERS
+from wbc.native.builtin import builtin, builtin_of_one, builtin_of_some
 from wbc.native.library import load_library
-from wbc.qp.problem import QP
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tick.buffers import INFINITE, OWN, REST_RATE, Buffers, TaskRows
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.qp.problem import QP
 
 #: What a tick with its values in one call returns where an argument is refused, as in ``native/builtins.h``
 REFUSED = -100
@@ -71,9 +75,13 @@ class CompiledTick(Buffers, ABC):
         self._library.wbc_tick_find_lost.restype = ctypes.c_double
         self.step_function = self._library.wbc_tick_step
         #: one tick; returns its flag
-        self.call = builtin(self._library.wbc_python_step, self.pointer.value or 0)
+        self.call: Callable[[], int] = builtin(self._library.wbc_python_step, self.pointer.value or 0)
         #: arrays that native code has the addresses of
-        self._kept: list[np.ndarray] = []
+        self._kept: list[Any] = []
+        #: a copy of :attr:`state`, and where the layout has ``moves`` of q (+) v dt after it
+        self.snapshot: Callable[[], bytes] = builtin(
+            self._library.wbc_python_kept, self._cycle(np.zeros(0), np.zeros((0, 3)), [], [])
+        )
 
     def step(self) -> int:
         return self.call()
@@ -90,24 +98,45 @@ class CompiledTick(Buffers, ABC):
         self._kept += [staged, table, request]
         return builtin(self._library.wbc_python_take, request.ctypes.data)
 
-    def cycler(self, staged: Array, plan: np.ndarray) -> Callable[..., bytes | int]:
-        """What ticks at a configuration with these values in one call: of (q, values in the order of the plan), arrays
-        of doubles. Returns a copy of :attr:`state` where the tick is solved, else its flag; a negative one, and nothing
-        is changed, where an argument is refused.
+    def cycler(
+        self, staged: Array, plan: np.ndarray, names: Sequence[str], step: type, context: object
+    ) -> Callable[[Any, dict[str, Any]], Any]:
+        """What ticks at a configuration with these values in one call: of (q, values by name), arrays of doubles.
+        Returns a step where the tick is solved, else its flag; a negative one, and nothing is changed, where an
+        argument is refused or names are others or in another order.
 
         Args:
-            staged, plan: as of :meth:`taker`.
+            staged, plan: as of :meth:`taker`. names: of the values.
+            step, context: the type of what is returned, whose ``_data`` is :attr:`snapshot`, and its ``_context``.
         """
-        table = np.ascontiguousarray(plan, np.intc).reshape(-1, 3)
+        known = [sys.intern(name) for name in names]
+        made = [step, context, sys.intern("_context"), sys.intern("_data")]
+        return builtin_of_some(self._library.wbc_python_cycle, self._cycle(staged, plan, known, made))
+
+    def part(self, first: int, count: int) -> Callable[[bytes], Array]:
+        """What makes an array of ``count`` numbers of :attr:`snapshot` from number ``first`` on, read-only, without a
+        copy.
+        """
+        request = np.array([*ARRAY_MAKERS, 8 * first, count], np.int64)
+        self._kept.append(request)
+        return builtin_of_one(self._library.wbc_python_part, request.ctypes.data)
+
+    def _cycle(self, staged: Array, plan: np.ndarray, names: Sequence[str], made: Sequence[object]) -> int:
+        """Address of a ``wbc_cycle`` of ``native/builtins.h``."""
+        table, moves = np.ascontiguousarray(plan, np.intc).reshape(-1, 3), np.array(self._layout.moves, np.intc)
+        # Addresses of objects of Python are their identities
+        objects = np.array([id(name) for name in names], np.int64)
         request = np.array(
             [
                 self.pointer.value, self.q.ctypes.data, staged.ctypes.data, table.ctypes.data, len(table),
                 self._layout.nq, self.state.nbytes, self.state.ctypes.data,
+                moves.ctypes.data, len(moves), self._layout.nq if len(moves) else 0,
+                objects.ctypes.data, *map(id, made),
             ],
             np.int64,
         )  # fmt: skip
-        self._kept += [staged, table, request]
-        return builtin_of_some(self._library.wbc_python_cycle, request.ctypes.data)
+        self._kept += [staged, table, moves, request, objects, names, made]
+        return request.ctypes.data
 
     def reset(self) -> None:
         self._library.wbc_tick_reset(self.pointer)
@@ -155,7 +184,7 @@ class CompiledTick(Buffers, ABC):
         self._find_torques()
         if self._command == "torque":
             self.kept[:nv] = self.report[self._torque]
-        self.v_last[:nv] += float(self.dt[0]) * v[:nv]
+        self._library.wbc_tick_arrive(self.pointer)
         if sound:
             self.kept[nv:] = v[nv:]
 
@@ -270,6 +299,8 @@ class CompiledTick(Buffers, ABC):
 
     def qp(self) -> QP:
         """The QP at the buffers' values, before any relaxation: of the first level, where there are several."""
+        from wbc.qp.problem import QP
+
         self.assemble()
         nv = self._layout.variables
         above = self._H[:, :nv]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
+from wbc.quick_dataclasses import dataclass
 from wbc.stack.layout import Block, Layout, rate_unit
 from wbc.stack.memory import LEVEL_NUMBERS
 from wbc.tasks._direction import Direction

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.certificate import Certificate, certify
-from wbc.qp.levels.hierarchy import LevelsAnswer
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxation, Relaxed
 from wbc.qp.solvers import make_solver
@@ -41,9 +41,12 @@ from wbc.tick.buffers import (
     UNSOUND,
     Buffers,
 )
-from wbc.tick.levels import Levels
 from wbc.tick.native import CompiledTick
 from wbc.validation import Array
+
+if TYPE_CHECKING:
+    from wbc.qp.levels.hierarchy import LevelsAnswer
+    from wbc.tick.levels import Levels
 
 #: What an equality row in its unit may be missed by through the rounding of its own numbers
 _ROUNDING = 1e-12
@@ -92,7 +95,11 @@ class SolvedTick(Buffers):
         self._exact = np.array(exact, dtype=np.bool_)
         self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
         #: strict levels, None where there is one
-        self.levels = Levels(assembly, stack, layout) if layout.cascade else None
+        self.levels: Levels | None = None
+        if layout.cascade:
+            from wbc.tick.levels import Levels
+
+            self.levels = Levels(assembly, stack, layout)
 
     def reset(self) -> None:
         self._solver.reset()
@@ -212,10 +219,10 @@ class SolvedTick(Buffers):
                         certificate = better
                         x = np.clip(found.solution.x, bounded.lower[: wide.n], bounded.upper[: wide.n])
                         v, multipliers = x[: self._nv], qp.rows_of(found.solution.multipliers)
-            else:
+            elif self.levels is not None:
                 multipliers = levels.multipliers
                 bounded = QP(qp.H, qp.g, *self._met(qp, answer, v), qp.A)
-                certificate = Levels.certified(levels, float(bounded.violation(v).max(initial=0.0)))
+                certificate = self.levels.certified(levels, float(bounded.violation(v).max(initial=0.0)))
         slack = qp.violation(v)[self._nv :] if flag == RELAXED else np.zeros(self._units.size)
         if self.levels is not None:
             slack = self.levels.with_soft(qp, v, slack)

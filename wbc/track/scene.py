@@ -19,7 +19,7 @@ from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.shapes import Convex, PlacedShape, Solid, Sphere
-from wbc.shapes.solid import names_of_shapes
+from wbc.shapes.names import names_of_shapes
 from wbc.track import render
 from wbc.track.clearance import bodies_of
 from wbc.validation import Array

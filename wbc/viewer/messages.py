@@ -4,6 +4,7 @@ A message is one JSON object with ``type``; ``wbc``: 1 is the format, and may be
 
     {"type": "set", "item": "hand", "values": {"target": [x, y, z, qx, qy, qz, qw], "weight": 2.0, "enabled": true}}
     {"type": "rate", "item": "hand", "rate": [vx, vy, vz, wx, wy, wz]}       m/s, rad/s, along the world's axes
+    {"type": "follow", "item": "hand", "dt": 0.02, "q": [[...], ...]}    a path that takes the item to its target
     {"type": "steer", "rates": [right, ahead, left]}    parts of full speed, of a climb; {"type": "go", "hold": "3,4"}
     {"type": "ask", "on": true}    {"type": "approve"}    every lift of a limb waits for a yes
     {"type": "arm", "name": "arm2"}    {"type": "hand", "rates": [right, ahead, out, left]}    one limb of it
@@ -31,6 +32,7 @@ FORMAT = 1
 OBEYED: dict[str, tuple[str, ...]] = {
     "set": ("item", "values"),
     "rate": ("item", "rate"),
+    "follow": ("item", "dt", "q"),
     "stop": (),
     "resume": (),
     "operate": (),

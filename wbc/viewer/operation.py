@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from wbc.api import Controller
 from wbc.controller import core_of
 from wbc.controller.handle import Handle
 from wbc.multibody import pin
-from wbc.stack.layout import Slot
-from wbc.tasks.base import Constraint
+from wbc.stack.layout import Block, Slot
+from wbc.tasks import Posture
+from wbc.tasks.base import Constraint, Task
 from wbc.validation import Array
 from wbc.viewer.messages import PAIRED, RATE_LASTS, WALKED, MessageError, value_of
 
@@ -22,6 +24,21 @@ from wbc.viewer.messages import PAIRED, RATE_LASTS, WALKED, MessageError, value_
 FASTEST = (1.0, 4.0)
 #: Nearer than this it is there [m, rad]
 ARRIVED = 1e-6
+
+
+@dataclass(eq=False)
+class FollowedPath:
+    """Configurations ``q`` [n, nq], ``dt`` [s] apart, that the posture ``leader`` leads along, at a time [s].
+
+    Attributes:
+        kept: what was set before: (handle, name, value).
+    """
+
+    leader: str
+    q: Array
+    dt: float
+    time: float = 0.0
+    kept: list[tuple[Handle, str, Any]] = field(default_factory=list)
 
 
 class Operation:
@@ -34,6 +51,9 @@ class Operation:
 
     A dragged obstacle does not jump: it goes there at no more than :data:`FASTEST`, and its ``velocity`` says so, so
     that links are moved out of its way in time.
+
+    A path that is to be followed is led by the posture of all joints, with the weight of the task that it is for; that
+    task and lighter ones are off until its end, or until something else is asked for.
 
     Attributes:
         stopped: the reason, or "" where the loop is not stopped. operated: somebody has control.
@@ -49,6 +69,7 @@ class Operation:
         self._kept: list[tuple[Handle, str, Any]] = []
         self._goals: dict[str, pin.SE3] = {}
         self._rates: dict[str, tuple[Array, float]] = {}
+        self._path: FollowedPath | None = None
         self.moving = False
 
     def obey(self, message: Mapping[str, Any]) -> None:
@@ -68,6 +89,8 @@ class Operation:
             self._set(message["item"], message["values"])
         elif kind == "rate":
             self._rate(message["item"], message["rate"])
+        elif kind == "follow":
+            self._follow(message)
         else:
             raise MessageError("message.type", kind, _owner(kind))
 
@@ -75,6 +98,8 @@ class Operation:
         """Raise what :meth:`obey` would raise for values, and change nothing."""
         if message["type"] in (*WALKED, *PAIRED):
             raise MessageError("message.type", message["type"], _owner(message["type"]))
+        if message["type"] == "follow":
+            self._path_of(message)
         if message["type"] in ("set", "rate"):
             handle = self._handle(message["item"])
             if message["type"] == "rate":
@@ -87,6 +112,7 @@ class Operation:
         if self.stopped:
             return
         self.stopped = reason
+        self._leave_path()
         for name in list(self._rates):
             self._end_rate(name)
         for name in list(self._goals):
@@ -130,7 +156,9 @@ class Operation:
                 self._shift(name, rate, dt)
         for name in list(self._goals):
             self._approach(name, dt)
-        self.moving = bool(self._rates or self._goals)
+        if self._path is not None:
+            self._along(self._path, dt)
+        self.moving = bool(self._rates or self._goals or self._path)
 
     # Values
 
@@ -165,8 +193,9 @@ class Operation:
         if "pose" in inputs and "velocity" in block.slots and isinstance(block.entry.item, Constraint):
             goal = validation.pose(f"{name}.pose", inputs.pop("pose"))
             self._goals[name], self.moving = goal, True
-        if "target" in inputs:
+        if "target" in inputs or (others and block.form == "task"):
             self._rates.pop(name, None)
+            self._leave_path()
         handle.set(**inputs)
         for value, number in others.items():
             setattr(handle, value, number)
@@ -183,11 +212,58 @@ class Operation:
         rate = self._rate_of(handle, sent)
         if self.stopped:
             raise MessageError("message", item, f"the robot is stopped ({self.stopped}); resume first")
+        self._leave_path()
         if not rate.any():
             self._end_rate(handle.item_name)
             return
         self._rates[handle.item_name] = rate.copy(), time.monotonic() + RATE_LASTS
         self.moving = True
+
+    def _path_of(self, message: Mapping[str, Any]) -> FollowedPath:
+        robot, handle = self._core.stack.robot, self._handle(message["item"])
+        leader = posture_of(self._core.layout.blocks, robot.nq)
+        if not leader or self._command != "velocity" or not handle.is_of(Task):
+            raise MessageError("message.item", handle.item_name, "a path leads a task, by a posture of all joints")
+        rows = validation.real_array("message.q", message["q"])
+        if rows.ndim != 2 or len(rows) < 2:
+            raise MessageError("message.q", np.shape(rows), "expected two configurations or more")
+        q = np.array([robot.configuration(f"message.q[{k}]", row) for k, row in enumerate(rows)])
+        dt = validation.scalar("message.dt", message["dt"], low=0.0, open_low=True, unit="s")
+        return FollowedPath(leader, q, dt)
+
+    def _follow(self, message: Mapping[str, Any]) -> None:
+        path = self._path_of(message)
+        if self.stopped:
+            raise MessageError("message", message["item"], f"the robot is stopped ({self.stopped}); resume first")
+        self._leave_path()
+        weight = float(self._core.handles[message["item"]].get("weight"))
+        for name, block in self._core.layout.blocks.items():
+            handle = self._core.handles[name]
+            if block.form != "task" or name == path.leader:
+                continue
+            if name == message["item"] or float(handle.get("weight")) < weight:
+                path.kept.append((handle, "enabled", handle.get("enabled")))
+                handle.switch(False)
+        leader = self._core.handles[path.leader]
+        path.kept += [(leader, name, leader.get(name)) for name in ("enabled", "weight", "target", "feedforward")]
+        for name, value in (("enabled", True), ("weight", weight)):
+            setattr(leader, name, value)
+        self._path, self.moving = path, True
+
+    def _along(self, path: FollowedPath, dt: float) -> None:
+        path.time += dt
+        k = int(path.time / path.dt)
+        if k >= len(path.q) - 1:
+            self._leave_path()
+            return
+        robot, leader = self._core.stack.robot, self._core.handles[path.leader]
+        rate = robot.difference(path.q[k], path.q[k + 1]) / path.dt
+        leader.set(target=robot.integrate(path.q[k], rate, path.time - k * path.dt), feedforward=rate)
+
+    def _leave_path(self) -> None:
+        path, self._path = self._path, None
+        for handle, name, value in [] if path is None else path.kept:
+            setattr(handle, name, value)
 
     # Motion
 
@@ -230,6 +306,14 @@ class Operation:
         del self._goals[name]
         slot = self._core.layout.blocks[name].slots["velocity"]
         self._core.write(slot, np.zeros(slot.size))
+
+
+def posture_of(blocks: Mapping[str, Block], nq: int) -> str:
+    """The name of the first posture of all joints among a stack's items, by which a path is followed; "": none."""
+    for name, block in blocks.items():
+        if isinstance(block.entry.item, Posture) and block.slots["target"].size == nq:
+            return name
+    return ""
 
 
 def _owner(kind: str) -> str:

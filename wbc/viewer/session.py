@@ -33,6 +33,7 @@ from wbc.viewer.self_motion import self_motion
 from wbc.viewer.server import SILENT, PageServer
 from wbc.viewer.tick import Tick
 from wbc.viewer.timeline import Timeline
+from wbc.viewer.ways import WaysRound
 
 #: States that are drawn and told a second, at most [1/s]
 RATE = 40.0
@@ -139,6 +140,7 @@ class Session:
         dragged = None if link is None or scenery is not None or pairing is not None else self._dragged
         self._drawing = Drawing(self.server.scene, controller, dragged, scenery=scenery, picked=self._picked)
         self._explainer = LiveExplainer()
+        self._ways = None if dragged is None else WaysRound(controller, self._send, self._refused)
         if link is not None:
             # A page may operate before the first of the regular signs; the loop would take it for lost
             link.live()
@@ -191,6 +193,8 @@ class Session:
         if self._tick is None:
             look(self.server.server, self._controller, tick, self._scenery)
         self._tick = tick
+        if self._ways is not None and self._link is not None and not self._link.flags & STOPPED:
+            self._ways.look(tick)
         if not self.server.watchers and self._drawn:
             # Who comes later is told where everything is by the next tick
             return
@@ -306,6 +310,8 @@ class Session:
         with self._sending:
             if not self._link.send(messages.write(message).encode()):
                 raise ViewerError("message", message["type"], "the loop takes no messages; is it still running?")
+        if self._ways is not None and message["type"] == "set" and "target" in message["values"]:
+            self._ways.dragged(message["item"])
 
     def _dragged(self, item: str, value: str, pose: pin.SE3, phase: str, client: int | None) -> None:
         """A gizmo was moved in the scene by one of viser's clients."""
@@ -320,7 +326,10 @@ class Session:
             self._send({"type": "set", "item": item, "values": {value: sent}})
         except WbcError as error:
             if phase == "end":
-                self.server.tell_all({"type": "refused", "reason": str(error)})
+                self._refused(str(error))
+
+    def _refused(self, reason: str) -> None:
+        self.server.tell_all({"type": "refused", "reason": reason})
 
     def _picked(self, hold: str, client: int | None) -> None:
         """A hold was clicked by one of viser's clients."""
@@ -329,7 +338,7 @@ class Session:
                 self._send({"type": "go", "hold": hold})
                 self._drawing.mark_goal(hold)
             except WbcError as error:
-                self.server.tell_all({"type": "refused", "reason": str(error)})
+                self._refused(str(error))
 
     def _operator_lost(self) -> None:
         self._drawing.let_go()

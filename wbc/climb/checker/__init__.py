@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.climb.checker.check import check as check
+    from wbc.climb.checker.checking import check as check
     from wbc.climb.checker.report import (
         CheckRules as CheckRules,
         ClimbReport as ClimbReport,

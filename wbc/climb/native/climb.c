@@ -111,7 +111,7 @@ int wbc_land(climb_t *c, const int *next, const int *kept, double wanted, const 
     return land_on(c, next, all, wanted, (const double (*)[12])touch, attempt, state, slack, which);
 }
 
-/* Single limbs that may hold elsewhere next, as far from where they are at rest as squared lengths from `least` on and below `most`:
+/* Single limbs that may hold elsewhere next, as far (and turned) from rest as squared lengths from `least` on and below `most`:
  * limb and foothold, 2 each; the stretch after that and the body's place, 4 each, or the squared length alone and where
  * the body is, where `guesses` is 0. How many */
 long wbc_candidates(climb_t *c, const int *contact, const double *touch, const double *base, double least, double most, int guesses,
@@ -124,7 +124,11 @@ long wbc_candidates(climb_t *c, const int *contact, const double *touch, const d
         compose(base, touch + 12 * l, own);
         for (int f = 0; f < c->footholds; f++) {
             minus3(own + 9, c->foothold + 12 * f + 9, apart);
-            const double far = dot3(apart, apart) / (c->limb[l].length * c->limb[l].length);
+            double far = dot3(apart, apart) / (c->limb[l].length * c->limb[l].length);
+            for (int i = 0; i < 3 && c->limb[l].rows == 6; i++) { /* an angle of 1 rad counts as a length */
+                const double turned = own[3 * i] - c->foothold[12 * f + 3 * i];
+                far += turned * turned;
+            }
             if (far < least || far >= most || c->cone_of[l * c->footholds + f] < 0) continue;
             if (contact[l] >= 0 && c->hold[f] == c->hold[contact[l]]) continue;
             int near = 1;

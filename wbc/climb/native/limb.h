@@ -15,10 +15,11 @@ typedef struct {
 } step_t;
 
 /* wbc/climb/chain.py has the same; `rows`: of the contact's pose that are fixed, 3, 5 or 6; `touch`: contact poses in the
- * body's frame at sampled angles, 12 each */
+ * body's frame at sampled angles, 12 each; `near`, `far`: least and greatest distance from the first step's place of the point that is
+ * at `wrist` in the contact's frame */
 typedef struct {
     int steps, angles, rows, samples;
-    double length, tip[12];
+    double length, near, far, tip[12], wrist[3];
     const step_t *step;
     const double *lower, *upper, *rest, *sample, *touch;
 } limb_t;

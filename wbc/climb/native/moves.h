@@ -25,14 +25,32 @@
 #define TURNED 0.15
 /* Distance from rest from which on stretch grows with its fourth power [lengths of a limb] */
 #define COMFORT 0.4
+/* Samples from which a limb that lands begins, besides rest */
+#define BEGINNINGS 3
+/* Steps of a guess; weight in it of what a contact is out of a limb's reach, and in the stretch [1/lengths of a limb squared] */
+#define GUESSES 3
+#define REACHES 10.0
+#define BEYOND_REACH 20.0
 
-/* The body's pose for which contacts are nearest to where they are at rest: two steps of least squares from `base` on, in place.
- * `touch`: contact poses at rest in the body's frame. The stretch: sum of squared distances from there in
- * lengths of the limbs, and more beyond COMFORT */
+/* How far a contact is out of the shell that a limb reaches with the body at a pose [m], below 0 where it is too near; `n`: the
+ * direction from the limb's root, `arm`: from the body to that root, along the axes of the world */
+static double out_of_reach(const limb_t *l, const double *base, const double *contact, double *arm, double *n) {
+    double at[3], by[3];
+    turn(base, l->step[0].place + 9, arm);
+    turn(contact, l->wrist, at);
+    for (int i = 0; i < 3; i++) by[i] = contact[9 + i] + at[i] - base[9 + i] - arm[i];
+    const double far = sqrt(dot3(by, by));
+    for (int i = 0; i < 3; i++) n[i] = far > 0.0 ? by[i] / far : 0.0;
+    return far > l->far ? far - l->far : far < l->near ? far - l->near : 0.0;
+}
+
+/* The body's pose for which contacts are nearest to where they are at rest, within reach: some steps of least squares from `base` on,
+ * in place. `touch`: contact poses at rest in the body's frame. The stretch: sum of squared distances from there in lengths of the
+ * limbs, and more beyond COMFORT, or out of reach */
 static double guess_body(const climb_t *c, const int *contact, const double (*touch)[12], double *base) {
     double from[12], stretch = 0.0;
     memcpy(from, base, sizeof from);
-    for (int round = 0; round < 2; round++) {
+    for (int round = 0; round < GUESSES; round++) {
         double H[36] = {0}, g[6], by[3], arm[3], moved[12];
         turn_between(from, base, by);
         const double unit = c->length * c->length;
@@ -51,6 +69,15 @@ static double guess_body(const climb_t *c, const int *contact, const double (*to
                 for (int k = 0; k < 3; k++) H[6 * (3 + i) + 3 + k] += (i == k ? dot3(arm, arm) : 0.0) - arm[i] * arm[k];
             }
             H[19] -= arm[2], H[20] += arm[1], H[24] += arm[2], H[26] -= arm[0], H[30] -= arm[1], H[31] += arm[0];
+            const double beyond = out_of_reach(c->limb + l, base, goal, arm, by);
+            if (beyond != 0.0) { /* the root is to go along by */
+                double row[6];
+                copy3(by, row), cross3(arm, by, row + 3);
+                for (int i = 0; i < 6; i++) {
+                    g[i] += REACHES * beyond * row[i];
+                    for (int k = 0; k <= i; k++) H[6 * i + k] += REACHES * row[i] * row[k];
+                }
+            }
             for (int axis = 2; axis >= 0 && c->limb[l].rows > (axis ? 3 : 5); axis -= 2) { /* z, then x where it counts */
                 const double w = 0.1 * c->limb[l].length * c->limb[l].length;
                 const double u[3] = {moved[axis], moved[3 + axis], moved[6 + axis]};
@@ -67,7 +94,7 @@ static double guess_body(const climb_t *c, const int *contact, const double (*to
     }
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
-        double moved[12], by[3];
+        double moved[12], by[3], arm[3];
         compose(base, touch[l], moved);
         minus3(moved + 9, c->foothold + 12 * contact[l] + 9, by);
         double far = sqrt(dot3(by, by)) / c->limb[l].length;
@@ -75,9 +102,34 @@ static double guess_body(const climb_t *c, const int *contact, const double (*to
             turn_between(c->foothold + 12 * contact[l], moved, by);
             far += TURNED * sqrt(dot3(by, by));
         }
-        stretch += far * far * (1.0 + far * far / (COMFORT * COMFORT));
+        const double beyond = out_of_reach(c->limb + l, base, c->foothold + 12 * contact[l], arm, by) / c->limb[l].length;
+        stretch += far * far * (1.0 + far * far / (COMFORT * COMFORT)) + BEYOND_REACH * beyond * beyond;
     }
     return stretch;
+}
+
+static void own_pose(const double *base, const double *world, double *out) {
+    double by[3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) out[3 * i + k] = base[i] * world[k] + base[3 + i] * world[3 + k] + base[6 + i] * world[6 + k];
+    minus3(world + 9, base + 9, by);
+    turn_back(base, by, out + 9);
+}
+
+/* Angles of a limb near a contact with the body at a pose: there, if one of a few beginnings leads there */
+static void begin_limb(const limb_t *l, const double *base, const double *contact, double *angle) {
+    double own[12];
+    int nearest[BEGINNINGS];
+    const size_t size = (size_t)l->angles * sizeof *angle;
+    memcpy(angle, l->rest, size);
+    if (reach_from(l, base, contact, angle)) return;
+    own_pose(base, contact, own);
+    const int count = nearest_samples(l, own, BEGINNINGS, nearest);
+    for (int k = 0; k < count; k++) {
+        memcpy(angle, l->sample + (size_t)nearest[k] * l->angles, size);
+        if (reach_from(l, base, contact, angle)) return;
+    }
+    memcpy(angle, l->rest, size);
 }
 
 static void pose_between(const double *a, const double *b, double part, double *out) {
@@ -87,14 +139,6 @@ static void pose_between(const double *a, const double *b, double part, double *
     for (int i = 0; i < 6; i++) twist[i] *= part;
     memcpy(out, a, 12 * sizeof *out);
     move_body(out, twist);
-}
-
-static void own_pose(const double *base, const double *world, double *out) {
-    double by[3];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) out[3 * i + k] = base[i] * world[k] + base[3 + i] * world[3 + k] + base[6 + i] * world[6 + k];
-    minus3(world + 9, base + 9, by);
-    turn_back(base, by, out + 9);
 }
 
 /* The same for limbs on which the body has to give way: all go evenly, and are brought back to their contacts */
@@ -263,15 +307,14 @@ static int land_on(climb_t *c, const int *next, const int *kept, double wanted, 
                    double *state, double *slack, int *which) {
     wish_t wish = {1, {support_of(c, kept)}, wanted, 0.0, 0.0, REST, {0}, 0, {{0}}};
     if (!wish.support[0]) return NOT_BORNE;
-    double own[12], from[12 + MOST_LIMBS * MOST_ANGLES];
+    double from[12 + MOST_LIMBS * MOST_ANGLES];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     guess_body(c, next, touch, state);
     for (int l = 0; l < c->limbs; l++) {
         double *now = state + 12 + c->offset[l];
         if (next[l] >= 0 && next[l] == kept[l]) continue;
-        if (next[l] >= 0) own_pose(state, c->foothold + 12 * next[l], own);
-        if (next[l] < 0 || !postures(c->limb + l, own, c->limb[l].rest, 1, now))
-            memcpy(now, c->limb[l].rest, (size_t)c->limb[l].angles * sizeof *now);
+        if (next[l] < 0) memcpy(now, c->limb[l].rest, (size_t)c->limb[l].angles * sizeof *now);
+        else begin_limb(c->limb + l, state, c->foothold + 12 * next[l], now);
     }
     if (attempt) begin_anew(c, next, touch, attempt, state);
     return posture_from(c, next, kept, kept, &wish, attempt < LAST_ATTEMPT, from, state, slack, which);

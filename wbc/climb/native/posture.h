@@ -10,6 +10,11 @@
 #define LOOKS 10
 /* Moves below this end the sweeps: what contacts lack then is made up by their limbs [rad, m of the length] */
 #define NEAR_ENOUGH 2e-2
+/* Sweeps end where so many of them leave more than this share of the sum of squared errors of contacts, if that is more than enough
+ * [lengths squared] */
+#define STALLED 4
+#define STALLS 0.5
+#define CLOSE 1e-10
 /* Weights of contacts and of the equilibrium's bounds over those of angles from rest [1/m^2 of the robot's length] */
 #define HOLDS 1e4
 #define BEARS 1e3
@@ -104,8 +109,9 @@ static double avoiding(const climb_t *c, const int *contact, const int *pair, co
     return found.gap - kept_distance(c, contact, pair[0], pair[1]);
 }
 
-/* One sweep of least squares; the largest move [m, rad] */
-static double sweep(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle, placed_t *placed) {
+/* One sweep of least squares; the largest move [m, rad]. `left`: sum of squared errors of the contacts before it [lengths squared] */
+static double sweep(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle, placed_t *placed,
+                    double *left) {
     double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3], J[MOST_ANGLES][6], M[MOST_ANGLES][3];
     double E[6][6], r[6], value[MOST_VARIABLES];
     int start[MOST_LIMBS], column[MOST_VARIABLES], n = 6;
@@ -118,6 +124,7 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
     memset(H, 0, (size_t)(n * n) * sizeof *H), memset(g, 0, (size_t)n * sizeof *g);
     for (int k = 0; k < n; k++) H[k * n + k] = 1e-6;
     const double unit = 1.0 / (c->length * c->length);
+    *left = 0.0;
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
         const limb_t *limb = c->limb + l;
@@ -139,6 +146,7 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
                 value[6 + k] = sum, column[6 + k] = start[l] + k;
             }
             add_row(n, H, g, column, value, 6 + k0, r[i], HOLDS * unit);
+            *left += unit * r[i] * r[i];
         }
         for (int k = 0; k < k0; k++) {
             const double off = angle[c->offset[l] + k] - limb->rest[k];
@@ -222,9 +230,10 @@ static int tighten(const climb_t *c, const int *contact, double *base, double *a
         return 1;
     }
     const wish_t none = {0};
+    double left;
     for (int k = 0; k < ITERATIONS; k++) {
         double most = 0.0;
-        sweep(c, contact, &none, base, angle, placed);
+        sweep(c, contact, &none, base, angle, placed, &left);
         for (int l = 0; l < c->limbs; l++) {
             if (contact[l] < 0) continue;
             place_limb(c->limb + l, base, angle + c->offset[l], placed + l);
@@ -252,8 +261,13 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
     c->searches++;
     *slack = INFINITY;
     for (int look = 0; look < LOOKS; look++) {
-        for (int k = 0; k < SWEEPS; k++, c->sweeps++)
-            if (sweep(c, contact, wish, base, angle, placed) < NEAR_ENOUGH) break;
+        double left, before = INFINITY;
+        for (int k = 0; k < SWEEPS; k++, c->sweeps++) {
+            if (sweep(c, contact, wish, base, angle, placed, &left) < NEAR_ENOUGH) break;
+            if (k % STALLED || (look && !k)) continue; /* contacts that are closed open at first, for a new bound */
+            if (left > CLOSE && left > STALLS * before) break;
+            before = left;
+        }
         if (!tighten(c, contact, base, angle)) return NOT_REACHED;
         place_all(c, base, angle, placed, center);
         *slack = INFINITY;

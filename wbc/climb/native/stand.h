@@ -190,9 +190,20 @@ static int left_out(const climb_t *c, const int *contact, int piece) {
     return c->piece[piece].limb >= 0 && contact[c->piece[piece].limb] == LEFT_OUT;
 }
 
-/* A row for every piece and body, then for every pair: two poses, the second one of pairs only, and the distance at these; 0: there is
- * no memory */
-#define GAP_ROW 25
+/* No more than the signed distance of two convex shapes, or of one from an endless cylinder: that along a direction in the world */
+static double gap_along(const shape_t *a, const double *A, const shape_t *b, const double *B, const double *normal) {
+    view_t v;
+    shape_t piece;
+    double own[3];
+    view_of(a, A, b, B, &v);
+    if (b->kind == ROD) beside_rod(&v, &piece);
+    turn_back(A, normal, own);
+    return clearance(&v, own) - a->size[4] - v.b->size[4];
+}
+
+/* A row for every piece and body, then for every pair: two poses, the second one of pairs only, the distance at these, and the normal
+ * if that was measured; 0: there is no memory */
+#define GAP_ROW 29
 static double *gap_rows(climb_t *c) {
     if (c->gap) return c->gap;
     const size_t rows = (size_t)c->pieces * c->bodies + c->pairs;
@@ -239,9 +250,17 @@ static double link_clearance(climb_t *c, const int *contact, const double *base,
                 if (far > 0.0) continue;
             }
             answer_t found;
+            const int known_way = last && last[24] > -INFINITY && convex(a) && (convex(b) || b->kind == ROD);
+            if (known_way && (found.gap = gap_along(a, pose[i], b, at, last + 25)) > keep + how.tie) {
+                memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
+                continue;
+            }
             measure_shapes(&how, a, pose[i], b, at, &found);
             c->measured++;
-            if (last) memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
+            if (last) {
+                memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
+                copy3(found.normal, last + 25);
+            }
             if (found.gap - keep < least) least = found.gap - keep, which[0] = i, which[1] = own ? -1 - other : j;
             if (least < 0.0) return least;
         }

@@ -12,17 +12,6 @@ static double gone(const shape_t *shape, const double *one, const double *other)
     return sqrt(dot3(by, by)) + shape->size[5] * sqrt(turned);
 }
 
-/* No more than the signed distance of two convex shapes, or of one from an endless cylinder: that along a direction in the world */
-static double gap_along(const shape_t *a, const double *A, const shape_t *b, const double *B, const double *normal) {
-    view_t v;
-    shape_t piece;
-    double own[3];
-    view_of(a, A, b, B, &v);
-    if (b->kind == ROD) beside_rod(&v, &piece);
-    turn_back(A, normal, own);
-    return clearance(&v, own) - a->size[4] - v.b->size[4];
-}
-
 /* Marks the instants at which two shapes are nearer than `keep` (of instant k: kept[kept_by * k]); their poses are `a_by` and `b_by`
  * numbers apart, 0: it stands */
 static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A, long a_by, const shape_t *b, const double *B,

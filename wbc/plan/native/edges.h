@@ -36,7 +36,7 @@ static int rows_between(plan_t *p, const double *x, const double *y) {
 
 static int edge(plan_t *p, const double *x, const double *y) {
     p->edges++;
-    return (!has_rows(p) || rows_between(p, x, y)) && clear(p, x, y);
+    return clear(p, x, y) && (!has_rows(p) || rows_between(p, x, y));
 }
 
 /* From x towards a target, no farther than `range`: configurations behind x that are free with their edges, into `out`, at most
@@ -58,7 +58,7 @@ static int walk(plan_t *p, const double *x, const double *target, double range, 
         const double now = last ? 0.0 : metric(p, to, target), moved = metric(p, from, to);
         /* A projection that leads back, or away, ends the walk */
         if (stepped && (now > left - 0.2 * stride * !last || moved > 2.0 * stride)) break;
-        if (!within(p, to) || !clear(p, to, to) || !edge(p, from, to)) break;
+        if (!within(p, to) || !edge(p, from, to)) break;
         count++, gone += moved, left = now, *reached = last;
     }
     return count;

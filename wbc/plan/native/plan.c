@@ -11,8 +11,7 @@ int wbc_plan_free(plan_t *p, const double *x) { return is_free(p, x); }
 
 /* The least distance of a pair at x less what it keeps, pads counted; infinite where there is none */
 double wbc_plan_margin(plan_t *p, const double *x) {
-    int pair;
-    return least_margin(p, x, &pair);
+    return least_margin(p, x, -INFINITY);
 }
 
 int wbc_plan_edge(plan_t *p, const double *x, const double *y) { return edge(p, x, y); }
@@ -45,8 +44,7 @@ int wbc_plan_root(plan_t *p, int tree, const double *x) {
  * how often it is tried; x where it has that room, or where there is none */
 void wbc_plan_away(plan_t *p, double *x, double room) {
     const int n = p->n;
-    int pair;
-    double best[n], y[n], most = least_margin(p, x, &pair);
+    double best[n], y[n], most = least_margin(p, x, -INFINITY);
     copy_x(p, x, best);
     for (double radius = 0.02; radius < 0.5 && most < room; radius *= 2.0)
         for (int again = 0; again < 20; again++) {
@@ -55,7 +53,7 @@ void wbc_plan_away(plan_t *p, double *x, double room) {
                 y[k] = fmin(fmax(x[k] + off, p->low[k]), p->high[k]);
             }
             if (has_rows(p) && !project(p, &p->path, y)) continue;
-            const double margin = least_margin(p, y, &pair);
+            const double margin = least_margin(p, y, most);
             if (margin > most && is_free(p, y) && edge(p, x, y)) copy_x(p, y, best), most = margin;
         }
     copy_x(p, best, x);

@@ -26,6 +26,15 @@ typedef struct {
     double angular[3], linear[3], turned, off, reached, bent;
 } drift_t;
 
+/* How a pair is seen to be far apart: by the balls about both, by a ball and a box in the world, or not so */
+enum { BALLS, BALL_BOX, UNSEEN };
+
+/* `ball` moves; `least`: what is required, with the radii; where in `offs` it stands how far both may be off */
+typedef struct {
+    double least;
+    int form, ball, other, ball_off, other_off;
+} outline_t;
+
 typedef struct {
     sweep_t *sweep;
     drift_t *drifts;  /* bodies x (depth + 1) */
@@ -35,16 +44,20 @@ typedef struct {
     double *normals;  /* pairs x 3: the directions that parted them last, or 0 */
     double half;      /* half of the piece at hand */
     double open;      /* what a proof may leave open of what is required [m] */
-    /* pairs of a body that moves and a solid in the world, LANES at a time: pose, half sides of the box about the solid, and what
-     * is required; then all other pairs */
-    double *lanes;
-    int *first_block, *block_pairs, *loose_pairs;
+    double *boxes;       /* bodies x 15: pose and half sides of the box about what stands in the world */
+    double *reaches;     /* bodies x depth: how far points can be from the joints of a chain */
+    double *offs;        /* bodies x (depth + 1): how far the first joints of it may take them within half a piece */
+    double *lane_pose;   /* frames x 12 x LANES: places that are looked at at once */
+    double *lane_centre; /* bodies x 3 x LANES: of the balls there */
+    outline_t *outlines; /* pairs */
+    int *near;           /* LANES x pairs: what is near to each other there */
+    int near_count[LANES];
     int recent[RECENT];
     const double *x, *y; /* ends of the motion at hand */
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
     const double *weight;                   /* n: squares of what a coordinate counts */
-    int n, pairs, loose, capacity, seeds, count[2];
+    int n, pairs, capacity, seeds, count[2];
     double range;     /* an edge is no longer */
     double step;      /* of edges with rows: between two projections */
     double tolerance; /* of equalities at a configuration */

@@ -12,8 +12,10 @@
 
 #include "places.h"
 
-/* Edges are looked at, before they are proven, at places no farther apart than this [rad, or characteristic lengths] */
-#define PROBED 0.5
+/* Edges are proven in pieces that are no longer [rad, or characteristic lengths] */
+#define PIECE 0.25
+/* and of LANES pieces, or less, one after so many others */
+#define STRIDE 5
 /* Pieces are not halved more often */
 #define PIECES 40
 /* Beyond so large a turn the linear part says nothing [rad] */
@@ -71,8 +73,8 @@ static double from_ball(const plan_t *p, int i, int j) {
     return sqrt(dot3(off, off)) - s->shape[j].size[4] - ball[3];
 }
 
-/* One pair over one piece: 1 where both halves must be looked at; `near`: the balls say nothing */
-static int examine(plan_t *p, int k, int last, int near) {
+/* One pair over one piece: 1 where both halves must be looked at */
+static int examine(plan_t *p, int k, int last) {
     sweep_t *s = p->sweep;
     const int i = s->first[k], j = s->second[k];
     stand(p, i);
@@ -80,7 +82,7 @@ static int examine(plan_t *p, int k, int last, int near) {
     const double off = off_of(p, i, s->stop_first[k]) + off_of(p, j, s->stop_second[k]), required = s->required[k];
     const int bounded = p->radius[i] < INFINITY && p->radius[j] < INFINITY;
     double *n = p->normals + 3 * k;
-    if (!near && bounded && (is_round(s->shape + j) ? from_ball(p, j, i) : from_ball(p, i, j)) - off >= required) return 0;
+    if (bounded && (is_round(s->shape + j) ? from_ball(p, j, i) : from_ball(p, i, j)) - off >= required) return 0;
     if (!bounded && bound_of(s, i, j) - off >= required) return 0;
     if (dot3(n, n) > 0.0 && parted_any(p, k) >= required) return 0;
     answer_t found;
@@ -94,71 +96,92 @@ static int examine(plan_t *p, int k, int last, int near) {
     return !(last || off <= p->open || found.gap - off >= required - p->open || parted_any(p, k) >= required - p->open);
 }
 
-/* One piece, and both halves of it where that is not enough; `count` pairs, or -1: all of them */
+/* One piece for some pairs, and both halves of it where that is not enough */
 static void halve(plan_t *p, double low, double high, const int *pairs, int count, int depth, int *room) {
     sweep_t *s = p->sweep;
-    const int whole = count < 0;
     int left = 0;
     place_joints(p, 0.5 * (low + high), 0.5 * (high - low));
-    /* What was too near before is first */
-    for (int k = 0; whole && low == high && k < RECENT && s->stopped < 0; k++)
-        if (p->recent[k] >= 0) examine(p, p->recent[k], 1, 0);
-    if (whole && s->stopped < 0) count = near_pairs(p, room), pairs = room;
     for (int k = 0; k < count && s->stopped < 0; k++)
-        if (examine(p, pairs[k], depth >= PIECES, whole)) room[left++] = pairs[k];
+        if (examine(p, pairs[k], depth >= PIECES)) room[left++] = pairs[k];
     if (!left || s->stopped >= 0) return;
     halve(p, low, 0.5 * (low + high), room, left, depth + 1, room + left);
     if (s->stopped < 0) halve(p, 0.5 * (low + high), high, room, left, depth + 1, room + left);
 }
 
-/* A pair that was too near is looked at first the next time */
-static int remembered(plan_t *p) {
-    const int stopped = p->sweep->stopped;
-    if (stopped < 0) return 1;
+/* Whether none of the pairs that were too near last is so again, at y; others too where `all` */
+static int apart_at(plan_t *p, int all) {
+    const sweep_t *s = p->sweep;
+    if (!all && p->recent[0] < 0) return 1;
+    place_joints(p, 1.0, 0.0);
+    for (int k = 0; k < RECENT && s->stopped < 0; k++)
+        if (p->recent[k] >= 0) examine(p, p->recent[k], 1);
+    for (int k = 0; all && k < p->pairs && s->stopped < 0; k++) examine(p, k, 1);
+    return s->stopped < 0;
+}
+
+/* Pieces at once: `count` of the motion from number `from` on, of `pieces`, behind what else is looked at; or places that are evenly
+ * spread, where `pieces` is 0. The first of few is y */
+static void look_along(plan_t *p, int from, int count, int pieces) {
+    sweep_t *s = p->sweep;
+    const double half = pieces ? 0.5 / pieces : 0.0;
+    const int ended = !pieces || count < LANES;
+    lanes_t t, share = {0};
+    for (int l = 0; l < LANES; l++) t[l] = 1.0;
+    for (int k = 0; k < count; k++) {
+        const int l = k + ended;
+        t[l] = pieces ? (from + k + 0.5) / pieces : (k + 1.0) / LANES, share[l] = pieces > 0;
+    }
+    place_lanes(p, t);
+    place_offs(p, half);
+    near_pairs(p, share);
+    /* What is far from each other is looked at first: what is in a body is so seen soonest */
+    for (int k = -ended; k < count && s->stopped < 0; k++) {
+        const int piece = k < 0 ? 0 : (STRIDE * (k + 1)) % count, l = k < 0 ? 0 : piece + ended, *near = p->near + p->pairs * l;
+        int left = 0;
+        if (!p->near_count[l]) continue;
+        stand_at(p, l, share[l] * half);
+        for (int m = 0; m < p->near_count[l] && s->stopped < 0; m++)
+            if (examine(p, near[m], 0)) s->list[left++] = near[m];
+        if (!left || s->stopped >= 0) continue;
+        const double low = (from + piece) / (double)pieces, high = (from + piece + 1.0) / pieces, middle = 0.5 * (low + high);
+        halve(p, low, middle, s->list, left, 1, s->list + left);
+        if (s->stopped < 0) halve(p, middle, high, s->list, left, 1, s->list + left);
+    }
+}
+
+/* Straight from x, which is clear, to y; only y where they are the same */
+static int clear(plan_t *p, const double *x, const double *y) {
+    sweep_t *s = p->sweep;
+    if (!p->pairs) return 1;
+    p->x = x, p->y = y;
+    s->stopped = -1;
+    if (apart_at(p, x == y) && x != y) {
+        const double wanted = metric(p, x, y) / PIECE;
+        if (wanted < LANES - 1) {
+            const int pieces = wanted <= 1.0 ? 1 : wanted <= 2.0 ? 2 : wanted <= 4.0 ? 4 : LANES - 1;
+            look_along(p, 0, pieces, pieces);
+        } else {
+            const int pieces = LANES * (int)ceil(wanted / LANES);
+            look_along(p, 0, LANES - 1, 0);
+            for (int k = 0; k < pieces && s->stopped < 0; k += LANES) look_along(p, k, LANES, pieces);
+        }
+    }
+    if (s->stopped < 0) return 1;
+    /* A pair that was too near is looked at first the next time */
     int k = 0;
-    while (k < RECENT - 1 && p->recent[k] != stopped) k++;
+    while (k < RECENT - 1 && p->recent[k] != s->stopped) k++;
     memmove(p->recent + 1, p->recent, k * sizeof *p->recent);
-    p->recent[0] = stopped;
+    p->recent[0] = s->stopped;
     return 0;
 }
 
-/* Whether nothing is too near at places between x and y: far from each other first, since what is in a body is so seen
- * soonest */
-static int probed(plan_t *p, const double *x, const double *y) {
-    sweep_t *s = p->sweep;
-    if (!p->pairs) return 1;
-    const double length = metric(p, x, y);
-    p->x = x, p->y = y;
-    s->stopped = -1;
-    for (int parts = 1; length > parts * PROBED && s->stopped < 0; parts *= 2)
-        for (int k = 1; k < 2 * parts && s->stopped < 0; k += 2)
-            halve(p, 0.5 * k / parts, 0.5 * k / parts, 0, -1, 0, s->list);
-    return remembered(p);
-}
-
-/* Straight from x to y, which may be x */
-static int proven(plan_t *p, const double *x, const double *y) {
-    sweep_t *s = p->sweep;
-    if (!p->pairs) return 1;
-    const double length = metric(p, x, y);
-    int parts = 1;
-    while (parts * PROBED < length) parts *= 2;
-    p->x = x, p->y = y;
-    s->stopped = -1;
-    if (x == y) halve(p, 0.0, 0.0, 0, -1, 0, s->list);
-    for (int k = 0; k < parts && x != y && s->stopped < 0; k++) halve(p, (double)k / parts, (k + 1.0) / parts, 0, -1, 0, s->list);
-    return remembered(p);
-}
-
-static int clear(plan_t *p, const double *x, const double *y) { return (x == y || probed(p, x, y)) && proven(p, x, y); }
-
-/* The least distance of all pairs at x, less what each keeps; which pair it is */
-static double least_margin(plan_t *p, const double *x, int *pair) {
+/* The least distance of all pairs at x, less what each keeps; what is less than `enough` may be any */
+static double least_margin(plan_t *p, const double *x, double enough) {
     sweep_t *s = p->sweep;
     double least = INFINITY;
     p->x = p->y = x;
     place_joints(p, 0.0, 0.0);
-    for (int k = 0; k < p->pairs; k++) {
+    for (int k = 0; k < p->pairs && least >= enough; k++) {
         const int i = s->first[k], j = s->second[k];
         answer_t found;
         stand(p, i);
@@ -166,7 +189,7 @@ static double least_margin(plan_t *p, const double *x, int *pair) {
         if (bound_of(s, i, j) - s->required[k] >= least) continue;
         if (convex(s->shape + i) && convex(s->shape + j) && capsules_of(s, i, j) - s->required[k] >= least) continue;
         distance_of(s, i, j, &found);
-        if (found.gap - s->required[k] < least) least = found.gap - s->required[k], *pair = k;
+        if (found.gap - s->required[k] < least) least = found.gap - s->required[k];
     }
     return least;
 }

@@ -84,7 +84,7 @@ static int pull(plan_t *p, double *x, int points, int k) {
         along_x(p, here, line, t, to);
         if (stepped && !project(p, &p->path, to)) continue;
         if (metric(p, before, to) + metric(p, to, after) > (1.0 - GAIN) * now) continue;
-        if (within(p, to) && clear(p, to, to) && edge(p, before, to) && edge(p, to, after)) {
+        if (within(p, to) && edge(p, before, to) && edge(p, to, after)) {
             copy_x(p, to, here);
             return points;
         }

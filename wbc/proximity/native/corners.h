@@ -7,10 +7,13 @@
 /* A corner no farther than this from the core of the other body is inside, and has no row [m] */
 #define INSIDE 1e-6
 /* A shape has at most this many: a hull, and both rims of a cylinder */
-#define MOST_CORNERS 16
+#define MOST_CORNERS 48
+/* Corners of a hull that are nearer to each other than this part of its bounding sphere's radius count as one */
+#define TOGETHER 0.3
 
 typedef struct {
-    double gap, line[6];
+    double gap, line[6], place[3];
+    int own;
 } corner_t;
 
 static void line_through(const double *point, const double *normal, double *line) {
@@ -27,15 +30,22 @@ static void corner_row(const scene_t *s, int own, int other, int c, double sign,
     memset(out->line, 0, sizeof out->line);
     turn(O, s->corner + 3 * (own * s->width + c), point);
     for (int k = 0; k < 3; k++) point[k] += O[9 + k];
+    copy3(point, out->place);
+    out->own = own;
     minus3(point, T + 9, offset);
     turn_back(T, offset, local);
-    nearest(shape, local, core);
-    minus3(core, local, offset);
-    const double length = sqrt(dot3(offset, offset));
-    if (length <= INSIDE) return;
-    turn(T, offset, normal);
-    for (int k = 0; k < 3; k++) normal[k] *= sign / length;
-    out->gap = length - s->shape[own].size[4] - shape->size[4];
+    double length = local[2], ball = 0.0;
+    if (shape->kind == PLANE) {
+        for (int k = 0; k < 3; k++) normal[k] = -sign * T[3 * k + 2];
+    } else {
+        nearest(shape, local, core);
+        minus3(core, local, offset);
+        length = sqrt(dot3(offset, offset)), ball = shape->size[4];
+        if (length <= INSIDE) return;
+        turn(T, offset, normal);
+        for (int k = 0; k < 3; k++) normal[k] *= sign / length;
+    }
+    out->gap = length - s->shape[own].size[4] - ball;
     line_through(point, normal, out->line);
 }
 
@@ -46,7 +56,7 @@ static int corners_of(const scene_t *s, int pair, corner_t *found) {
     int count = 0;
     for (int side = 0; side < 2; side++) {
         const int own = bodies[side], other = bodies[1 - side];
-        if (s->shape[other].kind != SUM) continue;
+        if (s->shape[other].kind != SUM && s->shape[other].kind != PLANE) continue;
         for (int c = 0; c < s->corner_count[own]; c++) {
             corner_row(s, own, other, c, side ? -1.0 : 1.0, found + count);
             if (found[count].gap < s->far / 2) found[count++].gap += more;
@@ -55,18 +65,30 @@ static int corners_of(const scene_t *s, int pair, corner_t *found) {
     return count;
 }
 
+/* The nearest corner that is not taken, which takes those of its hull that count as one with it; -1 without any */
+static int next_corner(const scene_t *s, const corner_t *found, int count, signed char *taken) {
+    int best = -1;
+    for (int k = 0; k < count; k++)
+        if (!taken[k] && (best < 0 || found[k].gap < found[best].gap)) best = k;
+    if (best < 0) return best;
+    const shape_t *shape = s->shape + found[best].own;
+    const double apart = shape->kind == HULL ? TOGETHER * shape->size[5] : 0.0;
+    taken[best] = 1;
+    for (int k = 0; apart > 0.0 && k < count; k++) {
+        double off[3];
+        minus3(found[k].place, found[best].place, off);
+        if (found[k].own == found[best].own && dot3(off, off) < apart * apart) taken[k] = 1;
+    }
+    return best;
+}
+
 /* The nearest corners of a row's pair, in a fixed order */
 static void corner_rows(scene_t *s, int row) {
     const int pair = s->row_pair[row], more = s->corners;
     corner_t found[2 * MOST_CORNERS];
-    int order[2 * MOST_CORNERS], count = corners_of(s, pair, found);
-    for (int k = 0; k < count; k++) order[k] = k;
-    for (int i = 1; i < count; i++) /* by distance; they are few */
-        for (int k = i; k > 0 && found[order[k]].gap < found[order[k - 1]].gap; k--) {
-            const int swap = order[k];
-            order[k] = order[k - 1], order[k - 1] = swap;
-        }
-    if (count > more) count = more;
+    signed char taken[2 * MOST_CORNERS] = {0};
+    int order[2 * MOST_CORNERS], all = corners_of(s, pair, found), count = 0;
+    for (int k; count < more && (k = next_corner(s, found, all, taken)) >= 0; count++) order[count] = k;
     for (int i = 1; i < count; i++) /* by number */
         for (int k = i; k > 0 && order[k] < order[k - 1]; k--) {
             const int swap = order[k];

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wbc.qp.equalities import independent
 from wbc.qp.levels.hierarchy import Achieved, Hierarchy, Level, LevelsAnswer
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 from wbc.qp.problem import QP, QPSolution, definite
 from wbc.qp.solvers.daqp import Daqp
 from wbc.validation import Array

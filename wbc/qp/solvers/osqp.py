@@ -1,7 +1,7 @@
 """OSQP: operator splitting (Stellato et al., Math. Prog. Comp. 12, 2020), kept, warm-started and polished.
 
 Splitting alone leaves errors of 1e-5 rad/s in directions of small weight; its answer serves as the guess
-of an active set, and :func:`wbc.qp.polish.polish` brings it to rounding level.
+of an active set, and :func:`wbc.qp.polishing.polish` brings it to rounding level.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from wbc.qp.polish import polish
+from wbc.qp.polishing import polish
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.solvers.backend import Backend, refusal
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pathlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
 from wbc.multibody import own, pin
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.geometry.meshes import Mesh, hull_mesh, mesh_of, read_mesh
 from wbc.robot.robot import Robot
 from wbc.robot.sources.files import read_xml

@@ -11,15 +11,15 @@ from wbc import validation
 from wbc.errors import RobotFileError, ShapeError
 from wbc.multibody import pin
 from wbc.robot.geometry.bodies import CollisionBody, bodies_of
-from wbc.robot.geometry.convex_parts import ConvexParts, parts_of
-from wbc.robot.geometry.meshes import Mesh, read_mesh
-from wbc.robot.geometry.styles import Style
 from wbc.robot.robot import Robot, changed
 from wbc.robot.sources.kinds import is_mjmodel
 from wbc.shapes import PlacedShape
 
 if TYPE_CHECKING:
     from mujoco import MjModel
+
+    from wbc.robot.geometry.convex_parts import ConvexParts
+    from wbc.robot.geometry.styles import Style
 
 
 def description_shapes(
@@ -37,7 +37,12 @@ def description_shapes(
     """
     bodies = bodies_of(robot, package_dirs, geometry)
     meshes = [b.link for b in bodies if b.mesh]
-    shapes, problems = _collect([b for b in bodies if not b.mesh], Style("convex" if exact else "capsule"))
+    shapes: dict[str, tuple[PlacedShape, ...]] = {}
+    problems: list[str] = []
+    if primitives := [b for b in bodies if not b.mesh]:
+        from wbc.robot.geometry.styles import Style
+
+        shapes, problems = _collect(primitives, Style("convex" if exact else "capsule"))
     parts = [_counted(shapes, "from the description")]
     if meshes:
         parts.append(f"meshes, not read (fit_shapes does): {', '.join(dict.fromkeys(meshes))}")
@@ -88,6 +93,8 @@ def fit_shapes(
     convex part; ``notes["shapes"]`` names the link and the reason. Shapes around an open mesh contain its surface. A
     capsule may stand out of a bulky link by several centimetres: look at ``excess``.
     """
+    from wbc.robot.geometry.styles import Style
+
     validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     if links is not None:
         links = validation.strings("links", links)
@@ -126,6 +133,9 @@ def convex_parts(mesh: Any, triangles: Any = None, *, scale: Any = 1.0) -> Conve
         >>> len(wbc.robots.convex_parts(np.vstack([corners, corners + 2]), faces + [[4, 5, 6], [4, 5, 7]]).parts)
         2
     """
+    from wbc.robot.geometry.convex_parts import parts_of
+    from wbc.robot.geometry.meshes import Mesh, read_mesh
+
     alike = validation.dimensions("scale", scale) == ()
     factor = validation.ordinary_array("scale", [scale] * 3 if alike else scale, (3,))
     if triangles is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import pathlib
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from wbc import extras
 from wbc.errors import RobotFileError
 from wbc.multibody import pin
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.sources.files import PARSER_ERRORS, captured_stderr
 from wbc.validation import Array
 

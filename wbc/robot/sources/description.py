@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RobotFileError
 from wbc.multibody import algebra, own, pin
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.loops import AnyLoop
 from wbc.robot.rebuilt import on_joint, without_joints
 from wbc.robot.robot import BASES

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError
 from wbc.multibody import own, pin, to_pin
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.sources.description import Description, with_base
 
 CONVENTIONS = ("standard", "modified")

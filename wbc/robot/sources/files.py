@@ -8,7 +8,6 @@ import os
 import pathlib
 import sys
 import sysconfig
-import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -100,6 +99,8 @@ def captured_stderr() -> Iterator[Noise]:
 
     One thread at a time; other threads' messages in that span are collected too, and shown by the caller.
     """
+    import tempfile
+
     noise = Noise()
     with _stderr_lock, tempfile.TemporaryFile() as store:
         if sys.stderr is not None:

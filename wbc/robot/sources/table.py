@@ -21,7 +21,6 @@ A file holds one TOML table for each robot:
 from __future__ import annotations
 
 import pathlib
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from typing import Any
@@ -70,6 +69,8 @@ def _files(folder: pathlib.Path) -> Iterator[tuple[pathlib.Path, str]]:
 
 
 def _rows(path: pathlib.Path, text: str) -> dict[str, Any]:
+    import tomllib
+
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -10,12 +10,12 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from wbc.errors import RobotFileError
 from wbc.multibody import own, single_joint
+from wbc.quick_dataclasses import dataclass
 from wbc.robot.sources.description import ROOT
 from wbc.robot.sources.urdf_checks import SINGLE, Remarks
 from wbc.validation import Array
@@ -42,19 +42,11 @@ _QUATERNIONS_SINCE = 1
 
 
 class NotUrdf(RobotFileError):
-    """A text that is no URDF.
-
-    Attributes:
-        reason: why, in words.
-    """
-
-    reason: str = ""
+    """A text that is no URDF."""
 
 
 def _refusal(reason: str) -> NotUrdf:
-    error = NotUrdf("urdf", "a text", reason)
-    error.reason = reason
-    return error
+    return NotUrdf("urdf", "a text", reason)
 
 
 @dataclass(frozen=True)

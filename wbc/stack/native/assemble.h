@@ -100,10 +100,13 @@ static void form_bounds(wbc_tick *t) {
 /* `screen`: without rows that no velocity within the bounds could violate */
 static void assemble(wbc_tick *t, int screen) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[14] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
+    double *res[15] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
                        t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor,
 #if NNZK > 0
                        t->handed,
+#endif
+#if HANDED_TO_LOST >= 0
+                       t->handed_to_lost,
 #endif
                        t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);

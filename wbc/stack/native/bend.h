@@ -26,7 +26,7 @@
  * once. */
 static void change_of_kept(wbc_tick *t, const double *v) {
     if (!t->lost_known || memcmp(v, t->lost_of, sizeof t->lost_of)) {
-        const double *arg[4] = {t->q, v, t->p, &t->dt};
+        const double *arg[5] = {t->q, v, t->p, &t->dt, t->handed_to_lost};
         double *res[1] = {t->report.lost};
         lost(arg, res, t->work_iw, t->work_w, 0);
         memcpy(t->lost_there, t->report.lost, MC * sizeof(double));

@@ -1,7 +1,7 @@
 /* The entry points of one stack's tick */
 #include "assemble.h"
 #include "levels.h"
-#include "bend.h"
+#include "arrive.h"
 
 static int refused(const wbc_tick *t) {
     for (int i = 0; i < NQ; i++)
@@ -103,7 +103,7 @@ static void commanded(wbc_tick *t, int sound) {
     }
     wbc_tick_torques(t);
 #endif
-    for (int i = 0; i < DOFS; i++) t->v_last[i] += t->dt * t->report.v[i];
+    wbc_tick_arrive(t);
     for (int i = DOFS; sound && i < NV; i++) t->kept[i] = t->report.v[i];
 #endif
 }

@@ -12,11 +12,14 @@
  *   COMMAND     0: velocities, 1: accelerations, 2: torques; of the last two the variables are accelerations and the
  *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
- *   HANDED      numbers that the rows hand to the curvature; with none of both the rows have no such output
+ *   HANDED HANDED_TO_LOST   numbers that the rows hand to the curvature, and to what bends; without curvature, and with -1, the rows
+ *               have no such output
  *   REDUCED     rows of loops, and of torques that nothing gives, which are taken out of the QP, see reduced.h; 0 without loops
  *   REDUCED_NV  NV with such rows, else 0
  *   give_order late_row   in which order they give velocities or accelerations, and which rows have forces, so that they give after
  *               the others
+ *   CLOSING CLOSING_FIRST   rows of couplings and loops of a stack of accelerations whose loops a tick closes, and the first of them
+ *               among the general rows; 0 without loops
  *   BENDING bent   general rows whose residual bends within a tick, and which they are: see bend.h
  *   margin_at rate_at   margin of each general row (-1: none), and where its rate is in p
  *   gain_at     where the gain of each task row is in p
@@ -116,8 +119,8 @@ typedef struct {
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
-    /* outputs of the generated rows; `handed` is for the curvature */
-    double handed[HANDED + 1];
+    /* outputs of the generated rows; `handed` is for the curvature, the other for what bends */
+    double handed[HANDED + 1], handed_to_lost[HANDED_TO_LOST + 2];
     double jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
     /* factorisation */
     double R[TALL * WIDE], inverse[TALL * WIDE], inverse_diagonal[TALL], y[WIDE];
@@ -150,6 +153,8 @@ typedef struct {
     double missed[NV], missed_size[NV]; /* by how much the command misses the rows, and the size of what was added up */
     double equal[REDUCED_NV * WIDE + 1], equal_scale[NV];
     double basis[REDUCED_NV * WIDE + 1], product_of_basis[REDUCED_NV * WIDE + 1], through[REDUCED_NV * WIDE + 1];
+    /* Loops at the end of the tick, see arrive.h: by how much they are open, their rows, and the factor of these */
+    double opened[CLOSING + 1], closing_rows[CLOSING * NV + 1], closing_factor[CLOSING * CLOSING + 1];
     double gram[REDUCED_NV * WIDE + 1], reduced_R[REDUCED_NV * WIDE + 1], reduced_inverse[REDUCED_NV * WIDE + 1];
     double reduced_pivot[NV], seen[REDUCED_NV * M_ALL + 1];
     /* DAQP workspace on our own memory */

@@ -10,13 +10,12 @@ and the set is corrected until every multiplier has the right sign and no other 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.qp.factor import ActiveRows, Factor, active_bounds
 from wbc.qp.problem import QP, QPSolution
+from wbc.quick_dataclasses import dataclass
 from wbc.validation import Array
 
 #: Corrections of the active set before giving up, and steps of iterative refinement on each set
