@@ -12,6 +12,7 @@ import itertools
 import time
 
 from wbc.climb import BodyPlace, first_stance, machines, scenes
+from wbc.climb.scene import size_of
 from wbc.climb.search import find_stances
 from wbc.errors import WbcError
 
@@ -22,7 +23,7 @@ HEADS = ("robot", "scene", "moves", "contacts ms", "of 30 moves ms", "else")
 def row(robot: str, scene: str, repeats: int) -> tuple[str, ...]:
     """Of a robot on a scene."""
     climber = machines.climber(robot)
-    course = scenes.draw(scene, scenes.size_of(climber))
+    course = scenes.draw(scene, size_of(climber))
     try:
         start = first_stance(climber, course.scene, scenes.placed(climber, course.start))
         goal = BodyPlace(climber.body_pose(scenes.placed(climber, course.goal)).translation)

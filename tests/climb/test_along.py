@@ -22,19 +22,10 @@ from wbc.climb.grids import INCH, cylinder_grid, remove_rows
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
 from wbc.climb.resume import stance_in
-from wbc.climb.scenes import draw, placed, size_of
+from wbc.climb.scene import size_of
+from wbc.climb.scenes import draw, placed
 from wbc.climb.search import NoStancesError
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
-
-
-@pytest.fixture(scope="module")
-def walker() -> Climber:
-    return machines.climber("walker")
-
-
-@pytest.fixture(scope="module")
-def scene() -> ClimbScene:
-    return cylinder_grid()
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from wbc.climb.loop import PlanReference
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, Mover
 from wbc.climb.plan import ContactPlan
-from wbc.climb.scene import Foothold
+from wbc.climb.scene import Foothold, size_of
 from wbc.climb.stance import FREE_LIMB
 from wbc.climb.time_law import MotionSpeeds, fastest
 from wbc.trajectory.least_time.reachability import SpeedProgram
@@ -94,9 +94,9 @@ def _slack_in_motion(
 @pytest.mark.parametrize(("name", "seed"), covering(("a1", "hexapod"), range(repeats(1))))
 def test_motions_keep_their_share_of_slack(name: str, seed: int) -> None:
     robot = climber(name)
-    course = scenes.draw("stepping_stones", scenes.size_of(robot), seed)
+    course = scenes.draw("stepping_stones", size_of(robot), seed)
     start = first_stance(robot, course.scene, scenes.placed(robot, course.start))
-    ahead = robot.body_pose(start.q).translation + [0.3 * scenes.size_of(robot), 0.0, 0.0]
+    ahead = robot.body_pose(start.q).translation + [0.3 * size_of(robot), 0.0, 0.0]
     balance, least, used = Equilibrium(robot, course.scene), np.inf, 0.0
     for share in (0.5, 0.2):
         options = ClimbOptions(motion=MotionOptions(inertia=share, speeds=MotionSpeeds(dwell=0.1)))
@@ -136,7 +136,7 @@ def test_least_time_with_rows_of_one_side_is_that_of_linear_programs(count: int)
 
 def test_a_body_leans_over_the_foot_that_holds() -> None:
     robot = climber("talos")
-    course = scenes.draw("stairs", scenes.size_of(robot))
+    course = scenes.draw("stairs", size_of(robot))
     start = first_stance(robot, course.scene, scenes.placed(robot, course.start))
     goal = BodyPlace(robot.body_pose(scenes.placed(robot, course.goal)).translation)
     stances = find_stances(robot, course.scene, start, goal, StanceOptions(apart=0.001)).stances

@@ -19,13 +19,12 @@ from wbc.climb import (
     MotionOptions,
     Stance,
     first_stance,
-    machines,
     plan_climb,
 )
 from wbc.climb.along import BodyTrack, plan_along
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
-from wbc.climb.grids import INCH, cylinder_grid, remove_columns, remove_rows
+from wbc.climb.grids import INCH, remove_columns, remove_rows
 from wbc.climb.loop import ClimbOutcome, ClimbRun
 from wbc.climb.time_law import MotionSpeeds
 
@@ -36,16 +35,6 @@ REGRASPS = 40
 #: Ways over 8 x 8 holds by their seed, and the fewest re-grasps of each as an exact search found them, which kept 2
 #: degrees of joint limits and 0.3 in of reach: at 61 a hand has to wait in the air, at 16 and 74 the last pose counts
 FEWEST = {0: 1, 1: 0, 3: 1, 6: 3, 7: 2, 16: 2, 61: 2, 74: 1, 76: 2, 144: 2}
-
-
-@pytest.fixture(scope="module")
-def walker() -> Climber:
-    return machines.climber("walker")
-
-
-@pytest.fixture(scope="module")
-def scene() -> ClimbScene:
-    return cylinder_grid()
 
 
 def carried_out(plan: ContactPlan, loop: ClimbLoop | None = None) -> ClimbRun:

@@ -24,8 +24,8 @@ from wbc.climb.grids import (
 )
 from wbc.climb.machines import climber
 from wbc.climb.places import body_frames, body_over, surface_frames
-from wbc.climb.scene import ClimbScene, Foothold, SceneBody, check_scale, reaches
-from wbc.climb.scenes import draw, families, placed, size_of
+from wbc.climb.scene import ClimbScene, Foothold, SceneBody, check_scale, reaches, size_of
+from wbc.climb.scenes import draw, families, placed
 from wbc.climb.surfaces import FootholdRules, footholds_on
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.geometry.kernel import segments_from

@@ -17,8 +17,8 @@ from wbc.climb.climber import Climber
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace, LimbAt, Route
 from wbc.climb.machines import climber
-from wbc.climb.scene import ClimbScene, Foothold
-from wbc.climb.scenes import draw, placed, size_of
+from wbc.climb.scene import ClimbScene, Foothold, size_of
+from wbc.climb.scenes import draw, placed
 from wbc.climb.search import NoStancesError, StanceOptions, find_stances
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.world import ClimbWorld, PostureOutcome

@@ -28,7 +28,8 @@ from wbc.climb.checker import check
 from wbc.climb.loop import ClimbOutcome
 from wbc.climb.motion import MoveError
 from wbc.climb.places import body_over
-from wbc.climb.scenes import ClimbCourse, draw, placed, size_of
+from wbc.climb.scene import size_of
+from wbc.climb.scenes import ClimbCourse, draw, placed
 from wbc.climb.time_law import MotionSpeeds
 
 #: Climbers, and scenes of their kind

@@ -13,6 +13,7 @@ from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, Equilibrium, first_s
 from wbc.climb.checker import CheckRules, check
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions, PlanReference
 from wbc.climb.plants import ClimbPlant, PlantErrors
+from wbc.climb.scene import size_of
 
 #: What plan and loop do not know: friction, masses, delay [s]
 UNKNOWN = {"friction": 0.8, "mass": 0.05, "delay": 0.005}
@@ -72,7 +73,7 @@ def test_a_hexapod_walks_in_tripods(seed: int) -> None:
 def test_courses_are_walked(name: str, scene: str, part: float, seed: int) -> None:
     """A fifth of the stones and holds is missing."""
     robot = climber(name)
-    course = scenes.draw(scene, scenes.size_of(robot), seed, density=0.8)
+    course = scenes.draw(scene, size_of(robot), seed, density=0.8)
     q, end = (scenes.placed(robot, frame) for frame in (course.start, course.goal))
     first, last = (robot.body_pose(posture).translation for posture in (q, end))
     options = ClimbOptions.by_torques()

@@ -24,8 +24,8 @@ from wbc.climb import (
 from wbc.climb.checker import check
 from wbc.climb.loop import ClimbOutcome
 from wbc.climb.machines import climber
-from wbc.climb.scene import SceneBody
-from wbc.climb.scenes import draw, placed, size_of
+from wbc.climb.scene import SceneBody, size_of
+from wbc.climb.scenes import draw, placed
 from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.shapes import HalfSpace

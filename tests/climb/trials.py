@@ -31,8 +31,8 @@ from wbc.climb.let_go import joined
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun
 from wbc.climb.motion import MoveError
 from wbc.climb.resume import coming_to_rest, stance_in
-from wbc.climb.scene import SceneBody
-from wbc.climb.scenes import draw, placed, size_of
+from wbc.climb.scene import SceneBody, size_of
+from wbc.climb.scenes import draw, placed
 from wbc.climb.search import NoStancesError
 from wbc.shapes import Sphere
 

@@ -13,7 +13,7 @@ from wbc.climb.climber import Climber
 from wbc.climb.motion import MotionOptions, MoveError, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.reach import LimbReach
-from wbc.climb.scene import ClimbScene, Foothold, reaches
+from wbc.climb.scene import ClimbScene, Foothold, size_of
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.surfaces import frame_on
 from wbc.multibody import pin
@@ -40,7 +40,7 @@ def lifts(climber: Climber, q: Array, limb: int, normal: Array, shares: Sequence
     away = climber.contact_pose(q, limb).translation - climber.body_pose(q).translation
     away = away - (away @ normal) * normal
     away = away / max(float(np.linalg.norm(away)), 1e-9)
-    reach = float(reaches(climber).min())
+    reach = size_of(climber)
     return [share * reach * (normal + part * away) for part in AWAY_FROM_BODY for share in shares]
 
 

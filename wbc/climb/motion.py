@@ -22,7 +22,7 @@ from wbc.climb.joint_values import beyond_limits
 from wbc.climb.move_path import BodyWay, HeldError, MovePath, SwingShape, held_way, move_path
 from wbc.climb.path_loads import LEAST, PathLoads
 from wbc.climb.plan import ContactMove, ContactPlan
-from wbc.climb.scene import ClimbScene, reaches
+from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.climb.watch import PlanWatch
@@ -184,7 +184,7 @@ class Mover:
         set_(self, "closure", Closure(self.climber))
         set_(self, "clearances", Clearances(self.climber, self.scene, self.options.clearance, self.options.apart))
         set_(self, "timing", PathTiming(self.climber, self.options.speeds))
-        shortest = float(reaches(self.climber).min())
+        shortest = size_of(self.climber)
         set_(self, "lift", self.options.lift or shortest / 16.0)
 
     closure: Closure = field(init=False)

@@ -234,6 +234,11 @@ def reaches(climber: Climber) -> Array:
     return np.array(out)
 
 
+def size_of(climber: Climber) -> float:
+    """The reach of a climber's shortest limb [m], at which :func:`draw` makes scenes for it."""
+    return float(reaches(climber).min())
+
+
 def check_scale(climber: Climber, scene: ClimbScene) -> None:
     """Refuses footholds on which no two limbs can be at once, or that are all under one limb, as of other units.
 

@@ -11,7 +11,7 @@ import numpy as np
 from wbc import validation
 from wbc.clearance import CylinderInside, EndlessCylinder, TriangleMesh
 from wbc.climb.climber import Climber
-from wbc.climb.scene import ClimbScene, Foothold, SceneBody, bar, reaches
+from wbc.climb.scene import ClimbScene, Foothold, SceneBody, bar
 from wbc.climb.surfaces import FootholdRules, footholds_on, frame_on
 from wbc.multibody import pin
 from wbc.shapes import Box, Convex, HalfSpace
@@ -67,11 +67,6 @@ def draw(name: str, size: float, seed: int = 0, density: float = 0.8) -> ClimbCo
 def families() -> tuple[str, ...]:
     """Names of the families of scenes."""
     return tuple(_FAMILIES)
-
-
-def size_of(climber: Climber) -> float:
-    """The reach of a climber's shortest limb [m], at which :func:`draw` makes scenes for it."""
-    return float(reaches(climber).min())
 
 
 def placed(climber: Climber, frame: pin.SE3) -> Array:

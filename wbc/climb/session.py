@@ -38,7 +38,7 @@ from wbc.climb.request import (
     SceneRequest,
 )
 from wbc.climb.resume import coming_to_rest, stance_in
-from wbc.climb.scene import ClimbScene, check_scale
+from wbc.climb.scene import ClimbScene, check_scale, size_of
 from wbc.climb.scene_files import read_scene
 from wbc.climb.sources import ClimbSetup, source_of
 from wbc.errors import RangeError, ShapeError
@@ -180,7 +180,7 @@ def scene_of(request: SceneRequest, climber: Climber) -> DrawnScene:
         whole = GRIDS[request.scene]()
     else:
         validation.one_of("scene", request.scene, (*GRIDS, *scenes.families()))
-        drawn = scenes.draw(request.scene, scenes.size_of(climber), request.seed, request.density)
+        drawn = scenes.draw(request.scene, size_of(climber), request.seed, request.density)
         whole, course = drawn.scene, (drawn.start, drawn.goal)
     if request.gravity is not None:
         whole = replace(whole, gravity=np.array(request.gravity))

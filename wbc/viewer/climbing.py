@@ -21,8 +21,7 @@ from wbc.climb.places import body_over, surface_frames
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.request import ClimberRequest, SceneRequest
-from wbc.climb.scene import ClimbScene
-from wbc.climb.scenes import size_of
+from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.search import NoStancesError
 from wbc.climb.session import climber_of, scene_of
 from wbc.climb.stance import FREE_LIMB, Stance

@@ -9,8 +9,7 @@ import numpy as np
 from wbc.climb.climber import Climber
 from wbc.climb.loop import ClimbRun
 from wbc.climb.report import surroundings
-from wbc.climb.scene import ClimbScene
-from wbc.climb.scenes import size_of
+from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.stance import FREE_LIMB
 from wbc.validation import Array
 from wbc.viewer.bodies import DrawnMesh, indexed

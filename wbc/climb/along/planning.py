@@ -19,7 +19,7 @@ from wbc.climb.joint_values import joint_values, with_joint_values
 from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.reach import LIMIT_MARGIN
-from wbc.climb.scene import ClimbScene, reaches
+from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.search import counted_words, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.time_law import cubics_need, fastest
@@ -95,9 +95,7 @@ def plan_along(
     validation.instance("track", track, BodyTrack, "a BodyTrack")
     motion = given.motion
     world = ClimbWorld(climber, scene, start, given.limits, motion.clearance, motion.apart)
-    limits = SwingLimits(
-        motion.lift or RISE * float(reaches(climber).min()), motion.speeds.share, motion.speeds.acceleration_share
-    )
+    limits = SwingLimits(motion.lift or RISE * size_of(climber), motion.speeds.share, motion.speeds.acceleration_share)
     clearances = Clearances(climber, scene, motion.clearance, motion.apart)
     first = None if start is None else _begun(climber, track, start)
     furthest, said = 0.0, ""

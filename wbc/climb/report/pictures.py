@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from wbc.climb.loop import ClimbRun
 from wbc.climb.report import surroundings
 from wbc.climb.report.surroundings import SHOWN, STUD, limb_colour, mixed
-from wbc.climb.scenes import size_of
+from wbc.climb.scene import size_of
 from wbc.climb.stance import FREE_LIMB
 from wbc.multibody import pin
 from wbc.track import film, render
