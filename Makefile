@@ -8,8 +8,9 @@ PYTEST_ARGS ?=
 # Processes of pytest; "auto" is one a core
 PYTEST_JOBS ?= auto
 # Tests of `make without`
-WITHOUT ?= $(addprefix tests/,multibody robots/test_bases.py robots/test_couplings_and_locks.py robots/test_dh.py \
-	robots/test_limits_and_frames.py robots/test_refused_files.py robots/test_urdf.py trajectory/test_joint_paths.py)
+WITHOUT ?= $(addprefix tests/,constraints estimation log multibody qp robots/test_bases.py robots/test_couplings_and_locks.py \
+	robots/test_dh.py robots/test_limits_and_frames.py robots/test_refused_files.py robots/test_urdf.py symbolic tasks \
+	test_validation.py trajectory/test_joint_paths.py)
 # Random cases of a test, as a multiple of the usual number
 REPEATS ?= 1
 

@@ -19,6 +19,7 @@ import importlib
 import json
 import sys
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from time import perf_counter, perf_counter_ns
 from typing import Any
@@ -104,14 +105,7 @@ def time_sample(contender: Contender, budget: float) -> dict[str, Any]:
 
 def walk(contender: Contender) -> dict[str, Any]:
     """The configuration after every tick of one pass."""
-    contender.reset()
-    states = []
-    for k in range(contender.case.ticks):
-        contender.aim(k)
-        contender.call()
-        contender.settle()
-        states.append(contender.state().tolist())
-    return {"states": states}
+    return {"states": time_sample(contender, inf)["states"]}
 
 
 def accuracy(contender: Contender, reference: Callable[[], float | None] | None = None) -> dict[str, Any]:

@@ -195,7 +195,7 @@ def _find(robot: Any) -> tuple[Recipe, Any, Robot | None]:
         if not looks_like_path(robot):
             return _made(robot)
     if isinstance(robot, (str, os.PathLike)):
-        return Recipe(validation.file_path("robot", robot).stem), robot, None
+        return Recipe(validation.file_path("robot", robot).stem.removesuffix(".urdf")), robot, None
     if is_mjmodel(robot):
         from wbc.robot.sources.mjmodel import model_name
 

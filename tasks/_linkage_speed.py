@@ -26,6 +26,8 @@ UNLIMITED = 1e3
 REGULAR = 1e-5
 #: Added to the square of what a linkage asks for, as a part of what its joints can do: it divides
 LEAST = 1e-12
+#: A linkage whose bend takes less than this part of the limits is not slowed: the bend hardly depends on its speed
+SLIGHT = 1e-3
 #: Most of :attr:`Bend.missed` where a linkage is slowed
 MISSED = 1e-8
 #: A linkage is at rest below this part of the speed that its joints reach in a tick
@@ -83,7 +85,8 @@ class LinkageSpeed(Constraint):
             matrix[k, dofs] = slope.T / length
             side = (ca.dot(slope, kin.v[dofs] + dt * bend.asked) + 2.0 * size * (left - 1.0)) / length
             # Where loops branch their rows depend on each other, and no accelerations are what they ask for
-            most[k] = ca.if_else(ca.fmax(size, bend.missed / MISSED) > 1.0, ca.inf, side)
+            bends = ca.logic_and(size > SLIGHT**2, ca.fmax(size, bend.missed / MISSED) <= 1.0)
+            most[k] = ca.if_else(bends, side, ca.inf)
         return Rows(matrix, -ca.inf * ca.SX.ones(len(linkages)), most)
 
 

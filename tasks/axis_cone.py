@@ -29,11 +29,9 @@ class AxisCone(Constraint):
     about the axis is free.
 
     Attributes:
-        frame: name of the frame that the axis is fixed in.
         half_angle: first value of the input [rad].
-        axis: a in that frame, of any length.
         direction: first value of the input; ``(0, 0, 1)`` is up.
-        relative_to: frame b that the direction is given in, ``"world"``, a frame of the robot or a moving frame.
+        others: as in :class:`wbc.tasks.AxisAlign`.
 
     Inputs:
         direction: d, 3 numbers of any length, kept at unit length, in the axes of the reference.

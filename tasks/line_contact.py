@@ -32,18 +32,11 @@ class LineContact(Pressing, Contact):
     mu = friction / sqrt(2), so that the pyramids are within Coulomb's cones.
 
     Attributes:
-        frame: name of the frame.
         half_length: X [m].
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     Inputs:
-        target: pose in the world [m, rad]. Default: the pose at the first step.
-        gain: how fast drift decays [1/s]. Default 10.
-        friction: Coulomb's coefficient [1]; in the pyramids that are the rows, mu = friction / sqrt(2).
-        least: least normal force [N].
-        most: largest normal force [N].
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     What it cannot do: follow the surface: where the frame turns about the edge its cone turns with it. It does not know
     whether the surface is there.

@@ -39,12 +39,9 @@ class LookAt(Task):
 
     Attributes:
         frame: name of the frame that carries the camera.
-        axis: the direction a in that frame, of any length.
         offset: the point c in that frame [m].
-        relative_to: frame b that the target is given in; ``"world"``, a frame of the robot or a moving frame.
-        around: b1, a direction in the frame; its part along the axis is dropped. None: the coordinate axis of the frame
-            that follows the one nearest to ``axis`` (x, y for a z axis).
         width: distance below which the rows fade, as a part of the robot's characteristic length.
+        others: as in :class:`wbc.tasks.AxisAlign`.
 
     Inputs:
         target: t, 3 numbers in the reference [m]. Default: the point on the axis at L from c, at the first step.

@@ -27,18 +27,14 @@ class PointContact(Pressing, Contact):
     (docs/torque.md) its force stays within the pyramid.
 
     Attributes:
-        frame: name of the frame; z is the normal, from the surface to the robot.
         friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
         edges: faces of the pyramid, 4 or more.
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     Inputs:
         target: position in the world, 3 numbers [m], or a pose. Default: where it is at the first step.
-        gain: how fast drift decays [1/s]. Default 10.
         friction: Coulomb's coefficient [1].
-        least: least normal force [N].
-        most: largest normal force [N].
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     What it cannot do: slide, roll or bear a torque. It does not know whether the ground is there. z of the frame is
     the normal: a foot whose frame turns with the leg needs a frame of its own, along the ground.

@@ -41,10 +41,9 @@ class RelativePose(Task):
 
     Attributes:
         frame_a, frame_b: names of the two frames.
-        kind: which rows: ``pose`` (6), ``position`` (3) or ``orientation`` (3).
         at: first value of the input.
         axes: ``"midway"``, ``"world"`` or a frame's name: along which axes rows and weights are counted.
-        weights: one number >= 0 a row, None: 1 each.
+        others: as in :class:`wbc.tasks.EndEffector`.
 
     Inputs:
         target: pose of b as seen from a; for every kind, since the point needs it. Default: the present one.

@@ -45,17 +45,13 @@ class RollingContact(Pressing, Contact):
         frame: name of a frame of the wheel with its origin in the centre.
         radius: from the centre to the ground [m].
         axis: axis of the wheel in the axes of the frame, about which it rolls forwards.
-        friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     Inputs:
         target: pose of the ground in the world, of which the plane counts: its origin, and z out of the ground [m,
             rad]. Default: level ground under the wheel at the first step.
         gain: how fast a distance from the ground decays [1/s]. Default 10.
-        friction: Coulomb's coefficient [1]; in the pyramids that are the rows, mu = friction / sqrt(2).
-        least: least normal force [N].
-        most: largest normal force [N].
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     What it cannot do: have rollers (``Rolling`` has their motion), rolling resistance, or the torque by which a wide
     wheel resists turning on the spot. A wheel that lies flat has no rolling direction; its rows fade.

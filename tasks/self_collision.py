@@ -70,14 +70,12 @@ class SelfCollision(Constraint):
     Attributes:
         pairs: pairs of links; None: ``robot.self_pairs``, and where that is None all pairs of links with shapes that
             are neither welded together nor neighbours across one joint.
-        margin: initial value of the input [m].
-        closest: how many of the sensed pairs have rows at a time; no more than there are such pairs.
-        corners: further rows of each of them while it is near, for corners and ends: what nearest points jump to.
         method: ``"auto"``: expressions where the shapes have one, if these are at most :data:`SYMBOLIC_PAIRS` pairs of
             shapes, else all are sensed; ``"symbolic"``: expressions or an error; ``"sensed"``: all are sensed.
+        others: as in :class:`wbc.tasks.Obstacle`.
 
     Inputs:
-        margin: what is kept between the shapes, >= 0 [m].
+        margin: what is kept between the shapes [m].
 
     What it cannot do: see what the link shapes do not cover. With fewer rows than sensed pairs that push at once the
     tick brakes, or pairs within their margins open too slowly. A ``margin`` raised while running is kept only by pairs

@@ -27,20 +27,17 @@ class SlidingContact(Pressing, Contact):
     where the frame goes, and the task ``"<contact> force"`` with how many newtons it presses.
 
     Attributes:
-        frame: name of the frame.
         friction: first value of the input.
-        least: first value of the input.
-        most: first value of the input; infinite for none.
         slow: first value of the input.
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     Inputs:
         target: pose in the world, of which the plane counts: its origin, and z out of the surface [m, rad]. Default:
             the pose of the frame at the first step.
         gain: how fast the distance from the plane decays [1/s]. Default 10.
         friction: coefficient of kinetic friction [1].
-        least: least normal force [N].
-        most: largest normal force [N].
         slow: speed up to which friction grows with speed [m/s].
+        others: as in :class:`wbc.tasks.SurfaceContact`.
 
     What it cannot do: stick: below ``slow`` friction is less than it may be, and at rest 0 (a point that sticks is a
     ``PointContact``). It does not follow a curved surface by itself.

@@ -35,12 +35,10 @@ class WorkspacePolyhedron(Constraint):
     normal a and the offset b / |a|.
 
     Attributes:
-        frame: name of the frame that carries the point.
         normals: k x 3 directions to the allowed side, in the axes of W, of any length; kept at unit length.
         offsets: first values of the input: k numbers, or one for all.
-        relative_to: reference frame b, ``"world"``, a frame of the robot or a moving frame.
-        offset: the point in ``frame`` [m].
         pose: first value of the input; None: the identity.
+        others: as in :class:`wbc.tasks.WorkspaceBox`.
 
     Inputs:
         offsets: k numbers d_i [m], the distance of each plane from the origin of W along its normal; -inf: no plane.

@@ -20,13 +20,14 @@ OPTIONAL = {"pinocchio": "pin", "coal": "coal", "toppra": "toppra", "ruckig": "r
 OPTIONAL |= {
     "cyclonedds": "cyclonedds",
     "foxglove": "foxglove-sdk",
+    "mcap_protobuf": "mcap-protobuf-support",
     "pxr": "usd-core",
     "rerun": "rerun-sdk",
     "torch": "torch",
     "zenoh": "eclipse-zenoh",
 }
 #: Extras that bring them
-EXTRAS = "foxglove|laws|rerun|ros2|torch|usd|zenoh"
+EXTRAS = "foxglove|laws|protobuf|rerun|ros2|torch|usd|zenoh"
 LACKING = {module: package for module, package in OPTIONAL.items() if find_spec(module) is None}
 #: What an error says in this process or another
 _WANTED = re.compile(

@@ -191,8 +191,8 @@ CENTRAL: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
     ),
     (
         "wbc/robot/carried.py",
-        "appendBodyToJoint(joint, own, local)",
-        "appendBodyToJoint(joint, own, pin.SE3.Identity())",
+        "appendBodyToJoint(joint, weighs, at.placement)",
+        "appendBodyToJoint(joint, weighs, pin.SE3.Identity())",
         ("robots/test_carried.py",),
     ),
     (
@@ -233,7 +233,12 @@ CENTRAL: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
         'self._view("p")[:, slot.span], flat[::-1])',
         ("batch/test_batch.py",),
     ),
-    ("wbc/proximity/corners.py", "shape.points - center", "shape.points + center", ("proximity/test_corners.py",)),
+    (
+        "wbc/shapes/convex.py",
+        "spread(self.points - self.center",
+        "spread(self.points + self.center",
+        ("proximity/test_corners.py",),
+    ),
     ("wbc/ik/continuation.py", "max(self.moved, moved)", "moved", ("ik/test_continuation.py",)),
 )
 
@@ -261,6 +266,18 @@ MUTATIONS = (
         "wbc/stack/native/balls.h",
         "center[1] * n[2] - center[2] * n[1]",
         "center[1] * n[2] + center[2] * n[1]",
+        ("controller/test_balls.py",),
+    ),
+    Mutation(
+        "wbc/stack/native/balls.h",
+        "length[c] - row_reach[r] - margin;",
+        "length[c] - row_reach[r] + margin;",
+        ("controller/test_balls.py",),
+    ),
+    Mutation(
+        "wbc/stack/native/balls.h",
+        "t->p[ball_pose[b] + 9 + i] + velocity[i] * t->dt",
+        "t->p[ball_pose[b] + 9 + i] - velocity[i] * t->dt",
         ("controller/test_balls.py",),
     ),
     Mutation(

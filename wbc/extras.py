@@ -21,6 +21,7 @@ EXTRAS = {
     "osqp": ("osqp",),
     "plots": ("matplotlib",),
     "programs": ("py_trees", "pydantic", "yaml"),
+    "protobuf": ("mcap_protobuf",),
     "recordings": ("pyarrow",),
     "rerun": ("rerun",),
     "ros2": ("cyclonedds", "rosbags"),

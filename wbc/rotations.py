@@ -13,6 +13,8 @@ from wbc.validation import Array
 TO_MUJOCO = [3, 0, 1, 2]
 #: Entries of a quaternion w, x, y, z in the order x, y, z, w
 TO_PINOCCHIO = [1, 2, 3, 0]
+#: Signs of the entries x, y, z, w of a conjugate quaternion
+CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 def exponential(turns: Array) -> Array:
@@ -37,6 +39,28 @@ def matrices(quaternions: Array) -> Array:
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def quaternion_product(p: Any, q: Any) -> list[Any]:
+    """Entries of the product p q of quaternions x, y, z, w, whose entries are numbers, arrays or expressions."""
+    (x, y, z, w), (a, b, c, d) = p, q
+    return [
+        w * a + x * d + y * c - z * b,
+        w * b + y * d + z * a - x * c,
+        w * c + z * d + x * b - y * a,
+        w * d - x * a - y * b - z * c,
+    ]
+
+
+def relative_quaternion(left: Array, right: Array) -> Array:
+    """left times the conjugate of right, quaternions x, y, z, w [..., 4]."""
+    return np.stack(quaternion_product(left.T, (right * CONJUGATE).T), axis=-1)
+
+
+def continuous_quaternions(quaternions: Array) -> Array:
+    """The same rotations [m, 4], each with the sign that is nearer to the one before."""
+    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0)
+    return np.asarray(quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
 
 
 def quaternion(rotation: Any) -> Array:

@@ -83,6 +83,7 @@ _ALL = (
     Figure("batch", (*TICK, "wbc/batch"), 1.0),
     Figure("bilateral", ("wbc/teleop/bilateral",), 1.5),
     Figure("cortex_m7", (*TICK, "wbc/export", "tests/export/single.py", "bench/cortex_m7"), 5.0),
+    Figure("changing", (*TICK, "wbc/native"), 3.0),
     Figure("clearance", ("wbc/clearance",), 1.0),
     Figure(
         "plan", ("wbc/plan", "bench/plan"), 60.0,
@@ -104,7 +105,7 @@ _ALL = (
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
     Figure("identification", ("wbc/identification",), 2.0),
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/published/newton_euler"), 3.0),
-    Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0),
+    Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0, views={"robots": store.joined}),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("levels", TICK, 0.5),
     Figure("pairs", (*TICK, "wbc/coordinates"), 0.5),

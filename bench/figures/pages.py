@@ -10,6 +10,8 @@ from bench.pool import ROOT
 
 #: ``<!-- figures NAME PART -->`` ... ``<!-- end -->``
 BLOCK = re.compile(r"<!-- figures (\S+) (\S+) -->\n.*?<!-- end -->\n", flags=re.DOTALL)
+#: The line under a block that says where it comes from, and the block's end
+SIGNED = re.compile(r"\n\n\*`[^\n]*\*\n\n<!-- end -->")
 #: Parts of a page that are no prose and no table of its own: blocks of figures, code
 APART = re.compile(
     r"<!-- figures[^\n]*-->\n.*?<!-- end -->\n|^```.*?^```$|(?:^ {4}[^\n]*\n)+", re.DOTALL | re.MULTILINE
@@ -30,8 +32,11 @@ def all_pages() -> list[Path]:
 
 
 def rendered(text: str, render: Callable[[str, str], str]) -> str:
-    """A page with every block as ``render(figure, part)`` has it."""
-    return BLOCK.sub(lambda m: f"<!-- figures {m[1]} {m[2]} -->\n\n{render(m[1], m[2])}\n\n<!-- end -->\n", text)
+    """A page with every block as ``render(figure, part)`` has it; of those of one run the last is signed."""
+    out = BLOCK.sub(lambda m: f"<!-- figures {m[1]} {m[2]} -->\n\n{render(m[1], m[2])}\n\n<!-- end -->\n", text)
+    for line in set(SIGNED.findall(out)):
+        out = out.replace(line, "\n\n<!-- end -->", out.count(line) - 1)
+    return out
 
 
 def loose(text: str) -> Iterator[str]:

@@ -30,34 +30,14 @@ DEVICE, LIGHT = Device(2.0, 15.0), Device(2.0, 10.0)
 SCHEMES = {
     "position-position": position_position(), "position-force": position_force(), "four-channel": four_channel(),
 }  # fmt: skip
-#: Delay there and back [s], jitter [s] and loss of each direction
-LINKS = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.2, 0.0, 0.0), (0.4, 0.0, 0.0), (0.6, 0.0, 0.0), (0.6, 0.1, 0.3))
 WALL = Wall(0.15)
-#: Robots: master, slave, how much more the slave moves, whether joint by joint
-PAIRS = (
-    ("panda", "ssrms", 3.0, False), ("xarm7", "ur10", 1.0, False), ("ur5", "talos_left_arm", 0.5, False),
-    ("ur3", "panda", 1.0, False), ("ur3", "ur10", 1.0, True), ("z1", "ur5", 1.0, True),
-)  # fmt: skip
-TIPS = {
-    "panda": "panda_hand_tcp", "ssrms": "tip", "xarm7": "link_eef", "ur10": "tool0", "ur5": "tool0", "ur3": "tool0",
-    "talos_left_arm": "gripper_left_base_link",
-}  # fmt: skip
-#: Joints of the Space Station arm at the start [degrees]
-BENT = (0.0, 30.0, -60.0, 90.0, -60.0, 20.0, 0.0)
 SECONDS = 8.0
-#: Random systems of a batch, batches, and their length in ticks
-FAMILY, BATCHES, TICKS = 250, 16, 1200
 
 
 def parts() -> dict[str, Sheet | str]:
     """What is accepted without passivity control, and the picture."""
     _picture()
     return {"accepted": _accepted()}
-
-
-def _system(scheme: Scheme, delay: float, jitter: float, loss: float) -> Bilateral:
-    link = Channel(0.5 * delay, jitter, loss)
-    return Bilateral(scheme, DEVICE, DEVICE, link, link, DT)
 
 
 def _accepted() -> Sheet:
@@ -85,7 +65,8 @@ def _picture() -> None:
     free = Bilateral(
         SCHEMES["position-force"], LIGHT, LIGHT, Channel(0.3), Channel(0.3), DT, passivity=False, unchecked=True
     )
-    systems = [free, dataclasses.replace(free, passivity=True), _system(SCHEMES["four-channel"], 0.6, 0.0, 0.0)]
+    passive = Bilateral(SCHEMES["four-channel"], DEVICE, DEVICE, Channel(0.3), Channel(0.3), DT)
+    systems = [free, dataclasses.replace(free, passivity=True), passive]
     run = run_bilateral(systems, [Operator(reach(seconds=SECONDS), k) for k in (100.0, 100.0, 400.0)], [WALL] * 3)
     titles = ("position-force, no control", "position-force, passive", "four-channel, passive")
     with style.pyplot() as plt:

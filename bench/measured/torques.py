@@ -7,13 +7,13 @@ import subprocess
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 import pinocchio as pin
 
 import wbc
 from bench.descriptions import write_urdf
+from bench.measured.ticks import median_at
 from bench.prepare import DESCRIPTIONS
 from bench.sheet import Sheet, us
 from wbc.api import Controller, Stack
@@ -111,20 +111,11 @@ def near(robot: Robot, size: float) -> list[np.ndarray]:
 def median(controller: Controller, states: list[np.ndarray], target: np.ndarray | None) -> float:
     """Median tick [us] at rest at these states, of the quickest of some turns."""
     controller.reset(controller.stack.robot.neutral)
-    v, least = np.zeros(controller.stack.robot.nv), np.inf
     if target is not None:
         goal = controller["hand"].target.copy()
         goal.translation += 0.05
         controller["hand"].target = goal
-    for _ in range(TURNS):
-        spent = np.empty(TICKS)
-        for k in range(TICKS):
-            at = states[k % STATES]
-            began = perf_counter()
-            controller.step(at, v)
-            spent[k] = perf_counter() - began
-        least = min(least, float(np.median(spent)))
-    return 1e6 * least
+    return median_at(controller, states, np.zeros(controller.stack.robot.nv), TICKS, TURNS)
 
 
 def placo(

@@ -114,6 +114,20 @@ def roboplan_of(problem: dict[str, Any]) -> Plan:
     return plan
 
 
+def patiently(plan: Plan, seed: int, seconds: float) -> dict[str, Any]:
+    """A path and the processor time that it took. Planners stop by the clock: where a busy core gave them less than
+    0.9 of ``seconds`` of processor until then, they plan again with as much more.
+    """
+    clock = seconds
+    while True:
+        began, used = time.monotonic(), time.process_time()
+        path, search = plan(seed, clock)
+        elapsed, used = time.monotonic() - began, time.process_time() - used
+        if path is not None or used > 0.9 * seconds or elapsed < 0.9 * clock:
+            return {"path": path, "seconds": used, "search": search}
+        clock *= 1.1 * seconds / used
+
+
 MAKERS = {"ompl": ompl_of, "roboplan": roboplan_of}
 
 
@@ -132,11 +146,8 @@ def main() -> None:
         util.RNG.setSeed(1)
     for line in sys.stdin:
         problem = json.loads(line)
-        plan = MAKERS[sys.argv[1]](problem)
-        begin = time.process_time()
-        path, search = plan(problem["seed"], problem["seconds"])
-        took = time.process_time() - begin
-        print(json.dumps({"path": path, "seconds": took, "search": search}), file=answers, flush=True)
+        answer = patiently(MAKERS[sys.argv[1]](problem), problem["seed"], problem["seconds"])
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 if __name__ == "__main__":

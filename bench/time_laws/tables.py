@@ -105,12 +105,6 @@ def near_published(record: Record, name: str) -> bool:
     return duration is not None and abs(duration / record["published"] - 1.0) <= 0.01
 
 
-def good_instance(record: Record) -> bool:
-    """Whether ours takes no longer than published, to 1 %, within limits."""
-    found = record["ours"]
-    return found["ratio"] is not None and found["duration"] <= 1.01 * record["published"] and found["ratio"] <= KEPT
-
-
 def suite(records: list[Record]) -> Sheet:
     """toppra's robustness suite."""
     rows = []

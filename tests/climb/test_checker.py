@@ -15,9 +15,13 @@ from tests.climb.by_hand import TRIPODS, gait
 from wbc.climb import ClimbScene, ContactPlan
 from wbc.climb.checker import CheckRules, check
 from wbc.climb.checker.clearances import coal_distance
+from wbc.climb.drive import standing_plan
 from wbc.climb.loop import ClimbLoop, ClimbRun
+from wbc.climb.machines import climber
 from wbc.climb.request import ClimberRequest, ClimbRequest, PathRequest, SceneRequest
+from wbc.climb.scene import Foothold
 from wbc.climb.session import climb
+from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import RangeError, ShapeError
 from wbc.log import Log
 from wbc.shapes import Box, PlacedShape, Sphere
@@ -107,6 +111,23 @@ def test_what_is_passed_between_two_ticks_is_found() -> None:
     assert violated["clearance of bodies"].where == "limb1_link3 and grain"
 
 
+def test_a_point_that_ends_within_what_may_be_missed_is_not_said_to_be_deeper() -> None:
+    plan, run = walked()
+    columns = {name: values[::5] for name, values in run.log.columns.items()}
+    log = dataclasses.replace(run.log, columns=columns, meta={**run.log.meta, "period": 0.05})
+    machine, q = plan.climber, log.array("q")
+    points = np.array([machine.contact_pose(at, 0).translation for at in q])
+    low = int(np.diff(points[:, 2]).argmin()) + 1
+    assert points[low - 1, 2] - points[low, 2] > 0.002
+    # Wide ground in which the point ends 0.3 mm deep: the rule has 0.4 mm
+    top = points[low] + [0.0, 0.0, 3e-4]
+    ground = PlacedShape(Box((0.2, 0.2, 0.1)), pin.SE3(np.eye(3), top - [0.0, 0.0, 0.05]))
+    few = dataclasses.replace(log, columns={name: values[low - 1 : low + 1] for name, values in columns.items()})
+    report = check(few, machine, _with(plan.scene, "ground", ground), CheckRules(clearance=0.0))
+    points_rule = {finding.rule: finding for finding in report.findings}["contact's point in a body"]
+    assert points_rule.kept, str(report)
+
+
 def test_a_body_beside_the_way_is_as_near_as_coal_says() -> None:
     plan, run = walked()
     beside = PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.26 + 0.05])))
@@ -170,3 +191,18 @@ def test_a_round_foot_leaves_a_mesh_that_it_is_deep_in() -> None:
     done = climb(ClimbRequest(PathRequest(speed=0.0), ClimberRequest("anymal_c"), SceneRequest(scene="mesh")))
     assert done.report is not None
     assert done.report.clean, done.report
+
+
+def test_a_sole_bears_as_it_is_turned_on_its_foothold() -> None:
+    robot, slacks = climber("talos"), list[float]()
+    for angle in (0.0, np.pi / 2):
+        poses = [robot.contact_pose(robot.rest, limb) for limb in range(2)]
+        turned = [pose * pin.SE3(pin.utils.rotate("z", angle), np.zeros(3)) for pose in poses]
+        scene = ClimbScene(
+            [Foothold(str(row), pose) for row, pose in enumerate(turned)], {}, np.array([0.0, 0.0, -9.81])
+        )
+        run = ClimbLoop(standing_plan(robot, scene, Stance((0, FREE_LIMB), robot.rest), 0.05), backend="vm").run()
+        report = check(run.log, robot, scene)
+        slacks.append(next(f.worst for f in report.findings if f.rule == "contacts bear the robot at rest"))
+    assert np.isfinite(slacks[0])
+    assert slacks[1] == pytest.approx(slacks[0], abs=1e-6)

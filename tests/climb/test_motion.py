@@ -169,15 +169,13 @@ def test_moves_that_nothing_bears_are_refused() -> None:
 
 
 def test_a_proof_that_stays_open_at_few_instants_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = climber("walker")
-    scene, stances = on_stones(robot, np.random.default_rng(1), 0.2)
-    mover = Mover(robot, scene)
-    quick = SwingShape(mover.lift, window=(0.1, 0.5))
-    monkeypatch.setattr(Mover, "_shapes", lambda *_: iter([quick]))
-    assert mover.moved(*stances.stances[2:4])[0].times[-1] > 0.0
+    robot = climber("truss_climber")
+    scene, stances = on_stones(robot, np.random.default_rng(1), 0.06)
+    monkeypatch.setattr(Mover, "_shapes", lambda mover, *_: iter([SwingShape(mover.lift)]))
+    assert Mover(robot, scene).moved(*stances.stances[:2])[0].times[-1] > 0.0
     monkeypatch.setattr(motion, "PARTS", (1,))
     with pytest.raises(MoveError) as open_:
-        Mover(robot, scene).moved(*stances.stances[2:4])
+        Mover(robot, scene).moved(*stances.stances[:2])
     assert open_.value.nearest is not None
     assert open_.value.nearest.distance > open_.value.nearest.required
 

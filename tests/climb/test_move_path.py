@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from wbc.climb.closure import Closure
+from wbc.climb.elastic_band import ElasticBand
 from wbc.climb.machines import climber
-from wbc.climb.move_path import LIFTING, SwingShape, move_path
+from wbc.climb.move_path import LIFTING, SwingShape, band_path, move_path
+from wbc.climb.scene import ClimbScene, Foothold
 from wbc.climb.stance import Stance
+from wbc.climb.world import ClimbWorld
 from wbc.errors import InfeasibleError
 
 #: Pairs of postures of a limb
@@ -29,8 +34,11 @@ def test_a_hand_that_cannot_keep_its_turn_goes_on_with_its_turn_free() -> None:
         )
         leaves, lands = closure.poses(one.q), closure.poses(other.q)[0]
         normals = {row: pose.rotation[:, 2] for row, pose in enumerate([*leaves, lands])}
+        scene = ClimbScene([Foothold(str(row), pose) for row, pose in enumerate([*leaves, lands])])
+        shape, band = SwingShape(HEIGHT), ElasticBand(ClimbWorld(robot, scene))
         try:
-            path = move_path(closure, one, other, SwingShape(HEIGHT), normals)
+            guide = band_path(closure, one, other, shape, normals, band)
+            path = move_path(closure, one, other, replace(shape, guide=guide), normals)
         except InfeasibleError:
             continue
         made += 1

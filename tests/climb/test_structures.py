@@ -133,7 +133,7 @@ def test_the_body_goes_round_what_is_in_its_way(monkeypatch: pytest.MonkeyPatch)
 
     assert bowed(Mover(walker(), scene)) < 0.05
     with monkeypatch.context() as straight:
-        straight.setattr(motion, "BOWS", 0)
+        straight.setattr(motion, "ASIDES", ())
         mover = next(blocked())
     assert bowed(mover) > 0.02
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -164,24 +163,6 @@ def test_key_sees_the_task_and_the_rows_and_no_first_values() -> None:
         Limit(Expression(lambda kin, p: 2 * kin.position("tip")[0], units="m"), lower=0.0),
     ]
     assert len({name_of(item) for item in (same[0], *others)}) == 1 + len(others)
-
-
-def test_key_sees_the_code_of_a_users_task_within(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (
-        "from dataclasses import dataclass\nfrom wbc.tasks.base import Row, Task\n\n@dataclass(frozen=True)\n"
-        "class Within(Task):\n    def rows(self, robot):\n        return (Row('a', 'rad'),)\n"
-        "    def error(self, robot, kin, inputs):\n        return kin.q[0] - 0.25\n"
-    )
-    file = tmp_path / "my_limited_tasks.py"
-    file.write_text(text)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    import my_limited_tasks
-
-    item = Limit(my_limited_tasks.Within(), lower=0.0)
-    before = name_of(item)
-    assert name_of(item) == before
-    file.write_text(text.replace("0.25", "0.75"))
-    assert name_of(item) != before
 
 
 def test_no_number_stands_for_equal_sides() -> None:

@@ -15,6 +15,7 @@ from tests.controller.stacks import DT, everything
 from wbc import Controller, Policy, Stack, WbcError, robots
 from wbc.controller import core_of
 from wbc.tasks import EndEffector, Posture
+from wbc.tick import native
 
 
 def pair(name: str, **how: Any) -> tuple[Controller, Controller]:
@@ -61,6 +62,27 @@ def test_it_is_what_setting_and_stepping_are(name: str) -> None:
         if k == 30:
             together.reset(q)
             apart.reset(q)
+
+
+def test_arrays_that_are_not_as_known_are_asked_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What code in C knows of numpy's memory spares time and changes nothing: others of the same numbers, and what is
+    refused.
+    """
+    assert (id(np.ndarray), id(np.dtype(np.float64))) == native.PLAIN_ARRAYS
+    known = everything("panda").compile(backend=COMPILED)
+    monkeypatch.setattr(native, "PLAIN_ARRAYS", (0, 0))
+    asked = everything("panda").compile(backend=COMPILED)
+    q, name = known.stack.robot.neutral, targets_of_poses(known)[0]
+    assert known.step(q)._data == asked.step(q)._data
+    pose = known[name].target.homogeneous
+    for _ in range(3):
+        assert known.step(q, **{name: pose})._data == asked.step(q, **{name: pose})._data
+    for bad in (q[:-1], q.reshape(1, -1), q.astype(">f4")[:-1], np.zeros(())):
+        for controller in (known, asked):
+            with pytest.raises(WbcError):
+                controller.step(bad)
+    for alike in (np.repeat(q, 2)[::2], q.astype(">f8"), q.view(np.rec.recarray), list(q)):
+        assert known.step(alike)._data == asked.step(alike)._data
 
 
 @pytest.mark.parametrize("solver", ["daqp", "osqp"])

@@ -21,7 +21,8 @@ import websockets
 
 import wbc
 from tests.formats.runs import recorded
-from wbc.formats import Ros2Plant, convert
+from tests.refusals import assert_refused
+from wbc.formats import FormatError, Ros2Plant, convert
 from wbc.formats.live import FoxgloveSink
 from wbc.formats.run import run_of
 from wbc.simulation import Connection
@@ -77,6 +78,7 @@ def test_foxglove_is_told_every_tick(tmp_path: Path) -> None:
     assert [tick["t"] for tick in told["/tick"]] == log["t"].tolist()
     assert told["/scene"][0]["entities"]
     assert told["/tf"]
+    assert_refused(lambda: convert(recording, "foxglove", "localhost"), FormatError, "HOST:PORT")
 
 
 ENDPOINT = """

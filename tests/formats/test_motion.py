@@ -158,7 +158,7 @@ def test_what_is_no_motion_is_refused(tmp_path: Path) -> None:
     assert_refused(lambda: read_motion(tmp_path / "no.mcap"), FormatError, "no such file")
     (tmp_path / "junk.mcap").write_bytes(b"junk" * 100)
     assert_refused(lambda: read_motion(tmp_path / "junk.mcap"), FormatError, "cannot be read")
-    assert_refused(lambda: read_motion(foxglove(tmp_path / "x.mcap", {"s": good}, "protobuf")), FormatError, "protobuf")
+    assert_refused(lambda: read_motion(foxglove(tmp_path / "x.mcap", {"s": good}, "cbor")), FormatError, "in cbor")
     robot = wbc.robots.load("ur5")
     assert_refused(lambda: motion.configurations(robot), UnknownNameError, "shoulder_pan_joint")
     assert motion.configurations(robot, ["a"]).tolist() == [robot.neutral.tolist()] * 2
@@ -211,6 +211,18 @@ def test_files_of_strangers_are_read_however_they_are_packed(how: Any, tmp_path:
     assert (motion.t.tolist(), motion.q[:, 0].tolist()) == ([0.0, 1.0, 2.0, 3.0], [30.0, 41.0, 22.0, 3.0])
 
 
+def test_frames_that_stand_do_not_say_when_a_recording_began(tmp_path: Path) -> None:
+    """Their stamps may be hours old; velocities of ros2_control are NaN where nobody measures them."""
+    stands = MOVED | {"parent_frame_id": "map", "child_frame_id": "base", "timestamp": {"sec": 5, "nsec": 0}}
+    joints = [state(a=0.5) | {"timestamp": {"sec": 9000 + k, "nsec": 0}} for k in range(3)]
+    for said in joints:
+        said["joints"][0]["velocity"] = float("nan")
+    topics = {"tf": ("foxglove.FrameTransform", [stands]), "j": ("foxglove.JointStates", joints)}
+    motion = read_motion(foxglove(tmp_path / "x.mcap", topics))
+    assert (motion.t.tolist(), motion.v) == ([0.0, 1.0, 2.0], None)
+    assert np.array_equal(motion.pose("base", 1.0).homogeneous, np.eye(4))
+
+
 def test_a_bag_whose_recorder_was_killed_is_read_as_far_as_it_came(tmp_path: Path) -> None:
     """It has no metadata, and its file ends anywhere."""
     rng = np.random.default_rng(0)
@@ -231,6 +243,33 @@ def test_a_bag_whose_recorder_was_killed_is_read_as_far_as_it_came(tmp_path: Pat
         assert np.array_equal(some.q, whole.q[: len(some.q)])
     file.unlink()
     assert_refused(lambda: read_motion(folder), FormatError, "cannot be read")
+    write_ros(tmp_path, "sqlite3", first, {})
+    (tmp_path / "sqlite3" / "metadata.yaml").unlink()
+    assert np.array_equal(read_motion(tmp_path / "sqlite3").q, whole.q)
+
+
+def test_foxglove_s_own_files_are_read(tmp_path: Path) -> None:
+    """In protobuf; positions that are zero are there, velocities that are not given are not."""
+    import foxglove
+    import mcap_protobuf  # noqa: F401
+    from foxglove import messages
+    from foxglove.channels import FrameTransformsChannel, JointStatesChannel
+
+    context, path = foxglove.Context(), tmp_path / "x.mcap"
+    with foxglove.open_mcap(path, context=context):
+        joints, frames = JointStatesChannel("/j", context=context), FrameTransformsChannel("/tf", context=context)
+        for k in range(3):
+            one = [messages.JointState(name="a", position=float(k)), messages.JointState(name="b", position=0.0)]
+            joints.log(messages.JointStates(joints=one), log_time=k * NANO)
+            move, turn = messages.Vector3(x=k, y=0.0, z=0.0), messages.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+            placed = {"parent_frame_id": "map", "child_frame_id": "c", "translation": move, "rotation": turn}
+            stamp = messages.Timestamp(sec=k, nsec=0)
+            transforms = [messages.FrameTransform(timestamp=stamp, **placed)]
+            frames.log(messages.FrameTransforms(transforms=transforms), log_time=9 * NANO)
+    motion = read_motion(path)
+    assert (motion.joints, motion.t.tolist(), motion.v) == (("a", "b"), [0.0, 1.0, 2.0], None)
+    assert motion.q.tolist() == [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
+    assert motion.pose("c", 1.5).translation.tolist() == [1.5, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("seed", [0, 2])

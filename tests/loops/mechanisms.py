@@ -170,6 +170,11 @@ MOTORS: Mapping[str, tuple[str, ...]] = {
     "delta": ("motor0", "motor1", "motor2"),
     "jansen": ("motor",),
     "parallelogram": ("joint0",),
+    "bennett": ("joint0",),
+    "sarrus": ("joint0",),
+    "desk_lamp": ("shoulder", "elbow"),
+    "hoekens": ("motor",),
+    "pantograph": ("main_joint", "inner_joint"),
 }
 
 
@@ -179,3 +184,85 @@ def with_motors(text: str, motors: Sequence[str]) -> str:
     return text.replace('gravity="0 0 0"', 'gravity="0 0 -9.81"').replace(
         "</mujoco>", f"<actuator>{made}</actuator></mujoco>"
     )
+
+
+def ring(name: str, points: Sequence[Array], axes: Sequence[Array]) -> str:
+    """One chain of hinges from the ground to the ground; the last hinge is two places on its axis, as files have it."""
+    inner, last = "", len(points) - 2
+    for k in reversed(range(last + 1)):
+        inner = body(f"link{k}", points[k] - (points[k - 1] if k else 0.0), hinge(f"joint{k}", axes[k]), inner)
+    ends = (points[-1], points[-1] + 0.1 * axes[-1])
+    loops = (
+        f'<connect name="end{n}" body1="link{last}" anchor="{numbers(end - points[last])}"/>'
+        for n, end in enumerate(ends)
+    )
+    return mjcf(name, inner, "".join(loops))
+
+
+def bennett(twist: float = 0.7, other: float = 1.3, length: float = 0.3, first: float = 1.2) -> str:
+    """Four bars whose axes are skew, which move as sin(twist) / length is the same of neighbours."""
+    lengths = (length, length * np.sin(other) / np.sin(twist))
+    second = 2.0 * np.arctan2(np.sin(0.5 * (other + twist)), np.sin(0.5 * (other - twist)) * np.tan(0.5 * first))
+    place, turn, points, axes = np.zeros(3), np.eye(3), list[Array](), list[Array]()
+    for k, angle in enumerate((first, second, -first, -second)):
+        points.append(place)
+        axes.append(turn[:, 2])
+        c, s, a, b = np.cos(angle), np.sin(angle), np.cos((twist, other)[k % 2]), np.sin((twist, other)[k % 2])
+        turn = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        place = place + lengths[k % 2] * turn[:, 0]
+        turn = turn @ np.array([[1.0, 0.0, 0.0], [0.0, a, -b], [0.0, b, a]])
+    return ring("bennett", points, axes)
+
+
+def sarrus() -> str:
+    """Two pairs of plates at right angles that lift a table straight up."""
+    sides = [np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])]
+    points = [out * side + height * np.array([0.0, 0.0, 1.0]) for side in sides for out, height in FOLD]
+    points[3:] = points[:2:-1]
+    return ring("sarrus", points, [np.array([1.0, 0.0, 0.0])] * 3 + [np.array([0.0, 1.0, 0.0])] * 3)
+
+
+#: How far out and how high the three hinges of each of Sarrus' pairs are [m]
+FOLD = ((0.3, 0.0), (0.45, 0.2), (0.3, 0.4))
+
+
+def desk_lamp() -> str:
+    """Two parallelograms, one on the other."""
+    y, aside = np.array([0.0, 1.0, 0.0]), np.array([0.1, 0.0, 0.0])
+    up, out = np.array([0.1, 0.0, 0.3]), np.array([0.25, 0.0, 0.1])
+    head = body("head", out, hinge("head_joint", y))
+    upper = body("arm1", np.zeros(3), hinge("elbow", y), head) + body("rod1", aside, hinge("rod1_joint", y))
+    plate = body("plate", up, hinge("plate_joint", y), upper)
+    bodies = body("arm0", np.zeros(3), hinge("shoulder", y), plate) + body("rod0", aside, hinge("rod0_joint", y))
+    loops = (
+        f'<connect name="{name}" body1="{one}" body2="{other}" anchor="{numbers(aside)}"/>'
+        for name, one, other in (("lower", "plate", "rod0"), ("upper", "head", "rod1"))
+    )
+    return mjcf("desk_lamp", bodies, "".join(loops))
+
+
+def hoekens() -> str:
+    """A crank and a rocker whose coupler goes straight for half a turn."""
+    y, unit = np.array([0.0, 1.0, 0.0]), 0.1
+    crank_end, heel = np.array([0.0, 0.0, unit]), np.array([2.0 * unit, 0.0, 0.0])
+    gap = heel - crank_end
+    middle = crank_end + 0.5 * gap
+    aside = np.array([-gap[2], 0.0, gap[0]]) / np.linalg.norm(gap)
+    pin = middle + aside * np.sqrt((2.5 * unit) ** 2 - 0.25 * gap @ gap)
+    crank = body("crank", np.zeros(3), hinge("motor", y), body("coupler", crank_end, hinge("knee", y)))
+    rocker = body("rocker", heel, hinge("heel", y))
+    anchor = numbers(pin - crank_end)
+    return mjcf("hoekens", crank + rocker, f'<connect name="pin" body1="coupler" body2="rocker" anchor="{anchor}"/>')
+
+
+def pantograph() -> str:
+    """Four bars in a parallelogram, two of them longer than it."""
+    y, arm, other = np.array([0.0, 1.0, 0.0]), np.array([0.1, 0.0, 0.2]), np.array([0.1, 0.0, -0.2])
+    tip = body("tip", 2.0 * arm, hinge("tip_joint", y))
+    inner = body("inner", arm, hinge("inner_joint", y), body("cross", other, hinge("cross_joint", y)))
+    bodies = body("main", np.zeros(3), hinge("main_joint", y), tip + inner)
+    return mjcf("pantograph", bodies, f'<connect name="cross" body1="cross" body2="tip" anchor="{numbers(arm)}"/>')
+
+
+#: Name -> text of those that move as their lengths are special; their rows depend on each other where they are closed
+SPECIAL: Mapping[str, str] = {make.__name__: make() for make in (bennett, sarrus, desk_lamp, hoekens, pantograph)}

@@ -15,7 +15,7 @@ import pytest
 import wbc
 from tests.loops.mechanisms import NAMED, four_bar, random_linkage
 from tests.repeats import repeats
-from wbc.errors import DuplicateNameError, NotFiniteError, UnknownNameError, UnsupportedJointError
+from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, UnknownNameError, UnsupportedJointError
 from wbc.robot import JointCurve, Loop, LoopError, Robot
 from wbc.validation import Array
 
@@ -203,6 +203,7 @@ def test_recordings_batches_and_clones_keep_them(tmp_path: Path) -> None:
             "pin",
         ),
         (lambda r: r.with_loops(JointCurve("turn", "moter", None, (0.0,))), UnknownNameError, "motor"),
+        (lambda r: JointCurve("turn", "motor", "motor", (0.0, 0.5)), RangeError, "follow itself"),
         (lambda r: Loop("pin", "crank", "rocker", "wld"), UnknownNameError, "weld"),  # type: ignore[arg-type]
         (wbc.support.braking, UnsupportedJointError, "with_loops"),
         (lambda r: r.closed([np.nan] * 3), NotFiniteError, "q"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -79,8 +80,8 @@ def moving(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
 
 @cache
 def simulated(robot: Robot, text: str) -> tuple[mujoco.MjModel, mujoco.MjData, MujocoJoints]:
-    """A file as MuJoCo has it."""
-    model = mujoco.MjModel.from_xml_string(text)
+    """A file as MuJoCo has it; no text: the model that is made here."""
+    model = mujoco.MjModel.from_xml_string(text) if text else mujoco_model(robot)
     return model, mujoco.MjData(model), MujocoJoints(model, robot)
 
 
@@ -221,6 +222,42 @@ def test_accelerations_keep_loops_closed() -> None:
     assert gaps[0] > 4e-3
     assert gaps[-1] < 1e-9
     assert -np.diff(gaps).min() < 0.11 * robot.characteristic_length * SPARSE * DT
+
+
+def coarse(name: str, count: int) -> Iterator[wbc.Step]:
+    """Ticks of accelerations of 20 ms, in which loops bend by more than rounding of limits."""
+    robot, rng = driven(name), np.random.default_rng(0)
+    stack = wbc.Stack(robot, 0.02).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, q, v = stack.compile(command="acceleration"), robot.neutral, np.zeros(robot.nv)
+    controller.reset(q)
+    for k in range(count):
+        if k % 30 == 0:
+            controller["posture"].target = pin.integrate(robot.model, q, 2.0 * rng.normal(size=robot.nv))
+        step = controller.step(q, v)
+        yield step
+        q, v = np.array(step.q_next), np.array(step.v)
+
+
+def test_velocities_that_keep_loops_closed_are_within_limits() -> None:
+    robot = driven("delta")
+    for step in coarse("delta", 450):
+        assert step.status == "solved"
+        assert np.abs(step.v).max() <= 3.0 * (1.0 + 1e-9)
+        assert np.abs(step.a).max() <= 200.0 * (1.0 + 1e-9)
+        assert max(robot.loop_gaps(step.q_next).values()) <= 1e-9
+
+
+def test_a_tick_that_leaves_loops_open_says_so() -> None:
+    """Where a step leads no correction of its size closes the ankle."""
+    robot = driven("ankle")
+    ends = [
+        (str(step.status), step.relaxed, max(robot.loop_gaps(step.q_next).values())) for step in coarse("ankle", 113)
+    ]
+    assert {status for status, _, gap in ends if gap <= 1e-9} == {"solved"}
+    ((status, relaxed, gap),) = [end for end in ends if end[2] > 1e-9]
+    assert status == "relaxed"
+    assert {slack.item for slack in relaxed} == {"mechanism"}
+    assert max(slack.amount for slack in relaxed) == pytest.approx(2.0 * gap / 0.02**2, rel=0.5)
 
 
 def plants(robot: Robot, text: str) -> dict[str, Plant]:

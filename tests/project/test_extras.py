@@ -13,6 +13,7 @@ from wbc.extras import EXTRAS
 
 #: Modules whose distribution is called otherwise
 DISTRIBUTIONS = {
+    "mcap_protobuf": "mcap-protobuf-support",
     "flint": "python-flint",
     "pxr": "usd-core",
     "py_trees": "py-trees",
@@ -28,15 +29,16 @@ USES = {
     "clips": "from wbc.retarget.sources import c3d; c3d.read_c3d(None)",
     "cluster": "from wbc.study import carrying_out; carrying_out.connected(2, None).__enter__()",
     "formats": "from wbc.formats import read_motion; read_motion('arm.urdf')",
-    "foxglove": "from wbc.formats.live import FoxgloveSink; FoxgloveSink()",
+    "foxglove": "import wbc.formats; wbc.formats.convert('no run', 'foxglove')",
     "gymnasium": "from wbc.learning import stack_actions; stack_actions(None, None, None, None, None)",
     "laws": LEAST_TIME,
     "mujoco": "wbc.robots.load('<mujoco/>')",
     "osqp": "stack.compile(solver='osqp', backend='vm')",
     "plots": "from wbc import style; style.pyplot().__enter__()",
     "programs": "from wbc.program import Program",
+    "protobuf": "from wbc.formats import motion_file; motion_file._decoder(None, 'protobuf')",
     "recordings": "from wbc.log import log; log._read_parquet(None)",
-    "rerun": "from wbc.formats.rerun_file import RerunSink; RerunSink('x.rrd')",
+    "rerun": "import wbc.formats; wbc.formats.convert('no run', 'rrd')",
     "ros2": "from wbc.formats import Ros2Plant; Ros2Plant(robot)",
     "studies": "from wbc.study import Study",
     "torch": "from wbc.learning import command_layer; command_layer(None)",

@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.project.layout import FOLDERS, nodes, relative, sources
+from tests.mutations import MUTATIONS
+from tests.project.layout import FOLDERS, ROOT, nodes, relative, sources
 
 PACKAGE = sources("wbc", "tasks", "robots", "bench")
 EVERYTHING = sources(*FOLDERS)
@@ -15,6 +16,8 @@ EVERYTHING = sources(*FOLDERS)
 UNFINISHED = re.compile(r"\b(" + "|".join(("TO" + "DO", "FIX" + "ME", "X" + "XX", "HA" + "CK")) + r")\b")
 #: Ways to read memory that no array of this process is known to own
 FOREIGN = ("from_" + "address", "as_" + "strided", "string_" + "at")
+#: What a docstring refers to of this package
+REFERENCE = re.compile(r":(?:func|class|meth|data|attr|mod):`~?(?!casadi)([\w.]+)`")
 SWITCHES = {"skip" + "if", "x" + "fail", "import" + "orskip"}
 
 
@@ -67,6 +70,28 @@ def test_no_memory_is_read_through_an_address() -> None:
 
 def test_no_test_is_switched_off() -> None:
     assert [fault for path in sources("tests") for fault in switched_off(path)] == []
+
+
+def test_every_mistake_that_is_planted_has_one_place() -> None:
+    """``python -m tests.mutations`` ends at one that has none."""
+    places = {(mutation.file, mutation.right): (ROOT / mutation.file).read_text() for mutation in MUTATIONS}
+    assert len(places) > 80
+    assert [key for key, text in places.items() if text.count(key[1]) != 1] == []
+
+
+def test_what_docstrings_refer_to_is_there() -> None:
+    """By its last name: a class, function or value of this package, or a module."""
+    files = sources("wbc", "tasks", "robots")
+    names = {part for path in files for part in path.with_suffix("").parts} | {"dataclasses", "Name"}
+    for path in files:
+        for n in nodes(path):
+            if isinstance(n, (ast.FunctionDef, ast.ClassDef)):
+                names.add(n.name)
+            elif isinstance(n, ast.Name | ast.Attribute) and isinstance(n.ctx, ast.Store):
+                names.add(n.id if isinstance(n, ast.Name) else n.attr)
+    asked = [(relative(path), name) for path in files for name in REFERENCE.findall(path.read_text())]
+    assert len(asked) > 500
+    assert [(path, name) for path, name in asked if name.split(".")[-1] not in names] == []
 
 
 def test_the_rules_find_what_breaks_them(tmp_path: Path, monkeypatch) -> None:

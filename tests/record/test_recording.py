@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import gc
 import json
 import multiprocessing
 import signal
@@ -20,7 +22,7 @@ from tests.stack import small
 from wbc import Controller, Recording, Stack, replay
 from wbc.controller import core_of
 from wbc.errors import NotFiniteError, UnknownNameError
-from wbc.log import FileWriter
+from wbc.log import FileWriter, LogFile
 from wbc.record import recorder, recording as files
 from wbc.record.background import BackgroundWriter
 from wbc.record.recorder import INPUTS
@@ -30,8 +32,8 @@ from wbc.shapes import Box
 from wbc.tasks import Obstacle
 
 TOP = Path(__file__).parents[2]
-#: Ticks of the small stack in a chunk
-CHUNK = 381
+#: Ticks of the small stack in a chunk: a second of them
+CHUNK = 100
 
 
 def history(one: Controller, rng: np.random.Generator, ticks: int) -> list[bytes]:
@@ -77,7 +79,7 @@ def test_every_tick_again(
     builder: str, backend: str, solver: str, ticks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a controller of its own, from the file alone; in chunks whose ends fall anywhere."""
-    for name in ("FEWEST", "MOST"):
+    for name in ("FEWEST", "CHUNK"):
         monkeypatch.setattr(f"wbc.record.recorder.{name}", 7)
     if builder == "sensed":
         one = sensed().compile(backend=backend)
@@ -150,7 +152,7 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
         held = []
         for _ in range(recorder._chunk * 2 + 5):
             one.step(small.Q)
-            held.append(recorder._end // recorder._size)
+            held.append(recorder._writing.end // recorder._writing.row)
         assert max(held) < recorder._chunk
     assert len(Recording(recorder.path)["q"]) == recorder.count == len(held)
 
@@ -328,11 +330,75 @@ def test_an_interrupted_tick_is_left_out(tmp_path: Path) -> None:
 
         recorder._call = interrupted
         with pytest.raises(KeyboardInterrupt):
-            one.step(near_limits(one.stack.robot, rng))
+            # With a period of its own the tick is not one call of C
+            one.step(near_limits(one.stack.robot, rng), None, one.stack.dt)
         recorder._call = call
         history(one, rng, 20)
     assert recorder.count == 40
     assert replay(recorder.path).identical
+
+
+def test_ticks_of_one_call_are_recorded_by_c(tmp_path: Path) -> None:
+    """What the policy finishes is told by Python; a tick that is interrupted there is left out."""
+    one, rng = controller("arm", "panda", backend="native"), np.random.default_rng(3)
+    core, calls, ended = core_of(one), list[int](), list[str]()
+    with one.record(tmp_path / "run.npz") as recorder:
+        call, finish = recorder._call, core.finish
+        recorder._call = lambda: calls.append(0) or call()
+
+        def interrupted(flag: int) -> int:
+            finish(flag)
+            raise KeyboardInterrupt
+
+        for k in range(400):
+            core.finish = interrupted if k == 200 else finish  # type: ignore[method-assign]
+            try:
+                ended.append(one.step(near_limits(one.stack.robot, rng)).status)
+            except KeyboardInterrupt:
+                continue
+            else:
+                # Until there is one that the policy has to finish
+                core.finish = interrupted if 200 <= k < 300 else finish  # type: ignore[method-assign]
+        chunks = recorder.count // recorder._chunk
+    assert len(calls) <= chunks + 103
+    assert list(Recording(recorder.path).status) == ended
+    assert replay(recorder.path).identical
+
+
+def test_ctrl_c_while_the_disk_is_waited_for_loses_nothing(tmp_path: Path) -> None:
+    one = small.stack().compile(backend="native")
+
+    class Interrupted:
+        def get(self) -> None:
+            raise KeyboardInterrupt
+
+    with one.record(tmp_path / "run.npz") as recorder:
+        assert recorder._writer is not None
+        free = recorder._writer._free
+        recorder._writer._free = Interrupted()  # type: ignore[assignment]
+        for _ in range(recorder._chunk - 1):
+            one.step(small.Q)
+        with pytest.raises(KeyboardInterrupt):
+            one.step(small.Q)
+        recorder._writer._free = free
+        for _ in range(recorder._chunk + 1):
+            one.step(small.Q)
+    assert len(Recording(recorder.path)["q"]) == recorder.count == 2 * recorder._chunk + 1
+    assert replay(recorder.path).identical
+
+
+def test_what_is_kept_of_chunks_is_no_work_for_the_collector_of_garbage(tmp_path: Path) -> None:
+    """It would stop a loop for milliseconds."""
+    writer = FileWriter(tmp_path / "x.npz", overwrite=False)
+    writer.begin({"sizes": {"t": 4}}, {})
+    writer.write(bytes(64))
+    gc.collect()
+    before = len(gc.get_objects())
+    for _ in range(1000):
+        writer.write(bytes(64))
+    assert len(gc.get_objects()) < before + 100
+    writer.close()
+    assert len(LogFile(tmp_path / "x.npz")["t"]) == 2002
 
 
 CHILD = """
@@ -397,18 +463,21 @@ def test_what_a_thread_writes_is_in_order_and_its_errors_come_back() -> None:
                 raise self.error
             self.numbers += numbers
 
+        def abandon(self) -> None:
+            pass
+
     for error, reason in ((OSError(28, "No space left"), "No space left"), (MemoryError(), "memory")):
-        writer = BackgroundWriter(kept := Kept(error))  # type: ignore[arg-type]
-        writer.begin({}, {})
-        memory = bytearray(8)
+        writer = BackgroundWriter(kept := Kept(error), 16, 2)  # type: ignore[arg-type]
+        memory = writer.begin({}, {})
         for k in range(4):
-            # The loop's memory is used again at once
-            memory[:] = bytes([k] * 8)
-            writer.write(memoryview(memory))
+            memory[:8] = bytes([k] * 8)
+            with contextlib.suppress(OSError):
+                memory = writer.exchange(memory, 8)
         with pytest.raises(OSError, match=reason):
             writer.wait()
         assert kept.numbers == bytes([0] * 8 + [1] * 8 + [2] * 8)
         assert writer.written == 24
+        writer.abandon()
         writer._thread.join(10.0)
         assert not writer._thread.is_alive()
 
@@ -433,7 +502,8 @@ def test_a_full_disk_does_not_stop_the_controller(tmp_path: Path, caplog: pytest
             assert one.step(small.Q).status == "solved"
         # The thread that writes has met the full disk
         if recorder._writer is not None:
-            recorder._writer._waiting.join()
+            with contextlib.suppress(OSError):
+                recorder._writer.wait()
     assert core_of(one).call is call
     assert [r.getMessage() for r in caplog.records] == [
         f"the recording {tmp_path / 'run.npz'} ends after {CHUNK} ticks: No space left on device"

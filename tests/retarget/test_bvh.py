@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.retarget import clips
+from tests.retarget import clips, motions
 from wbc.errors import ClipFileError, RangeError, UnknownNameError
 from wbc.retarget import Clip, load_clip
 
@@ -60,6 +61,21 @@ def test_positions_at_every_joint(tmp_path: Path) -> None:
     counted = read(tmp_path, text)
     np.testing.assert_allclose(counted.points, WALK.points, atol=1e-7)
     assert "counted from its offset" in " ".join(counted.notes)
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_a_skeleton_whose_names_say_nothing_stands_upright(tmp_path: Path, up: str) -> None:
+    nameless = replace(WALK, skeleton=motions.nameless(WALK.skeleton))
+    np.testing.assert_allclose(read(tmp_path, clips.bvh(nameless, up)).points, WALK.points, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding"), [("HIERARCHY", "utf-8-sig"), ("R\u00fccken", "latin-1"), ("\u8170", "shift_jis")]
+)
+def test_files_of_other_encodings(tmp_path: Path, name: str, encoding: str) -> None:
+    text = clips.bvh(WALK)
+    (tmp_path / "a.bvh").write_bytes((text if name in text else text.replace("Spine1", name)).encode(encoding))
+    np.testing.assert_allclose(load_clip(tmp_path / "a.bvh").points, WALK.points, atol=1e-7)
 
 
 def test_an_axis_and_a_unit_that_are_given_are_taken(tmp_path: Path) -> None:

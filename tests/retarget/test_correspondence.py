@@ -12,9 +12,10 @@ from tests.retarget import clips, motions
 from wbc import robots
 from wbc.errors import UnknownNameError
 from wbc.retarget import BodyError, Correspondence, CorrespondenceError, Skeleton
-from wbc.retarget.body import LIMBS, PointTree, find_body, side_of
-from wbc.retarget.correspondence import correspondence, rest_of
+from wbc.retarget.body import LIMBS, PointTree, find_body
+from wbc.retarget.correspondence import correspondence
 from wbc.retarget.robot_body import RobotBody, body_of
+from wbc.retarget.words import side_of
 
 HUMANOIDS = {
     "g1": ("left_knee_joint", "left_ankle_pitch_joint", "left_elbow_joint", "left_wrist_pitch_joint"),
@@ -93,7 +94,7 @@ def test_a_person_of_any_proportions_and_any_number_of_vertebrae(seed: int) -> N
         assert tuple(made.names[k] for k in (one.base, one.middle, one.end, one.tip)) == names
     assert np.allclose(match.axes, clips.turned(2, yaw), atol=1e-6)
     legs = sum(body("simple_humanoid").limbs["left_leg"].lengths)
-    rest = rest_of(made)
+    rest = made.rest
     one = match.limbs["left_leg"]
     theirs = np.linalg.norm(rest[one.base] - rest[one.middle]) + np.linalg.norm(rest[one.middle] - rest[one.end])
     assert match.scale == pytest.approx(legs / theirs)
@@ -101,7 +102,7 @@ def test_a_person_of_any_proportions_and_any_number_of_vertebrae(seed: int) -> N
 
 def test_a_dog_without_names() -> None:
     plan_of = clips.skeleton(clips.DOG_BONES)
-    tree = PointTree(motions.nameless(plan_of).names, plan_of.parents, rest_of(plan_of))
+    tree = PointTree(motions.nameless(plan_of).names, plan_of.parents, plan_of.rest)
     plan = find_body(tree)
     assert not plan.upright
     assert [plan_of.names[k] for k in plan.limbs["left_leg"]][:2] == ["LeftUpLeg", "LeftLeg"]

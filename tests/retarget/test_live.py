@@ -8,7 +8,7 @@ import pytest
 from tests.retarget import clips, motions
 from wbc.errors import NotFiniteError, ShapeError
 from wbc.retarget import Retargeter
-from wbc.retarget.retargeted import frame_poses
+from wbc.retarget.poses import frame_poses
 
 
 def test_a_walk_as_it_comes() -> None:

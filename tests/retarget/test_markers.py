@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from tests.retarget import clips
+from wbc import robots
 from wbc.errors import ClipFileError, RangeError, ShapeError, UnknownNameError
 from wbc.retarget import load_clip
+from wbc.retarget.correspondence import correspondence
+from wbc.retarget.robot_body import body_of
 from wbc.retarget.sources.axes import TO_Z_UP
 from wbc.retarget.sources.gaps import fill_gaps
 from wbc.retarget.sources.layouts import LAYOUTS
@@ -117,6 +120,45 @@ def test_a_marker_that_is_never_seen_is_left_out_and_said(tmp_path: Path) -> Non
     np.savez(file, positions=points, joint_names=NAMES, fps=30)
     with pytest.raises(ClipFileError, match="no point"):
         load_clip(file)
+
+
+#: Markers of Plug-in Gait and key points of COCO beside those of the pelvis, and the joints that they lie on here
+MARKERS = {
+    "LFHD": "Head", "RFHD": "Head", "C7": "Neck", "LKNE": "LeftLeg", "RKNE": "RightLeg", "LANK": "LeftFoot",
+    "RANK": "RightFoot", "LTOE": "LeftToe", "RTOE": "RightToe", "LSHO": "LeftArm", "RSHO": "RightArm",
+    "LELB": "LeftForeArm", "RELB": "RightForeArm", "LWRA": "LeftHand", "LWRB": "LeftHand", "RWRA": "RightHand",
+}  # fmt: skip
+POINTS = {
+    "nose": "HeadEnd", "left_shoulder": "LeftArm", "right_shoulder": "RightArm", "left_elbow": "LeftForeArm",
+    "right_elbow": "RightForeArm", "left_wrist": "LeftHand", "right_wrist": "RightHand", "left_hip": "LeftUpLeg",
+    "right_hip": "RightUpLeg", "left_knee": "LeftLeg", "right_knee": "RightLeg", "left_ankle": "LeftFoot",
+    "right_ankle": "RightFoot",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("table", [MARKERS, POINTS])
+def test_markers_without_bones_become_joints(tmp_path: Path, table: dict[str, str]) -> None:
+    assert WALK.turns is not None
+    points = {name: WALK.points[:, NAMES.index(joint)] for name, joint in table.items()}
+    hips = {"L": WALK.points[:, NAMES.index("LeftUpLeg")], "R": WALK.points[:, NAMES.index("RightUpLeg")]}
+    if table is MARKERS:
+        # Corners of the pelvis as far from each other as makes these the hips by Bell's shares
+        width = np.linalg.norm(hips["L"] - hips["R"], axis=1).mean() / 0.72
+        for side, left in (("L", 1.0), ("R", -1.0)):
+            to_corner = np.array([0.19, 0.14 * left, 0.30])
+            points[f"{side}ASI"] = hips[side] + WALK.turns[:, 0] @ (width * to_corner)
+            points[f"{side}PSI"] = points[f"{side}ASI"] + WALK.turns[:, 0] @ np.array([-0.15, -0.07 * left, 0.0])
+    file = tmp_path / "markers.npz"
+    np.savez(file, points=np.stack(list(points.values()), axis=1), names=list(points), fps=30)
+    clip = load_clip(file)
+    number = clip.skeleton.names.index
+    for joint, source in (("hip", "UpLeg"), ("knee", "Leg"), ("ankle", "Foot"), ("elbow", "ForeArm")):
+        for side in ("Left", "Right"):
+            place = clip.points[:, number(f"{side.lower()}_{joint}")]
+            np.testing.assert_allclose(place, WALK.points[:, NAMES.index(side + source)], atol=1e-9)
+    match = correspondence(body_of(robots.load("simple_humanoid")), clip.skeleton)
+    assert set(match.limbs) == {"left_leg", "right_leg", "left_arm", "right_arm"}
+    assert match.limbs["left_leg"].chain[:3] == tuple(number(f"left_{k}") for k in ("hip", "knee", "ankle"))
 
 
 def test_a_person_whose_root_is_the_origin_is_put_on_the_ground(tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from tests.retarget.fake import humanoid, motion_of
 from wbc import robots
 from wbc.errors import ClipFileError, RangeError, ShapeError, UnknownNameError
 from wbc.multibody import pin
-from wbc.retarget.outputs import JointColumns, write_lerobot, write_motion
+from wbc.retarget.outputs.motion import JointColumns
+from wbc.retarget.outputs.writing import write_lerobot, write_motion
 from wbc.simulation import mujoco_model
 
 MOTION = motion_of(humanoid())

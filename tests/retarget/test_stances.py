@@ -7,7 +7,8 @@ import pytest
 
 from tests.retarget import clips
 from wbc.retarget import Clip
-from wbc.retarget.stances import Stances, find_stances, intervals, with_hysteresis
+from wbc.retarget.clip import intervals
+from wbc.retarget.stances import Stances, find_stances, with_hysteresis
 
 FEET = {"left_leg": ("LeftFoot", "LeftToe"), "right_leg": ("RightFoot", "RightToe")}
 HANDS = {"left_arm": ("LeftHand", "LeftHandEnd"), "right_arm": ("RightHand", "RightHandEnd")}

@@ -11,7 +11,7 @@ import pytest
 import wbc
 from tests.refusals import assert_refused
 from tests.repeats import repeats
-from wbc.errors import RobotFileError
+from wbc.errors import RobotFileError, UnknownNameError
 from wbc.multibody import pin
 
 XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -31,11 +31,45 @@ XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
 def test_a_xacro_file_is_what_it_expands_to(count: int, tmp_path: Path) -> None:
     (tmp_path / "arm.urdf.xacro").write_text(XACRO)
     robot = wbc.robots.load(tmp_path / "arm.urdf.xacro", arguments={"count": count})
-    assert robot.joint_names == tuple(f"joint{k}" for k in range(1, count + 1))
+    assert (robot.name, robot.joint_names) == ("arm", tuple(f"joint{k}" for k in range(1, count + 1)))
     assert np.allclose(robot.limits.position_upper, np.pi / 2)
     assert np.allclose(robot.pose(robot.neutral, f"link{count}").translation[2], 0.1 * sum(range(1, count + 1)))
     assert np.isclose(pin.computeTotalMass(robot.model), 0.5 * sum(range(1, count + 1)))
     assert len(robot.shapes) == count
+
+
+def test_a_xacro_file_includes_files_beside_it_and_of_packages_beside_its_own(tmp_path: Path) -> None:
+    """With blocks, a file of numbers, arguments and what is there only unless one is given."""
+    here, other = tmp_path / "mine" / "urdf", tmp_path / "other"
+    for folder in (here / "parts", other):
+        folder.mkdir(parents=True)
+    for package in (tmp_path / "mine", other):
+        (package / "package.xml").write_text(f"<package><name>{package.name}</name></package>")
+    head = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    (here / "parts" / "numbers.yaml").write_text("joint1: {upper: !degrees 90}")
+    (here / "parts" / "link.xacro").write_text(
+        f"""{head}<xacro:property name="limits" value="${{xacro.load_yaml('parts/numbers.yaml')}}"/>
+<xacro:macro name="body" params="name mass:=1.0 *origin"><link name="${{name}}"><inertial><xacro:insert_block
+name="origin"/><mass value="${{mass}}"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+</xacro:macro></robot>"""
+    )
+    (other / "tool.xacro").write_text(f'{head}<link name="tool"/></robot>')
+    file = here / "arm.xacro"
+    file.write_text(
+        f"""{head}<xacro:arg name="held" default="true"/><xacro:include filename="parts/link.xacro"/><link name="base"/>
+<xacro:body name="arm" mass="${{2**-1}}"><origin xyz="0 0 ${{0.1*3}}"/></xacro:body>
+<joint name="joint1" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="0" upper="${{limits['joint1']['upper']}}" velocity="1" effort="1"/></joint>
+<xacro:unless value="$(arg held)"><xacro:include filename="$(find other)/tool.xacro"/>
+<joint name="fixed" type="fixed"><parent link="arm"/><child link="tool"/></joint></xacro:unless></robot>"""
+    )
+    robot = wbc.robots.load(file, arguments={"held": "false"})
+    assert "tool" in robot.frame_names
+    assert np.isclose(robot.limits.position_upper[0], np.pi / 2)
+    inertia = robot.model.inertias[1]
+    assert np.allclose([inertia.mass, *inertia.lever], [0.5, 0.0, 0.0, 0.3])
+    assert "tool" not in wbc.robots.load(file).frame_names
+    assert_refused(lambda: wbc.robots.load(file, arguments={"hold": "false"}), UnknownNameError, "held")
 
 
 def test_a_xacro_file_that_cannot_be_expanded_is_refused(tmp_path: Path) -> None:
@@ -48,6 +82,30 @@ def test_a_xacro_file_that_cannot_be_expanded_is_refused(tmp_path: Path) -> None
     stage = tmp_path / "x.usda"
     stage.write_text("#usda 1.0\n")
     assert_refused(lambda: wbc.robots.load(stage, arguments={"a": 1}), RobotFileError, "only xacro")
+
+
+@pytest.mark.parametrize("seed", range(repeats(3)))
+def test_poses_of_sdf_are_the_same_however_they_are_written(seed: int, tmp_path: Path) -> None:
+    rng, file = np.random.default_rng(seed), tmp_path / "x.sdf"
+    turn, place = rng.uniform(-1.5, 1.5, 3), rng.normal(size=3)
+    due = pin.SE3(pin.rpy.rpyToMatrix(*turn), place)
+
+    def read(how: str, numbers: Any) -> Any:
+        text = " ".join(f"{x:.12g}" for x in numbers)
+        file.write_text(
+            f"""<sdf version="1.9"><model name="m"><link name="a"/><link name="b"><pose {how}>{text}</pose></link>
+<joint name="w" type="fixed"><parent>world</parent><child>a</child></joint>
+<joint name="j" type="revolute"><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint></model></sdf>"""
+        )
+        robot = wbc.robots.load(file)
+        return robot.pose(robot.neutral, "b").homogeneous
+
+    assert np.allclose(read("", [*place, *turn]), due.homogeneous)
+    assert np.allclose(read('degrees="true"', [*place, *np.degrees(turn)]), due.homogeneous)
+    assert np.allclose(read('rotation_format="quat_xyzw"', pin.SE3ToXYZQUAT(due)), due.homogeneous)
+    bad = 'rotation_format="quat_xyzw"', [*place, 1.0, 1.0, 0.0, 0.0]
+    assert_refused(lambda: read(*bad), RobotFileError, "pose of b has no unit quaternion")
+    assert_refused(lambda: read('rotation_format="angles"', place), RobotFileError, "'angles'")
 
 
 def stage_of(model: pin.Model, path: Path, unit: float, turned: bool) -> None:

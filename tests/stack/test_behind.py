@@ -212,6 +212,36 @@ def test_who_waits_has_native_code(gate: threading.Event) -> None:
     assert first.batch(2).step(small.Q).v[1].tobytes() == first.clone().step(small.Q).v.tobytes()
 
 
+def test_the_compiler_has_a_low_priority_within_the_session_of_its_loop(gate: threading.Event) -> None:
+    controller = small.stack().compile()
+    child = behind._work.child
+    assert child is not None
+    # Of another session's it would count for nothing: processors are shared between sessions first
+    assert os.getsid(child.pid) == os.getsid(0)
+    assert os.getpgid(child.pid) == child.pid
+    assert os.getpriority(os.PRIO_PROCESS, child.pid) >= behind._LOW
+    gate.set()
+    assert controller._artifact.behind is not None
+    assert controller._artifact.behind.ended.wait(PATIENCE)
+
+
+def test_a_loop_in_real_time_waits_for_it_no_longer_than_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int]] = []
+    monkeypatch.setattr(os, "sched_getparam", lambda thread: os.sched_param(50 if thread else 0))
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda thread, policy, param: asked.append((policy, param.sched_priority))
+    )
+    before = sys.getswitchinterval()
+    with behind._beside_loops():
+        assert sys.getswitchinterval() == pytest.approx(behind._TURN)
+        assert asked == [(os.SCHED_FIFO, 49)]
+        if (child := os.fork()) == 0:
+            os._exit(sys.getswitchinterval() != before)
+        assert os.waitpid(child, 0)[1] == 0
+    assert sys.getswitchinterval() == before
+    assert asked[1:] == [(os.sched_getscheduler(0), 0)]
+
+
 def test_a_library_of_another_layout_is_refused(tmp_path: pathlib.Path, caplog: pytest.LogCaptureFixture) -> None:
     other = everything("ur5").compile(wait=True)._artifact.library
     assert other is not None

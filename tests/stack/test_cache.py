@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import logging
 import os
@@ -29,7 +30,7 @@ from wbc.native import cache, toolchain
 from wbc.shapes import HalfSpace, PlacedShape, Sphere
 from wbc.stack import artifact
 from wbc.stack.key import key, library_key
-from wbc.tasks import Damping, EndEffector, Expression, Hold, JointLimits, Obstacle, Posture
+from wbc.tasks import Damping, EndEffector, Expression, Hold, JointLimits, Limit, Obstacle, Posture
 from wbc.tasks.base import Row, Task
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -141,19 +142,23 @@ def test_key_changes_with_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     assert name_of(small.stack(), version="2") != name_of(small.stack())
 
 
-def test_key_changes_with_the_code_of_a_users_class(tmp_path: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The class and its fields stay the same, only its formula changes: old code would be wrong code."""
+@pytest.mark.parametrize("within", [False, True])
+def test_key_changes_with_the_code_of_a_users_class(
+    within: bool, tmp_path: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The class and its fields stay the same, only its formula changes: old code would be wrong code; within a limit
+    of it, too.
+    """
     text = (
         "from dataclasses import dataclass\nfrom wbc.tasks.base import Row, Task\n\n@dataclass(frozen=True)\n"
         "class Mine(Task):\n    def rows(self, robot):\n        return (Row('a', 'rad'),)\n"
         "    def error(self, robot, kin, inputs):\n        return kin.q[0] - 0.25\n"
     )
-    file = tmp_path / "my_tasks.py"
+    file = tmp_path / f"my_tasks_{within}.py"
     file.write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
-    import my_tasks
-
-    stack = small.stack().add(my_tasks.Mine())
+    mine = importlib.import_module(file.stem).Mine()
+    stack = small.stack().add(Limit(mine, lower=0.0) if within else mine)
     before = name_of(stack)
     assert name_of(stack) == before
     file.write_text(text.replace("0.25", "0.75"))

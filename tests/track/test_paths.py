@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.trajectory.path_checks import random_poses
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.track.path import ApproachedPath, SplinePath, TimedPath, smooth_step
 from wbc.track.presets import PRESETS, preset
@@ -15,20 +16,9 @@ from wbc.track.presets import PRESETS, preset
 START = pin.SE3(pin.utils.rotate("x", math.pi), np.array([0.4, 0.1, 0.5]))
 
 
-def poses(count: int, seed: int = 0) -> list[pin.SE3]:
-    """A chain of poses with turns of up to 1.5 rad between neighbours."""
-    rng = np.random.default_rng(seed)
-    out = [pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))]
-    for _ in range(count - 1):
-        axis = rng.normal(size=3)
-        turn = pin.exp3(axis / np.linalg.norm(axis) * rng.uniform(0.2, 1.5))
-        out.append(pin.SE3(turn @ out[-1].rotation, out[-1].translation + rng.uniform(-0.3, 0.3, 3)))
-    return out
-
-
 def spline(seed: int) -> SplinePath:
     rng = np.random.default_rng(seed)
-    return SplinePath(np.cumsum(rng.uniform(0.5, 1.5, 5)), poses(5, seed))
+    return SplinePath(np.cumsum(rng.uniform(0.5, 1.5, 5)), random_poses(seed, 5))
 
 
 PATHS: dict[str, TimedPath] = {
@@ -66,7 +56,7 @@ def test_ends_are_at_rest(name: str) -> None:
 
 
 def test_spline_meets_its_waypoints() -> None:
-    chain = poses(6, 3)
+    chain = random_poses(3, 6)
     times = np.array([2.0, 2.5, 3.7, 4.0, 5.5, 6.0])
     path = SplinePath(times, chain)
     assert path.duration == pytest.approx(4.0)
@@ -75,7 +65,7 @@ def test_spline_meets_its_waypoints() -> None:
 
 
 def test_two_poses_give_a_straight_line_and_one_axis() -> None:
-    a, b = poses(2, 4)
+    a, b = random_poses(4, 2)
     path = SplinePath([0.0, 2.0], [a, b])
     axis = pin.log3(b.rotation @ a.rotation.T)
     way = b.translation - a.translation
@@ -124,7 +114,7 @@ def test_circle_is_a_circle() -> None:
 
 
 def test_bad_paths_are_refused() -> None:
-    a, b = poses(2)
+    a, b = random_poses(0, 2)
     with pytest.raises(RangeError, match=r"path.times\[1\].*after 1 s"):
         SplinePath([1.0, 1.0], [a, b])
     with pytest.raises(ShapeError, match="at least two times"):

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import random
 import socket
-import threading
 import time
 from collections.abc import Iterator
 
@@ -15,10 +13,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from tests.viewer import arms
+from tests.viewer import arms, clients
 from tests.viewer.clients import client, heard
 from wbc.errors import WbcError
-from wbc.viewer.link import LoopEnd, ViewerEnd
+from wbc.viewer.link import LoopEnd
 from wbc.viewer.messages import LONGEST, OBEYED, SERVED, read, write
 from wbc.viewer.operation import Operation
 from wbc.viewer.session import Session
@@ -45,15 +43,8 @@ WRONG = (
 @pytest.fixture(scope="module")
 def served() -> Iterator[tuple[Session, LoopEnd]]:
     loop = LoopEnd(arms.state_size())
-    session = Session(arms.shared().clone(), ViewerEnd(os.dup(loop.file), arms.state_size()), silence=5.0)
-    runner = threading.Thread(target=session.run)
-    runner.start()
-    for state in arms.states(2):
-        loop.write(state.data, state.time)
-    yield session, loop
-    session.ended.set()
-    runner.join()
-    loop.close()
+    with clients.served(loop, 2, silence=5.0) as session:
+        yield session, loop
 
 
 def gone(session: Session) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import runpy
-import threading
 import time
 import urllib.error
 import urllib.request
@@ -18,10 +16,10 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from tests.viewer import arms
+from tests.viewer import arms, clients
 from tests.viewer.clients import client, heard
 from wbc.viewer import ViewerError, server
-from wbc.viewer.link import LoopEnd, ViewerEnd
+from wbc.viewer.link import LoopEnd
 from wbc.viewer.messages import read
 from wbc.viewer.session import Session
 
@@ -49,15 +47,8 @@ class Loop:
 @pytest.fixture(scope="module")
 def served() -> Iterator[tuple[Session, Loop]]:
     loop = Loop()
-    session = Session(arms.shared().clone(), ViewerEnd(os.dup(loop.end.file), arms.state_size()))
-    runner = threading.Thread(target=session.run)
-    runner.start()
-    for state in arms.states(3):
-        loop.end.write(state.data, state.time)
-    yield session, loop
-    session.ended.set()
-    runner.join()
-    loop.end.close()
+    with clients.served(loop.end, 3) as session:
+        yield session, loop
 
 
 def send(socket: ClientConnection, **message: Any) -> None:

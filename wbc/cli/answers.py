@@ -24,13 +24,13 @@ def given_targets(texts: Sequence[str], file: Path | None) -> list[Target]:
     Raises:
         WbcError: no target at all, or what :func:`parse_target` and :func:`read_targets` raise.
     """
-    found = [parseas_target(text) for text in texts] + ([] if file is None else read_targets(file))
+    found = [parse_target(text) for text in texts] + ([] if file is None else read_targets(file))
     if not found:
         raise WbcError("target", None, "give at least one with --target or --targets")
     return found
 
 
-def parseas_target(text: str) -> Target:
+def parse_target(text: str) -> Target:
     """A target from X,Y,Z or X,Y,Z,QX,QY,QZ,QW.
 
     Raises:

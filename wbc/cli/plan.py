@@ -35,7 +35,7 @@ class PlanPath(SceneOptions):
         import numpy as np
 
         from wbc import shapes, tasks
-        from wbc.cli.answers import check_output, parseas_target
+        from wbc.cli.answers import check_output, parse_target
         from wbc.cli.console import data, say, tell
         from wbc.cli.reading import numbers
         from wbc.cli.scene import configuration
@@ -54,7 +54,7 @@ class PlanPath(SceneOptions):
             stack.add(tasks.Obstacle(shapes.Box(given[3:]), margin=self.margin, pose=pose), name=f"box{k}")
         if setup.robot.self_pairs:
             stack.add(tasks.SelfCollision(), name="self")
-        targets = [parseas_target(text) for text in self.target]
+        targets = [parse_target(text) for text in self.target]
         if any(not target.oriented for target in targets):
             stack.add(tasks.EndEffector(setup.frame, kind="position"), name="place")
         goals: list[object] = [{"hand": t.pose} if t.oriented else {"place": t.pose.translation} for t in targets]

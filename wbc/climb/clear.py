@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,9 @@ from wbc.climb.joint_values import joint_values
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB
 from wbc.errors import ShapeError
+from wbc.geometry.kernel import segments_from
 from wbc.multibody import pin
-from wbc.shapes import PlacedShape
+from wbc.shapes import PlacedShape, Sphere
 from wbc.shapes.around import distance_to_segment
 from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import frame_index
@@ -32,10 +34,14 @@ AT_FOOTHOLD = len(STAIRS) - 1
 APPROACH = 0.5
 #: How much deeper than its form says a tip may be in what it holds [m]: rounding of descriptions and meshes
 SINK = 2e-3
+#: The same of a contact's point [m]
+POINT_SINK = 2e-4
 #: What is proven may be less by this [m]: a move may begin in a stance that has nothing to spare
 TOLERANCE = 1e-4
 #: Cosine of how far a round tip may be tilted on what it holds, 75 degrees
 TILTED = 0.26
+#: Radius of the ball that stands for a contact's point [m]: small beside what proofs may miss
+POINT = 1e-6
 #: A depth that stands for no requirement [m]
 ANY_DEPTH = 1e3
 
@@ -149,19 +155,19 @@ class Clearances:
             return []
         foothold, out = self.scene.footholds[row], list[Exemption]()
         mount, point = _scene_name(foothold.on), foothold.pose.translation
-        for body, sink in self._tips[limb]:
+        for body, sink, deepest in self._tips[limb]:
             if why_apart(body.shape, self.scene.bodies[foothold.on].shape):
                 continue
             for stair, share in list(enumerate(STAIRS))[since:]:
                 radius = (share * self.clearance + sink) / APPROACH
-                depth = ANY_DEPTH if share else deepest(sink)
+                depth = ANY_DEPTH if share else deepest
                 out.append(
                     Exemption(_stair_name(body.name, stair), mount, point, radius if share else radius + SINK, depth)
                 )
         return out
 
     @cached_property
-    def _tips(self) -> list[list[tuple[SweptBody, float]]]:
+    def _tips(self) -> list[list[SunkTip]]:
         return sunk_tips(self.climber)
 
     @cached_property
@@ -170,10 +176,10 @@ class Clearances:
         pairs = self_pairs(self.climber.robot, self.apart - TOLERANCE)
         none = len(self.scene.bodies), len(self.climber.limbs)
         told = [(none[0], none[1], -1)] * len(pairs)
-        limb_of = {body.name: limb for limb, tips in enumerate(self._tips) for body, _ in tips}
+        limb_of = {body.name: limb for limb, tips in enumerate(self._tips) for body, *_ in tips}
         mounts = {foothold.on for foothold in self.scene.footholds}
         for k, (name, placed) in enumerate(self.scene.bodies.items()):
-            for body in bodies_of(self.climber.robot):
+            for body in climber_bodies(self.climber):
                 if why_apart(body.shape, placed.shape):
                     continue
                 limb = limb_of.get(body.name, none[1])
@@ -189,10 +195,10 @@ class Clearances:
     @cached_property
     def _sweeper(self) -> Sweeper:
         robot = self.climber.robot
-        model, bodies = robot.model, {body.name: body for body in bodies_of(robot)}
+        model, bodies = robot.model, {body.name: body for body in climber_bodies(self.climber)}
         for limb, tips in zip(self.climber.limbs, self._tips, strict=True):
             contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement.translation
-            for body, _ in tips:
+            for body, *_ in tips:
                 grasp = model.frames[frame_index(model, body.link)].placement.actInv(contact)
                 for stair in range(len(STAIRS)):
                     name = _stair_name(body.name, stair)
@@ -213,7 +219,7 @@ class Clearances:
             for j in range(2, model.njoints)
             if model.joints[j].shortname().startswith("JointModelP")
         }
-        for body in bodies_of(robot):
+        for body in climber_bodies(self.climber):
             frame = model.frames[frame_index(model, body.link)]
             way = [
                 float(np.linalg.norm(model.jointPlacements[j].translation)) + slides.get(j, 0.0)
@@ -233,24 +239,60 @@ class Clearances:
         return np.array([b.shape.reach for b in self.scene.bodies.values()])
 
 
-def sunk_tips(climber: Climber) -> list[list[tuple[SweptBody, float]]]:
-    """Of each limb the bodies that its last joint moves, and how far they go beyond the contact's frame [m]."""
+@lru_cache(maxsize=16)
+def climber_bodies(climber: Climber) -> list[SweptBody]:
+    """Shapes of a climber's links, and a ball about each contact's point that lies out of all those which move with it:
+    the links' shapes may end before the point, or there may be none.
+    """
+    model, bodies = climber.robot.model, bodies_of(climber.robot)
+    points = list[SweptBody]()
+    for limb, chain in zip(climber.limbs, climber.chains, strict=True):
+        frame = model.frames[frame_index(model, limb.frame)]
+        point = frame.placement * limb.placement.translation
+        off = np.inf
+        for body in bodies:
+            on = model.frames[frame_index(model, body.link)]
+            if on.parentJoint == chain[-1]:
+                inside = (on.placement * (body.placement or pin.SE3.Identity())).actInv(point)
+                off = min(off, float(segments_from(body.shape, inside, inside)))
+        if off > SINK:
+            points.append(SweptBody(f"contact of {limb.name}", Sphere(POINT), limb.frame, limb.placement))
+    return bodies + points
+
+
+class SunkTip(NamedTuple):
+    """A body that a limb's last joint moves.
+
+    Attributes:
+        body: it. sink: how far it goes beyond the contact's frame [m]. deepest: how deep it may be in what the limb
+            holds, on its way [m].
+    """
+
+    body: SweptBody
+    sink: float
+    deepest: float
+
+
+def sunk_tips(climber: Climber) -> list[list[SunkTip]]:
+    """Of each limb the bodies that its last joint moves."""
     model, out = climber.robot.model, []
     for limb, chain in zip(climber.limbs, climber.chains, strict=True):
         tips = []
         contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement
-        for body in bodies_of(climber.robot):
+        for body in climber_bodies(climber):
             on = model.frames[frame_index(model, body.link)]
             if on.parentJoint == chain[-1]:
                 placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
-                tips.append((body, _beyond(placed, contact, limb.contact.fixed == "position")))
+                sink = _beyond(placed, contact, limb.contact.fixed == "position")
+                tips.append(SunkTip(body, sink, sink + (SINK if body.shape.reach > POINT else POINT_SINK)))
         out.append(tips)
     return out
 
 
-def deepest(sink: float) -> float:
-    """How deep a tip may be in what its limb holds [m], of how far it goes beyond the contact's frame [m]."""
-    return sink + SINK
+@lru_cache(maxsize=16)
+def stray_of(climber: Climber) -> float:
+    """How far contacts may be off their curves near footholds [m]: half of how deep any tip may sink in there."""
+    return min((tip.deepest - tip.sink for tips in sunk_tips(climber) for tip in tips), default=SINK) / 2.0
 
 
 def _scene_name(body: str) -> str:

@@ -81,14 +81,20 @@ class Closure:
             _at(state), _at(left),
         )  # fmt: skip
         if steps:
-            values = joint_values(self.climber.robot, q)
-            values[:, self._rows] = state[:, 12:]
-            q[:] = self._with_values(q, values)
-            if body:
-                root = self.climber.robot.model.jointPlacements[1]
-                for row, at in zip(q, state, strict=True):
-                    row[:7] = pin.SE3ToXYZQUAT(root.actInv(pin.SE3(at[:9].reshape(3, 3), at[9:12])))
+            self.with_states(q, state, bool(body))
         return left
+
+    def with_states(self, q: Array, states: Array, body: bool = True) -> None:
+        """Gives configurations ``(n, nq)`` the angles of states of :func:`climb_states`, and their bodies or not, in
+        place.
+        """
+        values = joint_values(self.climber.robot, q)
+        values[:, self._rows] = states[:, 12:]
+        q[:] = self._with_values(q, values)
+        if body:
+            root = self.climber.robot.model.jointPlacements[1]
+            for row, at in zip(q, states, strict=True):
+                row[:7] = pin.SE3ToXYZQUAT(root.actInv(pin.SE3(at[:9].reshape(3, 3), at[9:12])))
 
     def followed(self, limb: int, q: Array, poses: Array, turned: bool = True) -> int:
         """Brings a limb's contact to poses in the world ``(n, 12)``, in some configurations ``(n, nq)`` and in place,

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wbc.clearance import bodies_of
-from wbc.climb.clear import Clearances
+from wbc.climb.clear import Clearances, climber_bodies
 from wbc.climb.climber import Climber
 from wbc.climb.motion import MotionOptions, MoveError, carry_out
 from wbc.climb.plan import ContactPlan
@@ -105,8 +104,8 @@ def _links(climber: Climber, limb: int) -> set[str]:
     """Names of the links that a limb's last joint moves, and of their pieces."""
     model = climber.robot.model
     last = climber.chains[limb][-1]
-    on = {link for link in climber.robot.shapes if int(model.frames[model.getFrameId(link)].parentJoint) == last}
-    return on | {body.name for body in bodies_of(climber.robot) if body.link in on}
+    on = [body for body in climber_bodies(climber) if model.frames[model.getFrameId(body.link)].parentJoint == last]
+    return {body.link for body in on} | {body.name for body in on}
 
 
 def _frame(climber: Climber, scene: ClimbScene, start: Stance, limb: int) -> pin.SE3:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -18,32 +18,27 @@ from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import TOLERANCE, Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
+from wbc.climb.elastic_band import ElasticBand
 from wbc.climb.joint_values import beyond_limits
-from wbc.climb.move_path import BodyWay, HeldError, MovePath, SwingShape, held_way, move_path
+from wbc.climb.move_path import MovePath, SwingShape, band_path, move_path
 from wbc.climb.path_loads import LEAST, PathLoads
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.climb.watch import PlanWatch
-from wbc.climb.world import LEFT_OUT, ClimbWorld, CloseLinks
+from wbc.climb.world import ClimbWorld, CloseLinks
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.validation import Array
 
 #: How far contacts of a stance may be from their footholds [m]
 AT = 1e-4
-#: Heights to which limbs are lifted, one after the other, as multiples of the asked one
-HIGHER = (1.0, 2.0, 0.5, 4.0)
-#: Shares of a lift that lean towards the limb's resting place: straight, and where joints are near their limits
-LEANS = (0.0, 0.8)
-#: Parts of a path in which the body moves: while limbs are lifted, at first, at last
-WINDOWS = ((0.2, 0.8), (0.1, 0.5), (0.5, 0.9))
-#: How often a body goes further off its straight way past what is in it, at most
-BOWS = 4
-#: How much further than it has to it goes each time [lifts]
-AWAY = 0.1
-#: How far off it goes at most [lifts]
-MOST_BOW = 6.0
+#: Lifts on curves, one after the other: height as a multiple of the asked one, lean of :class:`SwingShape` [1]
+CURVES = ((1.0, 0.0), (1.0, 0.8), (2.0, 0.8))
+#: Heights to which limbs are lifted along bands, one after the other, as multiples of the asked one
+HEIGHTS = (1.0, 2.0, 0.5)
+#: How much further than it has to a band goes round links that touch, one after the other
+ASIDES = (1.0, 2.0)
 #: Instants of a move at which equilibrium is looked at where nothing weighs, and motors where something does
 INSTANTS = 12
 #: Of the margin asked for, the share that is kept where all limbs hold and the body shifts [1]
@@ -120,7 +115,7 @@ class MotionOptions:
         clearance: distance that links keep from bodies [m].
         apart: distance that links keep from each other [m]; a loop that follows the motion is some tenths of a mm off.
         lift: how far contacts are lifted off what they leave and land on [m]; 0: a sixteenth of the shortest limb.
-        tries: random postures through which limbs go where nothing simpler is clear, at most.
+        tries: random postures through which bands begin where nothing simpler is clear, at most.
         seed: of those.
         margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight; half of
             it where the body shifts and no limb lifts.
@@ -136,7 +131,7 @@ class MotionOptions:
     clearance: float = 0.01
     apart: float = 0.001
     lift: float = 0.0
-    tries: int = 20
+    tries: int = 2
     seed: int = 0
     margin: float = 0.0
     inertia: float = 0.5
@@ -197,9 +192,9 @@ class Mover:
     def moved(self, one: Stance, other: Stance, row: int = 0) -> tuple[TimedMove, float | None]:
         """The motion from a stance to the next one, from rest to rest, and its least margin of equilibrium.
 
-        Limbs in both stances at the same foothold hold it; others go on curves along the normals, with their turns
-        where that is possible, higher where that is not clear, evenly in their joints, or at last through random
-        postures. A motion that was found is kept.
+        Limbs in both stances at the same foothold hold it; the body goes straight and others on curves along the
+        normals, or all by elastic bands, of other lifts, further off what they touch, at last from random postures. A
+        motion that was found is kept.
 
         Args:
             row: of the stance in its path, for errors.
@@ -217,103 +212,68 @@ class Mover:
             if stance not in self.checked:
                 self._check(stance, which, row)
                 self.checked.add(stance)
-        refusals, known, unborne = list[tuple[float, float, MoveError]](), dict[BodyWay, Array | HeldError](), False
-        bow, stuck = self._bow(one, other, row, known)
+        refusals = list[tuple[float, float, MoveError]]()
         look = None if self.closure.short else functools.partial(self._look, one, other)
-        shapes, leans = self._shapes(one, other, bow), 0
-        while (shape := next(shapes, None)) is not None:
-            if refusals and self.watch.passed:
-                break
-            # Where the contacts do not bear the robot another swing changes nothing, another way of the body may
-            if unborne and shape.bow == bow:
-                continue
+        for shape in self._shapes(one, other, row, refusals):
             try:
-                path, stuck = self._path(one, other, replace(shape, yields=stuck), known, look)
+                path = move_path(self.closure, one, other, shape, self._normals, look=look)
             except _TouchError as error:
                 refusals.append((1.0, -float(error.value), _touched(error, row)))
                 continue
             except InfeasibleError as error:
-                stuck = stuck or isinstance(error, HeldError)
                 refusals.append((0.0, 0.0, _passed_on(row, error)))
                 continue
             refusal, margin, loads = self._refused(path, one, other, row)
             if refusal is None:
                 return self.timing.timed(path, loads), margin
-            if margin is not None:
-                unborne = True
-                refusals.append((2.0, margin, refusal))
-                further = self._leant(shape, loads, self._needed(one, other)) if leans < BOWS else None
-                if further is not None:
-                    bow, shapes = further, self._shapes(one, other, further)
-                    unborne, leans = False, leans + 1
-            elif refusal.nearest is not None:
-                refusals.append((1.0, refusal.nearest.distance - refusal.nearest.required, refusal))
+            near = refusal.nearest
+            refusals.append(
+                (2.0, margin or 0.0, refusal) if near is None else (1.0, near.distance - near.required, refusal)
+            )
         # The way that came nearest to be one: what lacks equilibrium, then what lacks clearance, then what is none
         raise max(refusals, key=lambda entry: entry[:2])[2]
 
-    def _bow(
-        self, one: Stance, other: Stance, row: int, known: dict[BodyWay, Array | HeldError]
-    ) -> tuple[tuple[float, float, float], bool]:
-        """How far the body goes off its straight way so that it and limbs that hold are clear, whatever others do, and
-        whether it has to yield to limbs that hold.
-        """
-        if self.closure.short:
-            return (0.0, 0.0, 0.0), False
-        rise, stuck, refusals = self._rise(one, other), False, list[MoveError]()
-        for begin in (0.0 * rise, rise, -rise):
-            bow, count = begin, 0
-            while count <= BOWS and np.linalg.norm(bow) <= MOST_BOW * self.lift:
-                try:
-                    q = held_way(self.closure, one, other, SwingShape(self.lift, bow=_three(bow), yields=stuck), known)
-                except HeldError as error:
-                    refusals.append(_passed_on(row, error))
-                    if stuck:
-                        break
-                    stuck = True
-                    continue
-                touch = self._touch(one, other, q, left_out=True)
-                if touch is None:
-                    return _three(bow), stuck
-                s, count = touch.row / (len(q) - 1.0), count + 1
-                refusals.append(_touched(_touch_error(touch, s), row))
-                if touch.away is None or not 0.0 < s < 1.0:
-                    break
-                bow = bow + (touch.lacks + AWAY * self.lift) / SwingShape(0.0).bowed(np.array([s]))[0] * touch.away
-        raise refusals[0]
-
-    def _leant(self, shape: SwingShape, loads: PathLoads | None, needed: float) -> tuple[float, float, float] | None:
-        """The bow of a way of the body on which contacts come nearer to bear the robot; None: there is none."""
-        if self.closure.short or loads is None:
-            return None
-        s, shift = loads.shift(needed)
-        far, part = float(np.linalg.norm(shift)), float(shape.bowed(np.array([s]))[0])
-        if far == 0.0 or part == 0.0 or loads.at_rest.min() >= needed:
-            return None
-        bow = np.array(shape.bow) + (1.0 + AWAY * self.lift / far) * shift / part
-        return _three(bow) if np.linalg.norm(bow) <= MOST_BOW * self.lift else None
+    def _shapes(
+        self, one: Stance, other: Stance, row: int, refusals: list[tuple[float, float, MoveError]]
+    ) -> Iterator[SwingShape]:
+        """Straight, then along elastic bands while the time lasts; those that contacts cannot follow are refused."""
+        for height, lean in CURVES:
+            yield SwingShape(height * self.lift, lean)
+            if not self.closure.short:
+                yield SwingShape(height * self.lift, lean, yields=True)
+        weighs = bool(np.any(self.scene.gravity))
+        balance = self.balance.world if weighs and isinstance(self.balance, Equilibrium) else None
+        band = ElasticBand(self._world, balance, self._needed(one, other))
+        swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
+        begins = [(SwingShape(f * self.lift), aside) for f in (HEIGHTS if swings else HEIGHTS[:1]) for aside in ASIDES]
+        begins += [(SwingShape(self.lift, evenly=True), aside) for aside in ASIDES if swings]
+        rng = np.random.default_rng(self.options.seed)
+        for _ in range(self.options.tries if swings else 0):
+            via = {
+                k: rng.uniform(*self._range(k)) for k in (range(len(one.contacts)) if self.closure.short else swings)
+            }
+            begins.append((SwingShape(self.lift, evenly=True, via=via), ASIDES[0]))
+        for shape, aside in begins:
+            if self.watch.passed:
+                return
+            try:
+                guide = band_path(self.closure, one, other, shape, self._normals, replace(band, aside=aside))
+            except InfeasibleError as error:
+                refusals.append((0.0, 0.0, _passed_on(row, error)))
+            else:
+                yield replace(shape, guide=guide)
 
     def _needed(self, one: Stance, other: Stance) -> float:
         """Slack at rest that contacts keep from stance to stance, where something weighs [weights]."""
         # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
         return max(LEAST, (SHIFTED if one.contacts == other.contacts else 1.0) * self.options.margin)
 
-    def _rise(self, one: Stance, other: Stance) -> Array:
-        """A lift along the mean normal of what is held ``(3)`` [m]."""
-        held = [self.scene.normals[a] for a, b in zip(one.contacts, other.contacts, strict=True) if a == b != FREE_LIMB]
-        up = np.sum(held, axis=0) if held else np.zeros(3)
-        return np.asarray(self.lift * up / max(float(np.linalg.norm(up)), 1e-9))
-
-    def _touch(self, one: Stance, other: Stance, q: Array, left_out: bool = False) -> CloseLinks | None:
-        """The first of configurations in which links are nearer than they may be on any way through these, limbs in
-        the air left out or not; None: in none.
+    def _touch(self, one: Stance, other: Stance, q: Array) -> CloseLinks | None:
+        """The first of configurations in which links are nearer than they may be on any way through these; None: in
+        none.
         """
-        places = [
-            [int(np.searchsorted(self._world.hold, at)) if at != FREE_LIMB else at for at in stance.contacts]
-            for stance in (one, other)
-        ]
-        if left_out:
-            places = [[a if a == b else LEFT_OUT for a, b in zip(*places, strict=True)]] * 2
-        contacts = np.repeat(np.array(places, dtype=np.int32), [len(q) // 2, len(q) - len(q) // 2], axis=0)
+        places = [self._world.places_of(stance.contacts) for stance in (one, other)]
+        contacts = np.repeat(places, [len(q) // 2, len(q) - len(q) // 2], axis=0)
         return self._world.first_touch(contacts, self._world.states_of(q))
 
     def _look(self, one: Stance, other: Stance, s: Array, q: Array) -> None:
@@ -328,20 +288,6 @@ class Mover:
         return ClimbWorld(
             self.climber, self.scene, clear=given.clearance, apart=given.apart, margin=0.0, spare=-TOLERANCE
         )
-
-    def _path(
-        self, one: Stance, other: Stance, shape: SwingShape, known: dict[BodyWay, Array | HeldError],
-        look: Callable[[Array, Array], None] | None,
-    ) -> tuple[MovePath, bool]:  # fmt: skip
-        """A path, and whether limbs that hold cannot follow the body's straight way: then it yields to them."""
-        try:
-            return move_path(self.closure, one, other, shape, self._normals, known=known, look=look), shape.yields
-        except HeldError:
-            if shape.yields or self.closure.short:
-                raise
-        return move_path(
-            self.closure, one, other, replace(shape, yields=True), self._normals, known=known, look=look
-        ), True
 
     @property
     def _normals(self) -> dict[int, Array]:
@@ -411,39 +357,6 @@ class Mover:
                 return self.balance.margin(held, path.q[k], motors=True, effort=effort), 100.0 * float(path.s[k])
         return None
 
-    def _shapes(self, one: Stance, other: Stance, bow: tuple[float, float, float]) -> Iterator[SwingShape]:
-        """From the simplest on."""
-        base = SwingShape(self.lift, bow=bow)
-        swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
-        # A body that limbs with few joints take along seldom goes straight
-        short = bool(self.closure.short)
-        yield base
-        if swings:
-            if short:
-                yield from self._in_joints(base)
-            for lean in LEANS:
-                yield from (replace(base, height=f * self.lift, lean=lean) for f in HIGHER if (f, lean) != (1.0, 0.0))
-            for window in WINDOWS:
-                for lean in LEANS:
-                    yield from (replace(base, height=f * self.lift, window=window, lean=lean) for f in HIGHER[:3])
-            if not short:
-                yield from self._in_joints(base)
-        for rise in (self._rise(one, other), -self._rise(one, other)):
-            yield replace(base, bow=_three(bow + rise))
-        if swings:
-            rng = np.random.default_rng(self.options.seed)
-            limbs = range(len(self.climber.limbs)) if short else swings
-            for k in range(self.options.tries):
-                via = {limb: rng.uniform(*self._range(limb)) for limb in limbs}
-                yield replace(base, height=HIGHER[k % 3] * self.lift, lean=LEANS[k % 2], joints=True, via=via)
-
-    def _in_joints(self, base: SwingShape) -> Iterator[SwingShape]:
-        """Evenly in the joints between lifted postures."""
-        for height in HIGHER[:3]:
-            for tuck in (0.0, 0.5, 1.0):
-                shape = replace(base, height=height * self.lift, joints=True, tucked=tuck, window=WINDOWS[0])
-                yield replace(shape, lean=LEANS[1])
-
     def _range(self, limb: int) -> tuple[Array, Array]:
         """Of random angles: limits, or half a turn about those at rest."""
         rest = self.climber.angles(self.climber.rest, limb)
@@ -512,11 +425,6 @@ def _checked(climber: Climber, scene: ClimbScene, stances: StancePath) -> list[S
             if not FREE_LIMB <= row < len(scene.footholds):
                 raise RangeError(f"stances[{k}].contacts", row, f"expected rows from 0 to {len(scene.footholds) - 1}")
     return [Stance(tuple(s.contacts), climber.robot.configuration(f"stances[{k}].q", s.q)) for k, s in enumerate(path)]
-
-
-def _three(vector: Array) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
 
 
 def _told(nearest: Nearest) -> str:

@@ -9,9 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
+from wbc.climb.clear import stray_of
 from wbc.climb.closure import CLOSED, FREE_BODY, HEAVY_BODY, LIGHT_BODY, Closure
+from wbc.climb.elastic_band import BandRows, ElasticBand
 from wbc.climb.joint_values import beyond_limits, joint_values, with_joint_values
 from wbc.climb.stance import FREE_LIMB, Stance
+from wbc.climb.world import held_pose
 from wbc.errors import InfeasibleError
 from wbc.multibody import pin
 from wbc.rotations import exponential, matrices
@@ -22,25 +25,17 @@ from wbc.validation import Array
 LIFTING = 0.2
 #: Share of a path in which a limb keeps its turn as it lifts, and as it lands, where it cannot keep it all the way
 ALIGNED = 0.1
+#: Share of a path along a guide in which a limb that lifts or lands is on its curve: then it goes over to the guide
+ON_CURVE = 0.15
 #: Intervals of a path at first: they are doubled until contacts hold between them
 FEWEST = 20
 #: Intervals of a path at most
 MOST = 160
 #: Largest error of a held contact between samples [m, rad]
 HELD = 2e-5
-#: How far limbs that lift or land may be from their curves between samples [m]: less than tips may sink in
-STRAYED = 1e-3
 #: Largest change of a joint from sample to sample beyond what it is asked to make, as a share of 1 rad in the coarsest
 #: path: more is a jump
 JUMP = 0.6
-
-
-class HeldError(InfeasibleError):
-    """Contacts that hold cannot stay where they are on the way of the body."""
-
-
-#: Samples, window, bow and whether the body yields
-BodyWay = tuple[int, tuple[float, float], tuple[float, float, float], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,36 +45,20 @@ class SwingShape:
     Attributes:
         height: how far the contact is lifted along the normal that it leaves, and along the one that it lands on [m].
         lean: how much of that goes towards where the limb's contact is at rest, at most this share of the height [1].
-        joints: the limb goes from lifted to lifted posture evenly in its joints; else its contact goes on a curve,
-            where its turn is free between lift and land if it cannot be kept.
-        tucked: share of the way to its resting angles that it bends in the middle; of paths in the joints.
-        window: from where to where on the path the body moves [1].
-        via: limb -> angles through which it goes in the middle; of paths in the joints.
-        yields: the body yields to the limbs that hold, which go as evenly in their joints as they can.
-        bow: how far the body goes off the straight line in the middle, in the world ``(3)`` [m].
+        yields: the body yields to limbs that hold, which go as evenly in their joints as they can; of paths without a
+            guide, on which limbs in the air turn freely between lift and land where they cannot keep their turn.
+        evenly: bands begin evenly in the joints; else limbs in the air are on their curves at first.
+        via: limb -> angles through which it goes in the middle at first, of bands that begin evenly.
+        guide: a path that body and limbs follow, but for what contacts need; None: the body goes straight and evenly,
+            contacts in the air on their curves.
     """
 
     height: float
     lean: float = 0.0
-    joints: bool = False
-    tucked: float = 0.0
-    window: tuple[float, float] = (0.0, 1.0)
-    via: Mapping[int, Array] = field(default_factory=dict)
     yields: bool = False
-    bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def body(self, s: Array) -> Array:
-        """How far the body is on its way at parts of the path [1]."""
-        low, high = self.window
-        if (low, high) == (0.0, 1.0):
-            return s
-        x = np.clip((s - low) / (high - low), 0.0, 1.0)
-        return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
-
-    def bowed(self, s: Array) -> Array:
-        """Share of the bow by which the body is off the straight line at parts of the path [1]."""
-        b = self.body(s)
-        return np.asarray(16.0 * (b * (1.0 - b)) ** 2)
+    evenly: bool = False
+    via: Mapping[int, Array] = field(default_factory=dict)
+    guide: MovePath | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,13 +135,12 @@ class MovePath:
 
 def move_path(
     closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array],
-    *, known: dict[BodyWay, Array | HeldError] | None = None, look: Callable[[Array, Array], None] | None = None,
+    *, look: Callable[[Array, Array], None] | None = None,
 ) -> MovePath:  # fmt: skip
     """The path from a stance to the next one: contacts that both have stay closed.
 
     Args:
         normals: row of a foothold -> outward normal in the world ``(3)``, of footholds that are left or landed on.
-        known: what limbs that hold did on ways of the body between these stances; what they do is added.
         look: is called with s and q of the coarsest samples, and raises where there is no need for finer ones.
 
     Raises:
@@ -170,101 +148,145 @@ def move_path(
     """
     count = FEWEST
     while True:
-        moving = _Moving(closure, one, other, shape, normals, {} if known is None else known)
+        moving = _Moving(closure, one, other, shape, normals)
         path = moving.path(count)
         if look is not None and count == FEWEST:
             look(path.s, path.q)
-        if path.error < HELD and moving.strayed(path) < STRAYED:
+        if path.error < HELD and moving.strayed(path) < stray_of(closure.climber):
             return path
         count *= 2
         if count > MOST:
             if path.error < HELD:
                 raise InfeasibleError("limbs in the air", path.error, f"stray from their curves between {MOST} samples")
             reason = f"leave their places by {path.error:.2g} m or rad between {MOST} samples"
-            raise HeldError("held contacts", path.error, reason)
+            raise InfeasibleError("held contacts", path.error, reason)
 
 
-def held_way(
-    closure: Closure, one: Stance, other: Stance, shape: SwingShape, known: dict[BodyWay, Array | HeldError]
-) -> Array:
-    """Configurations on the way of the body ``(samples, nq)``, in which limbs that hold do; others go evenly.
+def band_path(
+    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array], band: ElasticBand
+) -> MovePath:
+    """A path through the samples of an elastic band from a stance to the next one.
 
     Raises:
-        HeldError: limbs that hold cannot follow.
+        InfeasibleError: contacts cannot be where they have to.
     """
-    return _Moving(closure, one, other, shape, {}, known).held_way(np.linspace(0.0, 1.0, FEWEST + 1))
+    moving, s = _Moving(closure, one, other, shape, normals), np.linspace(0.0, 1.0, FEWEST + 1).round(9)
+    q, ends = moving.evenly(s), (s < LIFTING + 1e-9) | (s > 1.0 - LIFTING - 1e-9)
+    curves = moving.curves(s)
+    poses = np.tile([place(pose) for pose in moving.poses[0]], (len(s), 1, 1))
+    closed = np.zeros(poses.shape[:2], dtype=bool)
+    for limb in moving.held:
+        poses[:, limb] = place(held_pose(closure.climber, band.world.scene, limb, one.contacts[limb], one.q))
+        closed[:, limb] = True
+    at_first = closed.copy()
+    for limb, curve in curves.items():
+        poses[:, limb], closed[:, limb], at_first[:, limb] = curve, ends, ends if shape.evenly else True
+    if shape.evenly:
+        # The body goes where limbs that hold take it
+        closure.bring(q, moving._places(s), FREE_BODY)
+    contacts = [band.world.places_of(stance.contacts) for stance in (one, other)]
+    near = np.repeat(contacts, [len(s) // 2, len(s) - len(s) // 2], axis=0)
+    bears = np.where(contacts[0] == contacts[1], contacts[0], FREE_LIMB).astype(np.int32)
+    closure.with_states(q, band.relaxed(band.world.states_of(q), BandRows(near, poses, closed, at_first, bears)))
+    moving.close_ends(s, q)
+    q[0], q[-1] = one.q, other.q
+    # Contacts go on their curves up to where these end: a spline through few samples would have a kink there
+    fine = np.linspace(0.0, 1.0, 4 * FEWEST + 1)
+    fine = np.union1d(s, fine[(fine < LIFTING + 1e-9) | (fine > 1.0 - LIFTING - 1e-9)].round(9))
+    path = MovePath(closure, moving.held, s, q)
+    q = path.configurations(path.at(fine))
+    moving.close_ends(fine, q)
+    q[0], q[-1] = one.q, other.q
+    return MovePath(closure, moving.held, fine, q)
 
 
 class _Moving:
     """What goes where on the way from one stance to the next."""
 
     def __init__(
-        self, closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array],
-        known: dict[BodyWay, Array | HeldError],
+        self, closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
     ) -> None:  # fmt: skip
-        self.closure, self.one, self.other, self.shape, self.known = closure, one, other, shape, known
+        self.closure, self.one, self.other, self.shape = closure, one, other, shape
         self.climber = closure.climber
         self.poses = closure.poses(one.q), closure.poses(other.q)
         pairs = list(zip(one.contacts, other.contacts, strict=True))
         self.held = {k: self.poses[0][k] for k, (a, b) in enumerate(pairs) if a == b != FREE_LIMB}
         self.swings = [k for k, (a, b) in enumerate(pairs) if a != b]
-        #: Steps of joints that limbs in the air are asked to make, from sample to sample [m, rad]
+        #: Steps of joints that a guide makes, or that are asked of limbs in the air, from sample to sample [m, rad]
         self.even: Array | float = 0.0
         self.lifts = {
-            k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k]))
-            for k in self.swings
-            if normals
+            k: tuple(self._lift(k, end, row, normals) for end, row in enumerate(pairs[k])) for k in self.swings
         }
 
     def _lift(self, limb: int, end: int, row: int, normals: Mapping[int, Array]) -> Array:
         """From a contact of the first or second stance to where it is lifted [m]."""
         if row == FREE_LIMB:
             return np.zeros(3)
-        normal, height = normals[row], self.shape.height
-        if self.shape.lean == 0.0:
-            return np.asarray(height * normal)
-        stance = (self.one, self.other)[end]
-        rest = self.climber.contact_pose(self.climber.rest, limb)
-        there = self.climber.body_pose(stance.q) * self.climber.body_pose(self.climber.rest).actInv(rest)
-        away = there.translation - self.poses[end][limb].translation
-        away -= (away @ normal) * normal
-        far = max(float(np.linalg.norm(away)), 1e-9)
-        return np.asarray(height * normal + self.shape.lean * min(height, far) * away / far)
+        out = self.shape.height * normals[row]
+        if self.shape.lean > 0.0:
+            climber, stance = self.climber, (self.one, self.other)[end]
+            rest = climber.body_pose(climber.rest).actInv(climber.contact_pose(climber.rest, limb))
+            away = (climber.body_pose(stance.q) * rest).translation - self.poses[end][limb].translation
+            away -= (away @ normals[row]) * normals[row]
+            out += self.shape.lean * away * min(1.0, self.shape.height / max(float(np.linalg.norm(away)), 1e-9))
+        return np.asarray(out)
 
     def path(self, count: int) -> MovePath:
         s = np.linspace(0.0, 1.0, count + 1)
-        curves = {limb: self._curve(limb, s) for limb in self.swings}
-        if self.closure.short.intersection([*self.held, *curves]):
-            # The body goes where limbs that hold with more rows than they have joints take it
-            q, held = self._between(s), self._places(s)
-            if self.shape.joints:
-                self._by_joints(s, q, curves, LIFTING, held)
-            else:
-                self._close(s, q, held | curves, HEAVY_BODY)
+        if self.shape.guide is not None:
+            q = self.shape.guide.configurations(self.shape.guide.at(s))
+            self.even = self._steps(q)
+            self.close_ends(s, q)
         else:
-            q = self.held_way(s)
-            if self.shape.joints:
-                self._by_joints(s, q, curves, LIFTING)
+            q, curves = self.evenly(s), self.curves(s)
+            if self.closure.short.intersection([*self.held, *curves]):
+                # The body goes where limbs that hold with more rows than they have joints take it
+                self._close(s, q, self._places(s) | curves, HEAVY_BODY)
             else:
+                self._close(s, q, self._places(s), LIGHT_BODY if self.shape.yields else HEAVY_BODY)
                 self._by_curves(s, q, curves)
         q[0], q[-1] = self.one.q, self.other.q
         self._check(q, count)
         return MovePath(self.closure, self.held, s, q)
 
-    def held_way(self, s: Array) -> Array:
-        """Body and limbs that hold, which another swing does not change."""
-        shape = self.shape
-        key = len(s), shape.window, shape.bow, shape.yields
-        if key not in self.known:
-            try:
-                self.known[key] = q = self._between(s)
-                self._close(s, q, self._places(s), LIGHT_BODY if shape.yields else HEAVY_BODY)
-            except HeldError as error:
-                self.known[key] = error
-        known = self.known[key]
-        if isinstance(known, HeldError):
-            raise known
-        return known.copy()
+    def _by_curves(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
+        """Limbs in the air go on their curves. Where they cannot with their turns, as from branch to branch or past a
+        singular wrist, these are free in between: joints go evenly but for what positions on the curves need.
+        """
+        kept = q.copy()
+        try:
+            self._close(s, q, curves, 0.0)
+            self._check(q, len(s) - 1)
+        except InfeasibleError:
+            if all(self.climber.fixed(limb) == "position" for limb in curves):
+                raise
+            q[:] = kept
+            up, down = (int(k) for k in np.flatnonzero((s > ALIGNED - 1e-9) & (s < 1.0 - ALIGNED + 1e-9))[[0, -1]])
+            for part in (slice(up + 1), slice(down, None)):
+                self._close(s[part], q[part], {limb: poses[part] for limb, poses in curves.items()}, 0.0)
+            between, x = slice(up + 1, down), np.linspace(0.0, 1.0, down - up + 1)[:, None]
+            for limb in curves:
+                first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
+                slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
+                self.closure.put(limb, q[up : down + 1], _cubic(x, first[1], last[0], *slopes))
+            self.even = self._steps(q)
+            self.even[:up], self.even[down:] = 0.0, 0.0
+            for limb in self.held:
+                self.even[:, self.climber.joints(limb) - 6] = 0.0
+            at = {limb: poses[between] for limb, poses in curves.items()}
+            self._close(s[between], q[between], at, 0.0, turned=False)
+
+    def close_ends(self, s: Array, q: Array) -> None:
+        """Brings contacts that hold, and those that lift or land, to where they have to be, in place."""
+        up, down = s < ON_CURVE + 1e-9, s > 1.0 - ON_CURVE - 1e-9
+        for part, curves in ((up, self.curves(s[up])), (~(up | down), {}), (down, self.curves(s[down]))):
+            some = q[part]
+            self._close(s[part], some, curves | self._places(s[part]), LIGHT_BODY)
+            q[part] = some
+
+    def curves(self, s: Array) -> dict[int, Array]:
+        """Of each limb in the air the poses of its contact ``(n, 12)``."""
+        return {limb: self._curve(limb, s) for limb in self.swings}
 
     def _places(self, s: Array) -> dict[int, Array]:
         return {limb: np.tile(place(pose), (len(s), 1)) for limb, pose in self.held.items()}
@@ -272,21 +294,24 @@ class _Moving:
     def strayed(self, path: MovePath) -> float:
         """How far limbs that lift or land are from their curves half-way between samples [m]."""
         middle = (path.s[1:] + path.s[:-1]) / 2
-        chosen = middle[(middle < LIFTING) | (middle > 1.0 - LIFTING)] if self.swings else middle[:0]
-        curves = {limb: self._curve(limb, chosen) for limb in self.swings}
-        left = self.closure.bring(path.configurations(path.at(chosen)), curves, turned=False, steps=0)
+        share = LIFTING if self.shape.guide is None else ON_CURVE
+        chosen = middle[(middle < share) | (middle > 1.0 - share)] if self.swings else middle[:0]
+        left = self.closure.bring(path.configurations(path.at(chosen)), self.curves(chosen), turned=False, steps=0)
         return float(left.max(initial=0.0))
 
-    def _between(self, s: Array) -> Array:
-        """Body on the straight line, joints evenly."""
+    def evenly(self, s: Array) -> Array:
+        """Body on the straight line, joints evenly, or through given angles."""
         robot, ends = self.climber.robot, (self.one.q, self.other.q)
         first, last = (self.climber.body_pose(q) for q in ends)
-        turn, b = pin.log3(first.rotation.T @ last.rotation), self.shape.body(s)[:, None]
-        joints = joint_values(robot, ends[0][None]) + s[:, None] * pin.difference(robot.model, *ends)[6:]
+        turn, part = pin.log3(first.rotation.T @ last.rotation), s[:, None]
+        steps = pin.difference(robot.model, *ends)[6:]
+        joints = joint_values(robot, ends[0][None]) + part * steps
+        for limb, angles in self.shape.via.items():
+            rows = self.climber.joints(limb) - 6
+            joints[:, rows] += 16.0 * (part * (1.0 - part)) ** 2 * (angles - joints[0, rows] - 0.5 * steps[rows])
         out = with_joint_values(robot, np.tile(ends[0], (len(s), 1)), joints)
-        bow = self.shape.bowed(s)[:, None] * np.array(self.shape.bow)
-        positions = (1.0 - b) * first.translation + b * last.translation + bow
-        for q, rotation, position in zip(out, first.rotation @ exponential(b * turn), positions, strict=True):
+        positions = (1.0 - part) * first.translation + part * last.translation
+        for q, rotation, position in zip(out, first.rotation @ exponential(part * turn), positions, strict=True):
             q[:] = self.climber.with_body(q, pin.SE3(rotation, position))
         return out
 
@@ -305,74 +330,24 @@ class _Moving:
         out[:, :9] = (start.rotation @ exponential(turn)).reshape(-1, 9)
         return out
 
-    def _by_curves(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
-        """Limbs in the air go on their curves. Where they cannot with their turns, as from branch to branch or past a
-        singular wrist, these are free in between: joints go evenly but for what positions on the curves need.
-        """
-        kept = q.copy()
-        try:
-            self._close(s, q, curves, 0.0)
-            self._check(q, len(s) - 1)
-        except InfeasibleError as error:
-            if isinstance(error, HeldError) or all(self.climber.fixed(limb) == "position" for limb in curves):
-                raise
-            q[:] = kept
-            between = self._by_joints(s, q, curves, ALIGNED)
-            self._close(s[between], q[between], {k: curve[between] for k, curve in curves.items()}, 0.0, turned=False)
-
-    def _by_joints(
-        self, s: Array, q: Array, curves: Mapping[int, Array], share: float, held: Mapping[int, Array] | None = None
-    ) -> slice:
-        """Limbs in the air lift and land on their curves over a share of the path, and in between, which is returned,
-        go evenly in their joints. Where limbs that hold are given, these do so too, and the body goes along.
-        """
-        up, down = (int(k) for k in np.flatnonzero((s > share - 1e-9) & (s < 1.0 - share + 1e-9))[[0, -1]])
-        held, even = held or {}, [*self.swings, *(held or {})]
-        wanted, between = {**held, **curves}, slice(up + 1, down)
-        for part in (slice(up + 1), slice(down, None)):
-            ends = {limb: poses[part] for limb, poses in wanted.items()}
-            self._close(s[part], q[part], ends, HEAVY_BODY if held else 0.0)
-        x = np.linspace(0.0, 1.0, down - up + 1)[:, None]
-        for limb in even:
-            first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
-            slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
-            angles = _cubic(x, first[1], last[0], *slopes)
-            if limb in self.shape.via or self.shape.tucked:
-                middle, rest = (first[1] + last[0]) / 2, self.climber.angles(self.climber.rest, limb)
-                via = self.shape.via.get(limb, middle + self.shape.tucked * (rest - middle))
-                angles += 16.0 * (x * (1.0 - x)) ** 2 * (via - _cubic(0.5, first[1], last[0], *slopes))
-            self.closure.put(limb, q[up : down + 1], angles)
-        if held:
-            self._close(s[between], q[between], {k: poses[between] for k, poses in held.items()}, FREE_BODY)
-        self.even = self._steps(q)
-        self.even[:up], self.even[down:] = 0.0, 0.0
-        for limb in set(self.held).difference(even):
-            self.even[:, self.climber.joints(limb) - 6] = 0.0
-        return between
-
     def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float, turned: bool = True) -> None:
         """Brings contacts to poses in the world, ``(samples, 12)``, or to their positions only; the body as well, where
-        limbs cannot follow.
+        limbs cannot follow, or where it is light.
         """
         reached = [self.closure.followed(k, q, p, turned) for k, p in wanted.items()] if body < LIGHT_BODY else [0]
         if min(reached, default=len(s)) == len(s):
             return
-        if body == 0.0 and not self.closure.short.intersection(wanted):
-            name, part = self.climber.limbs[list(wanted)[int(np.argmin(reached))]].name, 100.0 * s[min(reached)]
-            reason = f"is out of reach at {part:.0f} % of the way to the next stance"
-            raise InfeasibleError(f"contact of {name}", float(s[min(reached)]), reason)
+        if body == 0.0:
+            name = f"contact of {self.climber.limbs[list(wanted)[int(np.argmin(reached))]].name}"
+            part = float(s[min(reached)])
+            raise InfeasibleError(name, part, f"is out of reach at {100.0 * part:.0f} % of the way to the next stance")
         left = self.closure.bring(q, wanted, body, turned)
         for k in np.flatnonzero(left > 1e3 * CLOSED)[:1]:
             at, size, here = float(s[k]), float(left[k]), slice(k, k + 1)
             away = {limb: self.closure.error(q[here], {limb: poses[here]}) for limb, poses in wanted.items()}
-            kind, limb = InfeasibleError if body == 0.0 else HeldError, max(away, key=lambda limb: away[limb])
+            limb = max(away, key=lambda limb: away[limb])
             reason = f"is off by {size:.3g} m or rad at {100.0 * at:.0f} % of the way to the next stance"
-            raise kind(f"contact of {self.climber.limbs[limb].name}", size, reason)
-
-    def _kind(self, dof: str) -> type[InfeasibleError]:
-        """Of an error of a joint: whether it is one of a limb that holds."""
-        number = self.climber.robot.dof_names.index(dof)
-        return HeldError if any(number in self.climber.joints(limb) for limb in self.held) else InfeasibleError
+            raise InfeasibleError(f"contact of {self.climber.limbs[limb].name}", size, reason)
 
     def _steps(self, q: Array) -> Array:
         """Of joints from sample to sample [m, rad]."""
@@ -385,9 +360,9 @@ class _Moving:
         if jumps.size and jumps.max() > most:
             k, joint = np.unravel_index(int(jumps.argmax()), steps.shape)
             name, size = robot.dof_names[6 + int(joint)], float(abs(steps[k, joint]))
-            raise self._kind(name)(name, size, f"jumps by {size:.3g} rad or m on the way to the next stance")
+            raise InfeasibleError(name, size, f"jumps by {size:.3g} rad or m on the way to the next stance")
         if worst := beyond_limits(robot, q):
-            raise self._kind(worst[0])(
+            raise InfeasibleError(
                 worst[0], worst[1], f"is {worst[1]:.3g} rad or m beyond its limit on the way to the next"
             )
 

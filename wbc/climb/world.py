@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.clearance import bodies_of
+from wbc.clearance import SweptBody
 from wbc.climb.chain import library, limb_table
-from wbc.climb.clear import deepest, sunk_tips
+from wbc.climb.clear import SINK, climber_bodies, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
 from wbc.climb.joint_values import climb_states
@@ -63,6 +63,20 @@ class CloseLinks(NamedTuple):
     limbs: frozenset[int]
     lacks: float
     away: Array | None
+
+
+class SampleAims(NamedTuple):
+    """What contacts of some states are to be.
+
+    Attributes:
+        near: places near which tips may be ``(n, limbs)``.
+        closed: which contacts are to be where they are wanted ``(n, limbs)``.
+        poses: where, in the world ``(n, limbs, 12)``.
+    """
+
+    near: NDArray[np.int32]
+    closed: NDArray[np.bool_]
+    poses: Array
 
 
 class _ConeNumbers(ctypes.Structure):
@@ -351,6 +365,26 @@ class ClimbWorld:
         limbs = frozenset(self._piece_limbs[k] for k in pieces) - {-1}
         return CloseLinks(int(row), self.touching(which), limbs, float(lacks[0]), lacks[1:] if which[1] >= 0 else None)
 
+    def band(
+        self, aims: SampleAims, bounds: Array, slack: float, aside: float, states: Array
+    ) -> tuple[Array, Array, float, Array, Array, Array]:  # fmt: skip
+        """Normal equations of states ``(n, ...)`` over the twist of the body and all angles, m of them: H, of which the
+        lower half counts, ``(n, m, m)`` and g ``(n, m)``; their cost; clearances less what is kept ``(n)`` [m]; squared
+        errors of contacts ``(n)`` [lengths squared]; centres of mass ``(n, 3)`` [m].
+
+        Args:
+            aims: of contacts. bounds: of slack ``(k, 4)``, as of :meth:`slack`. slack: that they are to leave.
+            aside: how much further apart than they have to be links are led [m].
+        """
+        n, m = len(states), states.shape[1] - 6
+        H, g, each, centers = np.empty((n, m, m)), np.empty((n, m)), np.empty((3, n)), np.empty((n, 3))
+        given = [np.ascontiguousarray(part) for part in (*aims, bounds, states)]
+        self._code.wbc_band(
+            self._world, ctypes.c_long(n), *map(_at, given[:3]), len(bounds), _at(given[3]), ctypes.c_double(slack),
+            ctypes.c_double(aside), _at(given[4]), _at(H), _at(g), *map(_at, each), _at(centers),
+        )  # fmt: skip
+        return H, g, float(each[0].sum()), each[1], each[2], centers
+
     def candidates(
         self, contacts: NDArray[np.int32], state: Array, least: float, most: float, guesses: bool = True
     ) -> tuple[NDArray[np.int32], Array]:
@@ -374,6 +408,11 @@ class ClimbWorld:
     def contacts(self, contacts: Sequence[int]) -> NDArray[np.int32]:
         """A row for the other calls."""
         return np.array(contacts, dtype=np.int32)
+
+    def places_of(self, contacts: Sequence[int]) -> NDArray[np.int32]:
+        """The first place of each foothold, of rows of these."""
+        rows = np.asarray(contacts)
+        return np.where(rows >= 0, np.searchsorted(self.hold, rows), rows).astype(np.int32)
 
     def touching(self, which: NDArray[np.int32]) -> str:
         """The names of two bodies that touch."""
@@ -482,20 +521,18 @@ def _pieces_of(climber: Climber, margin: float) -> _Pieces:
         for limb, chain in enumerate(climber.chains)
         for joint, steps in zip(chain, limbs.steps_to[limb], strict=True)
     }
-    depths = {body.name: deepest(sink) for tips in sunk_tips(climber) for body, sink in tips}
-    names = iter(body.name for body in bodies_of(climber.robot))
+    depths = {tip.body.name: tip.sink + SINK for tips in sunk_tips(climber) for tip in tips}
     found = _Pieces([], [], np.zeros(0, dtype=np.int32), [])
     rows: dict[str, list[int]] = {}
-    for link, group in climber.robot.shapes.items():
-        frame = frame_index(model, link)
+    for body in climber_bodies(climber):
+        frame = frame_index(model, body.link)
         parent = int(model.frames[frame].parentJoint)
         on = next((int(j) for j in reversed(list(model.supports[parent])) if int(j) in last_step), 1)
-        for placed in group:
-            at = data.oMi[on].actInv(data.oMf[frame]) * _centre(placed)
-            rows.setdefault(link, []).append(len(found.links))
-            found.places.append((*last_step.get(on, (-1, -1)), depths.get(next(names)), tuple(place(at))))
-            found.links.append(link)
-            found.shapes.append(placed.shape)
+        at = data.oMi[on].actInv(data.oMf[frame]) * _centre(body)
+        rows.setdefault(body.link, []).append(len(found.links))
+        found.places.append((*last_step.get(on, (-1, -1)), depths.get(body.name), tuple(place(at))))
+        found.links.append(body.link if body.link in climber.robot.shapes else body.name)
+        found.shapes.append(body.shape)
     chosen = climber.robot.self_pairs or ()
     pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
     return found._replace(pairs=np.array(pairs, dtype=np.int32).ravel())
@@ -517,8 +554,8 @@ def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: 
     return given * pin.SE3(pin.utils.rotate("z", float(about)), np.zeros(3))
 
 
-def _centre(placed: PlacedShape | SceneBody) -> pin.SE3:
-    pose = placed.placement
+def _centre(placed: PlacedShape | SweptBody | SceneBody) -> pin.SE3:
+    pose = placed.placement or pin.SE3.Identity()
     return pose * pin.SE3(np.eye(3), np.asarray(placed.shape.center, dtype=np.float64))
 
 

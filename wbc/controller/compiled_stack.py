@@ -80,9 +80,9 @@ class CompiledStack(Handles):
         if v is None and dt is None and not core.waits and core.call is core.plain_call:
             # In one call, with the interpreter's lock, so that no other thread is within
             done = (self._cycle_with_targets if targets else self._cycle)(q, targets)
-            if type(done) is int and done == REFUSED and targets:
-                done = self._cycle_as_planned(q, targets)
             if type(done) is Step:
+                return done
+            if done == REFUSED and targets and type(done := self._cycle_as_planned(q, targets)) is Step:
                 return done
             if done >= 0:
                 return self._finished(done, q)
@@ -128,6 +128,7 @@ class CompiledStack(Handles):
             self._busy = True
             if self._core.finish(flag) < 0:
                 self._core.refuse(q, None)
+            self._core.finished()
             return Step(self._snapshot(), self._context)
         finally:
             self._busy = False

@@ -67,6 +67,10 @@ class Carried:
         self.velocity[3:] = angular + turn @ self._drift[3:]
 
 
+def _nothing() -> None:
+    """What is told where nothing is recorded."""
+
+
 class Core:
     """The memory of one controller and what works on it. Nothing here checks what a user says: :class:`wbc.Controller`
     and :class:`wbc.controller.handle.Handle` do. Packages above have it from :func:`wbc.controller.core_of`.
@@ -77,7 +81,8 @@ class Core:
         handles: run-time values of the items by name. row_costs: of each task row at weight 1.
         directions, ramps: of scaled tasks, and of weights that change. together: sets values of several items.
         call: one tick on the buffers as they are, returns its flag; a recorder puts its own in place.
-        resets: how many there were. recording: the file that ticks are recorded into, or None.
+        resets: how many there were. recording: the file that ticks are recorded into, or None. finished: is told that
+            ``finish`` has followed a tick with its values in one call; a recorder puts its own in place.
         waits: the next step has more to do than to copy q: defaults to take from it, ramps, dt to set back, or native
             code to change over to, which it may not where ``may_change`` is false.
         plain_call: the native tick that is all of a step's work where it is ``call``; None where there is more.
@@ -105,6 +110,7 @@ class Core:
         self.snapshot = self.assembly.snapshot
         self.resets, self.ramps = 0, Ramps()
         self.recording: pathlib.Path | None = None
+        self.finished: Callable[[], None] = _nothing
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
         self.first: dict[Slot, str] = {}
         self.waiting: dict[Slot, str] = {}

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import pathlib
-
 import numpy as np
 
-from wbc import extras
 from wbc.formats.errors import FormatError
 from wbc.formats.tables import WholeSink
 from wbc.log.lerobot import write_lerobot_dataset
@@ -16,16 +13,9 @@ TOLERANCE = 1e-4
 
 
 class LeRobotSink(WholeSink):
-    """A folder: ``observation.state`` is the configuration, ``action`` the command of each tick.
+    """A folder: ``observation.state`` is the configuration, ``action`` the command of each tick."""
 
-    Raises:
-        MissingPackageError: pyarrow is not installed.
-    """
-
-    def __init__(self, path: pathlib.Path) -> None:
-        extras.require("recordings", "a dataset of LeRobot")
-        super().__init__(path)
-        path.mkdir()
+    needs = ("recordings", "a dataset of LeRobot")
 
     def close(self) -> None:
         """Write the folder.
@@ -42,9 +32,9 @@ class LeRobotSink(WholeSink):
         if rate < 1 or np.abs(t - t[0] - np.arange(len(t)) / rate).max() > TOLERANCE:
             raise FormatError("run", period, "ticks are not at a whole number a second, which frames of LeRobot are")
         groups = {"observation.state": "q", "action": "v" if log.group("v") else "a"}
-        for name, group in groups.items():
-            if not log.group(group):
-                raise FormatError("run", group, f"has no columns for {name}")
-        members = {name: list(log.group(group)) for name, group in groups.items()}
-        episode = {name: log.array(group) for name, group in groups.items()}
-        write_lerobot_dataset(self._path, robot, rate, members, [episode], [f"run of {robot}"])
+        names = {feature: list(log.group(group)) for feature, group in groups.items()}
+        if lacking := [feature for feature, members in names.items() if not members]:
+            raise FormatError("run", groups[lacking[0]], f"has no columns for {lacking[0]}")
+        episode = {feature: log.array(group) for feature, group in groups.items()}
+        self._path.mkdir()
+        write_lerobot_dataset(self._path, robot, rate, names, [episode], [f"run of {robot}"])

@@ -6,7 +6,6 @@ import pathlib
 import time
 from typing import Any
 
-from wbc import extras
 from wbc.formats.errors import FormatError
 from wbc.formats.messages import NANO, Message, MessageSink
 
@@ -17,18 +16,24 @@ PORT = 8765
 class FoxgloveSink(MessageSink):
     """A server on this machine, which plays a run at the speed at which it was, or as it is written.
 
+    Attributes:
+        port: where it listens.
+
     Args:
         path: ``HOST:PORT``, or nothing for 127.0.0.1 and port 8765.
 
     Raises:
-        MissingPackageError: foxglove-sdk is not installed. FormatError: the address cannot be served on.
+        FormatError: the address cannot be served on.
     """
 
-    def __init__(self, path: pathlib.Path | None = None) -> None:
-        extras.require("foxglove", "a connection for Foxglove")
+    needs = ("foxglove", "a connection for Foxglove")
+
+    def __init__(self, path: pathlib.Path) -> None:
         import foxglove
 
-        host, _, port = str(path or "").rpartition(":")
+        host, _, port = ("" if path == pathlib.Path() else str(path)).rpartition(":")
+        if (host or port) and not port.isdigit():
+            raise FormatError("address", str(path), "expected HOST:PORT")
         self._foxglove, self._channels, self._bodies = foxglove, dict[str, Any](), list[Message]()
         self._context = foxglove.Context()
         self._began: float | None = None
@@ -41,21 +46,12 @@ class FoxgloveSink(MessageSink):
                     if message.topic == channel.topic:
                         self._put(message)
 
+        served = {"host": host or "127.0.0.1", "port": int(port or PORT), "context": self._context}
         try:
-            self._server = foxglove.start_server(
-                name="wbc",
-                host=host or "127.0.0.1",
-                port=int(port) if port.isdigit() else PORT,
-                server_listener=LateListener(),
-                context=self._context,
-            )
+            self._server = foxglove.start_server(name="wbc", **served, server_listener=LateListener())
         except (RuntimeError, OSError) as error:
             raise FormatError("address", str(path), f"cannot be served on: {error}") from error
-
-    @property
-    def port(self) -> int:
-        """Where it listens."""
-        return int(self._server.port)
+        self.port = int(self._server.port)
 
     def _open(self, topic: str, schema: dict[str, Any]) -> None:
         self._channels[topic] = self._foxglove.Channel(topic, schema=schema, context=self._context)
@@ -71,5 +67,4 @@ class FoxgloveSink(MessageSink):
         self._channels[message.topic].log(message.data, log_time=message.time)
 
     def close(self) -> None:
-        """End the server."""
         self._server.stop()

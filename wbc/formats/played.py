@@ -13,7 +13,7 @@ from wbc.formats.motion import RecordedMotion
 from wbc.log import Log
 from wbc.record.recorder import names
 from wbc.robot import Robot
-from wbc.simulation import Command, CommandKind, PlantState
+from wbc.simulation import Command, CommandKind, KinematicPlant, PlantState
 from wbc.tick.outcome import Status
 from wbc.validation import Array
 
@@ -21,11 +21,11 @@ from wbc.validation import Array
 AT_ONCE = 1e-9
 
 
-class PlayedPlant:
+class PlayedPlant(KinematicPlant):
     """A plant that moves as was recorded, whatever it is commanded; commands are kept.
 
     Attributes:
-        nq, nv, time_step, commands: as of :class:`wbc.simulation.Plant`. given: the commands, with their times [s].
+        given: the commands, with their times [s].
 
     Args:
         robot: whose joints they are. motion: what was recorded, two states or more.
@@ -35,38 +35,36 @@ class PlayedPlant:
         FormatError: less than two states. UnknownNameError: a joint that the robot has not.
     """
 
-    time_step = 0.0
     commands = (CommandKind.VELOCITY, CommandKind.POSITION, CommandKind.TORQUE)
 
     def __init__(self, robot: Robot, motion: RecordedMotion, ignored: Sequence[str] = ()) -> None:
         if len(motion.t) < 2:
             raise FormatError("motion", len(motion.t), "expected two joint states or more")
-        self.nq, self.nv, self.given = robot.nq, robot.nv, list[tuple[float, Command]]()
-        self._robot, self._t, self._q = robot, motion.t, motion.configurations(robot, ignored)
-        self._now = self._start = float(motion.t[0])
-        self._shift = 0.0
+        self._robot, self._t, self._recorded = robot, motion.t, motion.configurations(robot, ignored)
+        self.given = list[tuple[float, Command]]()
+        super().__init__(robot)
 
     def reset(self, q: Array, time: float) -> None:
         """Begin the recording anew; ``q`` is not gone to: read says where the robot was."""
-        self._now, self._shift = self._start, time - self._start
+        self._time, self._shift = float(self._t[0]), time - float(self._t[0])
 
     def read(self) -> PlantState:
         """Between two recorded states on the line that joins them, with the velocity that led there; invalid after the
         last one.
         """
-        k = int(np.clip(np.searchsorted(self._t, self._now - AT_ONCE) - 1, 0, len(self._t) - 2))
-        length = self._t[k + 1] - self._t[k]
-        v = self._robot.difference(self._q[k], self._q[k + 1]) / length
-        q = self._robot.integrate(self._q[k], v, float(np.clip(self._now - self._t[k], 0.0, length)))
-        return PlantState(q, v, self._now + self._shift, valid=bool(self._now <= self._t[-1] + AT_ONCE))
+        t, now = self._t, self._time
+        k = int(np.clip(np.searchsorted(t, now - AT_ONCE) - 1, 0, len(t) - 2))
+        v = self._robot.difference(*self._recorded[k : k + 2]) / (t[k + 1] - t[k])
+        q = self._robot.integrate(self._recorded[k], v, float(np.clip(now, t[k], t[k + 1]) - t[k]))
+        return PlantState(q, v, now + self._shift, valid=bool(now <= t[-1] + AT_ONCE))
 
     def apply(self, command: Command) -> None:
         """Keep it."""
-        self.given.append((self._now + self._shift, Command(command.kind, command.values.copy())))
+        self.given.append((self._time + self._shift, Command(command.kind, command.values.copy())))
 
     def advance(self, dt: float) -> None:
         """Go on in the recording."""
-        self._now += dt
+        self._time += dt
 
 
 def answered(

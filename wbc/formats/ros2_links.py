@@ -10,7 +10,6 @@ import weakref
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -89,7 +88,6 @@ class DdsLink(Ros2Link):
             raise FormatError("domain", domain, f"DDS does not connect: {error}") from error
 
     def take(self) -> Sequence[Any]:
-        """See :class:`Ros2Link`."""
         # What is said of an endpoint that is gone has no names
         return [message for message in self._reader.take(KEPT) if hasattr(message, "name")]
 
@@ -98,8 +96,8 @@ class DdsLink(Ros2Link):
 
 
 def _idl(store: Any, kind: str, known: dict[str, Any]) -> Any:
-    """The class of a message in Cyclone, which reads the types of fields when it is made."""
-    from cyclonedds.idl import IdlStruct, types as idl
+    """The class of a message in Cyclone."""
+    from cyclonedds.idl import make_idl_struct, types as idl
     from cyclonedds.idl.annotations import final
 
     def of(field: Any) -> Any:
@@ -112,9 +110,7 @@ def _idl(store: Any, kind: str, known: dict[str, Any]) -> Any:
 
     if kind not in known:
         fields = {name: of(field) for name, field in store.fielddefs[kind][1]}
-        name = kind.rpartition("/")[2]
-        body = {"__annotations__": fields, "__module__": __name__, "__doc__": f"``{kind}``."}
-        known[kind] = final(dataclass(type(IdlStruct)(name, (IdlStruct,), body, typename=dds_name(kind))))
+        known[kind] = final(make_idl_struct(kind.rpartition("/")[2], dds_name(kind), fields))
     return known[kind]
 
 
@@ -150,7 +146,6 @@ class ZenohLink(Ros2Link):
             raise FormatError("zenoh", locator, f"Zenoh does not connect: {error}") from error
 
     def take(self) -> Sequence[Any]:
-        """See :class:`Ros2Link`."""
         came = range(len(self._came))
         return [self._store.deserialize_cdr(bytes(self._came.popleft()), STATE) for _ in came]
 

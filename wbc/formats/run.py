@@ -77,7 +77,7 @@ class Run:
 
     def __init__(self, path: pathlib.Path, trust: bool = False) -> None:
         recording = recording_in(path)
-        self.path = path if recording is None else recording
+        self.path = recording or path
         self.about: Mapping[str, Any]
         self.units: Mapping[str, str]
         self.robot: Robot | None = None

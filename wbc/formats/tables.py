@@ -8,10 +8,11 @@ import pathlib
 import numpy as np
 
 from wbc.formats.run import Run, SeenTick
+from wbc.formats.sink import Sink
 from wbc.log import Log, save
 
 
-class CsvSink:
+class CsvSink(Sink):
     """A row a tick; the head has the units."""
 
     def __init__(self, path: pathlib.Path) -> None:
@@ -19,31 +20,26 @@ class CsvSink:
         self._writer = csv.writer(self._file)
 
     def begin(self, run: Run) -> None:
-        """The head."""
         self._writer.writerow(f"{name} [{unit}]" if unit else name for name, unit in run.units.items())
 
     def write(self, log: Log, seen: list[SeenTick]) -> None:
-        """Rows."""
         self._writer.writerows(zip(*(values.tolist() for values in log.columns.values()), strict=True))
         self._file.flush()
 
     def close(self) -> None:
-        """Nothing more comes."""
         self._file.close()
 
 
-class WholeSink:
+class WholeSink(Sink):
     """What is written as a whole: it is kept until then, in memory."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self._path, self._logs = path, list[Log]()
 
     def begin(self, run: Run) -> None:
-        """What is said of the run."""
         self._units, self._about = run.units, run.about
 
     def write(self, log: Log, seen: list[SeenTick]) -> None:
-        """Keep them."""
         self._logs.append(log)
 
     def whole(self) -> Log:
@@ -56,5 +52,4 @@ class NpzSink(WholeSink):
     """A log for :func:`wbc.log.load` and ``numpy.load``, with the same names in every run."""
 
     def close(self) -> None:
-        """Write the file."""
         save(self.whole(), self._path.parent, "npz", self._path.stem)

@@ -12,17 +12,14 @@ from wbc.errors import RangeError
 from wbc.formats.motion import RecordedMotion
 from wbc.simulation import Connection, Plant
 
-#: What a joint's position is called in observations and actions
-POSITION = ".pos"
-
 
 def named(joints: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
     """What LeRobot calls the positions of joints -> a value each."""
-    return {f"{joint}{POSITION}": value for joint, value in zip(joints, values, strict=True)}
+    return {f"{joint}.pos": value for joint, value in zip(joints, values, strict=True)}
 
 
 class LeRobotDevice:
-    """What LeRobot asks of robots and teleoperators alike; there is nothing to calibrate.
+    """What LeRobot asks of robots and teleoperators alike; there is nothing to calibrate or to configure.
 
     Attributes:
         name, id: as LeRobot names it. joints: of actions.
@@ -44,6 +41,10 @@ class LeRobotDevice:
 
     def configure(self) -> None:
         """Nothing to do."""
+
+    def disconnect(self) -> None:
+        """End it."""
+        self.is_connected = False
 
     def _require(self) -> None:
         if not self.is_connected:
@@ -72,6 +73,8 @@ class StackRobot(LeRobotDevice):
         ShapeError: no controller. UnknownNameError: no such task. RangeError: joints with several coordinates.
     """
 
+    observation_features = LeRobotDevice.action_features
+
     def __init__(
         self, controller: Controller, posture: str, plant: Plant | None = None, *, real_time: bool = False
     ) -> None:
@@ -83,11 +86,6 @@ class StackRobot(LeRobotDevice):
         super().__init__(self.robot.name, self.robot.joint_names)
         self.controller, self.real_time, self._posture = controller, real_time, posture
         self._connection = Connection(plant, self.robot, controller.stack.dt)
-
-    @property
-    def observation_features(self) -> dict[str, type]:
-        """What an observation has."""
-        return self.action_features
 
     def connect(self, calibrate: bool = True) -> None:
         """Bring the robot to rest at its neutral configuration.
@@ -103,7 +101,7 @@ class StackRobot(LeRobotDevice):
         """Bring the robot to rest."""
         if self.is_connected:
             self._connection.rest()
-            self.is_connected = False
+        super().disconnect()
 
     def get_observation(self) -> dict[str, float]:
         """Positions of the joints.
@@ -139,31 +137,24 @@ class StackRobot(LeRobotDevice):
 
 
 class StackTeleoperator(LeRobotDevice):
-    """A recorded motion as what leads a robot, with the methods of ``lerobot.teleoperators.Teleoperator``.
+    """A recorded motion as what leads a robot, with the methods of ``lerobot.teleoperators.Teleoperator``; it feels
+    nothing.
 
     Args:
         motion: from :func:`wbc.formats.read_motion`. clock: time since it began [s]; default: since :meth:`connect`.
     """
 
     name = "wbc_motion"
+    feedback_features: Mapping[str, type] = {}
 
     def __init__(self, motion: RecordedMotion, clock: Callable[[], float] | None = None) -> None:
         self._motion = validation.instance("motion", motion, RecordedMotion, "a RecordedMotion")
         super().__init__("motion", motion.joints)
         self._clock = clock
 
-    @property
-    def feedback_features(self) -> dict[str, type]:
-        """It feels nothing."""
-        return {}
-
     def connect(self, calibrate: bool = True) -> None:
         """Begin the motion."""
         self._began, self.is_connected = time.monotonic(), True
-
-    def disconnect(self) -> None:
-        """End it."""
-        self.is_connected = False
 
     def get_action(self) -> dict[str, float]:
         """Positions of the recorded joints now.
@@ -176,4 +167,4 @@ class StackTeleoperator(LeRobotDevice):
         return named(self.joints, self._motion.at(now).tolist())
 
     def send_feedback(self, feedback: Mapping[str, Any]) -> None:
-        """It feels nothing."""
+        """It is not felt."""

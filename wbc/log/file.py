@@ -37,6 +37,8 @@ from wbc.validation import Array
 _LOCAL = struct.Struct("<4s5H3L2H")
 #: Head of an array: mark, version, length of what is said of it
 _NPY = struct.Struct("<6sBBH")
+#: What is kept of a member until the directory is written: check sum, size, place in the file
+_ENTRY = struct.Struct("<IQQ")
 #: Length of the end of the directory [bytes]
 _END = 22
 #: Place for the heads of a chunk: of a member, and of an array [bytes]
@@ -94,7 +96,8 @@ class FileWriter:
             raise error("path", str(path), "there is a file; choose another, or overwrite=True") from None
         except OSError as problem:
             raise error("path", str(path), f"cannot be written: {problem.strerror}") from problem
-        self._members: list[zipfile.ZipInfo] = []
+        # Bytes: of objects by thousands the interpreter would collect garbage, for milliseconds, while a loop waits
+        self._members = dict[str, bytes]()
         self._counts: dict[str, int] = {}
         self._width = 0
         # A chunk as it is written, behind place for its heads: memory of its size is not asked of the system each time
@@ -140,7 +143,7 @@ class FileWriter:
     def close(self) -> None:
         """Write the directory."""
         with zipfile.ZipFile(self._file, "a") as archive:
-            archive.filelist = self._members
+            archive.filelist = [_member(name, *_ENTRY.unpack(entry)) for name, entry in self._members.items()]
         self._file.close()
 
     def abandon(self) -> None:
@@ -150,10 +153,8 @@ class FileWriter:
 
     def _put(self, name: str, content: bytes | memoryview, place: int = 0) -> None:
         """A member; ``place``: where in the chunk's memory it is, behind place for its head."""
-        member = zipfile.ZipInfo(name)
-        member.CRC, member.file_size = zlib.crc32(content), len(content)
-        member.compress_size, member.header_offset = len(content), self._file.tell()
-        head = member.FileHeader(zip64=False)
+        entry = zlib.crc32(content), len(content), self._file.tell()
+        head = _member(name, *entry).FileHeader(zip64=False)
         if place:
             self._chunk[place - len(head) : place] = head
             content = memoryview(self._chunk)[place - len(head) : place + len(content)]
@@ -161,7 +162,14 @@ class FileWriter:
         # By one write: a program that is killed leaves it whole or not at all, and a loop waits for no other
         if self._file.write(data) != len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        self._members.append(member)
+        self._members[name] = _ENTRY.pack(*entry)
+
+
+def _member(name: str, check: int, size: int, place: int) -> zipfile.ZipInfo:
+    """A member of the archive, without compression."""
+    out = zipfile.ZipInfo(name)
+    out.CRC, out.file_size, out.compress_size, out.header_offset = check, size, size, place
+    return out
 
 
 def _header(kind: np.dtype[Any], shape: tuple[int, ...]) -> bytes:

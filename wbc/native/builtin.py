@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 #: ``METH_NOARGS``, ``METH_O`` and ``METH_FASTCALL``
@@ -57,3 +57,9 @@ def _made(function: Any, argument: int, flags: int) -> Any:
     address = ctypes.cast(function, ctypes.c_void_p).value or 0
     method = _methods.setdefault(address, _MethodDef(b"call", address, flags, None))
     return _make(ctypes.byref(method), argument, None)
+
+
+def places_of(holder: object, values: Sequence[object]) -> list[int]:
+    """Bytes from the address of an object to the slots that hold these values."""
+    words = ctypes.cast(id(holder), ctypes.POINTER(ctypes.c_size_t))[: type(holder).__basicsize__ // 8]
+    return [8 * words.index(id(value)) for value in values]

@@ -35,6 +35,7 @@ class Docstring:
         attributes: of the section Attributes, name -> text.
         inputs: of the section Inputs, name -> text.
         other_inputs: first words of that section that belong to no name, "" for none.
+        others: the class that says what the ``borrowed`` attributes and inputs are, "" for none.
         example: Python.
     """
 
@@ -44,6 +45,8 @@ class Docstring:
     attributes: dict[str, str]
     inputs: dict[str, str]
     other_inputs: str
+    others: str
+    borrowed: frozenset[str]
     example: str
 
     @property
@@ -67,23 +70,32 @@ def read(cls: type) -> Docstring:
     paragraphs = re.split(r"\n{2,}(?! )", "\n".join(free).strip())
     cannot = [" ".join(one.removeprefix(CANNOT).split()) for one in paragraphs if one.startswith(CANNOT)]
     text = "\n\n".join(one for one in paragraphs if not one.startswith(CANNOT))
-    attributes, _ = _entries(sections.get("Attributes", []))
-    inputs, rest = inputs_of(cls)
+    own, _ = _entries(sections.get("Attributes", []))
+    named, rest = _entries(_section(cls, "Inputs"))
+    others = _others(own) or _others(named)
+    attributes, inputs = _with_others(own, "Attributes"), inputs_of(cls)[0]
+    kept = {*own, *named} - {"others"}
     return Docstring(
         opening=_shown("\n".join(lines[:start])),
         text=_shown(text),
         cannot="".join(f"{one[0].upper()}{one[1:]}" for one in map(markdown, cannot)),
-        attributes=_resolved(attributes),
+        attributes=attributes,
         inputs=inputs,
         other_inputs=re.split(r"\. |, and", rest)[0].rstrip("."),
+        others=others,
+        borrowed=frozenset({*attributes, *inputs} - kept),
         example="\n".join(line[4:] for line in sections.get("Example", [])),
     )
 
 
 def inputs_of(cls: type) -> tuple[dict[str, str], str]:
     """The section Inputs of a class: name -> text, and what belongs to no name."""
-    sections, _ = _sections((inspect.getdoc(cls) or "").splitlines())
-    return _entries(sections.get("Inputs", []))
+    named, rest = _entries(_section(cls, "Inputs"))
+    return _with_others(named, "Inputs"), rest
+
+
+def _section(cls: type, heading: str) -> list[str]:
+    return _sections((inspect.getdoc(cls) or "").splitlines())[0].get(heading, [])
 
 
 def markdown(text: str) -> str:
@@ -146,12 +158,17 @@ def _entries(lines: list[str]) -> tuple[dict[str, str], str]:
     return texts, markdown(" ".join(rest)).strip()
 
 
-def _resolved(attributes: dict[str, str]) -> dict[str, str]:
-    """``others: as in :class:`wbc.tasks.Name``` stands for the attributes of that class."""
-    reference = re.fullmatch(r"as in `(\w+)`\.?", attributes.get("others", ""))
-    if reference is None:
-        return attributes
+def _others(texts: dict[str, str]) -> str:
+    """The class of ``others: as in :class:`wbc.tasks.Name```, "" for none."""
+    reference = re.fullmatch(r"as in `(\w+)`\.?", texts.get("others", ""))
+    return "" if reference is None else reference.group(1)
+
+
+def _with_others(texts: dict[str, str], heading: str) -> dict[str, str]:
+    """Texts by name; ``others`` stands for what that class has under the same heading."""
+    if not (others := _others(texts)):
+        return texts
     from wbc.tasks import registry
 
-    own = {name: text for name, text in attributes.items() if name != "others"}
-    return read(registry()[reference.group(1)]).attributes | own
+    own = {name: text for name, text in texts.items() if name != "others"}
+    return _with_others(_entries(_section(registry()[others], heading))[0], heading) | own

@@ -15,6 +15,8 @@ from wbc.tasks.base import Item, Task, registry
 INDEX = "README.md"
 #: A page of this project that a docstring names, with a heading of it
 PAGE = re.compile(r"\bdocs/(\w+\.md)((?:#[\w-]+)?)")
+#: What an index leaves out of a sentence
+APART = re.compile(r" \([^()]*\)")
 #: What stands above the tables of the index
 INDEX_HEAD = """# Tasks and constraints
 
@@ -100,11 +102,11 @@ def made(cls: type[Item]) -> str:
 
 
 def index() -> str:
-    """The list of all items, a line each."""
+    """The list of all items, a line each, without the symbols and remarks that stand in parentheses on their pages."""
     lists = []
     for title, wanted in (("Tasks", True), ("Constraints", False)):
         lines = [
-            f"- [{name}]({page_name(cls)}): {docstring.read(cls).summary}"
+            f"- [{name}]({page_name(cls)}): {APART.sub('', docstring.read(cls).summary)}"
             for name, cls in shipped().items()
             if issubclass(cls, Task) is wanted
         ]

@@ -13,6 +13,7 @@ import numpy as np
 from wbc.pages.docstring import Docstring, PageError
 from wbc.stack.declaration import Declaration, Entry
 from wbc.stack.layout import Block, Layout, Slot
+from wbc.tasks import registry
 from wbc.tasks.base import Constraint, Input, Item, Task
 
 #: Letters that a list of rows may take; of a longer one only the first and the last are named
@@ -78,6 +79,7 @@ def _names(cls: type[Item], text: Docstring, block: Block) -> str:
     slots = {name: slot for name, slot in block.slots.items() if not slot.input.sensed}
     entries: list[tuple[tuple[str, str], list[str]]] = []
     said: dict[str, str] = {}
+    elsewhere: list[str] = []
     for name, parameter in inspect.signature(cls).parameters.items():
         meaning = text.attributes.get(name, "")
         if name == "gain" and issubclass(cls, Task):
@@ -85,6 +87,15 @@ def _names(cls: type[Item], text: Docstring, block: Block) -> str:
             continue
         if not meaning:
             raise PageError(f"{cls.__name__}.__doc__", name, "no text for this field under Attributes")
+        if name in text.borrowed:
+            other = inspect.signature(registry()[text.others]).parameters[name]
+            if other != parameter.replace(kind=other.kind):
+                raise PageError(
+                    f"{cls.__name__}.__doc__", name, f"it is {parameter}, and that of {text.others} {other}"
+                )
+            elsewhere.append(name)
+            slots.pop(name, None)
+            continue
         kind, meaning = _type(str(parameter.annotation)), _without_stop(meaning)
         if name in slots:
             kind, _, told = _input(cls, text, slots.pop(name), said)
@@ -99,10 +110,14 @@ def _names(cls: type[Item], text: Docstring, block: Block) -> str:
         else:
             entries.append((about, [name]))
     for name, slot in slots.items():
-        if name not in COMMON or name in text.inputs:
+        if name in text.borrowed:
+            elsewhere.append(name)
+        elif name not in COMMON or name in text.inputs:
             kind, default, meaning = _input(cls, text, slot, said)
             entries.append(((f"{kind}, default {default}", meaning), [name]))
     lines = [f"- {', '.join(f'`{name}`' for name in names)} ({kind}): {meaning}" for (kind, meaning), names in entries]
+    if elsewhere:
+        lines.append(f"- {', '.join(f'`{name}`' for name in elsewhere)}: as in `{text.others}`")
     return "\n".join(line if line.endswith(".") else f"{line}." for line in lines)
 
 

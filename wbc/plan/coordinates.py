@@ -14,7 +14,7 @@ from wbc.clearance import Tree
 from wbc.errors import UnsupportedJointError
 from wbc.multibody import pin
 from wbc.robot import Robot
-from wbc.rotations import exponential, matrices
+from wbc.rotations import exponential, matrices, quaternion_product
 from wbc.symbolic.joint_steps import JointKind, joint_steps, turns_for_quaternions
 from wbc.validation import Array
 
@@ -70,7 +70,7 @@ class BallTurns:
         first, second, third = (
             self._turn(k, x[..., self.number + k] if math is np else x[self.number + k], math) for k in range(3)
         )
-        return _product(_product(first, second), third)
+        return quaternion_product(quaternion_product(first, second), third)
 
     def _turn(self, k: int, angle: Any, math: ModuleType) -> list[Any]:
         out = [0.0 * angle] * 3 + [math.cos(0.5 * angle)]
@@ -81,22 +81,11 @@ class BallTurns:
         """In the axes of what it carries [..., 3]."""
         i, j, k = self.order
         second, third = (self._turn(m, x[..., self.number + m], np) for m in (1, 2))
-        after = [matrices(np.stack(turns, axis=-1)) for turns in (_product(second, third), third)]
+        after = [matrices(np.stack(turns, axis=-1)) for turns in (quaternion_product(second, third), third)]
         a, b, c = np.moveaxis(rate[..., self.span], -1, 0)
         return np.asarray(
             a[..., None] * after[0][..., i, :] + b[..., None] * after[1][..., j, :] + c[..., None] * np.eye(3)[k]
         )
-
-
-def _product(p: list[Any], q: list[Any]) -> list[Any]:
-    """Of quaternions x, y, z, w."""
-    (x, y, z, w), (a, b, c, d) = p, q
-    return [
-        w * a + x * d + y * c - z * b,
-        w * b + y * d + z * a - x * c,
-        w * c + z * d + x * b - y * a,
-        w * d - x * a - y * b - z * c,
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,12 +158,8 @@ class PlanningCoordinates:
         for f, frame in enumerate(frames):
             if frame.coordinate in leaders and frame.moves in (1, 2):
                 c = leaders[frame.coordinate]
-                frames[f] = replace(
-                    frame,
-                    coordinate=number[at[c.leader]],
-                    scale=frame.scale * c.ratio,
-                    offset=frame.scale * c.offset + frame.offset,
-                )
+                scale, offset = frame.scale * c.ratio, frame.scale * c.offset + frame.offset
+                frames[f] = replace(frame, coordinate=number[at[c.leader]], scale=scale, offset=offset)
             elif frame.moves in (1, 2):
                 frames[f] = replace(frame, coordinate=number[frame.coordinate])
         labels = [robot.dof_names[dof] for dof in dofs]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -118,7 +119,7 @@ class PathFollower:
         if self.braking or left is None or scene.violation(motion_of(self.path.coordinates, left)) is None:
             return True
         fast, brisk = self.path.motion_limits()
-        speed, hit = self._speed(), None
+        speed, hit = self._timing(1), None
         for share in BRAKING:
             part = self._left(share)
             assert part is not None
@@ -139,29 +140,19 @@ class PathFollower:
         """The beginning of what is left of the path; None where nothing is."""
         path = self.law.path
         assert isinstance(path, PolynomialPath)
-        here, end = self._place(), float(path.knots[-1])
+        here, end = self._timing(0), float(path.knots[-1])
         until = here + share * (end - here)
         if until - here < 1e-9:
             return None
         inner = path.knots[(path.knots > here + 1e-12) & (path.knots < until - 1e-12)]
         knots = np.concatenate([[here], inner, [until]])
         pieces = np.clip(np.searchsorted(path.knots, knots[:-1], side="right") - 1, 0, len(path.knots) - 2)
-        degree = int(path.degree or 0)
-        rows = []
-        for order in range(degree, -1, -1):
-            scale = float(np.prod(np.arange(1, order + 1)))
-            rows.append(
-                path.evaluate(knots[:-1], order, pieces) / scale
-                if order <= 3
-                else path.coefficients[degree - order, pieces]
-            )
-        return PolynomialPath(knots, np.array(rows))
-
-    def _place(self) -> float:
-        return self._timing(0)
-
-    def _speed(self) -> float:
-        return self._timing(1)
+        rows = path.coefficients[:, pieces]
+        # The first piece begins within one of the path's
+        shift, first = here - path.knots[pieces[0]], rows[:, 0].copy()
+        for k in range(len(rows)):
+            rows[k, 0] = sum(comb(len(rows) - 1 - j, k - j) * shift ** (k - j) * first[j] for j in range(k + 1))
+        return PolynomialPath(knots, rows)
 
     def _timing(self, order: int) -> float:
         """Place on the path, or its rate."""

@@ -11,7 +11,6 @@ import numpy as np
 from wbc import validation
 from wbc.controller.core import Core
 from wbc.errors import RangeError, ShapeError
-from wbc.robot import Robot
 from wbc.stack.layout import Slot
 from wbc.validation import Array
 
@@ -40,8 +39,6 @@ def goals_of(core: Core, goal: Any) -> tuple[Goal, ...]:
     Raises:
         UnknownNameError, ShapeError, NotFiniteError, RotationError, RangeError: it is none of them.
     """
-    if isinstance(goal, Mapping):
-        return (_target(core, "goal", goal),)
     if isinstance(goal, (list, tuple, set, frozenset)) and not _is_configuration(goal):
         if not goal:
             raise RangeError("goal", goal, "expected at least one goal")
@@ -55,12 +52,8 @@ def _goals_within(core: Core, name: str, goal: Any) -> tuple[Goal, ...]:
         return (_target(core, name, goal),)
     rows = np.asarray(validation.real_array(name, goal))
     if rows.ndim == 2:
-        return tuple(ConfigurationGoal(_configuration(robot, f"{name}[{k}]", row)) for k, row in enumerate(rows))
-    return (ConfigurationGoal(_configuration(robot, name, rows)),)
-
-
-def _configuration(robot: Robot, name: str, q: Array) -> Array:
-    return robot.configuration(name, q)
+        return tuple(ConfigurationGoal(robot.configuration(f"{name}[{k}]", row)) for k, row in enumerate(rows))
+    return (ConfigurationGoal(robot.configuration(name, rows)),)
 
 
 def _is_configuration(goal: Any) -> bool:

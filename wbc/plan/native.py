@@ -25,12 +25,12 @@ NODES = 200_000
 POINTS = 20_000
 #: What :meth:`NativePlanner.grow` ends with when the trees are full
 FULL = -1
-#: Numbers of a ``drift_t`` of ``native/plan.h``
-_DRIFT = 10
 #: Places that are looked at together
 LANES = 8
 #: Numbers that an ``outline_t`` takes the room of
-_OUTLINE = 4
+_OUTLINE = 6
+#: Numbers of the motion of a core: ``WAYS`` of ``native/plan.h``
+_WAYS = 11
 #: Pairs that were too near last and are looked at first
 RECENT = 3
 
@@ -50,13 +50,16 @@ class _PlanStruct(ctypes.Structure):
     """``plan_t`` of ``native/plan.h``."""
 
     _fields_ = [
-        *((name, ctypes.c_void_p) for name in ("sweep", "drifts", "gone", "radius", "balls", "normals")),
+        *((name, ctypes.c_void_p) for name in ("sweep", "gone", "radius", "normals")),
         *((name, ctypes.c_double) for name in ("half", "open")),
-        *((name, ctypes.c_void_p) for name in ("boxes", "reaches", "offs", "lane_pose", "lane_centre")),
-        *((name, ctypes.c_void_p) for name in ("outlines", "near")),
+        *((name, ctypes.c_void_p) for name in ("boxes", "reaches", "offs", "lane_pose", "lane_centre", "lane_ends")),
+        *((name, ctypes.c_void_p) for name in ("lane_ways", "share", "lane_stamp", "outlines", "near")),
         ("near_count", ctypes.c_int * LANES),
         ("recent", ctypes.c_int * RECENT),
-        *((name, ctypes.c_void_p) for name in ("x", "y", "low", "high", "sample_low", "sample_high", "weight")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("x", "y", "low", "high", "sample_low", "sample_high", "weight", "scale")
+        ),
         *((name, ctypes.c_int) for name in ("n", "pairs", "capacity", "seeds")),
         ("count", ctypes.c_int * 2),
         *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "longest")),
@@ -64,10 +67,12 @@ class _PlanStruct(ctypes.Structure):
         ("path", _KeptRows),
         ("goal", _KeptRows),
         ("node", ctypes.c_void_p * 2),
+        ("lanes", ctypes.c_void_p * 2),
         ("parent", ctypes.c_void_p * 2),
         ("work", ctypes.c_void_p),
         ("meet", ctypes.c_int * 2),
         *((name, ctypes.c_int) for name in ("edges", "projections", "measured")),
+        *((name, ctypes.c_int) for name in ("struck", "partial", "alive", "ended", "lane_node", "lane")),
     ]
 
 
@@ -102,27 +107,22 @@ class NativePlanner:
         scene: whose pairs are kept apart. low, high: limits of x. sample_low, sample_high: where samples are drawn.
     """
 
-    def __init__(
-        self,
-        scene: PlanningScene,
-        rows: PlanningRows,
-        p: Array,
-        limits: tuple[Array, Array],
-    ) -> None:
+    def __init__(self, scene: PlanningScene, rows: PlanningRows, p: Array, limits: tuple[Array, Array]) -> None:
         coordinates = scene.coordinates
         n = coordinates.count
         self.scene, self._call, self._rows = scene, library(), {"path": rows}
         self.low, self.high = (np.ascontiguousarray(side) for side in limits)
         self.sample_low, self.sample_high = self.low.copy(), self.high.copy()
-        self._p, self._weight = p, coordinates.scale**-2.0
+        self._p, self._scale, self._weight = p, 1.0 / coordinates.scale, coordinates.scale**-2.0
         self._struct = it = _PlanStruct(n=n, capacity=NODES, range=1.0, step=0.1, tolerance=1e-8, drift=1e-3)
-        self._nodes = [np.empty((NODES, n)) for _ in range(2)]
+        self._nodes, self._lanes = ([np.empty((NODES, n)) for _ in range(2)] for _ in range(2))
         self._parents = [np.empty(NODES, dtype=np.int32) for _ in range(2)]
         self._points, self._others = np.empty((POINTS, n)), np.empty((POINTS, n))
-        for name in ("low", "high", "sample_low", "sample_high", "weight"):
-            setattr(it, name, getattr(self, f"_{name}" if name == "weight" else name).ctypes.data)
+        for name in ("low", "high", "sample_low", "sample_high", "_weight", "_scale"):
+            setattr(it, name.strip("_"), getattr(self, name).ctypes.data)
         for k in range(2):
             it.node[k], it.parent[k] = self._nodes[k].ctypes.data, self._parents[k].ctypes.data
+            it.lanes[k] = self._lanes[k].ctypes.data
         self._kept: dict[str, list[Array]] = {}
         self._compiled: dict[PlanningRows, tuple[int, int, int]] = {}
         self.use("path", rows)
@@ -136,11 +136,13 @@ class NativePlanner:
         frames = len(coordinates.tree.frames)
         self._normals = np.zeros((pairs, 3))
         self._arrays: dict[str, Array] = {
-            "drifts": np.zeros((bodies, depth + 1, _DRIFT)), "gone": np.zeros(frames), "radius": np.zeros(bodies),
-            "balls": np.zeros((bodies, 4)), "normals": self._normals, "boxes": np.zeros((bodies, 15)),
+            "gone": np.zeros(frames), "radius": np.zeros(bodies), "normals": self._normals,
+            "boxes": np.zeros((bodies, 15)), "share": np.zeros(LANES),
             "reaches": np.zeros((bodies, depth)), "offs": np.zeros((bodies, depth + 1)),
             "lane_pose": np.zeros((frames, 12, LANES)), "lane_centre": np.zeros((bodies, 3, LANES)),
-            "outlines": np.zeros((pairs, _OUTLINE)), "near": np.zeros((LANES, pairs), dtype=np.int32),
+            "lane_ends": np.zeros((bodies, 6, LANES)), "lane_ways": np.zeros((bodies, depth + 1, _WAYS, LANES)),
+            "lane_stamp": np.zeros(bodies, dtype=np.int32), "outlines": np.zeros((pairs, _OUTLINE)),
+            "near": np.zeros((LANES, pairs), dtype=np.int32),
         }  # fmt: skip
         for name, array in self._arrays.items():
             setattr(it, name, array.ctypes.data)

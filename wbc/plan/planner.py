@@ -36,7 +36,7 @@ LEAST_PAD = 1e-5
 #: Samples of the first search; one that ends without a path is followed by one of twice as many
 FIRST = 2000
 #: Length of the longest edges against the diagonal of the space
-RANGE = 0.07
+RANGE = 0.2
 #: and against that in one search after the other: some spaces want short ones, some long ones
 RANGES = (1.0, 0.5, 2.0)
 #: Descents to configurations that meet a target
@@ -74,7 +74,7 @@ class PlanningOptions:
 
     seed: int = 0
     seconds: float = 10.0
-    paths: int = 2
+    paths: int = 4
     cuts: int = 30
     range: float | None = None
     step: float = 0.1

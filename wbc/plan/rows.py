@@ -25,7 +25,6 @@ from wbc.tasks import FrameVelocityLimit, MovingFrame
 from wbc.tasks._linkage_speed import LinkageSpeed
 from wbc.tasks.base import Constraint, Task
 from wbc.tasks.inputs import as_value
-from wbc.validation import Array
 
 #: Constraints that say nothing of configurations: of speeds, or of what measured bodies do, which the scene has
 OTHERS = (MeasuredApart, FrameVelocityLimit, LinkageSpeed, MovingFrame)
@@ -180,8 +179,3 @@ class RowsBuilder:
         if free and not coupled:
             reason = "its rows are of velocities, which a path of configurations cannot keep; plan without it"
             raise CommandError(block.entry.name, type(item).__name__, reason)
-
-
-def evaluated(rows: PlanningRows, x: Array, p: Array) -> Array:
-    """c at x, on CasADi's virtual machine."""
-    return np.asarray(rows.function(x, p)[0]).ravel()

@@ -78,9 +78,7 @@ def polish(qp: QP, solution: QPSolution, rounds: int = ROUNDS) -> Polished:
     return Polished(best, False, count)
 
 
-def solve_on(
-    qp: QP, factor: Factor, held: NDArray[np.int8], multipliers: Array, refinements: int = REFINEMENTS
-) -> tuple[Array, Array, ActiveRows]:
+def solve_on(qp: QP, factor: Factor, held: NDArray[np.int8], multipliers: Array) -> tuple[Array, Array, ActiveRows]:
     """The optimum with the rows of ``held`` at their bounds: x, multipliers, and the rows used.
 
     ``multipliers`` only decides the order in which dependent rows are left out.
@@ -89,7 +87,7 @@ def solve_on(
     bound = np.where(held == -1, qp.lower, qp.upper)[rows.index]
     x = np.zeros(qp.n, dtype=np.longdouble)
     lam = np.zeros(qp.n + qp.m, dtype=np.longdouble)
-    for _ in range(1 + refinements):
+    for _ in range(1 + REFINEMENTS):
         force = -factor.stationarity(qp, x, lam).astype(np.float64)
         offset = (bound - factor.rows_at(x)[rows.index]).astype(np.float64)
         dy, mu = rows.solve(factor.inverse.T @ force, offset)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import functools
 import hashlib
 import json
@@ -12,14 +13,16 @@ import os
 import pickle
 import platform
 import struct
-from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from wbc import extras, validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.log.file import Columns, FileWriter
 from wbc.record.background import BackgroundWriter
 from wbc.record.recording import FORMAT, RecordingError
+from wbc.record.rows import RowWriting, TickRow
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 
@@ -36,53 +39,18 @@ def recorded_inputs(layout: Layout) -> tuple[str, ...]:
 
 #: Of the report, besides the command and how the tick ended: what is told of it, but not compared by a replay
 TOLD = ("error", "margin")
-#: In place of a number of resets: what the solver remembers is not what was recorded
-UNKNOWN = -1
 #: The part ``reset`` of a tick that begins cold
 COLD = struct.pack("d", 1.0)
 #: The part ``reset`` of a tick that begins warm
 WARM = struct.pack("d", 0.0)
-#: Size of a chunk [bytes]; its memory is not asked of the system each time
+#: Size of a chunk [bytes]: it is compared and written in some 50 us
 CHUNK = 1 << 17
-#: Ticks of a chunk at least
+#: Ticks of a chunk at least: the first is written whole
 FEWEST = 16
-#: Ticks of a chunk at most
-MOST = 1024
+#: Time of a chunk's ticks at most, and of those that wait for the disk: what a kill loses is twice as long at most [s]
+BEHIND = 1.0
 #: Packages whose version decides the bits of a command
 PACKAGES = ("casadi", "pin", "daqp", "osqp", "numpy")
-
-
-class TickRow:
-    """The parts of a tick side by side, and from where in its memory each is copied.
-
-    Attributes:
-        sizes: part -> how many numbers, in their order.
-    """
-
-    def __init__(self, state: memoryview) -> None:
-        self._state, self.sizes = state, dict[str, int]()
-
-    @property
-    def size(self) -> int:
-        """Of all parts so far [bytes]."""
-        return 8 * sum(self.sizes.values())
-
-    def add(self, places: Mapping[str, slice]) -> list[tuple[int, int, memoryview]]:
-        """Lay out parts by their places in memory: (begin and end in the row [bytes], the memory) of each piece that is
-        copied at once. Parts that touch, but for one number that C has more, are a piece with it.
-        """
-        pieces: list[tuple[int, slice]] = []
-        for name, place in sorted(places.items(), key=lambda pair: (pair[1].start, pair[1].stop)):
-            begin, piece = pieces[-1] if pieces else (0, slice(-2, -2))
-            if place.start == piece.stop + 1:
-                self.sizes[f"before {name}"] = 1
-            elif place.start != piece.stop:
-                begin, piece = self.size, slice(place.start, place.start)
-                pieces.append((begin, piece))
-            pieces[-1] = begin, slice(piece.start, place.stop)
-            self.sizes[name] = place.stop - place.start
-        spans = [(begin, 8 * piece.start, 8 * piece.stop) for begin, piece in pieces if piece.start != piece.stop]
-        return [(begin, begin + stop - start, self._state[start:stop]) for begin, start, stop in spans]
 
 
 class Recorder:
@@ -98,39 +66,55 @@ class Recorder:
 
     Attributes:
         path: the file.
-        count: ticks so far. Refused inputs are no tick.
     """
 
     def __init__(self, controller: CompiledStack, path: str | os.PathLike[str], overwrite: bool) -> None:
         self.path = validation.file_path("path", path)
-        self.count = 0
         self._core = core = core_of(controller)
         self._tick = core.tick
         layout, places = core.layout, core.context.memory
-        state = core.tick.state.data.cast("B")
-        row = TickRow(state)
-        self._given = row.add({name: places[name] for name in recorded_inputs(layout)})
+        row, state = TickRow(), core.tick.state.data.cast("B")
+        given = row.add({name: places[name] for name in recorded_inputs(layout)})
         p = Columns.of(row.sizes)["p"]
         self._values = 8 * p.start, 8 * p.stop, state[8 * places["p"].start : 8 * places["p"].stop]
-        self._reset, row.sizes["reset"] = row.size, 1
+        reset, row.sizes["reset"] = row.size, 1
         others = {"others": slice(layout.nv, layout.variables)} if layout.variables > layout.nv else {}
-        told = {"v": slice(0, layout.nv)} | others
-        self._told = row.add(told | {name: places[name] for name in ("flag", *TOLD)})
+        told = row.add({"v": slice(0, layout.nv)} | others | {name: places[name] for name in ("flag", *TOLD)})
+        self._given, self._told = (
+            [(begin, begin + size, state[place : place + size]) for begin, place, size in pieces]
+            for pieces in (given, told)
+        )
         pickled, problem = _pickled(controller.stack)
         text = about(controller) | {"sizes": row.sizes, "not_pickled": problem}
-        self._writer: BackgroundWriter | None = BackgroundWriter(FileWriter(self.path, overwrite, RecordingError))
-        self._writer.begin(text, {} if pickled is None else {"stack.pickle": pickled})
-        self._size = row.size
-        self._chunk, self._process = max(FEWEST, min(MOST, CHUNK // self._size)), os.getpid()
-        # Ticks that are not written yet, in memory that is kept: what asks the system for more waits where it is short
-        self._memory, self._end = memoryview(bytearray(self._chunk * self._size)), 0
+        ticks = min(max(FEWEST, CHUNK // row.size), max(1, round(BEHIND / controller.stack.dt)))
+        waiting = max(1, round(BEHIND / (ticks * controller.stack.dt)))
+        file = FileWriter(self.path, overwrite, RecordingError)
+        self._writer: BackgroundWriter | None = BackgroundWriter(file, ticks * row.size, waiting)
+        self._chunk, self._process = ticks, os.getpid()
+        self._pieces = np.array([*given, *told], np.int64)
+        self._writing = RowWriting(row=row.size, size=ticks * row.size, given=len(given), told=len(told), reset=reset)
+        self._writing.pieces = self._pieces.ctypes.data
+        self._fill(self._writer.begin(text, {} if pickled is None else {"stack.pickle": pickled}))
         #: resets of the controller before the last tick that was recorded whole
-        self._seen = UNKNOWN
+        self._seen = 0
         self._problem: OSError | None = None
-        self._call = core.call
+        self._call, self._plain_call, self._finished = core.call, core.plain_call, core.finished
         core.call = functools.partial(_recorded, self)
+        if self._call is self._plain_call:
+            core.plain_call, core.finished = core.call, self._tell
+            core.assembly.recording[0] = ctypes.addressof(self._writing)
         core.recording = self.path
         atexit.register(self._leave)
+
+    @property
+    def count(self) -> int:
+        """Ticks so far. Refused inputs are no tick."""
+        return self._writing.count
+
+    def _fill(self, chunk: memoryview) -> None:
+        """Record into this memory from now on."""
+        self._memory, self._writing.chunk = chunk, ctypes.addressof(ctypes.c_char.from_buffer(chunk))
+        self._writing.end = 0
 
     def close(self) -> None:
         """End the recording; what is not written yet is written. More calls do nothing.
@@ -168,12 +152,11 @@ class Recorder:
             # a fork has a copy of the controller, but the file is its parent's
             self._writer.abandon()
             self._detach()
-        elif self._end:
+        elif self._writing.end:
             try:
-                self._writer.write(self._memory[: self._end])
+                self._fill(self._writer.exchange(self._memory, self._writing.end))
             except OSError as error:
                 self._fail(self._writer, error)
-            self._end = 0
 
     def _leave(self) -> None:
         """At the end of a process that did not close; what could not be written is in the log already."""
@@ -181,15 +164,15 @@ class Recorder:
             self.close()
 
     def _fail(self, writer: BackgroundWriter, error: OSError) -> None:
-        self._problem, self.count = error, writer.written // self._size
+        self._problem, self._writing.count = error, writer.written // self._writing.row
         log.warning("the recording %s ends after %d ticks: %s", self.path, self.count, error.strerror)
         writer.abandon()
         self._detach()
 
     def _detach(self) -> None:
         self._writer = None
-        self._core.call = self._call
-        self._core.recording = None
+        self._core.call, self._core.plain_call, self._core.finished = self._call, self._plain_call, self._finished
+        self._core.assembly.recording[0], self._core.recording = 0, None
 
     def __enter__(self) -> Recorder:
         return self
@@ -197,37 +180,46 @@ class Recorder:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
+    def _tell(self, warm: bool = True) -> None:
+        """Record what came of a tick; ``warm``: the solver remembered what it was recorded with."""
+        memory, writing = self._memory, self._writing
+        begin = writing.end
+        first = begin + writing.reset
+        memory[first : first + len(COLD)] = WARM if warm else COLD
+        for first, last, numbers in self._told:
+            memory[begin + first : begin + last] = numbers
+        writing.end = begin + writing.row
+        writing.count += 1
+        writing.ready, self._seen = 1, self._core.resets
+        if writing.end == writing.size:
+            self._send()
+
 
 def _recorded(recorder: Recorder) -> int:
-    """A tick, recorded."""
-    resets, seen = recorder._core.resets, recorder._seen
-    if seen == UNKNOWN:
+    """A tick, recorded; those of which nothing but the configuration and values is new C records by itself."""
+    writing, core = recorder._writing, recorder._core
+    if writing.end == writing.size:
+        # Ctrl-C came while the last chunk was waiting for the disk
+        recorder._send()
+    ready, resets = writing.ready, core.resets
+    if not ready:
         # the first one, or the one before was interrupted between its call and its record
         recorder._tick.reset()
-    memory, begin = recorder._memory, recorder._end
+    memory, begin = recorder._memory, writing.end
     for first, last, numbers in recorder._given:
         memory[begin + first : begin + last] = numbers
-    recorder._seen = UNKNOWN
+    writing.ready = 0
     flag = recorder._call()
     if flag:
-        flag = recorder._core.finish(flag)
+        flag = core.finish(flag)
     if flag < 0:
-        recorder._seen = seen
+        writing.ready = ready
         return flag
-    if recorder._core.resets != resets:
+    if core.resets != resets:
         # found again from other rows, which are sensed inputs, and from no active set
-        resets = recorder._core.resets
         first, last, numbers = recorder._values
         memory[begin + first : begin + last] = numbers
-    first = begin + recorder._reset
-    memory[first : first + len(COLD)] = WARM if resets == seen else COLD
-    for first, last, numbers in recorder._told:
-        memory[begin + first : begin + last] = numbers
-    end = recorder._end = begin + recorder._size
-    recorder._seen = resets
-    recorder.count += 1
-    if end == len(recorder._memory):
-        recorder._send()
+    recorder._tell(bool(ready) and core.resets == recorder._seen)
     return flag
 
 

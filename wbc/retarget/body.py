@@ -7,14 +7,14 @@ bones, the trunk lies between them, and names only decide between left and right
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wbc.errors import WbcError
-from wbc.retarget.clip import Array
+from wbc.retarget.clip import Array, ancestors
+from wbc.retarget.words import FRONT, HIND, side_of, words
 
 #: Limbs by name, in the order in which they are shown
 LIMBS = ("left_leg", "right_leg", "left_arm", "right_arm")
@@ -32,15 +32,8 @@ UPRIGHT = 0.6
 LOWER = 0.2
 #: A bone shorter than this share of its limb has no direction
 SHORT = 1e-3
-
-_LEFT = {"left", "l", "fl", "hl", "rl", "bl", "lf", "lh", "lb"}
-_RIGHT = {"right", "r", "fr", "hr", "rr", "br", "rf", "rh", "rb"}
-_FRONT = {"front", "fore", "fl", "fr", "lf", "rf", "arm", "hand", "shoulder"}
-_HIND = {"hind", "rear", "back", "hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", "leg", "hip", "foot"}
-#: Words of a single pair of limbs that say which it is
-ARM_WORDS = {"arm", "hand", "wrist", "elbow", "shoulder", "forearm", "gripper"}
-LEG_WORDS = {"leg", "hip", "knee", "ankle", "foot", "toe", "thigh", "shin"}
-_PARTS = {"leg", "arm", "hip", "knee", "ankle", "foot", "toe", "thigh", "shin", "shoulder", "elbow", "wrist", "hand"}
+#: Forward, where neither names nor toes nor a head say it: along x, as in robots' descriptions
+AHEAD = np.array([1.0, 0.0, 0.0])
 
 
 class BodyError(WbcError):
@@ -62,23 +55,29 @@ class PointTree:
 
     def children(self) -> list[list[int]]:
         """Numbers of each point's children."""
-        found: list[list[int]] = [[] for _ in self.names]
+        below: list[list[int]] = [[] for _ in self.names]
         for child, parent in enumerate(self.parents):
             if parent >= 0:
-                found[parent].append(child)
-        return found
+                below[parent].append(child)
+        return below
 
     def path(self, start: int, end: int) -> tuple[int, ...]:
         """Points from one to another along the tree, both included."""
-        up, down = self._ancestors(start), self._ancestors(end)
+        up, down = ancestors(self.parents, start), ancestors(self.parents, end)
         meeting = next(point for point in up if point in down)
         return (*up[: up.index(meeting) + 1], *reversed(down[: down.index(meeting)]))
 
-    def _ancestors(self, point: int) -> list[int]:
-        chain = [point]
-        while self.parents[chain[-1]] >= 0:
-            chain.append(self.parents[chain[-1]])
-        return chain
+    def bones(self, chain: Sequence[int]) -> Array:
+        """Lengths from point to point of a chain [m]."""
+        return np.asarray(np.linalg.norm(np.diff(self.points[list(chain)], axis=0), axis=1))
+
+    def length(self, chain: Sequence[int]) -> float:
+        """Of a chain [m]."""
+        return float(self.bones(chain).sum())
+
+    def said(self, chains: Sequence[Sequence[int]]) -> set[str]:
+        """Words of the names of chains' points."""
+        return {word for chain in chains for point in chain for word in words(self.names[point])}
 
 
 @dataclass(frozen=True)
@@ -104,37 +103,15 @@ class BodyPlan:
 
 @dataclass(frozen=True)
 class _LimbPair:
-    """Two chains that mirror each other, and the point that carries them."""
+    """Two chains that mirror each other, the point that carries them, and the middle of their first points [m]."""
 
     carrier: int
     chains: tuple[tuple[int, ...], tuple[int, ...]]
     reach: float
+    middle: Array
 
 
-def words(name: str) -> list[str]:
-    """Words of a name in lower case: of camel case, underscores, dots and blanks."""
-    spaced = re.sub(r"([a-z])([A-Z])|([A-Z])([A-Z][a-z])", r"\1\3 \2\4", name)
-    return [word for word in re.split(r"[^a-z]+", spaced.lower()) if word]
-
-
-def side_of(name: str) -> int:
-    """1 of a name that says left, -1 of one that says right, else 0; the first word that says it counts."""
-    for word in words(name):
-        part = word[1:] if word[:1] in "lr" and word[1:] in _PARTS else ""
-        if word in _LEFT or (part and word[0] == "l"):
-            return 1
-        if word in _RIGHT or (part and word[0] == "r"):
-            return -1
-    return 0
-
-
-def find_body(
-    tree: PointTree,
-    *,
-    field: str = "skeleton",
-    arms: bool = False,
-    straight: float = 1.0,
-) -> BodyPlan:
+def find_body(tree: PointTree, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0) -> BodyPlan:
     """The plan of a tree of points.
 
     Args:
@@ -148,35 +125,27 @@ def find_body(
     if not pairs:
         raise BodyError(field, ", ".join(tree.names[:8]), "no two chains of equal bones: there are no limbs to find")
     up = _up(tree, pairs)
-    # Where neither names nor toes nor a head say it the front is along x, as in robots' descriptions
-    hint = np.array([1.0, 0.0, 0.0])
-    middles = [_middle(tree, pair) for pair in pairs]
-    if len(pairs) == 1:
-        legs, fore, upright = pairs[0], None, True
-    else:
-        order = np.argsort([float(middle @ up) for middle in middles])
-        low, high = pairs[order[0]], pairs[order[-1]]
+    legs, fore, upright = pairs[0], None, True
+    if len(pairs) > 1:
+        legs, *_, fore = sorted(pairs, key=lambda pair: float(pair.middle @ up))
         if len(pairs) > 2:
             # Of more than two pairs those that reach farthest up and down
-            ends = [float(np.mean([tree.points[chain[-1]] @ up for chain in pair.chains])) for pair in pairs]
-            low = pairs[int(np.argmin(ends))]
-        trunk = _middle(tree, high) - _middle(tree, low)
+            legs = min(pairs, key=lambda pair: np.mean([tree.points[chain[-1]] @ up for chain in pair.chains]))
+        trunk = fore.middle - legs.middle
         upright = bool(abs(trunk @ up) > UPRIGHT * np.linalg.norm(trunk))
-        legs, fore = low, high
     across = _across(tree, pairs, up, straight)
     if not upright and fore is not None:
-        legs, fore = _hind_and_fore(tree, (legs, fore), up, across, hint)
-    left = _left(tree, (legs, fore), across, up, hint, upright)
+        legs, fore = _hind_and_fore(tree, (legs, fore), up)
+    left = _left(tree, (legs, fore), across, up, upright)
     limbs: dict[str, tuple[int, ...]] = {}
     for kind, pair in (("leg", legs), ("arm", fore)):
-        if pair is None:
-            continue
-        feet = kind == "leg" or not upright
-        branches = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
-        chains = sorted(branches, key=lambda chain: -float(tree.points[chain[0]] @ left))
-        if abs(float((tree.points[chains[0][0]] - tree.points[chains[1][0]]) @ left)) < SHORT * pair.reach:
-            chains = sorted(branches, key=lambda chain: -float(tree.points[chain[-1]] @ left))
-        limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
+        if pair is not None:
+            feet = kind == "leg" or not upright
+            branches = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
+            chains = sorted(branches, key=lambda chain: -float(tree.points[chain[0]] @ left))
+            if abs(float((tree.points[chains[0][0]] - tree.points[chains[1][0]]) @ left)) < SHORT * pair.reach:
+                chains = sorted(branches, key=lambda chain: -float(tree.points[chain[-1]] @ left))
+            limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
     if arms and fore is None:
         limbs = {name.replace("leg", "arm"): chain for name, chain in limbs.items()}
     chest = legs.carrier if fore is None else fore.carrier
@@ -190,27 +159,18 @@ def longest_chain(tree: PointTree, first: int) -> tuple[int, ...]:
     chain = [first]
     while children[chain[-1]]:
         here = chain[-1]
-        chain.append(max(children[here], key=lambda child: reach[child] + _bone(tree, child)))
+        chain.append(max(children[here], key=lambda child: reach[child] + tree.length((here, child))))
     return tuple(chain)
 
 
 def _lowest_branch(tree: PointTree, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
     """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest."""
     children = tree.children()
-    below, waiting = [], [chain[0]]
-    while waiting:
-        point = waiting.pop()
-        below.append(point)
-        waiting += children[point]
-    lowest = min((point for point in below if not children[point]), key=lambda point: float(tree.points[point] @ up))
-    if float((tree.points[chain[-1]] - tree.points[lowest]) @ up) > LOWER * _length(tree, chain):
+    ends = [k for k in reversed(range(len(children))) if not children[k] and chain[0] in ancestors(tree.parents, k)]
+    lowest = min(ends, key=lambda point: float(tree.points[point] @ up))
+    if float((tree.points[chain[-1]] - tree.points[lowest]) @ up) > LOWER * tree.length(chain):
         return tree.path(chain[0], lowest)
     return chain
-
-
-def _bone(tree: PointTree, point: int) -> float:
-    parent = tree.parents[point]
-    return float(np.linalg.norm(tree.points[point] - tree.points[parent])) if parent >= 0 else 0.0
 
 
 def _reaches(tree: PointTree) -> Array:
@@ -219,14 +179,14 @@ def _reaches(tree: PointTree) -> Array:
     for point in range(len(tree.names) - 1, 0, -1):
         parent = tree.parents[point]
         if parent >= 0:
-            reach[parent] = max(reach[parent], reach[point] + _bone(tree, point))
+            reach[parent] = max(reach[parent], reach[point] + tree.length((parent, point)))
     return reach
 
 
 def _pairs(tree: PointTree) -> list[_LimbPair]:
     """Pairs of limbs on the trunk."""
     children = tree.children()
-    found: list[_LimbPair] = []
+    pairs: list[_LimbPair] = []
     waiting = [point for point, parent in enumerate(tree.parents) if parent < 0]
     while waiting:
         point = waiting.pop()
@@ -235,41 +195,32 @@ def _pairs(tree: PointTree) -> list[_LimbPair]:
         for _, bones, a, b in costs:
             if bones < UNLIKE and a in rest and b in rest:
                 pair = rest.pop(a), rest.pop(b)
-                found.append(_LimbPair(point, pair, min(_length(tree, chain) for chain in pair)))
+                middle = np.asarray(np.mean([tree.points[a], tree.points[b]], axis=0))
+                pairs.append(_LimbPair(point, pair, min(map(tree.length, pair)), middle))
         waiting += rest
-    longest = max((pair.reach for pair in found), default=0.0)
-    return [pair for pair in found if pair.reach > LEAST_LIMB * longest and min(map(len, pair.chains)) >= 2]
-
-
-def _length(tree: PointTree, chain: Sequence[int]) -> float:
-    return float(np.linalg.norm(np.diff(tree.points[list(chain)], axis=0), axis=1).sum())
+    longest = max((pair.reach for pair in pairs), default=0.0)
+    return [pair for pair in pairs if pair.reach > LEAST_LIMB * longest and min(map(len, pair.chains)) >= 2]
 
 
 def _unlike(tree: PointTree, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[float, float]:
     """(by which of several partners the nearest and likest comes first, how much the bones of two chains differ)."""
-    profiles = [np.linalg.norm(np.diff(tree.points[list(chain)], axis=0), axis=1) for chain in (a, b)]
-    length = max(float(profile.sum()) for profile in profiles)
+    first, second = tree.bones(a), tree.bones(b)
+    length = max(float(first.sum()), float(second.sum()))
     if length == 0.0:
         return np.inf, np.inf
     if len(a) == len(b):
-        bones = float(np.abs(profiles[0] - profiles[1]).sum()) / length
+        bones = float(np.abs(first - second).sum()) / length
     else:
-        bones = 0.1 + abs(float(profiles[0].sum() - profiles[1].sum())) / length
+        bones = 0.1 + abs(float(first.sum() - second.sum())) / length
     sides = side_of(tree.names[a[0]]) * side_of(tree.names[b[0]])
-    distance = float(np.linalg.norm(tree.points[a[0]] - tree.points[b[0]])) / length
-    return bones + APART * distance + NAMED * sides, bones
-
-
-def _middle(tree: PointTree, pair: _LimbPair) -> Array:
-    return np.asarray(np.mean([tree.points[chain[0]] for chain in pair.chains], axis=0))
+    return bones + APART * tree.length((a[0], b[0])) / length + NAMED * sides, bones
 
 
 def _up(tree: PointTree, pairs: Sequence[_LimbPair]) -> Array:
     """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings."""
     rise = np.zeros(3)
-    for pair in pairs:
-        for chain in pair.chains:
-            rise += tree.points[chain[0]] - tree.points[chain[-1]]
+    for chain in itertools.chain(*(pair.chains for pair in pairs)):
+        rise += tree.points[chain[0]] - tree.points[chain[-1]]
     axis = int(np.argmax(np.abs(rise)))
     up = np.zeros(3)
     up[axis] = np.sign(rise[axis]) or 1.0
@@ -293,64 +244,48 @@ def _across(tree: PointTree, pairs: Sequence[_LimbPair], up: Array, straight: fl
     return snapped if abs(out[axis]) > straight * size else out / size
 
 
-def _left(
-    tree: PointTree, pairs: tuple[_LimbPair, _LimbPair | None], across: Array, up: Array, hint: Array, upright: bool
-) -> Array:
-    """The direction to the left; ``hint`` is forward where neither names, nor a lying trunk, nor toes say it."""
+def _left(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair | None], across: Array, up: Array, upright: bool) -> Array:
+    """The direction to the left; :data:`AHEAD` is forward where neither names, nor a lying trunk, nor toes say it."""
     legs, fore = pairs
     votes = 0.0
-    for pair in (legs, fore):
-        for chain in pair.chains if pair is not None else ():
-            said = side_of(tree.names[chain[0]]) or side_of(tree.names[chain[-1]])
-            votes += said * float(np.sign((tree.points[list(chain)].mean(axis=0) - _middle(tree, legs)) @ across))
+    for chain in (*legs.chains, *(fore.chains if fore is not None else ())):
+        said = side_of(tree.names[chain[0]]) or side_of(tree.names[chain[-1]])
+        votes += said * float(np.sign((tree.points[list(chain)].mean(axis=0) - legs.middle) @ across))
     if votes:
         return np.asarray(across * np.sign(votes))
     forward = np.zeros(3)
     if not upright and fore is not None:
-        forward = _middle(tree, fore) - _middle(tree, legs)
+        forward = fore.middle - legs.middle
     elif min(map(len, legs.chains)) >= 4:
         # Toes point forward
         for chain in legs.chains:
-            toe = tree.points[chain[-1]] - tree.points[chain[-2]]
-            before = tree.points[chain[-2]] - tree.points[chain[-3]]
+            before, toe = np.diff(tree.points[list(chain[-3:])], axis=0)
             forward += toe + (before if abs(before @ up) < 0.5 * np.linalg.norm(before) else 0.0)
     ahead = np.cross(across, up)
     vote = float(forward @ ahead)
     if abs(vote) < 0.2 * float(np.linalg.norm(forward)) or vote == 0.0:
-        vote = float(hint @ ahead) or 1.0
+        vote = float(AHEAD @ ahead) or 1.0
     return np.asarray(across * np.sign(vote))
 
 
-def _hind_and_fore(
-    tree: PointTree, pairs: tuple[_LimbPair, _LimbPair], up: Array, across: Array, hint: Array
-) -> tuple[_LimbPair, _LimbPair]:
+def _hind_and_fore(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair], up: Array) -> tuple[_LimbPair, _LimbPair]:
     """Of two pairs under a lying trunk the hind legs and the front legs."""
     a, b = pairs
-
-    def front(pair: _LimbPair) -> int:
-        said = {word for chain in pair.chains for point in chain for word in words(tree.names[point])}
-        return len(said & _FRONT) - len(said & _HIND)
-
-    if front(a) != front(b):
-        return (b, a) if front(a) > front(b) else (a, b)
+    first, second = (len(said & FRONT) - len(said & HIND) for said in (tree.said(pair.chains) for pair in pairs))
+    if first != second:
+        return (b, a) if first > second else (a, b)
     head = _head(tree, a, b, up)
     if head:
         end = tree.points[head[-1]]
-        nearer = np.linalg.norm(end - _middle(tree, a)) < np.linalg.norm(end - _middle(tree, b))
-        return (b, a) if nearer else (a, b)
-    return (a, b) if float((_middle(tree, b) - _middle(tree, a)) @ hint) >= 0.0 else (b, a)
+        return (b, a) if np.linalg.norm(end - a.middle) < np.linalg.norm(end - b.middle) else (a, b)
+    return (a, b) if float((b.middle - a.middle) @ AHEAD) >= 0.0 else (b, a)
 
 
 def _head(tree: PointTree, legs: _LimbPair, fore: _LimbPair | None, up: Array) -> tuple[int, ...]:
     """The chain without a partner that reaches highest, beyond the trunk."""
-    carriers = {legs.carrier} | ({fore.carrier} if fore is not None else set())
-    limbs = {chain[0] for pair in (legs, fore) if pair is not None for chain in pair.chains}
-    trunk = set(tree.path(legs.carrier, fore.carrier)) if fore is not None else {legs.carrier}
-    chains = [
-        longest_chain(tree, child)
-        for carrier in carriers
-        for child in tree.children()[carrier]
-        if child not in limbs and child not in trunk
-    ]
-    chains = [chain for chain in chains if float((tree.points[chain[-1]] - _middle(tree, legs)) @ up) > 0.0]
+    pairs = [pair for pair in (legs, fore) if pair is not None]
+    no_head = {*tree.path(pairs[0].carrier, pairs[-1].carrier), *(chain[0] for pair in pairs for chain in pair.chains)}
+    children, carriers = tree.children(), {pair.carrier for pair in pairs}
+    chains = [longest_chain(tree, child) for carrier in carriers for child in children[carrier] if child not in no_head]
+    chains = [chain for chain in chains if float((tree.points[chain[-1]] - legs.middle) @ up) > 0.0]
     return max(chains, key=lambda chain: float(tree.points[chain[-1]] @ up), default=())

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,11 @@ class Skeleton:
     parents: tuple[int, ...]
     offsets: Array
     ends: tuple[bool, ...]
+
+    @property
+    def rest(self) -> Array:
+        """Positions at rest [joints, 3] [m]."""
+        return rest_places(self.parents, self.offsets)
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,34 @@ class Clip:
     rate: float
     points: Array
     turns: Array | None
-    seen: NDArray[np.bool_]
+    seen: Marks
     name: str
     notes: tuple[str, ...] = ()
+
+
+def rest_places(parents: Sequence[int], offsets: Array) -> Array:
+    """Positions of a tree at rest, of offsets from the parents [joints, 3]."""
+    places = np.array(offsets, dtype=float)
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            places[joint] += places[parent]
+    return places
+
+
+def ancestors(parents: Sequence[int], joint: int) -> list[int]:
+    """A joint and all above it, up to the root."""
+    chain = [joint]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return chain
+
+
+def intervals(marks: Marks) -> list[tuple[int, int]]:
+    """First frame and the one after the last of every run of true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marks, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def listed(entries: Sequence[str], most: int, apart: str = ", ") -> str:
+    """The first entries in a line, with dots where there are more."""
+    return apart.join([*entries[:most], *(["..."] if len(entries) > most else [])])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,13 +12,15 @@ import numpy as np
 
 from wbc import validation
 from wbc.extras import require
-from wbc.retarget.body import ARM_WORDS, LIMBS, BodyError, BodyPlan, PointTree, find_body, words
+from wbc.retarget.body import LIMBS, BodyError, BodyPlan, PointTree, find_body
 from wbc.retarget.clip import Array, Skeleton
 from wbc.retarget.robot_body import RobotBody
-from wbc.robot import Robot
+from wbc.retarget.words import ARM_WORDS
 
 #: How much a limb's longer bone counts against its shorter one when knee and elbow are sought
 UNEVEN = 0.5
+#: Points of the trunk
+TRUNK = ("pelvis", "chest", "head")
 
 
 class CorrespondenceError(BodyError):
@@ -38,6 +41,15 @@ class LimbMatch:
     middle: int
     end: int
     tip: int
+
+    @property
+    def chain(self) -> tuple[int, int, int, int]:
+        """Base, middle, end and tip."""
+        return self.base, self.middle, self.end, self.tip
+
+    def length(self, points: Array) -> float:
+        """Of its two bones, where the skeleton's points are there [m]."""
+        return float(np.linalg.norm(np.diff(points[list(self.chain[:3])], axis=0), axis=1).sum())
 
 
 @dataclass(frozen=True)
@@ -67,19 +79,22 @@ class Correspondence:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        names, robot = self.skeleton.names, self.body.robot
-        rows = [("", *(part for part in ("base", "middle", "end", "tip")))]
+        names, model = self.skeleton.names, self.body.robot.model
+        rows: list[tuple[str, ...]] = [("", "base", "middle", "end", "tip")]
         for limb, match in self.limbs.items():
             mine = self.body.limbs[limb]
-            first = str(robot.model.names[mine.joints[0]])
-            hinges = [_joint_of(robot, frame) if frame else "contact" for frame in (mine.middle, mine.wrist)]
-            rows.append((f"{limb} of {robot.name}", first, *hinges, mine.contact))
-            rows.append((f"  {match.source}", *(names[k] for k in (match.base, match.middle, match.end, match.tip))))
-        widths = [max(len(row[k]) for row in rows) for k in range(5)]
+            frames = [model.frames[int(model.getFrameId(frame))] for frame in (mine.middle, mine.wrist) if frame]
+            joints = [str(model.names[joint]) for joint in (mine.joints[0], *(frame.parentJoint for frame in frames))]
+            joints += ["contact"] * (3 - len(joints))
+            rows.append((f"{limb} of {self.body.robot.name}", *joints, mine.contact))
+            rows.append((f"  {match.source}", *(names[k] for k in match.chain)))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        trunk = f"pelvis {names[self.pelvis]}, chest {names[self.chest]}"
-        lines.append(f"{trunk}{f', head {names[self.head]}' if self.head >= 0 else ''}; scale {self.scale:.3f}")
+        lines.append(", ".join(f"{part} {name}" for part, name in self._trunk().items()) + f"; scale {self.scale:.3f}")
         return "\n".join([*lines, *self.notes])
+
+    def _trunk(self) -> dict[str, str]:
+        return {part: self.skeleton.names[k] for part in TRUNK if (k := int(getattr(self, part))) >= 0}
 
     def save(self, file: str | os.PathLike[str]) -> None:
         """Write it as a short YAML, which :meth:`read` takes after it was edited.
@@ -87,15 +102,12 @@ class Correspondence:
         Raises:
             CorrespondenceError: the file cannot be written.
         """
-        names = self.skeleton.names
         lines = [f"robot: {self.body.robot.name}", f"scale: {self.scale:.6g}"]
         lines.append(f"all_fours: {str(self.all_fours).lower()}")
-        lines += [f"pelvis: {_quoted(names[self.pelvis])}", f"chest: {_quoted(names[self.chest])}"]
-        if self.head >= 0:
-            lines.append(f"head: {_quoted(names[self.head])}")
+        lines += [f"{part}: {_quoted(name)}" for part, name in self._trunk().items()]
         lines.append("limbs:  # base, middle, end, tip")
         for limb, match in self.limbs.items():
-            points = ", ".join(_quoted(names[k]) for k in (match.base, match.middle, match.end, match.tip))
+            points = ", ".join(_quoted(self.skeleton.names[k]) for k in match.chain)
             lines.append(f"  {limb}: [{match.source}, {points}]")
         with validation.writing("correspondence", file, CorrespondenceError), open(file, "w", encoding="utf-8") as out:
             out.write("\n".join(lines) + "\n")
@@ -126,10 +138,8 @@ class Correspondence:
         names = self.skeleton.names
         changes: dict[str, Any] = {}
         for key, value in given.items():
-            validation.one_of(
-                "correspondence", key, ("robot", "scale", "all_fours", "pelvis", "chest", "head", "limbs")
-            )
-            if key in ("pelvis", "chest", "head"):
+            validation.one_of("correspondence", key, ("robot", "scale", "all_fours", *TRUNK, "limbs"))
+            if key in TRUNK:
                 changes[key] = names.index(validation.one_of(key, value, names))
             elif key == "scale":
                 changes[key] = validation.scalar("scale", value, low=1e-3, high=1e3)
@@ -138,35 +148,16 @@ class Correspondence:
         limbs = dict(self.limbs)
         for limb, row in validation.mapping("limbs", given.get("limbs", {}), "limbs to points").items():
             validation.one_of("limbs", limb, self.body.limbs)
-            points = validation.strings(f"limbs.{limb}", row)
+            field, points = f"limbs.{limb}", validation.strings(f"limbs.{limb}", row)
             if len(points) != 5:
-                raise CorrespondenceError(
-                    f"limbs.{limb}", row, "expected a limb and four points: base, middle, end, tip"
-                )
-            source = validation.one_of(f"limbs.{limb}", points[0], LIMBS)
-            limbs[limb] = LimbMatch(
-                source, *(names.index(validation.one_of(f"limbs.{limb}", point, names)) for point in points[1:])
-            )
+                raise CorrespondenceError(field, row, "expected a limb and four points: base, middle, end, tip")
+            source = validation.one_of(field, points[0], LIMBS)
+            limbs[limb] = LimbMatch(source, *(names.index(validation.one_of(field, k, names)) for k in points[1:]))
         return replace(self, limbs=limbs, **changes)
-
-
-def _joint_of(robot: Robot, frame: str) -> str:
-    """Name of the joint that carries a frame."""
-    model = robot.model
-    return str(model.names[int(model.frames[int(model.getFrameId(frame))].parentJoint)])
 
 
 def _quoted(name: str) -> str:
     return "'" + name.replace("'", "''") + "'"
-
-
-def rest_of(skeleton: Skeleton) -> Array:
-    """Points of a skeleton at rest [joints, 3] [m]."""
-    points = np.array(skeleton.offsets, dtype=float)
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            points[joint] += points[parent]
-    return points
 
 
 def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = False) -> Correspondence:
@@ -178,20 +169,14 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
     Raises:
         CorrespondenceError: no limbs in the skeleton, or none that the robot needs: a robot that walks needs legs.
     """
-    rest = rest_of(skeleton)
+    rest, robot, some = skeleton.rest, body.robot, ", ".join(skeleton.names[:8])
     plan = find_body(PointTree(skeleton.names, skeleton.parents, rest))
     limbs = {name: _hinges(plan, chain, name, skeleton.ends) for name, chain in plan.limbs.items()}
-    if "left_arm" not in limbs:
-        said = {word for chain in plan.limbs.values() for point in chain for word in words(skeleton.names[point])}
-        if said & ARM_WORDS:
-            limbs = {
-                name.replace("leg", "arm"): replace(m, source=m.source.replace("leg", "arm"))
-                for name, m in limbs.items()
-            }
-    moves = body.robot.base != "fixed"
-    if moves and "left_leg" not in limbs:
-        names = ", ".join(skeleton.names[:8])
-        raise CorrespondenceError("skeleton", names, f"has no legs, and {body.robot.name!r} stands on its own")
+    if "left_arm" not in limbs and plan.tree.said([*plan.limbs.values()]) & ARM_WORDS:
+        renamed = {name.replace("leg", "arm"): match for name, match in limbs.items()}
+        limbs = {name: replace(match, source=name) for name, match in renamed.items()}
+    if robot.base != "fixed" and "left_leg" not in limbs:
+        raise CorrespondenceError("skeleton", some, f"has no legs, and {robot.name!r} stands on its own")
     pairs: dict[str, LimbMatch] = {}
     notes: list[str] = []
     for limb in body.limbs:
@@ -204,60 +189,43 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
         else:
             notes.append(f"{limb} has nobody to follow: the skeleton has no {source}")
     if not pairs:
-        raise CorrespondenceError(
-            "skeleton", ", ".join(skeleton.names[:8]), f"has no limb that {body.robot.name!r} has"
-        )
-    notes += [
-        f"{limb}: the size of its end is not in the robot's file and is assumed"
-        for limb, m in body.limbs.items()
-        if m.guessed
-    ]
+        raise CorrespondenceError("skeleton", some, f"has no limb that {robot.name!r} has")
+    guessed = [limb for limb, own in body.limbs.items() if own.guessed]
+    notes += [f"{limb}: the size of its end is not in the robot's file and is assumed" for limb in guessed]
     head = plan.head[min(1, len(plan.head) - 1)] if plan.head else -1
-    scale = _scale(body, rest, pairs, plan)
     return Correspondence(
-        body, skeleton, rest, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright, scale, all_fours,
-        tuple(notes),
+        body, skeleton, rest, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright,
+        _scale(body, rest, pairs, plan), all_fours, tuple(notes),
     )  # fmt: skip
 
 
 def _hinges(plan: BodyPlan, chain: tuple[int, ...], name: str, ends: tuple[bool, ...]) -> LimbMatch:
     """Hip, knee, ankle and toe of a chain: the three points between which its two longest and most equal bones lie."""
-    points = plan.tree.points[list(chain)]
+    tree, names = plan.tree, ", ".join(plan.tree.names[point] for point in chain)
     if len(chain) < 3:
-        names = ", ".join(plan.tree.names[point] for point in chain)
-        raise CorrespondenceError(
-            "skeleton", names, f"the {name} has {len(chain)} points; base, middle and end are needed"
-        )
-    bones = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        reason = f"the {name} has {len(chain)} points; base, middle and end are needed"
+        raise CorrespondenceError("skeleton", names, reason)
+    bones = tree.bones(chain)
     best, places = -np.inf, (0, 1, 2)
-    for a in range(len(chain) - 2):
-        for b in range(a + 1, len(chain) - 1):
-            for c in range(b + 1, len(chain)):
-                upper, lower = (float(np.linalg.norm(points[j] - points[i])) for i, j in ((a, b), (b, c)))
-                # A point left out costs the shorter of its bones: little of a clavicle or a toe, much of an elbow
-                left_out = sum(min(bones[k - 1], bones[k]) for k in range(a + 1, c) if k != b)
-                score = min(upper, lower) - UNEVEN * abs(upper - lower) - left_out
-                # The end of a bone is no joint
-                score -= 0.5 * bones[c - 1] * ends[chain[c]]
-                if score > best:
-                    best, places = score, (a, b, c)
+    for a, b, c in itertools.combinations(range(len(chain)), 3):
+        upper, lower = (tree.length((chain[i], chain[j])) for i, j in ((a, b), (b, c)))
+        # A point left out costs the shorter of its bones: little of a clavicle or a toe, much of an elbow
+        left_out = sum(min(bones[k - 1], bones[k]) for k in range(a + 1, c) if k != b)
+        # The end of a bone is no joint
+        score = min(upper, lower) - UNEVEN * abs(upper - lower) - left_out - 0.5 * bones[c - 1] * ends[chain[c]]
+        if score > best:
+            best, places = score, (a, b, c)
     if best <= 0.0:
-        names = ", ".join(plan.tree.names[point] for point in chain)
         raise CorrespondenceError("skeleton", names, f"the bones of the {name} have no length")
-    a, b, c = places
-    return LimbMatch(name, chain[a], chain[b], chain[c], chain[-1])
-
-
-def _length(points: Array, match: LimbMatch) -> float:
-    """Length of the two bones of a limb [m]."""
-    return float(np.linalg.norm(np.diff(points[[match.base, match.middle, match.end]], axis=0), axis=1).sum())
+    base, middle, end = (chain[k] for k in places)
+    return LimbMatch(name, base, middle, end, chain[-1])
 
 
 def _scale(body: RobotBody, rest: Array, pairs: Mapping[str, LimbMatch], plan: BodyPlan) -> float:
     """Metres of the robot to one of the skeleton: of the legs' lengths, or of the heights of backs on four legs."""
     kind = "leg" if "left_leg" in pairs else "arm"
     sides = [name for name in (f"left_{kind}", f"right_{kind}") if name in pairs]
-    theirs = float(np.mean([_length(rest, pairs[name]) for name in sides]))
+    theirs = float(np.mean([pairs[name].length(rest) for name in sides]))
     if body.plan.upright:
         return float(np.mean([sum(body.limbs[name].lengths) for name in sides])) / theirs
     if not plan.upright:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from wbc.retarget.clip import Array
 from wbc.retarget.options import RetargetOptions
 from wbc.retarget.plan import ContactGrip, MotionPlan, balanced, logarithms
 from wbc.retarget.robot_body import RobotBody, with_frame
-from wbc.retarget.still_contact import StillContact
 from wbc.robot import Robot
 from wbc.shapes import Convex, HalfSpace, PlacedShape
 from wbc.tasks.base import Task
@@ -44,8 +43,8 @@ NEAR_ENOUGH = 1e-5
 THIN = 2e-4
 #: Links besides feet that have rows of the ground at a time
 NEAREST = 8
-#: The ground's rows begin this far below it, so that they say nothing of feet that are held on it [m]
-DEPTH = 2e-4
+#: The ground's rows begin this far above it: links that roll lower another corner within a tick [m]
+ABOVE = 3e-4
 #: What a foot that goes below the ground costs, see docs/soft.md
 GROUND_PRICE = 1e5
 #: How fast feet come down to the ground's rows, as share of one over the time of a tick
@@ -79,6 +78,14 @@ def limited(robot: Robot, options: RetargetOptions) -> Robot:
     acceleration = np.where(np.isfinite(limits.acceleration), limits.acceleration, options.acceleration)
     velocity[:base], acceleration[:base] = options.base_velocity, options.base_acceleration
     return robot.with_limits(velocity=velocity, acceleration=acceleration)
+
+
+@dataclass(frozen=True)
+class StillContact(tasks.Hold):
+    """A contact at rest; where its target is after a tick is met to rounding, second-order motion included."""
+
+    abstract: ClassVar[bool] = True
+    exact: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -190,16 +197,17 @@ class Engine:
         A foot that is held comes down to its place on the ground as fast as the plan says. A row that lets it come down
         slower would be served by turns of its leg, which lift corners of its hull.
         """
-        ends = {name: limb.end for name, limb in self.body.limbs.items()}
+        ends, ground_pose = {name: limb.end for name, limb in self.body.limbs.items()}, pin.SE3.Identity()
+        ground_pose.translation = np.array([0.0, 0.0, ABOVE])
         held = self._limbs if self.options.hold else []
         self._own_ground = {name: f"{name} above ground" for name in held if self.body.is_foot(name)}
         for name, item in self._own_ground.items():
-            ground = tasks.Obstacle(HalfSpace(), links=(ends.pop(name),), pose=_below(DEPTH))
+            ground = tasks.Obstacle(HalfSpace(), links=(ends.pop(name),), pose=ground_pose)
             stack.add(ground, name=item, soft=GROUND_PRICE)
         self._ground = [*self._own_ground.values()]
         if links := (*ends.values(), *self._links):
             closest = min(len(self.body.limbs) + NEAREST, len(links))
-            ground = tasks.Obstacle(HalfSpace(), links=links, pose=_below(DEPTH), closest=closest)
+            ground = tasks.Obstacle(HalfSpace(), links=links, pose=ground_pose, closest=closest)
             stack.add(ground, name="above ground", soft=GROUND_PRICE)
             self._ground.append("above ground")
 
@@ -229,19 +237,19 @@ class Engine:
 
     def _columns_of(self, follower: _PlanFollower) -> list[int]:
         """Which of the numbers of :meth:`rows`, before they are put in order, an item's inputs are."""
-        places, turns = 3 * len(self._places), 9 * len(self._turns)
-        place = 3 * self._places.index(follower.place) if follower.place else None
-        turn = 9 * self._turns.index(follower.turn) if follower.turn or follower.stands else None
-        ahead = 1 if follower.stands else 0
-        target = [] if turn is None else list(range(turn + ahead * turns, turn + ahead * turns + 9))
-        first = 2 * turns + ahead * places
-        target += [] if place is None else list(range(first + place, first + place + 3))
-        if follower.stands:
-            return target
-        first = 2 * turns + 2 * places
-        rates = [] if place is None else list(range(first + place, first + place + 3))
-        first += places
-        return target + rates + ([] if turn is None else list(range(first + turn // 3, first + turn // 3 + 3)))
+        nine, three, place, turn = 9 * len(self._turns), 3 * len(self._places), follower.place, follower.turn
+        # Where turns, next turns, places, next places, their rates and the turns' rates begin
+        first = np.cumsum([0, nine, nine, three, three, three]).tolist()
+
+        def columns(block: int, names: Sequence[str], name: str, size: int) -> list[int]:
+            start = first[block] + size * names.index(name)
+            return list(range(start, start + size))
+
+        ahead, stands = int(follower.stands), follower.stands
+        target = columns(ahead, self._turns, turn, 9) if turn or stands else []
+        target += columns(2 + ahead, self._places, place, 3) if place else []
+        rates = columns(4, self._places, place, 3) if place and not stands else []
+        return target + rates + (columns(5, self._turns, turn, 3) if turn and not stands else [])
 
     def targets(self, plan: MotionPlan) -> tuple[Array, Array]:
         """Positions [ticks, places, 3] and rotations [ticks, turns, 3, 3] that the stack follows."""
@@ -267,8 +275,7 @@ class Engine:
             np.swapaxes(turns, -1, -2), np.swapaxes(next_turns, -1, -2), places, next_places,
             (next_places - places) / dt, logarithms(steps.reshape(-1, 3, 3)) / dt,
         )  # fmt: skip
-        columns = np.concatenate([values.reshape(ticks, -1) for values in numbers], axis=1)
-        return np.ascontiguousarray(columns[:, self._order])
+        return np.take(np.concatenate([values.reshape(ticks, -1) for values in numbers], axis=1), self._order, axis=1)
 
     def start(self, places: Array, turns: Array, held: Mapping[str, ContactGrip]) -> Array:
         """Bring the robot to the first of some targets, with the velocity with which they go on; its configuration.
@@ -427,18 +434,8 @@ def _solid(corners: Array) -> PlacedShape:
 def _joints_between(robot: Robot, first: str, second: str) -> int:
     """How many joints lie on the way from one link to another."""
     model = robot.model
-    chains = []
-    for link in (first, second):
-        chain = [int(model.frames[int(model.getFrameId(link))].parentJoint)]
-        while chain[-1] > 0:
-            chain.append(int(model.parents[chain[-1]]))
-        chains.append(chain)
-    return len(set(chains[0]) ^ set(chains[1]))
-
-
-def _below(depth: float) -> pin.SE3:
-    """The pose of a plane this far below the ground [m]."""
-    return pin.SE3(np.eye(3), np.array([0.0, 0.0, -depth]))
+    a, b = ({*model.supports[model.frames[model.getFrameId(link)].parentJoint]} for link in (first, second))
+    return len(a ^ b)
 
 
 def _next(values: Array) -> Array:

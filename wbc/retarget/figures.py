@@ -7,13 +7,12 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc.multibody import pin
+from wbc.retarget.clip import Array, Marks, intervals
 from wbc.retarget.poses import frame_poses
 from wbc.retarget.solids import surface_points
 from wbc.robot import Robot
-from wbc.validation import Array
 
 #: A limit counts as kept up to this much beyond it, as a share of the limit and in rad or m
 TOLERANCE = 1e-6
@@ -27,7 +26,7 @@ def motion_figures(
     robot: Robot,
     rate: float,
     q: Array,
-    stance: Mapping[str, NDArray[np.bool_]],
+    stance: Mapping[str, Marks],
     *,
     ground: float | None = 0.0,
     balls: Collection[str] = (),
@@ -52,14 +51,12 @@ def motion_figures(
     velocity = steps[:, first:] * rate
     acceleration = np.diff(velocity, axis=0) * rate
     limits = robot.limits
-    places = robot.position_index[first:]
-    known = places >= 0
-    values = q[:, places[known]]
+    index = robot.position_index[first:]
+    known = index >= 0
+    values = q[:, index[known]]
     low, high = limits.position_lower[first:][known], limits.position_upper[first:][known]
     outside = (values < low - TOLERANCE) | (values > high + TOLERANCE)
-    out: dict[str, Any] = {
-        "frames": len(q), "rate": rate, "position_breaches": int(outside.any(axis=1).sum()),
-    }  # fmt: skip
+    out: dict[str, Any] = {"frames": len(q), "rate": rate, "position_breaches": int(outside.any(axis=1).sum())}
     for name, moves, limit, share in (
         ("velocity", velocity, limits.velocity[first:], "fastest"),
         ("acceleration", acceleration, limits.acceleration[first:], "quickest"),
@@ -67,31 +64,20 @@ def motion_figures(
         part = np.abs(moves) / np.where(limit > 0.0, limit, np.inf)
         out[f"{name}_breaches"] = int((part > 1.0 + TOLERANCE).any(axis=1).sum()) if part.size else 0
         out[share] = float(part.max()) if part.size else 0.0
-    jumps = np.abs(acceleration) > JUMP
-    out["jumps"] = int(jumps.any(axis=1).sum())
-    feet = {frame: stands for frame, stands in stance.items() if frame in robot.frame_names}
-    out |= _touching(robot, q, feet, ground, balls)
-    return out
-
-
-def _touching(
-    robot: Robot, q: Array, feet: Mapping[str, NDArray[np.bool_]], ground: float | None, balls: Collection[str]
-) -> dict[str, Any]:
-    """Depths below the ground, and slides of soles."""
-    surfaces = surface_points(robot)
+    out["jumps"] = int((np.abs(acceleration) > JUMP).any(axis=1).sum())
+    surfaces, feet = surface_points(robot), [frame for frame in stance if frame in robot.frame_names]
     names = tuple({*surfaces, *feet})
-    soles = {foot: np.zeros((1, 3)) if foot in balls else _own_points(robot, foot, surfaces) for foot in feet}
-    rotations, positions = frame_poses(robot, names, q)
-    poses = {name: (rotations[:, k], positions[:, k]) for k, name in enumerate(names)}
-    lowest = np.full(len(q), np.inf)
-    for name, points in surfaces.items():
-        turn, place = poses[name]
-        lowest = np.minimum(lowest, (turn[:, 2] @ points.T).min(axis=1) + place[:, 2])
-    tracks = {foot: soles[foot] @ np.swapaxes(poses[foot][0], 1, 2) + poses[foot][1][:, None] for foot in feet}
-    slides = {foot: _slide(track, np.asarray(feet[foot])) for foot, track in tracks.items()}
-    out: dict[str, Any] = {"slide": max(slides.values(), default=0.0), "slides": slides}
+    turns, places = frame_poses(robot, names, q)
+    poses = {name: (turns[:, k], places[:, k]) for k, name in enumerate(names)}
+    slides: dict[str, float] = {}
+    for foot in feet:
+        turn, place = poses[foot]
+        sole = np.zeros((1, 3)) if foot in balls else _own_points(robot, foot, surfaces)
+        slides[foot] = _slide(sole @ np.swapaxes(turn, 1, 2) + place[:, None], np.asarray(stance[foot]))
+    out |= {"slide": max(slides.values(), default=0.0), "slides": slides}
     if ground is not None and surfaces:
-        depth = np.maximum(0.0, ground - lowest)
+        heights = [(poses[k][0][:, 2] @ own.T).min(axis=1) + poses[k][1][:, 2] for k, own in surfaces.items()]
+        depth = np.maximum(0.0, ground - np.min(heights, axis=0))
         out |= {"penetration": float(depth.max()), "penetration_frames": int((depth > 1e-3).sum())}
     return out
 
@@ -109,11 +95,10 @@ def _own_points(robot: Robot, foot: str, surfaces: Mapping[str, Array]) -> Array
     return np.concatenate(out) if out else np.zeros((1, 3))
 
 
-def _slide(track: Array, stands: NDArray[np.bool_]) -> float:
+def _slide(track: Array, stands: Marks) -> float:
     """Largest motion along the ground of a point of a sole from where its stance began [m]."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], stands, [False])).astype(int))).reshape(-1, 2)
     worst = 0.0
-    for start, stop in edges:
+    for start, stop in intervals(stands):
         heights = track[start, :, 2]
         sole = track[start:stop, heights <= heights.min() + SOLE_HEIGHT, :2]
         worst = max(worst, float(np.linalg.norm(sole - sole[0], axis=2).max()))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from wbc import robots, validation
 from wbc.errors import ClipFileError, WbcError
 from wbc.retarget.report import write_report
-from wbc.retarget.sources import CLIP_SUFFIXES, load_clip
+from wbc.retarget.sources.loading import CLIP_SUFFIXES, load_clip
 
 if TYPE_CHECKING:
     from wbc.retarget.retargeter import Retargeter

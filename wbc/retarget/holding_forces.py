@@ -62,18 +62,17 @@ def held(motion: Retargeted, *, frames: int = FRAMES, friction: float = 0.7) -> 
     robot, body = motion.robot, motion.body
     if robot.base == "fixed":
         raise RangeError("motion", robot.name, "a fixed base holds the robot")
+    contact: dict[str, tasks.SurfaceContact | tasks.PointContact] = {}
     for name, limb in body.limbs.items():
-        center = 0.5 * (limb.corners.min(axis=0) + limb.corners.max(axis=0))
-        robot = robot.with_frame(f"retarget_{name}_contact", limb.end, pin.SE3(np.eye(3), center))
+        low, high, frame = limb.corners.min(axis=0), limb.corners.max(axis=0), f"retarget_{name}_contact"
+        robot = robot.with_frame(frame, limb.end, pin.SE3(np.eye(3), 0.5 * (low + high)))
+        contact[name] = tasks.PointContact(frame, friction=friction)
+        long, wide, _ = (0.5 * (high - low)).tolist()
+        if limb.contact == "flat" and min(long, wide) > NARROW:
+            contact[name] = tasks.SurfaceContact(frame, half_lengths=(long, wide), friction=friction)
     stack = Stack(robot, dt=0.01)
-    for name, limb in body.limbs.items():
-        half = 0.5 * np.ptp(limb.corners, axis=0)
-        frame = f"retarget_{name}_contact"
-        if limb.contact == "flat" and half[:2].min() > NARROW:
-            surface = tasks.SurfaceContact(frame, half_lengths=(float(half[0]), float(half[1])), friction=friction)
-            stack.add(surface, name=name)
-        else:
-            stack.add(tasks.PointContact(frame, friction=friction), name=name)
+    for name, item in contact.items():
+        stack.add(item, name=name)
     stack.add(tasks.TorqueLimits(), name="motors")
     controller = stack.compile(command="torque")
     controller.reset(motion.q[0])

@@ -128,7 +128,7 @@ class LiveRetargeter:
         need = float(lowering(body, places.pelvis, places.turn, limbs, 1.0 / self.rate)[0])
         self._low = max(need, self._low - RISE / self.rate)
         pelvis = places.pelvis - np.array([0.0, 0.0, self._low])
-        return MotionPlan(self._engine.dt, pelvis, places.turn, places.chest, places.head, limbs)
+        return MotionPlan(pelvis, places.turn, places.chest, places.head, limbs, self._engine.dt)
 
     def _limb(self, name: str, limb: LimbPlaces) -> LimbPlan:
         """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
@@ -139,18 +139,16 @@ class LiveRetargeter:
         step = 1.0 / (BLEND * self.rate)
         state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
         flat = limb.rotation is not None and robot.contact == "flat"
+        heading = state.heading if flat else None
         if state.share <= 0.0:
-            end, rotation = (
-                state.place[None],
-                state.heading[None] if flat and state.heading is not None else limb.rotation,
-            )
+            end, rotation = state.place[None], limb.rotation if heading is None else heading[None]
         else:
             end, rotation = raised(robot, limb)
             share = float(minimum_jerk(np.array(state.share)))
             if share < 1.0:
                 end = state.place + share * (end - state.place)
-            if flat and rotation is not None and state.heading is not None and share < 1.0:
-                rotation = state.heading @ exponential(share * logarithms(state.heading.T @ rotation))
+            if rotation is not None and heading is not None and share < 1.0:
+                rotation = heading @ exponential(share * logarithms(heading.T @ rotation))
         held = np.array([stands and state.share * BLEND <= BEFORE])
         lies = np.array([not self._match.body.is_foot(name) and bool(state.place[2] <= robot.radius)])
         return LimbPlan(limb.middle, limb.wrist, end, rotation, held, held, lies)
@@ -161,7 +159,6 @@ def _between(last: tuple[Array, Array], now: tuple[Array, Array], every: int) ->
     if every == 1:
         return np.concatenate([last[0], now[0]]), np.concatenate([last[1], now[1]])
     shares = np.linspace(0.0, 1.0, every + 1)[:, None, None]
-    turned = shares * logarithms(np.swapaxes(last[1][0], 1, 2) @ now[1][0])
-    return last[0] + shares * (now[0] - last[0]), last[1] @ exponential(turned.reshape(-1, 3)).reshape(
-        every + 1, -1, 3, 3
-    )
+    vectors = shares * logarithms(np.swapaxes(last[1][0], 1, 2) @ now[1][0])
+    turned = exponential(vectors.reshape(-1, 3)).reshape(every + 1, -1, 3, 3)
+    return last[0] + shares * (now[0] - last[0]), last[1] @ turned

@@ -6,6 +6,13 @@ from dataclasses import dataclass, field
 
 from wbc import validation
 
+#: Least and most of the numbers among the options, in their units
+BOUNDS = {
+    "rate": (1.0, 2000.0), "tick_rate": (10.0, 2000.0), "scale": (1e-3, 1e3), "clearance": (0.0, 1.0),
+    "balance": (0.0, 1e6),
+    **dict.fromkeys(("acceleration", "velocity", "base_velocity", "base_acceleration"), (1e-3, 1e6)),
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
 class RetargetWeights:
@@ -64,19 +71,9 @@ class RetargetOptions:
     weights: RetargetWeights = field(default_factory=RetargetWeights)
 
     def __post_init__(self) -> None:
-        put = object.__setattr__
-        for name, low, high in (
-            ("tick_rate", 10.0, 2000.0),
-            ("acceleration", 1e-3, 1e6),
-            ("velocity", 1e-3, 1e6),
-            ("base_velocity", 1e-3, 1e6),
-            ("base_acceleration", 1e-3, 1e6),
-            ("balance", 0.0, 1e6),
-        ):
-            put(self, name, validation.scalar(f"options.{name}", getattr(self, name), low=low, high=high))
-        for name, low, high in (("rate", 1.0, 2000.0), ("scale", 1e-3, 1e3), ("clearance", 0.0, 1.0)):
-            if getattr(self, name) is not None:
-                put(self, name, validation.scalar(f"options.{name}", getattr(self, name), low=low, high=high))
+        for name, (low, high) in BOUNDS.items():
+            if (value := getattr(self, name)) is not None or name not in ("rate", "scale", "clearance"):
+                object.__setattr__(self, name, validation.scalar(f"options.{name}", value, low=low, high=high))
         validation.flag("options.hold", self.hold)
         if self.all_fours is not None:
             validation.flag("options.all_fours", self.all_fours)

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wbc.retarget.body import LIMBS
-from wbc.retarget.clip import Array
+from wbc.retarget.clip import Array, Marks, intervals
 from wbc.retarget.mapping import LimbPlaces, Places
 from wbc.retarget.robot_body import RobotBody, RobotLimb
-from wbc.retarget.stances import Marks, intervals, smoothed
-from wbc.rotations import exponential
+from wbc.retarget.stances import smoothed
+from wbc.rotations import continuous_quaternions, exponential
 
 #: Time in which a foot leaves the place of its stance for the skeleton's path, and comes to the next one [s]
 BLEND = 0.12
@@ -49,19 +50,14 @@ class ContactGrip(Enum):
 
 
 @dataclass(frozen=True)
-class LimbPlan:
+class LimbPlan(LimbPlaces):
     """A limb's targets over ticks.
 
     Attributes:
-        middle, wrist, end: positions [ticks, 3] [m]. rotation: [ticks, 3, 3]; None: free.
         stands: in stance. held: in stance or shortly before one [ticks].
         lies: it is a hand on the ground where it is held [ticks].
     """
 
-    middle: Array
-    wrist: Array
-    end: Array
-    rotation: Array | None
     stands: Marks
     held: Marks
     lies: Marks
@@ -72,19 +68,15 @@ class LimbPlan:
 
 
 @dataclass(frozen=True)
-class MotionPlan:
-    """Targets over ticks; see :class:`wbc.retarget.mapping.Places`.
+class MotionPlan(Places):
+    """Targets over ticks.
 
     Attributes:
         dt: time from tick to tick [s].
     """
 
-    dt: float
-    pelvis: Array
-    turn: Array
-    chest: Array
-    head: Array | None
     limbs: dict[str, LimbPlan]
+    dt: float
 
     @property
     def ticks(self) -> int:
@@ -95,8 +87,7 @@ class MotionPlan:
 def resampled(values: Array, rate: float, times: Array) -> Array:
     """Values [frames, ...] at other times, by a cubic spline."""
     if len(values) < 4:
-        where = np.clip(np.rint(times * rate).astype(int), 0, len(values) - 1)
-        return np.asarray(values[where])
+        return np.asarray(values[_nearest(len(values), rate, times)])
     own = np.arange(len(values)) / rate
     if len(times) == len(own) and np.allclose(times, own, atol=1e-9):
         return values
@@ -105,13 +96,16 @@ def resampled(values: Array, rate: float, times: Array) -> Array:
     return np.asarray(CubicSpline(own, values, axis=0)(times))
 
 
+def _nearest(frames: int, rate: float, times: Array) -> NDArray[np.int_]:
+    """The frames that are nearest to some times."""
+    return np.asarray(np.clip(np.rint(times * rate).astype(int), 0, frames - 1))
+
+
 def turns_resampled(rotations: Array, rate: float, times: Array) -> Array:
     """Rotations [frames, 3, 3] at other times."""
     if len(rotations) == len(times):
         return rotations
-    quaternions = Rotation.from_matrix(rotations).as_quat()
-    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0, -1.0, 1.0)
-    quaternions[1:] *= np.cumprod(flips)[:, None]
+    quaternions = continuous_quaternions(Rotation.from_matrix(rotations).as_quat())
     return np.asarray(Rotation.from_quat(resampled(quaternions, rate, times)).as_matrix())
 
 
@@ -139,54 +133,48 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
         marks: robot's limb -> whether it stands [frames]. rate: of frames [Hz]. times: of the ticks [s].
     """
     dt = float(times[1] - times[0]) if len(times) > 1 else 1.0 / rate
-    frame = np.clip(np.rint(times * rate).astype(int), 0, len(places.pelvis) - 1)
-    limbs = {
-        name: _limb_plan(
-            body.limbs[name], _limb_resampled(limb, rate, times), marks[name][frame], dt, hand=not body.is_foot(name)
-        )
-        for name, limb in sorted(places.limbs.items(), key=lambda item: LIMBS.index(item[0]))
-    }
-    pelvis = resampled(places.pelvis, rate, times)
-    turn = turns_resampled(places.turn, rate, times)
+    at = _nearest(len(places.pelvis), rate, times)
+    limbs: dict[str, LimbPlan] = {}
+    for name in sorted(places.limbs, key=LIMBS.index):
+        limb = places.limbs[name]
+        middle, wrist, end = (resampled(values, rate, times) for values in (limb.middle, limb.wrist, limb.end))
+        there = LimbPlaces(middle, wrist, end, _turns(limb.rotation, rate, times))
+        limbs[name] = _limb_plan(body.limbs[name], there, marks[name][at], dt, hand=not body.is_foot(name))
+    pelvis, turn = resampled(places.pelvis, rate, times), turns_resampled(places.turn, rate, times)
     pelvis = pelvis - np.array([0.0, 0.0, 1.0]) * lowering(body, pelvis, turn, limbs, dt)[:, None]
-    head = None if places.head is None else turns_resampled(places.head, rate, times)
-    return MotionPlan(dt, pelvis, turn, turns_resampled(places.chest, rate, times), head, limbs)
+    chest, head = turns_resampled(places.chest, rate, times), _turns(places.head, rate, times)
+    return MotionPlan(pelvis, turn, chest, head, limbs, dt)
 
 
-def _limb_resampled(limb: LimbPlaces, rate: float, times: Array) -> LimbPlaces:
-    rotation = None if limb.rotation is None else turns_resampled(limb.rotation, rate, times)
-    middle, wrist, end = (resampled(values, rate, times) for values in (limb.middle, limb.wrist, limb.end))
-    return LimbPlaces(middle, wrist, end, rotation)
+def _turns(rotations: Array | None, rate: float, times: Array) -> Array | None:
+    return None if rotations is None else turns_resampled(rotations, rate, times)
 
 
 def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
     """A limb's targets with its stances at rest."""
     end, rotation = raised(robot, limb)
     raw, raw_rotation = end.copy(), None if rotation is None else rotation.copy()
-    stances = [(a, b, *standing_place(robot, limb, a, b)) for a, b in intervals(stands)]
+    runs = intervals(stands)
     held, lies = stands.copy(), np.zeros(len(stands), dtype=bool)
-    count = len(stands)
-    for number, (a, b, place, heading) in enumerate(stances):
+    for number, (a, b) in enumerate(runs):
+        place, heading = standing_place(robot, limb, a, b)
         end[a:b] = place
         if rotation is not None and heading is not None:
             rotation[a:b] = heading
-        last = stances[number - 1][1] if number else 0
-        following = stances[number + 1][0] if number + 1 < len(stances) else count
-        for first, until, towards in ((last, a, 1), (b, following, -1)):
-            open_end = (towards == 1 and not number) or (towards == -1 and number + 1 == len(stances))
-            width = min(BLEND, (1.0 if open_end else SHARE) * (until - first) * dt)
-            steps = round(width / dt)
+        first, last = number == 0, number + 1 == len(runs)
+        free = (0 if first else runs[number - 1][1], len(stands) if last else runs[number + 1][0])
+        for count, open_end, comes in ((a - free[0], first, True), (free[1] - b, last, False)):
+            steps = round(min(BLEND, (1.0 if open_end else SHARE) * count * dt) / dt)
             if steps < 1:
                 continue
-            span = np.arange(a - steps, a) if towards == 1 else np.arange(b, b + steps)
-            span = span[(span >= 0) & (span < count)]
-            away = (a - span if towards == 1 else span - b + 1) / (steps + 1)
-            share = minimum_jerk(away)
+            span = np.arange(a - steps, a) if comes else np.arange(b, b + steps)
+            span = span[(span >= 0) & (span < len(stands))]
+            share = minimum_jerk((a - span if comes else span - b + 1) / (steps + 1))
             end[span] = place + share[:, None] * (raw[span] - place)
             if rotation is not None and raw_rotation is not None and heading is not None:
                 off = logarithms(heading.T @ raw_rotation[span])
                 rotation[span] = heading @ exponential(share[:, None] * off)
-        before = max(a - round(BEFORE / dt), last if number else 0)
+        before = max(a - round(BEFORE / dt), free[0])
         held[before:a] = True
         lies[before:b] = hand and bool(place[2] <= robot.radius)
     return LimbPlan(limb.middle, limb.wrist, end, rotation, stands, held, lies)
@@ -258,8 +246,7 @@ def lowering(body: RobotBody, pelvis: Array, turn: Array, limbs: dict[str, LimbP
             continue
         hip = pelvis + turn @ ((robot.base - body.places[0]) @ body.axes)
         up = np.array([0.0, 0.0, float(np.linalg.norm(robot.places[2] - robot.places[3]))])
-        flat = robot.contact == "flat" and plan.rotation is not None
-        ankle = plan.end + (plan.rotation @ up if flat and plan.rotation is not None else 0.0)
+        ankle = plan.end + (plan.rotation @ up if robot.contact == "flat" and plan.rotation is not None else 0.0)
         across = np.linalg.norm((hip - ankle)[:, :2], axis=1)
         reach = STRETCH * sum(robot.lengths)
         most = np.sqrt(np.maximum(reach**2 - across**2, (0.2 * reach) ** 2))

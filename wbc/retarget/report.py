@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,19 +13,17 @@ from PIL import Image, ImageDraw
 
 from wbc import extras
 from wbc.multibody import pin
+from wbc.retarget.clip import Array
 from wbc.retarget.outputs.writing import MOTION_FORMATS, write_motion
 from wbc.shapes import Box
 from wbc.track import render
 from wbc.track.film import save_film
 from wbc.track.page import RunPage
 from wbc.track.scene import Colour, Scene
-from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.retarget.retargeted import Retargeted
 
-#: Files of a clip's folder, besides those of more formats
-WRITTEN = ("motion.npz", "report.json", "report.txt", "film.mp4", "film.gif", "report.html")
 #: Colours of the robot, of the person beside it, and of the ground
 ROBOT: Colour = (0.32, 0.42, 0.58)
 PERSON: Colour = (0.93, 0.55, 0.15)
@@ -80,9 +78,9 @@ def write_report(
     figures |= motion.errors.figures
     if seconds is not None:
         figures |= {"seconds": seconds, "frames_a_second": len(motion.q) / max(seconds, 1e-9)}
-    points = motion.errors.points
+    far = motion.errors.points
     figures["error"] = motion.errors.mean
-    figures["errors"] = {name: {"mean": float(far.mean()), "largest": float(far.max())} for name, far in points.items()}
+    figures["errors"] = {name: {"mean": float(d.mean()), "largest": float(d.max())} for name, d in far.items()}
     if support and motion.robot.base != "fixed":
         from wbc.retarget.holding_forces import held
 
@@ -125,53 +123,48 @@ def text_lines(figures: Mapping[str, Any]) -> list[str]:
     return lines + [f"note: {note}" for note in figures["notes"]]
 
 
-def save_motion_film(
-    motion: Retargeted, file: pathlib.Path, progress: Callable[[float], None] | None = None
-) -> pathlib.Path:
+def save_motion_film(motion: Retargeted, file: pathlib.Path) -> pathlib.Path:
     """A film of the robot and, beside it, the person's skeleton; the camera stands still. Returns the file."""
-    clip, q = motion.clip, motion.q
+    q = motion.q
     count = int(np.clip(motion.time[-1] * FILM_RATE, 2, MOST_PICTURES))
     rows = np.unique(np.linspace(0, len(q) - 1, count).astype(int))
-    points, bones = _beside(motion, rows)
+    extent = _extent(motion, rows)
+    points, bones = _beside(motion, rows, extent)
+    everything = np.concatenate([points.reshape(-1, 3), extent])
+    low, high = everything.min(axis=0) - BEYOND, everything.max(axis=0) + BEYOND
     scene = Scene(motion.robot, colours={"*": ROBOT}, floor=False, detail=DETAIL)
-    everything = np.concatenate([points.reshape(-1, 3), _extent(motion, rows)])
-    _add_ground(scene, everything)
+    middle = pin.SE3(np.eye(3), np.array([*(0.5 * (low + high))[:2], -0.01]))
+    scene.add_shape(Box((*(high - low)[:2].tolist(), 0.02)), middle, "ground", GROUND)
     shot = scene.film(render.framed(everything, FILM_SIZE, AZIMUTH, ELEVATION, filled=0.9))
     frames = []
     for k, row in enumerate(rows):
         scene.add_robot(q[row])
-        for start, end in bones:
-            line = points[k, [start, end]]
+        for line in points[k][bones]:
             if np.linalg.norm(line[1] - line[0]) > BONE:
                 scene.add_path(line, colour=PERSON, radius=BONE)
         image = Image.fromarray(shot())
         standing = [limb for limb, stands in motion.stance.items() if stands[row]]
-        words = f"{clip.name}  {motion.time[row]:6.2f} s   stands: {', '.join(standing) or 'nothing'}"
+        words = f"{motion.clip.name}  {motion.time[row]:6.2f} s   stands: {', '.join(standing) or 'nothing'}"
         ImageDraw.Draw(image).text((8, 8), words, fill=(34, 39, 46))
         frames.append(image)
-        if progress is not None:
-            progress((k + 1) / len(rows))
     return save_film(frames, file, len(rows) / max(float(motion.time[-1]), 1e-9))
 
 
-def _beside(motion: Retargeted, rows: NDArray[np.int_]) -> tuple[Array, list[tuple[int, int]]]:
+def _beside(motion: Retargeted, rows: NDArray[np.int_], extent: Array) -> tuple[Array, list[tuple[int, int]]]:
     """The person's points in the film's frames, scaled to the robot's height and moved aside, and its bones."""
-    clip, extent = motion.clip, _extent(motion, rows)
-    at = np.clip(np.round(motion.time[rows] * clip.rate).astype(int), 0, len(clip.points) - 1)
-    points = clip.points[at]
-    tall = float(np.ptp(clip.points[:, :, 2], axis=1).max())
-    height = float(np.ptp(extent[:, 2])) or 1.0
+    clip, parents = motion.clip, motion.clip.skeleton.parents
+    points = clip.points[np.clip(np.round(motion.time[rows] * clip.rate).astype(int), 0, len(clip.points) - 1)]
+    tall, height = float(np.ptp(clip.points[:, :, 2], axis=1).max()), float(np.ptp(extent[:, 2])) or 1.0
     points = points * (height / max(tall, 1e-6))
     aside = extent.mean(axis=0) - points.mean(axis=(0, 1))
     width = float(np.ptp(points[:, :, 1])) / 2.0 + float(np.ptp(extent[:, 1])) / 2.0
     points = points + np.array([aside[0], aside[1] + width + ASIDE * height, 0.0])
-    parents = clip.skeleton.parents
-    if max(parents) < 0:
-        # Markers without bones: each with the nearest one
-        middle = clip.points[len(clip.points) // 2]
-        apart = np.linalg.norm(middle[:, None] - middle[None], axis=2) + 1e3 * np.eye(len(middle))
-        return points, [(joint, int(other)) for joint, other in enumerate(apart.argmin(axis=1))]
-    return points, [(parent, joint) for joint, parent in enumerate(parents) if parent >= 0]
+    if max(parents) >= 0:
+        return points, [(parent, joint) for joint, parent in enumerate(parents) if parent >= 0]
+    # Markers without bones: each with the nearest one
+    middle = clip.points[len(clip.points) // 2]
+    apart = np.linalg.norm(middle[:, None] - middle[None], axis=2) + 1e3 * np.eye(len(middle))
+    return points, [(joint, int(other)) for joint, other in enumerate(apart.argmin(axis=1))]
 
 
 def _extent(motion: Retargeted, rows: NDArray[np.int_]) -> Array:
@@ -182,9 +175,3 @@ def _extent(motion: Retargeted, rows: NDArray[np.int_]) -> Array:
         out += [data.oMi[joint].translation.copy() for joint in range(1, model.njoints)]
     places = np.array(out)
     return np.concatenate([places, places.max(axis=0, keepdims=True) + LINK])
-
-
-def _add_ground(scene: Scene, points: Array) -> None:
-    low, high = points.min(axis=0) - BEYOND, points.max(axis=0) + BEYOND
-    middle = pin.SE3(np.eye(3), np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, -0.01]))
-    scene.add_shape(Box((float(high[0] - low[0]), float(high[1] - low[1]), 0.02)), middle, "ground", GROUND)

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from wbc.retarget.clip import Array, Clip
+from wbc.retarget.clip import Array, Clip, Marks
 from wbc.retarget.figures import motion_figures
 from wbc.retarget.plan import MotionPlan
 from wbc.retarget.poses import frame_poses
 from wbc.retarget.robot_body import RobotBody
-from wbc.retarget.stances import Marks
 from wbc.robot import Robot
 
 

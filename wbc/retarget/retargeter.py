@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc import robots, validation
 from wbc.errors import NotFiniteError, ShapeError
-from wbc.retarget.clip import Array, Clip, Skeleton
+from wbc.retarget.clip import Array, Clip, Marks, Skeleton, intervals
 from wbc.retarget.correspondence import Correspondence, CorrespondenceError, correspondence
 from wbc.retarget.engine import Engine
 from wbc.retarget.live import LiveRetargeter
@@ -19,7 +19,7 @@ from wbc.retarget.plan import MotionPlan, plan_motion
 from wbc.retarget.poses import frame_poses
 from wbc.retarget.retargeted import GivenUp, Retargeted
 from wbc.retarget.robot_body import RobotBody, body_of
-from wbc.retarget.stances import Marks, Stances, find_stances, intervals
+from wbc.retarget.stances import Stances, find_stances
 from wbc.robot import Robot
 
 #: A stance counts from where its contact is this near to its place [m]
@@ -32,6 +32,8 @@ FAR = 0.1
 LONG = 0.1
 #: Hands of a person lead front legs where they are on the ground for this share of the clip
 ON_HANDS = 0.3
+#: Times in which something is not served are one where they are less apart than this [s]
+TOGETHER = 0.05
 #: Shortest leg of a skeleton, so that speeds count [m]
 LEAST_LEG = 0.05
 
@@ -160,15 +162,10 @@ class Retargeter:
 
 def stances_of(match: Correspondence, clip: Clip) -> Stances:
     """Stances of a clip, of the skeleton's limbs that lead a robot's."""
-    feet: dict[str, Array] = {}
-    hands: dict[str, Array] = {}
-    lengths = []
-    for limb in match.limbs.values():
-        ends = clip.points[:, [limb.end, limb.tip]]
-        (feet if limb.source.endswith("leg") else hands)[limb.source] = ends
-        bones = np.diff(match.rest[[limb.base, limb.middle, limb.end]], axis=0)
-        if limb.source.endswith("leg"):
-            lengths.append(float(np.linalg.norm(bones, axis=1).sum()))
+    ends = {limb.source: clip.points[:, [limb.end, limb.tip]] for limb in match.limbs.values()}
+    feet = {source: points for source, points in ends.items() if source.endswith("leg")}
+    hands = {source: points for source, points in ends.items() if source not in feet}
+    lengths = [limb.length(match.rest) for limb in match.limbs.values() if limb.source in feet]
     return find_stances(feet, hands, clip.rate, max(float(np.mean(lengths)) if lengths else 1.0, LEAST_LEG))
 
 
@@ -233,17 +230,12 @@ def _gave_way(gave: list[tuple[int, tuple[str, ...]]], dt: float) -> list[GivenU
             ticks.setdefault(name, []).append(tick)
     out = []
     for name, when in ticks.items():
-        marks = np.zeros(max(when) + 1, dtype=bool)
-        marks[when] = True
+        marks = np.isin(np.arange(max(when) + 1), when)
         out += [GivenUp(name, a * dt, b * dt, "gave way to limits of the joints") for a, b in _joined(marks, dt)]
     return out
 
 
-def _not_served(
-    plan: MotionPlan,
-    offsets: dict[str, tuple[Array, Array]],
-    landed: dict[str, Marks],
-) -> list[GivenUp]:
+def _not_served(plan: MotionPlan, offsets: dict[str, tuple[Array, Array]], landed: dict[str, Marks]) -> list[GivenUp]:
     """Contacts that come late or are not held, and limbs far from their targets."""
     dt, out = plan.dt, list[GivenUp]()
     for name, limb in plan.limbs.items():
@@ -258,11 +250,9 @@ def _not_served(
 
 
 def _joined(marks: Marks, dt: float) -> list[tuple[int, int]]:
-    """Runs of true, those less than a twentieth of a second apart as one."""
+    """Runs of true, those less than :data:`TOGETHER` apart as one."""
     out: list[tuple[int, int]] = []
     for a, b in intervals(marks):
-        if out and (a - out[-1][1]) * dt < 0.05:
-            out[-1] = (out[-1][0], b)
-        else:
-            out.append((a, b))
+        start = out.pop()[0] if out and (a - out[-1][1]) * dt < TOGETHER else a
+        out.append((start, b))
     return out

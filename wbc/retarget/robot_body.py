@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from wbc.multibody import pin
-from wbc.retarget.body import ARM_WORDS, LEG_WORDS, BodyError, BodyPlan, PointTree, find_body, words
-from wbc.retarget.clip import Array
+from wbc.retarget.body import BodyError, BodyPlan, PointTree, find_body
+from wbc.retarget.clip import Array, ancestors
 from wbc.retarget.solids import LinkBalls, balls_of_joints
+from wbc.retarget.words import ARM_WORDS, LEG_WORDS
 from wbc.robot import Robot
 
 #: Balls no farther from each other are at one place [m]: descriptions are rounded to less
@@ -127,11 +129,11 @@ class RobotBody:
         return _is_foot(name, self.plan, self.robot.base == "fixed")
 
 
-def joint_tree(robot: Robot, balls: dict[int, LinkBalls] | None = None) -> tuple[PointTree, pin.Data]:
-    """Joints at ``robot.neutral``, with one more point at the end of each last link.
+def joint_tree(robot: Robot, balls: dict[int, LinkBalls]) -> tuple[PointTree, pin.Data]:
+    """Joints at ``robot.neutral``, with one more point at the end of each last link; and Pinocchio's data there.
 
     Args:
-        balls: of :func:`~wbc.retarget.solids.balls_of_joints`; None: looked for here.
+        balls: of :func:`~wbc.retarget.solids.balls_of_joints`.
     """
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, robot.neutral)
@@ -139,43 +141,37 @@ def joint_tree(robot: Robot, balls: dict[int, LinkBalls] | None = None) -> tuple
     pin.computeJointJacobians(model, data, robot.neutral)
     names = [str(name) for name in list(model.names)]
     parents = [-1, *(int(model.parents[j]) for j in range(1, model.njoints))]
-    points = [np.array(data.oMi[j].translation) for j in range(model.njoints)]
+    points = [np.array(pose.translation) for pose in data.oMi]
     if robot.base != "fixed":
         # The world is no part of a body that moves in it
         points[0] = points[1].copy()
-    carried = balls_of_joints(robot) if balls is None else balls
-    for joint in range(1, model.njoints):
-        if joint not in parents[: model.njoints]:
-            names.append(f"{names[joint]} end")
-            parents.append(joint)
-            points.append(_tip(robot, data, joint, parents, carried.get(joint)))
+    for joint in sorted({*range(1, model.njoints)} - {*parents}):
+        names.append(f"{names[joint]} end")
+        parents.append(joint)
+        points.append(_tip(robot, data, joint, ancestors(parents, joint)[:-1], balls.get(joint)))
     return PointTree(tuple(names), tuple(parents), np.array(points)), data
 
 
-def _tip(robot: Robot, data: pin.Data, joint: int, parents: list[int], balls: LinkBalls | None) -> Array:
-    """The point of a last link that is farthest from the joint before."""
-    model, own = robot.model, data.oMi[joint]
-    here = np.array(own.translation)
-    candidates = [np.array(data.oMf[i].translation) for i, f in enumerate(model.frames) if int(f.parentJoint) == joint]
-    before = int(parents[joint])
-    back = here - np.array(data.oMi[before].translation)
-    if float(np.linalg.norm(back)) < 1e-9 and before > 0:
-        back = here - np.array(data.oMi[int(parents[before])].translation)
+def _tip(robot: Robot, data: pin.Data, joint: int, chain: list[int], balls: LinkBalls | None) -> Array:
+    """The point of a last link that is farthest from the joint before; ``chain``: it and the joints above it."""
+    own, places = data.oMi[joint], [np.array(data.oMi[k].translation) for k in chain]
+    here = places[0]
+    lengths = [float(np.linalg.norm(a - b)) for a, b in itertools.pairwise(places)]
+    candidates = [
+        np.array(data.oMf[k].translation)
+        for k, frame in enumerate(robot.model.frames)
+        if int(frame.parentJoint) == joint
+    ]
     if balls is not None:
         candidates.append(own.act(balls.middle))
-    most = max(LONGEST * _chain_length(data, parents, joint), 0.05)
+    most = max(LONGEST * sum(lengths), 0.05)
     candidates = [point for point in candidates if float(np.linalg.norm(point - here)) < most]
     far = max(candidates, key=lambda point: float(np.linalg.norm(point - here)), default=here)
-    return far if float(np.linalg.norm(far - here)) > 1e-3 else here + HAND * back
-
-
-def _chain_length(data: pin.Data, parents: list[int], joint: int) -> float:
-    """Length of the chain from the root to a joint."""
-    length = 0.0
-    while (parent := int(parents[joint])) > 0:
-        length += float(np.linalg.norm(data.oMi[joint].translation - data.oMi[parent].translation))
-        joint = parent
-    return length
+    if float(np.linalg.norm(far - here)) > 1e-3:
+        return far
+    places.append(np.array(data.oMi[0].translation))
+    before = 2 if len(chain) > 1 and float(np.linalg.norm(here - places[1])) < 1e-9 else 1
+    return np.asarray(here + HAND * (here - places[before]))
 
 
 def body_of(robot: Robot) -> RobotBody:
@@ -190,20 +186,20 @@ def body_of(robot: Robot) -> RobotBody:
     plan = find_body(tree, field="robot", arms=fixed, straight=STRAIGHT)
     if robot.base not in ("fixed", "floating"):
         raise BodyError("robot", robot.name, f"its base is {robot.base}; load it with base='floating' or 'fixed'")
-    said = {word for chain in plan.limbs.values() for point in chain for word in words(tree.names[point])}
+    said = tree.said([*plan.limbs.values()])
     if not fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
     count = robot.model.njoints
     limbs: dict[str, RobotLimb] = {}
     new = robot
     for name in plan.limbs:
-        limb, placed = _limb(name, robot, data, plan, balls)
-        limbs[name] = limb
+        limbs[name], placed = _limb(name, robot, data, plan, balls)
         for frame, (joint, placement) in placed.items():
             new = with_frame(new, frame, joint, placement)
-    kinds = ("leg", "arm") if not fixed else ("arm", "arm")
-    pelvis = _middle(limbs, kinds[0])
-    chest = _middle(limbs, kinds[1]) if f"left_{kinds[1]}" in limbs else pelvis
+    pelvis, chest = (
+        np.asarray(0.5 * (limbs[f"left_{kind}"].base + limbs[f"right_{kind}"].base))
+        for kind in ("arm" if fixed else "leg", "arm" if "left_arm" in limbs else "leg")
+    )
     carriers = {"pelvis": (plan.pelvis, pelvis), "chest": (plan.chest, chest)}
     if plan.head and plan.upright:
         carriers["head"] = (max(joint for joint in plan.head if joint < count), tree.points[plan.head[0]])
@@ -237,10 +233,6 @@ def with_frame(robot: Robot, name: str, joint: int, placement: pin.SE3) -> Robot
 
 def _is_foot(name: str, plan: BodyPlan, fixed: bool) -> bool:
     return not fixed and (name.endswith("leg") or not plan.upright)
-
-
-def _middle(limbs: dict[str, RobotLimb], kind: str) -> Array:
-    return np.asarray(0.5 * (limbs[f"left_{kind}"].base + limbs[f"right_{kind}"].base))
 
 
 def _axis(robot: Robot, data: pin.Data, joint: int) -> Array:
@@ -281,22 +273,18 @@ def _limb(
     own = balls.get(joints[-1])
     if own is not None and float(np.linalg.norm(own.middle)) > size:
         own = None
-    end, contact, radius, corners, guessed = _end(data.oMi[joints[-1]], own, plan.axes, ankle, tip, size, foot=foot)
-    around = (
-        LinkBalls(corners, np.full(len(corners), radius))
-        if own is None
-        else own.moved(end.actInv(data.oMi[joints[-1]]))
-    )
-    surface = around.corners(CORNERS, EXACT)
+    balls_there = None if own is None else own.moved(data.oMi[joints[-1]])
+    end, contact, radius, corners, guessed = _end(balls_there, plan.axes, ankle, tip, size, foot=foot)
+    guess = LinkBalls(corners, np.full(len(corners), radius))
+    surface = (guess if own is None else own.moved(end.actInv(data.oMi[joints[-1]]))).corners(CORNERS, EXACT)
     if foot and contact == "point" and radius > 0.0:
         # Its ball covers what is drawn of the foot, beyond the ball's middle as seen from the knee
         far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
         radius = float(np.clip(np.linalg.norm(far, axis=1).max(initial=radius), radius, BALL * radius))
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
     limb = RobotLimb(
-        joints=joints, base=base, middle=f"{frame}_middle", wrist=f"{frame}_wrist" if wrist else "", end=frame,
-        places=places, contact=contact, radius=radius, corners=corners, surface=surface,
-        guessed=guessed,
+        joints, base, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, contact, radius, corners,
+        surface, guessed,
     )  # fmt: skip
     placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
     if wrist:
@@ -334,17 +322,20 @@ def _wrist(robot: Robot, data: pin.Data, joints: tuple[int, ...], middle: int, t
 
 
 def _end(
-    pose: pin.SE3, balls: LinkBalls | None, axes: Array, ankle: Array, tip: Array, size: float, *, foot: bool
+    balls: LinkBalls | None, axes: Array, ankle: Array, tip: Array, size: float, *, foot: bool
 ) -> tuple[pin.SE3, Contact, float, Array, bool]:
-    """Pose of the contact frame in the world, its kind and radius, corners in it, and whether it was guessed."""
+    """Pose of the contact frame in the world, its kind and radius, corners in it, and whether it was guessed.
+
+    Args:
+        balls: of the last link, in the world.
+    """
     jointed = float(np.linalg.norm(ankle - tip)) > 1e-9
     if balls is None:
         if foot and jointed:
             corners = np.array([[x, y, 0.0] for x in GUESSED_SOLE[0] for y in GUESSED_SOLE[1]])
             return pin.SE3(axes, ankle - ANKLE * size * axes[:, 2]), "flat", 0.0, corners, True
         return pin.SE3(axes, tip), "point", TIP, np.zeros((1, 3)), True
-    centers = balls.centers @ np.asarray(pose.rotation).T + np.asarray(pose.translation)
-    local = centers @ axes
+    local = balls.centers @ axes
     heights = local[:, 2] - balls.radii
     low = heights < heights.min() + SOLE
     sole, round_ = local[low, :2], balls.radii[low, None]
@@ -358,7 +349,7 @@ def _end(
         middle = LinkBalls(local, balls.radii).middle
         half = (np.abs(local - middle) + balls.radii[:, None]).max(axis=0)
         return pin.SE3(axes, axes @ middle), "point", float(np.median(half)), np.zeros((1, 3)), False
-    center, radius = _ball(centers, balls.radii, tip)
+    center, radius = _ball(balls.centers, balls.radii, tip)
     return pin.SE3(axes, center), "point", radius, np.zeros((1, 3)), False
 
 
@@ -372,10 +363,10 @@ def _ball(centers: Array, radii: Array, tip: Array) -> tuple[Array, float]:
         nearest = nearest[int(np.argmax(radii[nearest]))]
         return centers[nearest], float(radii[nearest])
     # Corners of a mesh: the ball through those near the tip
-    near = centers[np.linalg.norm(centers - tip, axis=1) < max(0.03, 1.5 * np.linalg.norm(centers - tip, axis=1).min())]
+    away = np.linalg.norm(centers - tip, axis=1)
+    near = centers[away < max(0.03, 1.5 * away.min())]
     matrix = np.hstack([2.0 * near, np.ones((len(near), 1))])
-    solution = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
-    center = solution[:3]
+    center = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0][:3]
     if float(np.linalg.norm(center - tip)) > 0.05:
         center = tip
     return center, float(np.linalg.norm(near - center, axis=1).max())

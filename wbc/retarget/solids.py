@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from dataclasses import dataclass
 
@@ -21,8 +22,10 @@ log = logging.getLogger("wbc")
 
 #: Corners about the rim of a cylinder
 RIM = 16
-#: Directions in which hulls are compared [1]
+#: Directions in which balls of links are sampled [1]
 DIRECTIONS = 1500
+#: How much less exact than the one before a hull is tried that has too many corners [1]
+COARSER = 1.5
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class LinkBalls:
         return LinkBalls(self.centers @ np.asarray(placement.rotation).T + placement.translation, self.radii)
 
     def corners(self, count: int, exact: float) -> Array:
-        """At most ``count`` points whose hull is that of the balls; fewer where they are within ``exact`` of it [m]."""
+        """Points whose hull is that of the balls; at most ``count``, to ``exact`` [m] where so many can be."""
         # Evenly over the sphere: along a spiral by the golden angle
         rank = np.arange(DIRECTIONS) + 0.5
         z, turn = 1.0 - 2.0 * rank / DIRECTIONS, np.pi * (3.0 - np.sqrt(5.0)) * rank
@@ -64,15 +67,11 @@ class LinkBalls:
         points = self.centers[far] + ways.T * self.radii[far, None]
         # All corners and what stands out of them of the balls, where that is not too much
         every = np.unique(np.concatenate([self.centers[self.radii == 0.0], points[self.radii[far] > 0.0]]), axis=0)
-        if len(every) <= count:
-            return every
-        own, most = points @ ways, reach.max(axis=0)
-        chosen: list[int] = []
-        lacking = np.full(DIRECTIONS, np.inf)
-        while len(chosen) < count and float(lacking.max()) > exact:
-            chosen.append(int(np.argmax(lacking)))
-            lacking = np.minimum(lacking, most - own[chosen[-1]])
-        return np.asarray(np.unique(points[chosen], axis=0))
+        chosen = every
+        with contextlib.suppress(QhullError):
+            while len(chosen) > count:
+                chosen, exact = every[ConvexHull(every, qhull_options=f"W{exact}").vertices], COARSER * exact
+        return chosen
 
 
 def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
@@ -92,25 +91,16 @@ def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
             if isinstance(placed.shape, (Sphere, Capsule)):
                 a, b, radius = placed.shape.capsule()
                 add(link, placed.placement, np.array([a, b]), np.full(2, radius))
-    try:
-        bodies = bodies_of(robot)
-    except WbcError:
-        bodies = []
-    for body in bodies:
-        if robot.shapes.get(body.link) and not body.mesh:
-            continue
-        try:
-            centers, radii = _balls(body.read())
-        except WbcError as error:
-            log.info("%s", error)
-            continue
-        add(body.link, to_pin(body.placement), centers, radii)
+    with contextlib.suppress(WbcError):
+        for body in bodies_of(robot):
+            if body.mesh or not robot.shapes.get(body.link):
+                try:
+                    add(body.link, to_pin(body.placement), *_balls(body.read()))
+                except WbcError as error:
+                    log.info("%s", error)
     for link, corners in surface_points(robot).items():
         add(link, pin.SE3.Identity(), corners, np.zeros(len(corners)))
-    return {
-        joint: _hull(np.concatenate([centers for centers, _ in parts]), np.concatenate([radii for _, radii in parts]))
-        for joint, parts in found.items()
-    }
+    return {joint: _hull(*map(np.concatenate, zip(*parts, strict=True))) for joint, parts in found.items()}
 
 
 def surface_points(robot: Robot) -> dict[str, Array]:

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wbc.retarget.clip import Array
-
-Marks = NDArray[np.bool_]
+from wbc.retarget.clip import Array, Marks, intervals
 
 #: A foot comes to stand below this speed, of a leg of 1 m [m/s]
 SLOW = 0.25
@@ -39,12 +36,6 @@ class Stances:
 
     marks: dict[str, Marks]
     ankle: dict[str, float]
-
-
-def intervals(marks: Marks) -> list[tuple[int, int]]:
-    """First frame and the one after the last of every run of true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marks, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def smoothed(values: Array, deviation: float) -> Array:
@@ -82,29 +73,19 @@ def find_stances(feet: Mapping[str, Array], hands: Mapping[str, Array], rate: fl
         feet: limb -> its ankle and toe [frames, points, 3]. hands: the same of hands. rate: [Hz]. leg: length of a leg
             [m], which speeds and heights are counted in.
     """
-    marks: dict[str, Marks] = {}
-    frames = len(next(iter(feet.values()))) if feet else len(next(iter(hands.values()), np.zeros((0,))))
-    lowest = np.full(frames, np.inf)
-    for points in feet.values():
-        lowest = np.minimum(lowest, points[..., 2].min(axis=1))
-    for limb, points in feet.items():
-        height = points[..., 2].min(axis=1)
-        candidate = _candidates(points, rate, leg)
-        for start, end in intervals(candidate):
-            candidate[start:end] = bool((height[start:end] < lowest[start:end] + LEVEL * leg).any())
-        marks[limb] = candidate
-    ankle = {limb: _standing(points[:, 0, 2], marks[limb]) for limb, points in feet.items()}
-    ground = min(
-        (float(points[marks[limb], :, 2].min()) for limb, points in feet.items() if marks[limb].any()), default=0.0
-    )
-    for limb, points in hands.items():
-        candidate = _candidates(points, rate, leg)
-        height = points[..., 2].min(axis=1)
-        for start, end in intervals(candidate):
-            candidate[start:end] = bool(np.median(height[start:end]) < ground + HAND_HEIGHT * leg)
-        marks[limb] = candidate
-        ankle[limb] = _standing(points[:, 0, 2], candidate)
-    return Stances(marks, ankle)
+    heights = {limb: points[..., 2].min(axis=1) for limb, points in (*feet.items(), *hands.items())}
+    marks = {limb: _candidates(points, rate, leg) for limb, points in (*feet.items(), *hands.items())}
+    lowest = np.min([heights[limb] for limb in feet], axis=0) if feet else np.zeros(0)
+    for limb in feet:
+        for start, end in intervals(marks[limb]):
+            near = heights[limb][start:end] < lowest[start:end] + LEVEL * leg
+            marks[limb][start:end] = bool(near.any())
+    ground = min((float(heights[limb][marks[limb]].min()) for limb in feet if marks[limb].any()), default=0.0)
+    for limb in hands:
+        for start, end in intervals(marks[limb]):
+            marks[limb][start:end] = bool(np.median(heights[limb][start:end]) < ground + HAND_HEIGHT * leg)
+    ankles = {limb: points[:, 0, 2] for limb, points in (*feet.items(), *hands.items())}
+    return Stances(marks, {limb: _standing(ankle, marks[limb]) for limb, ankle in ankles.items()})
 
 
 def _candidates(points: Array, rate: float, leg: float) -> Marks:

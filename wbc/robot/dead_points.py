@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbc.robot.loops import Linkage
+from wbc.robot.loops import Linkage, rank
 from wbc.robot.shortest_steps import DEPENDENT
 from wbc.validation import Array
 
@@ -65,19 +65,19 @@ class DeadPointSearch:
             undriven = [dof for dof in linkage.dofs if dof in passive]
             for dofs, branches in ((list(linkage.dofs), True), (undriven, False)):
                 if dofs:
-                    rank = max(_rank(jacobian[np.ix_(linkage.rows, dofs)]) for jacobian in seen)
-                    self._parts.append((linkage, dofs, branches, rank))
+                    most = max(rank(jacobian[np.ix_(linkage.rows, dofs)]) for jacobian in seen)
+                    self._parts.append((linkage, dofs, branches, most))
 
     def near(self, q: Array, within: float) -> tuple[DeadPoint, ...]:
         """Those that are no further away, of each linkage the nearest, one at which it branches before others."""
         out: dict[str, DeadPoint] = {}
-        for linkage, dofs, branches, rank in self._parts:
-            if linkage.name in out or rank == 0:
+        for linkage, dofs, branches, most in self._parts:
+            if linkage.name in out or most == 0:
                 continue
-            least, motion = self._least(q, linkage, dofs, rank)
+            least, motion = self._least(q, linkage, dofs, most)
             slopes = [
-                (self._least(self._moved(q, SLOPE * way), linkage, dofs, rank)[0] - least)
-                - (self._least(self._moved(q, -SLOPE * way), linkage, dofs, rank)[0] - least)
+                (self._least(self._moved(q, SLOPE * way), linkage, dofs, most)[0] - least)
+                - (self._least(self._moved(q, -SLOPE * way), linkage, dofs, most)[0] - least)
                 for way in self._ways(q, linkage)
             ]
             steepest = float(np.linalg.norm(slopes)) / (2.0 * SLOPE)
@@ -87,10 +87,10 @@ class DeadPointSearch:
                 out[linkage.name] = DeadPoint(linkage.name, joint, float(distance), branches)
         return tuple(out.values())
 
-    def _least(self, q: Array, linkage: Linkage, dofs: list[int], rank: int) -> tuple[float, Array]:
+    def _least(self, q: Array, linkage: Linkage, dofs: list[int], most: int) -> tuple[float, Array]:
         """(the singular value that is lost, the motion of these joints that it is of)."""
         _, sizes, motions = np.linalg.svd(self._rows(q)[np.ix_(linkage.rows, dofs)])
-        return float(sizes[rank - 1]), motions[rank - 1]
+        return float(sizes[most - 1]), motions[most - 1]
 
     def _ways(self, q: Array, linkage: Linkage) -> Array:
         """Motions of the linkage that its loops allow, orthonormal [motions, nv]."""
@@ -100,8 +100,3 @@ class DeadPointSearch:
         out = np.zeros((len(motions) - count, jacobian.shape[1]))
         out[:, list(linkage.dofs)] = motions[count:]
         return out
-
-
-def _rank(jacobian: Array) -> int:
-    sizes = np.linalg.svd(jacobian)[1]
-    return int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from wbc import validation
-from wbc.errors import WbcError
+from wbc.errors import RangeError, WbcError
 from wbc.multibody import pin
 from wbc.quick_dataclasses import dataclass
 from wbc.robot.limits import Limits
@@ -103,6 +103,8 @@ class JointCurve:
 
     def __post_init__(self) -> None:
         validation.name("JointCurve.name", self.name)
+        if self.follower == self.leader:
+            raise RangeError("JointCurve.leader", self.leader, "a joint does not follow itself")
         numbers = validation.real_array("JointCurve.coefficients", self.coefficients).reshape(-1)
         object.__setattr__(self, "coefficients", tuple(numbers.tolist()))
         object.__setattr__(
@@ -138,11 +140,13 @@ class Linkage:
         loops: their names.
         rows: places of their rows among those of all loops.
         dofs: degrees of freedom that move them. Indices into v.
+        held: how many of the rows are independent at closed configurations like any other.
     """
 
     loops: tuple[str, ...]
     rows: tuple[int, ...]
     dofs: tuple[int, ...]
+    held: int
 
     @property
     def name(self) -> str:
@@ -159,12 +163,14 @@ class LoopRows:
         bases: of each loop the directions of its residual that no other row has, rows x residual.
         rows: label and unit of each row; one that mixes several is named by the largest of them.
         moved: of each loop the degrees of freedom that move it. Indices into v.
+        held: of each linkage how many of its rows are independent at closed configurations; empty: not known.
     """
 
     loops: tuple[AnyLoop, ...] = ()
     bases: tuple[Array, ...] = ()
     rows: tuple[tuple[str, str], ...] = ()
     moved: tuple[tuple[int, ...], ...] = ()
+    held: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.loops)
@@ -187,8 +193,13 @@ class LoopRows:
             names = itertools.chain.from_iterable(part.loops for part in parts)
             rows = itertools.chain.from_iterable(part.rows for part in parts)
             dofs = {*moved}.union(*(part.dofs for part in parts))
-            out.append(Linkage((*names, loop.name), (*rows, *range(first, end)), tuple(sorted(dofs))))
-        return tuple(out)
+            every = (*rows, *range(first, end))
+            out.append(Linkage((*names, loop.name), every, tuple(sorted(dofs)), len(every)))
+        return (
+            tuple(replace(part, held=count) for part, count in zip(out, self.held, strict=True))
+            if self.held
+            else (*out,)
+        )
 
     def moving(self, matrix: ca.SX) -> ca.SX:
         """The entries of a Jacobian of the rows that are not 0 in every configuration [rows, nv]."""
@@ -290,7 +301,19 @@ class Closing:
                 turns = label.startswith("r")
                 unit = units[loop.follower] if isinstance(loop, JointCurve) else "rad" if turns else "m"
                 rows.append((f"{loop.name}.{label}", unit))
-        return LoopRows(tuple(self._loops[:count]), bases, tuple(rows), tuple(tuple(dofs.tolist()) for dofs in moved))
+        made = LoopRows(tuple(self._loops[:count]), bases, tuple(rows), tuple(tuple(dofs.tolist()) for dofs in moved))
+        kept = [
+            np.concatenate([basis @ each[span] for basis, span in zip(bases, self.spans, strict=False)])
+            for each in jacobians
+        ]
+        held = (max(rank(each[np.ix_(part.rows, part.dofs)]) for each in kept) for part in made.linkages)
+        return replace(made, held=tuple(held))
+
+
+def rank(jacobian: Array) -> int:
+    """How many rows are independent by :data:`~wbc.robot.shortest_steps.DEPENDENT`."""
+    sizes = np.linalg.svd(jacobian)[1]
+    return int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum())
 
 
 def independent(parts: Sequence[slice], jacobians: Array) -> tuple[Array, ...]:

@@ -559,6 +559,10 @@ class Robot:
         for loop, basis in zip(loops, rows.bases, strict=True):
             if not len(basis):
                 log.warning("%s: the loop %r adds nothing to the others", self.name, loop.name)
+        for part in rows.linkages:
+            if part.held == len(part.dofs):
+                said = "its loops hold as many motions as it has joints; lengths of the file may be rounded"
+                log.warning("%s: the linkage of %s cannot move: %s", self.name, part.name, said)
         return replace(bare, neutral=neutral, loops=rows)
 
     def require_tree(self, what: str) -> None:

@@ -16,6 +16,7 @@ from wbc.robot import JointCurve, Robot
 from wbc.robot.robot import checked_robot
 from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import PlacedShape
+from wbc.simulation.dynamics import AXIS
 from wbc.simulation.plant import CommandKind
 from wbc.symbolic.joints import motion_at
 from wbc.symbolic.kinematics import WORLD, frame_index
@@ -113,7 +114,7 @@ def mujoco_model(
     Raises:
         MissingPackageError: MuJoCo is not installed.
         UnsupportedJointError: a joint that MuJoCo has none for: planar and helical ones, and composites; a joint that
-            follows a polynomial of more than the fourth degree.
+            follows a polynomial of more than the fourth degree; a loop that a slide closes.
         RangeError: inertias that MuJoCo refuses, and why; a time step or a friction out of range.
         UnknownNameError: no such kind of actuator, or frame.
     """
@@ -220,13 +221,13 @@ def _add_couplings(spec: mujoco.MjSpec, robot: Robot) -> None:
         equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
         equality.name1, equality.name2 = names
         equality.data[:5] = [coupling.offset, coupling.ratio, 0.0, 0.0, 0.0]
-        equality.solref, equality.solimp = [SOFT * spec.option.timestep, 1.0], HARD
 
 
 def _add_loops(spec: mujoco.MjSpec, robot: Robot, bodies: Sequence[mujoco.MjsBody]) -> None:
     import mujoco
 
-    kinds = {"connect": mujoco.mjtEq.mjEQ_CONNECT, "weld": mujoco.mjtEq.mjEQ_WELD}
+    # A hinge is two places on its axis
+    places: dict[str, tuple[float, ...]] = {"connect": (0.0,), "weld": (0.0,), "hinge": (0.0, AXIS)}
     for loop in robot.loops.loops:
         if isinstance(loop, JointCurve):
             # y = y0 + sum c_k (x - x0)^k in powers of x
@@ -237,14 +238,21 @@ def _add_loops(spec: mujoco.MjSpec, robot: Robot, bodies: Sequence[mujoco.MjsBod
             equality = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT)
             equality.name1, equality.name2 = loop.follower, loop.leader or ""
             equality.data[:POWERS] = np.pad(terms, (0, POWERS - len(terms)))
+            equality.name = loop.name
+        elif loop.kind not in places:
+            raise UnsupportedJointError("robot", loop.name, f"MuJoCo closes no loop by a {loop.kind}")
         else:
-            equality = spec.add_equality(type=kinds[loop.kind], objtype=mujoco.mjtObj.mjOBJ_SITE)
-            equality.name1, equality.name2 = sites = [f"{loop.name} {side}" for side in "ab"]
-            for site, name in zip(sites, (loop.first, loop.second), strict=True):
-                frame = robot.model.frames[0 if name == WORLD else frame_index(robot.model, name)]
-                turn = quaternion(frame.placement.rotation)[TO_MUJOCO]
-                bodies[int(frame.parentJoint)].add_site(name=site, pos=frame.placement.translation, quat=turn)
-        equality.name = loop.name
+            kind = mujoco.mjtEq.mjEQ_WELD if loop.kind == "weld" else mujoco.mjtEq.mjEQ_CONNECT
+            for number, along in enumerate(places[loop.kind]):
+                equality = spec.add_equality(type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
+                equality.name = f"{loop.name} axis" if number else loop.name
+                equality.name1, equality.name2 = sites = [f"{equality.name} {side}" for side in "ab"]
+                for site, name in zip(sites, (loop.first, loop.second), strict=True):
+                    frame = robot.model.frames[0 if name == WORLD else frame_index(robot.model, name)]
+                    place, turn = frame.placement.act(np.array([0.0, 0.0, along])), frame.placement.rotation
+                    body = bodies[int(frame.parentJoint)]
+                    body.add_site(name=site, pos=place, quat=quaternion(turn)[TO_MUJOCO])
+    for equality in spec.equalities:
         equality.solref, equality.solimp = [SOFT * spec.option.timestep, 1.0], HARD
 
 

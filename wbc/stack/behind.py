@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import weakref
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -26,6 +27,8 @@ log = logging.getLogger("wbc")
 _PATIENCE = 5.0
 #: Priority of the process that compiles (nice)
 _LOW = 10
+#: How long a loop waits for the interpreter's lock while its library is loaded behind it [s]; Python's own is 5 ms
+_TURN = 1e-4
 #: Where modules are looked for is told last, so that nothing there hides Python's own
 _CHILD = """
 import pathlib, signal, sys
@@ -46,7 +49,13 @@ def _stop(child: subprocess.Popen[str]) -> None:
 
 
 class _Work:
-    """What compiles in this process: one library at a time, each in a process of its own."""
+    """What compiles in this process: one library at a time, each in a process of its own.
+
+    Attributes:
+        interval: how long threads waited for the interpreter's lock before :func:`_beside_loops`, within it [s].
+    """
+
+    interval: float | None = None
 
     def __init__(self) -> None:
         self.forget()
@@ -56,6 +65,8 @@ class _Work:
         self.turn, self.ends = threading.Lock(), threading.Event()
         self.threads: set[threading.Thread] = set()
         self.child: subprocess.Popen[str] | None = None
+        if self.interval is not None:
+            sys.setswitchinterval(self.interval)
 
     def end(self) -> None:
         """End it, for good."""
@@ -72,6 +83,30 @@ _work = _Work()
 atexit.register(_work.end)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_work.forget)
+
+
+@contextlib.contextmanager
+def _beside_loops() -> Iterator[None]:
+    """What this thread does keeps no tick of another one waiting for long: the interpreter's lock changes hands every
+    :data:`_TURN`, and beside loops in real time who holds it is held up by no other process, nor holds up the loops.
+    """
+    before, own = sys.getswitchinterval(), None
+    _work.interval = before
+    sys.setswitchinterval(min(before, _TURN))
+    with contextlib.suppress(OSError, AttributeError):
+        own = os.sched_getscheduler(0), os.sched_getparam(0)
+        threads = [thread.native_id for thread in threading.enumerate() if thread.native_id]
+        highest = max(os.sched_getparam(thread).sched_priority for thread in threads)
+        if highest > 1:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(highest - 1))
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+        _work.interval = None
+        if own is not None:
+            with contextlib.suppress(OSError):
+                os.sched_setscheduler(0, *own)
 
 
 class Changing(Protocol):
@@ -152,14 +187,15 @@ class NativeBehind:
 
     def _make(self, child: subprocess.Popen[str] | None) -> None:
         name = compile_behind(self._folder) if child is None else _finish(child)
-        path = cache.base_of(name, library=True) / name / LIBRARY
-        if cache.find(name, library=True) is None:
-            raise CompileError("library", str(path), "is not what was compiled")
-        made = path, load_library(path)
-        self._made = made
-        for waiting in list(self._ticks):
-            if (tick := waiting()) is not None:
-                tick.offer(made[1])
+        with _beside_loops():
+            path = cache.base_of(name, library=True) / name / LIBRARY
+            if cache.find(name, library=True) is None:
+                raise CompileError("library", str(path), "is not what was compiled")
+            made = path, load_library(path)
+            self._made = made
+            for waiting in list(self._ticks):
+                if (tick := waiting()) is not None:
+                    tick.offer(made[1])
         log.info("%s: native code is there, and controllers change over with their next tick", self._what)
 
 
@@ -178,7 +214,7 @@ def _start(folder: Path) -> subprocess.Popen[str] | None:
         [sys.executable, "-P", "-c", _CHILD, str(folder), *paths],
         env={**os.environ, "WBC_CACHE": str(cache.base_of(f"{folder.name}-", library=True))},
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace",
-        start_new_session=True,
+        process_group=0,
     )  # fmt: skip
     with contextlib.suppress(OSError, AttributeError):
         os.setpriority(os.PRIO_PGRP, child.pid, _LOW)

@@ -19,6 +19,7 @@ from wbc.stack.tables import (
     bent_rows,
     brakes,
     force_scales,
+    forces_in_loops,
     gain_table,
     give_order,
     kept_rows,
@@ -27,8 +28,10 @@ from wbc.stack.tables import (
     margin_table,
     rate_table,
     reported_slacks,
+    spare_rows,
     stops,
     taken_out,
+    torque_rows,
 )
 from wbc.symbolic.kinematics import Kinematics
 
@@ -61,6 +64,8 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
     )
     brake_at, brake_limit = brakes(stack, layout)
     stop_at, stop_low, stop_high = stops(stack, layout)
+    spare = spare_rows(stack, layout)
+    forces = forces_in_loops(stack, layout)
     lines = [
         "/* Sizes and tables of one stack; generated */",
         "#include <stddef.h>",
@@ -86,6 +91,10 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
                 "ELASTIC": int(layout.elastic),
                 "REDUCED": taken_out(stack, layout),
                 "REDUCED_NV": layout.variables if taken_out(stack, layout) else 0,
+                "SPARED": len(spare),
+                "FORCES": forces,
+                "FORCED_NV": layout.variables if forces else 0,
+                "FORCE_FIRST": layout.loop_forces.start,
                 "CLOSING": 0 if program.arrival is None else program.arrival.numel_out("opened"),
                 "CLOSING_FIRST": 0 if layout.mechanism is None else layout.mechanism.start,
                 "COMMAND": COMMANDS.index(stack.command),
@@ -102,6 +111,10 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
         _table("int", "a_col", a_col),
         _table("int", "give_order", give_order(stack, layout, at)),
         _table("int", "late_row", late_rows(layout, at)),
+        _table("int", "spare_first", np.cumsum([0, *(len(rows) for rows, _ in spare)])),
+        _table("int", "spare_row", [row for rows, _ in spare for row in rows]),
+        _table("int", "spare_held", [held for _, held in spare]),
+        _table("int", "row_torque", torque_rows(stack, layout)),
         _table("int", "row_order", orders),
         _table("int", "bound_sequence", sequence),
         _table("int", "unit_start", [u[0] for u in units]),

@@ -33,14 +33,15 @@ from wbc.stack.memory import (
 SIZES = (
     "NQ", "NV", "NP", "MT", "MC", "NB", "MH", "NNZJ", "NNZA", "NNZK", "CALM", "BENDING", "ELASTIC", "UNITS",
     "LAST_ORDER", "ACTIVE_MAX", "DOFS", "SOFT_ROWS", "PRICES", "KEPT", "SLEWED", "LEADING", "LEVELS", "LEVEL_MOST",
-    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED", "REDUCED", "REDUCED_NV", "CLOSING",
-    "CLOSING_FIRST",
+    "SOFT_MAX", "BALLS", "SEGMENTS", "SENSED", "BLOCKED", "REDUCED", "REDUCED_NV", "SPARED", "CLOSING",
+    "CLOSING_FIRST", "FORCES", "FORCED_NV", "FORCE_FIRST",
 )  # fmt: skip
 REALS = ("LONGEST", "LEFT_FREE", "DAMPING", "FAR")
 #: Tables of ``stack.h``; the last four are what its BLOCKS are made of
 INT_TABLES = (
-    "j_start", "j_col", "a_start", "a_end", "a_col", "give_order", "late_row", "row_order", "bound_sequence",
-    "unit_start", "unit_size",
+    "j_start", "j_col", "a_start", "a_end", "a_col", "give_order", "late_row", "spare_first",
+    "spare_row", "spare_held", "row_order", "bound_sequence",
+    "unit_start", "unit_size", "row_torque",
     "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
     "slewed_at", "slewed_dof", "level_start", "row_level", "ball_pose", "ball_velocity", "ball_margin", "ball_rate",
     "ball_row", "ball_first", "row_segment", "segment_row", "sensed_row", "sensed_count", "sensed_distance",
@@ -65,7 +66,7 @@ WRITTEN = (
     "screw",
     "segment_ahead",
     "opened",
-    "closing_rows",
+    "closing_columns",
 )
 #: What the tick compiled for the stack does in place of what is here, once there is one
 FORWARDED = (

@@ -347,7 +347,7 @@ class _ProgramBuilder:
         return ca.sparsify(keeps * (later - kept - rest * self.dt))
 
     def arrival(self) -> list[ca.SX]:
-        """q (+) v dt, there the residuals of the mechanism's rows, and these rows transposed."""
+        """q (+) v dt, there the residuals of the mechanism's rows, and their columns in groups of four."""
         block = self.layout.mechanism
         assert block is not None
         assert isinstance(block.entry.item, Mechanism)
@@ -355,7 +355,8 @@ class _ProgramBuilder:
         kept = block.entry.item.residual(self.stack.robot, tracer, inputs)
         rows = block.entry.item.velocity_rows(self.stack.robot, tracer, inputs, self.dt)
         assert kept is not None
-        outputs = [ca.densify(part) for part in tracer.expanded(kept, rows.matrix.T)]
+        columns = ca.vertcat(rows.matrix, ca.SX(-len(block.rows) % 4, self.stack.robot.nv))
+        outputs = [ca.densify(part) for part in tracer.expanded(kept, columns)]
         return [self.later, *ca.Function("kept", [self.kinematics.q, self.p], outputs)(self.later, self.p)]
 
     def sensed_matrix(self, block: Block, count: int) -> ca.SX:
@@ -445,7 +446,7 @@ def build(stack: Declaration, layout: Layout) -> TickProgram:
     lost = checked_function("lost", inputs, [ca.densify(bent)], ["lost"]) if bent.nnz() else None
     arrival = None
     if b.second is not None and stack.robot.loops:
-        arrival = checked_function("arrival", inputs, b.arrival(), ["next_q", "opened", "closing_rows"])
+        arrival = checked_function("arrival", inputs, b.arrival(), ["next_q", "opened", "closing_columns"])
     return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival)
 
 

@@ -97,9 +97,35 @@ def bent_rows(layout: Layout, program: TickProgram) -> list[int]:
 
 
 def taken_out(stack: Declaration, layout: Layout) -> int:
-    """Equality rows that every tick of a robot with loops has: they are taken out of its QP; 0 without loops."""
+    """Independent equality rows that every tick of a robot with loops has: they are taken out of its QP; 0 without."""
     blocks = layout.of_form("rows") if stack.robot.loops else ()
-    return sum(len(block.rows) for block in blocks if isinstance(block.entry.item, (Mechanism, Unactuated)))
+    whole = sum(len(block.rows) for block in blocks if isinstance(block.entry.item, (Mechanism, Unactuated)))
+    return whole - sum(len(rows) - held for rows, held in spare_rows(stack, layout))
+
+
+def spare_rows(stack: Declaration, layout: Layout) -> list[tuple[list[int], int]]:
+    """(general rows; how many are independent where loops are closed) of linkages whose rows depend on each other."""
+    block, robot = layout.mechanism, stack.robot
+    first = 0 if block is None else block.span.stop - len(robot.loops.rows)
+    parts = [part for part in robot.loops.linkages if len(part.rows) > part.held]
+    return [([first + row for row in part.rows], part.held) for part in parts]
+
+
+def forces_in_loops(stack: Declaration, layout: Layout) -> int:
+    """Variables of the QP, one a row of the mechanism; 0 where rows depend on each other or have no forces, or none is
+    a variable.
+    """
+    block, count = layout.mechanism, len(layout.loop_rows)
+    return count if block is not None and len(block.rows) == count and not spare_rows(stack, layout) else 0
+
+
+def torque_rows(stack: Declaration, layout: Layout) -> list[int]:
+    """The degree of freedom whose torque each general row is that no motor gives, -1 for other rows."""
+    out = [-1] * layout.general_rows
+    for block in layout.of_form("rows"):
+        if isinstance(block.entry.item, Unactuated):
+            out[block.start : block.start + len(block.rows)] = stack.robot.unactuated
+    return out
 
 
 def late_rows(layout: Layout, at: ca.Sparsity) -> list[int]:

@@ -8,6 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wbc import rotations
+
 #: Entries of a constant rotation or translation closer than this to 0 or +-1 are that number:
 #: a quarter turn written in floating point leaves 6e-17, which would cost an operation each.
 SNAP = 1e-14
@@ -145,8 +147,7 @@ def exp3(vector: ca.SX) -> ca.SX:
 
 def quaternion_product(a: ca.SX, b: ca.SX) -> ca.SX:
     """Hamilton product a * b of quaternions (x, y, z, w)."""
-    av, aw, bv, bw = a[:3], a[3], b[:3], b[3]
-    return ca.vertcat(aw * bv + bw * av + ca.cross(av, bv), aw * bw - ca.dot(av, bv))
+    return ca.SX(ca.vertcat(*rotations.quaternion_product(ca.vertsplit(a), ca.vertsplit(b))))
 
 
 def quaternion_conjugate(quat: ca.SX) -> ca.SX:

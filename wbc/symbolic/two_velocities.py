@@ -35,12 +35,12 @@ class TwoVelocityDynamics:
             the first on.
     """
 
-    def __init__(self, kinematics: Kinematics, motion: Velocities | None = None) -> None:
+    def __init__(self, kinematics: Kinematics) -> None:
         self.kinematics = kinematics
         self.reference = ca.SX.sym("v_r", kinematics.nv)
         self.acceleration = ca.SX.sym("a_r", kinematics.nv)
         self.parameters = ca.SX.sym("phi", PER_BODY * (kinematics.njoints - 1))
-        self._true = motion if motion is not None else Velocities(kinematics)
+        self._true = Velocities(kinematics)
         self._moved = Velocities(kinematics, self.reference)
 
     @cached_property

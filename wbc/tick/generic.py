@@ -173,7 +173,7 @@ class GenericTick(CompiledTick):
             calls["curvature"] = program.curvature, [*state, copies["force"]], [entries]
         if program.arrival is not None:
             written = [field("next_q"), self._written("opened", program.arrival.nnz_out(1))]
-            written.append(self._written("closing_rows", program.arrival.nnz_out(2)))
+            written.append(self._written("closing_columns", program.arrival.nnz_out(2)))
             calls["arrival"] = program.arrival, [copies["start"], copies["way"], p, dt], written
         if program.torque is not None:
             calls["torque"] = program.torque, [*state, field("v"), field("enabled")], [field("torque")]

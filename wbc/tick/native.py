@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc.errors import SolverError
-from wbc.native.arrays import ARRAY_MAKERS
-from wbc.native.builtin import builtin, builtin_of_one, builtin_of_some
+from wbc.native.arrays import ARRAY_MAKERS, PLAIN_ARRAYS
+from wbc.native.builtin import builtin, builtin_of_one, builtin_of_some, places_of
 from wbc.native.library import load_library
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -78,6 +78,8 @@ class CompiledTick(Buffers, ABC):
         self.call: Callable[[], int] = builtin(self._library.wbc_python_step, self.pointer.value or 0)
         #: arrays that native code has the addresses of
         self._kept: list[Any] = []
+        #: address of a ``wbc_recording`` of ``native/builtins.h``, into which ticks with values in one call go; 0: none
+        self.recording = np.zeros(1, np.int64)
         #: a copy of :attr:`state`, and where the layout has ``moves`` of q (+) v dt after it
         self.snapshot: Callable[[], bytes] = builtin(
             self._library.wbc_python_kept, self._cycle(np.zeros(0), np.zeros((0, 3)), [], [])
@@ -99,7 +101,7 @@ class CompiledTick(Buffers, ABC):
         return builtin(self._library.wbc_python_take, request.ctypes.data)
 
     def cycler(
-        self, staged: Array, plan: np.ndarray, names: Sequence[str], step: type, context: object
+        self, staged: Array, plan: np.ndarray, names: Sequence[str], step: Callable[[bytes, Any], Any], context: object
     ) -> Callable[[Any, dict[str, Any]], Any]:
         """What ticks at a configuration with these values in one call: of (q, values by name), arrays of doubles.
         Returns a step where the tick is solved, else its flag; a negative one, and nothing is changed, where an
@@ -107,11 +109,14 @@ class CompiledTick(Buffers, ABC):
 
         Args:
             staged, plan: as of :meth:`taker`. names: of the values.
-            step, context: the type of what is returned, whose ``_data`` is :attr:`snapshot`, and its ``_context``.
+            step, context: the type of what is returned, made of :attr:`snapshot` and of this, which it keeps in slots.
         """
         known = [sys.intern(name) for name in names]
-        made = [step, context, sys.intern("_context"), sys.intern("_data")]
-        return builtin_of_some(self._library.wbc_python_cycle, self._cycle(staged, plan, known, made))
+        data = self.snapshot()
+        places = places_of(step(data, context), (context, data))
+        request = self._cycle(staged, plan, known, [id(step), id(context), *places])
+        self._kept += [step, context]
+        return builtin_of_some(self._library.wbc_python_cycle, request)
 
     def part(self, first: int, count: int) -> Callable[[bytes], Array]:
         """What makes an array of ``count`` numbers of :attr:`snapshot` from number ``first`` on, read-only, without a
@@ -121,21 +126,21 @@ class CompiledTick(Buffers, ABC):
         self._kept.append(request)
         return builtin_of_one(self._library.wbc_python_part, request.ctypes.data)
 
-    def _cycle(self, staged: Array, plan: np.ndarray, names: Sequence[str], made: Sequence[object]) -> int:
-        """Address of a ``wbc_cycle`` of ``native/builtins.h``."""
+    def _cycle(self, staged: Array, plan: np.ndarray, names: Sequence[str], step: Sequence[int]) -> int:
+        """Address of a ``wbc_cycle`` of ``native/builtins.h``; ``step``: what it has of what is returned."""
         table, moves = np.ascontiguousarray(plan, np.intc).reshape(-1, 3), np.array(self._layout.moves, np.intc)
         # Addresses of objects of Python are their identities
         objects = np.array([id(name) for name in names], np.int64)
         request = np.array(
             [
-                self.pointer.value, self.q.ctypes.data, staged.ctypes.data, table.ctypes.data, len(table),
-                self._layout.nq, self.state.nbytes, self.state.ctypes.data,
+                self.pointer.value, self.recording.ctypes.data, self.q.ctypes.data, staged.ctypes.data,
+                table.ctypes.data, len(table), self._layout.nq, self.state.nbytes, self.state.ctypes.data,
                 moves.ctypes.data, len(moves), self._layout.nq if len(moves) else 0,
-                objects.ctypes.data, *map(id, made),
+                objects.ctypes.data, *PLAIN_ARRAYS, *step,
             ],
             np.int64,
         )  # fmt: skip
-        self._kept += [staged, table, moves, request, objects, names, made]
+        self._kept += [staged, table, moves, request, objects, names]
         return request.ctypes.data
 
     def reset(self) -> None:

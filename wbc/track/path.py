@@ -16,7 +16,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
-from wbc.rotations import quaternion
+from wbc.rotations import continuous_quaternions, quaternion, relative_quaternion
 from wbc.validation import Array
 
 #: Consecutive orientations may be at most this far apart [rad]; beyond it, the direction of the turn is ambiguous.
@@ -161,12 +161,9 @@ def _continuous(quaternions: Array) -> Array:
     Raises:
         RangeError: neighbours further apart than LARGEST_TURN.
     """
-    out = quaternions.copy()
+    out = continuous_quaternions(quaternions)
     for k in range(1, len(out)):
-        product = float(out[k] @ out[k - 1])
-        if product < 0.0:
-            out[k] = -out[k]
-        angle = 2.0 * math.acos(min(abs(product), 1.0))
+        angle = 2.0 * math.acos(min(float(out[k] @ out[k - 1]), 1.0))
         if angle > LARGEST_TURN:
             shown = f"{math.degrees(angle):.1f} deg"
             raise RangeError(f"path.poses[{k}]", shown, "too far from the orientation before it; add a pose between")
@@ -175,12 +172,4 @@ def _continuous(quaternions: Array) -> Array:
 
 def _angular_velocity(unit: Array, rate: Array) -> Array:
     """2 vec(dQ/dt Q^-1) of a unit quaternion x, y, z, w, in world axes."""
-    x, y, z, w = unit.tolist()
-    a, b, c, d = rate.tolist()
-    return np.array(
-        [
-            2.0 * (w * a - d * x - b * z + c * y),
-            2.0 * (w * b - d * y - c * x + a * z),
-            2.0 * (w * c - d * z - a * y + b * x),
-        ]
-    )
+    return 2.0 * relative_quaternion(rate, unit)[:3]

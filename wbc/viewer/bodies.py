@@ -70,7 +70,7 @@ def bounded(parts: tuple[Shape, ...]) -> tuple[Shape, ...]:
     return tuple(part for part in parts if not isinstance(part, HalfSpace))
 
 
-def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> DrawnMesh:
+def shape_mesh(parts: tuple[Shape, ...]) -> DrawnMesh:
     """The surface of shapes, in their common frame."""
     flat = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float) * GROUND
     origin, surfaces = pin.SE3.Identity(), []
@@ -79,7 +79,7 @@ def shape_mesh(parts: tuple[Shape, ...], colour: Colour = OBSTACLE) -> DrawnMesh
             surfaces.append(flat.reshape(2, 3, 3))
         else:
             surfaces.append(render.triangles(PlacedShape(part, origin)))
-    return indexed(np.concatenate(surfaces), colour)
+    return indexed(np.concatenate(surfaces), OBSTACLE)
 
 
 def indexed(triangles: Array, colour: Colour) -> DrawnMesh:

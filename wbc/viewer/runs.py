@@ -8,7 +8,7 @@ import io
 import pathlib
 import re
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,9 +45,7 @@ Note = Mapping[str, Any]
 PAGE_DETAIL = 0.012
 
 
-def states_of(
-    recording: Recording, *, trust: bool = False, rate: float = RATE, progress: Callable[[int], None] | None = None
-) -> tuple[Controller, list[SharedTick]]:
+def states_of(recording: Recording, *, trust: bool = False, rate: float = RATE) -> tuple[Controller, list[SharedTick]]:
     """The ticks of a recording done again: a controller of their stack, and ``rate`` states a second.
 
     Raises:
@@ -60,8 +58,6 @@ def states_of(
         if time >= due - 1e-9:
             states.append(SharedTick(tick.number + 1, time, state_of(tick.step)))
             due = time + 1.0 / rate
-        if progress is not None:
-            progress(tick.number)
     if not states:
         raise ViewerError("recording", str(recording.path), "holds no tick")
     return controller, states

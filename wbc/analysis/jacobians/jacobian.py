@@ -120,7 +120,7 @@ def _block(model: ExactModel, declared: Rows, axes: str | None) -> tuple[Matrix,
         unit = [model.ring.one if k == dof else model.ring.zero for k in range(model.robot.nv)]
         return [unit], "-"
     if isinstance(declared, BodyRows) and declared.expressed is not None:
-        return _body(model, declared, declared.expressed), declared.expressed
+        return body_rows(model, declared, declared.expressed), declared.expressed
     if axes is not None:
         return _expressed(model, declared, axes), axes
     found = [(_expressed(model, declared, frame), frame) for frame in model.distinct_frames()]
@@ -128,16 +128,19 @@ def _block(model: ExactModel, declared: Rows, axes: str | None) -> tuple[Matrix,
 
 
 def _expressed(model: ExactModel, declared: BodyRows | PitchPlaneRows, axes: str) -> Matrix:
-    return _body(model, declared, axes) if isinstance(declared, BodyRows) else _pitch_plane(model, declared, axes)
+    return body_rows(model, declared, axes) if isinstance(declared, BodyRows) else _pitch_plane(model, declared, axes)
 
 
-def _body(model: ExactModel, declared: BodyRows, axes: str) -> Matrix:
-    """Chosen components of v and omega: columns a x (p - o) and a of the joints between base and frame."""
+def body_rows(model: ExactModel, declared: BodyRows, axes: str, at: str | None = None) -> Matrix:
+    """Chosen components of v and omega: columns a x (p - o) and a of the joints between base and frame.
+
+    v is that of the body's point at the origin p of another frame, ``at``, where one is given.
+    """
     ring = model.ring
     joint, _ = model.frame(declared.frame)
     reference, _ = model.frame(declared.base)
     moving, carrying = set(model.support(joint)), set(model.support(reference))
-    point = model.frame_in(axes, declared.frame).position
+    point = model.frame_in(axes, at or declared.frame).position
     height = len(declared.translation) + len(declared.rotation)
     matrix = [[ring.zero] * model.robot.nv for _ in range(height)]
     for j in moving ^ carrying:

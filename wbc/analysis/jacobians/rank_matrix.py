@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from wbc.analysis.algebra.minors import without
 from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
-from wbc.analysis.algebra.transforms import cross
 from wbc.analysis.jacobians.equivalent_rows import split_twists, whole_twist
-from wbc.analysis.jacobians.jacobian import symbolic_jacobian
+from wbc.analysis.jacobians.jacobian import body_rows, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel
-from wbc.analysis.rows import BodyRows, Rows
+from wbc.analysis.rows import Rows
 
 
 def equivalent_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
@@ -28,7 +27,7 @@ def equivalent_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Mat
     frames = model.distinct_frames()
     for i, axes in enumerate(frames):
         for point in frames[max(i - 1, 0) : i + 2]:
-            yield [row for r in whole for row in _twist(model, r, point, axes)] + fixed
+            yield [row for r in whole for row in body_rows(model, r, axes, at=point)] + fixed
     for equivalent in split_twists(model, rows):
         yield symbolic_jacobian(model, equivalent).matrix
 
@@ -40,25 +39,6 @@ def rank_matrices(model: ExactModel, rows: Sequence[Rows]) -> Iterator[Matrix]:
     """
     for matrix in equivalent_matrices(model, rows):
         yield reduced(model.ring, matrix)
-
-
-def _twist(model: ExactModel, rows: Rows, point: str, axes: str) -> Matrix:
-    """(v; omega) of the body, v at the origin of another frame."""
-    assert isinstance(rows, BodyRows)
-    ring = model.ring
-    joint, _ = model.frame(rows.frame)
-    origin = model.frame_in(axes, point).position
-    matrix = [[ring.zero] * model.robot.nv for _ in range(6)]
-    for j in model.support(joint):
-        axis = model.axis_in(axes, j)
-        if ring.coordinates[j - 1].slides:
-            column = [*axis, ring.zero, ring.zero, ring.zero]
-        else:
-            on_axis = model.joint_in(axes, j).position
-            column = [*cross(axis, [a - b for a, b in zip(origin, on_axis, strict=True)], ring), *axis]
-        for row, entry in zip(matrix, column, strict=True):
-            row[j - 1] = entry
-    return matrix
 
 
 def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:

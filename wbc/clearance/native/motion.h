@@ -126,6 +126,18 @@ static double farthest_from(const double *pose, const double *axis, const double
 /* How far points at `reach` may go: no chord is longer than its arc, or than twice the reach */
 static double gone(double shift, double angle, double reach) { return shift + fmin(angle, 2.0) * reach; }
 
+/* A body and the ends of its core at the place of its frame */
+static void place_core(sweep_t *s, int b) {
+    static const double still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const double *frame = s->body_frame[b] < 0 ? still : s->pose + 12 * s->body_frame[b], *line = s->line + 8 * b;
+    double *ends = s->world_line + 6 * b;
+    compose(frame, s->body_place + 12 * b, s->body_pose + 12 * b);
+    for (int e = 0; e < 2; e++) {
+        turn(frame, line + 3 * e, ends + 3 * e);
+        for (int k = 0; k < 3; k++) ends[3 * e + k] += frame[9 + k];
+    }
+}
+
 /* A body in the middle, and how far its points may be off it, frame by frame up its chain.
  *
  * Joints are taken to where they are from the last to the first: what is before a joint is then still in the middle. With g the
@@ -139,14 +151,9 @@ static double gone(double shift, double angle, double reach) { return shift + fm
  * with r_j as large as joints beyond j may make it (1 where j shifts). So of a link that rests, as one that holds something while
  * all others move, little is left. */
 static void place_body(sweep_t *s, int b) {
-    static const double still[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    const double *frame = s->body_frame[b] < 0 ? still : s->pose + 12 * s->body_frame[b], *line = s->line + 8 * b;
-    double *ends = s->world_line + 6 * b, *moved = s->moved + 2 * (s->depth + 1) * b, reach_;
-    compose(frame, s->body_place + 12 * b, s->body_pose + 12 * b);
-    for (int e = 0; e < 2; e++) {
-        turn(frame, line + 3 * e, ends + 3 * e);
-        for (int k = 0; k < 3; k++) ends[3 * e + k] += frame[9 + k];
-    }
+    const double *ends = s->world_line + 6 * b, *line = s->line + 8 * b;
+    double *moved = s->moved + 2 * (s->depth + 1) * b, reach_;
+    place_core(s, b);
     moved[0] = moved[1] = 0.0;
     double even[2][3] = {{0}}, turned[3] = {0}, carried = 0.0, bent = 0.0;
     for (int k = 0; k < s->chain_length[b]; k++, moved += 2) {

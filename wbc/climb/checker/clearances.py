@@ -234,8 +234,9 @@ class _PairDistances:
         out = np.minimum(values, FAR)
         step = np.minimum(floor[:-1], floor[1:]) - floor[:-1]
         proven = (values[:-1] + values[1:] + floor[1:] - floor[:-1] - travel) / 2.0 - step
-        out[:-1] = np.where(values[:-1] < 0.0, values[:-1], np.minimum(out[:-1], proven))
-        for k in np.flatnonzero((proven < 0.0) & (values[:-1] >= 0.0) & (values[1:] >= 0.0)).tolist():
+        least = np.minimum(values[:-1], values[1:])
+        out[:-1] = np.where(least < -self._tolerance, out[:-1], np.minimum(out[:-1], proven))
+        for k in np.flatnonzero((proven < 0.0) & (least >= -self._tolerance)).tolist():
             low = min(floor[k], floor[k + 1])
             ends = values[k] + floor[k] - low, values[k + 1] + floor[k + 1] - low
             out[k] = self._halved((a, b), k, (0.0, 1.0), ends, travel[k], low)
@@ -261,7 +262,7 @@ class _PairDistances:
     ) -> float:
         """The room on a part of the way between two ticks: proven, or found to be none."""
         bound = (values[0] + values[1] - travel) / 2.0
-        if bound >= -self._tolerance or min(values) < 0.0 or ends[1] - ends[0] < SHORTEST:
+        if bound >= -self._tolerance or min(values) < -self._tolerance or ends[1] - ends[0] < SHORTEST:
             return min(bound, *values)
         middle = (ends[0] + ends[1]) / 2.0
         pin.forwardKinematics(

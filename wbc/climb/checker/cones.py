@@ -72,7 +72,9 @@ def _margin(climbed: Climbed, k: int, mass: float, gravity: Array) -> float:
     places, balance, rows, limits = climbed.tips[0][k], [], [], []
     closed = [(limb, int(row)) for limb, row in enumerate(climbed.contacts[k]) if row != OPEN]
     for at, (limb, row) in enumerate(closed):
-        turn = climbed.scene.footholds[row].pose.rotation
+        # A limb that fixes its turn may hold at any turn about the normal
+        turned = climbed.climber.limbs[limb].contact.fixed == "pose"
+        turn = climbed.tips[1][k][limb] if turned else climbed.scene.footholds[row].pose.rotation
         arm = pin.skew(places[limb])
         balance.append(np.block([[turn, np.zeros((3, 3))], [arm @ turn, turn]]))
         a, b = cone_at(climbed, limb, row)

@@ -256,11 +256,42 @@ long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state
         const double *at = state + k * (12 + c->offset[c->limbs]);
         place_all(c, at, at + 12, placed, center);
         if ((lacks[0] = -link_clearance(c, contact + k * c->limbs, at, placed, which)) <= 0.0) continue;
-        avoiding(c, contact + k * c->limbs, which, at, placed, start, value, column, &count);
+        avoiding(c, contact + k * c->limbs, 0, which, at, placed, start, value, column, &count);
         copy3(value, lacks + 1);
         return k;
     }
     return n;
+}
+
+/* Weight of pairs that are too near and of slack that lacks in bands: they come to rest where these still push */
+#define PUSH 3e2
+
+/* Of n states the normal equations of least squares over twist of the body and all angles, m = 6 + angles of them: H ``(m, m)``, its
+ * lower half, and g. `closed`: limb by limb whether its contact is to be at the pose `wanted` (12 each); `bound` (4 each): of a slack;
+ * `aside`: how much further apart than they have to be pairs are led [m]. `cost`: what rows cost; `far`: clearances [m]; `open`: squared errors of contacts [lengths squared]; `center`: of mass */
+void wbc_band(climb_t *c, long n, const int *contact, const char *closed, const double *wanted, int bounds, const double *bound,
+              double slack, double aside, const double *state, double *H, double *g, double *cost, double *far, double *open, double *center) {
+    const int angles = c->offset[c->limbs], m = 6 + angles;
+    placed_t placed[MOST_LIMBS];
+    near_t near = {.within = aside};
+    int start[MOST_LIMBS], which[2];
+    for (int l = 0; l < c->limbs; l++) start[l] = 6 + c->offset[l];
+    memset(H, 0, sizeof *H * (size_t)(n * m * m)), memset(g, 0, sizeof *g * (size_t)(n * m));
+    for (long k = 0; k < n; k++, state += 12 + angles, H += m * m, g += m, contact += c->limbs, closed += c->limbs, center += 3) {
+        place_all(c, state, state + 12, placed, center);
+        open[k] = 0.0;
+        for (int l = 0; l < c->limbs; l++) {
+            double by[3];
+            minus3(placed[l].tip + 9, c->foothold + 12 * (contact[l] < 0 ? 0 : contact[l]) + 9, by);
+            near.off[l] = sqrt(dot3(by, by));
+            if (closed[l]) open[k] += add_contact(c, l, placed + l, wanted + (k * c->limbs + l) * 12, state, start[l], m, H, g);
+        }
+        cost[k] = HOLDS * open[k];
+        near.count = 0;
+        far[k] = clearance_near(c, contact, state, placed, which, &near);
+        for (int i = 0; i < near.count; i++) cost[k] += add_avoided(c, contact, near.off, near.pair[i], (near.pair[i][1] < 0 ? OF_LINKS : 1.0) * aside, state, placed, start, PUSH, m, H, g);
+        for (int i = 0; i < bounds; i++) cost[k] += add_bound(c, bound + 4 * i, slack, center, state, placed, start, PUSH, m, H, g);
+    }
 }
 
 /* Of n states of a body and its limbs' angles the contacts of some limbs at poses in the world, 12 each: closed in at most `steps`

@@ -73,10 +73,10 @@ static void move_body(double *base, const double *twist) {
 }
 
 /* How a point of a piece moves along n with the angles of its limb, times a sign, added to a row */
-static void along_limb(const climb_t *c, const int *contact, int piece, const placed_t *placed, const double *point, const double *n,
+static void along_limb(const climb_t *c, int piece, const placed_t *placed, const double *point, const double *n,
                        double sign, const int *start, double *value, int *column, int *count) {
     const piece_t *p = c->piece + piece;
-    if (p->limb < 0 || contact[p->limb] < 0) return;
+    if (p->limb < 0 || start[p->limb] < 0) return;
     for (int s = 0; s <= p->step; s++, ++*count) {
         const step_t *step = c->limb[p->limb].step + s;
         double arm[3], by[3];
@@ -87,9 +87,9 @@ static void along_limb(const climb_t *c, const int *contact, int piece, const pl
     }
 }
 
-/* The distance of a pair less what it keeps, and its row */
-static double avoiding(const climb_t *c, const int *contact, const int *pair, const double *base, const placed_t *placed,
-                       const int *start, double *value, int *column, int *count) {
+/* The distance of a pair less what it keeps, and its row; `start`: of each limb its first column, -1: its angles stay */
+static double avoiding(const climb_t *c, const int *contact, const double *off, const int *pair, const double *base,
+                       const placed_t *placed, const int *start, double *value, int *column, int *count) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     const int own = pair[1] < 0, other = own ? -1 - pair[1] : pair[1];
     double a[12], b[12], arm[3], lever[3], far_point[3];
@@ -103,22 +103,83 @@ static double avoiding(const climb_t *c, const int *contact, const int *pair, co
         value[k] = own ? 0.0 : -found.normal[k], value[3 + k] = own ? 0.0 : -lever[k];
         column[k] = k, column[3 + k] = 3 + k;
     }
-    along_limb(c, contact, pair[0], placed, found.point, found.normal, -1.0, start, value, column, count);
+    along_limb(c, pair[0], placed, found.point, found.normal, -1.0, start, value, column, count);
     along3(found.point, found.gap, found.normal, far_point);
-    if (own) along_limb(c, contact, other, placed, far_point, found.normal, 1.0, start, value, column, count);
-    return found.gap - kept_distance(c, contact, pair[0], pair[1]);
+    if (own) along_limb(c, other, placed, far_point, found.normal, 1.0, start, value, column, count);
+    return found.gap - kept_distance(c, contact, off, pair[0], pair[1]);
+}
+
+/* Rows that bring a contact to a pose; its squared error [lengths squared] */
+static double add_contact(const climb_t *c, int l, const placed_t *placed, const double *goal, const double *base, int start, int n,
+                          double *H, double *g) {
+    const limb_t *limb = c->limb + l;
+    const int k0 = limb->angles;
+    double arm[3], J[MOST_ANGLES][6], E[6][6], r[6], value[6 + MOST_ANGLES], left = 0.0;
+    int column[6 + MOST_ANGLES];
+    const double unit = 1.0 / (c->length * c->length);
+    contact_error(limb, placed->tip, goal, r, E);
+    limb_jacobian(limb, placed, J);
+    minus3(placed->tip + 9, base + 9, arm);
+    for (int i = 0; i < limb->rows; i++) {
+        double lever[3];
+        cross3(arm, E[i], lever); /* E (w x arm) = w (arm x E) */
+        for (int k = 0; k < 3; k++) {
+            value[k] = E[i][k], value[3 + k] = lever[k] + E[i][3 + k];
+            column[k] = k, column[3 + k] = 3 + k;
+        }
+        for (int k = 0; k < k0; k++) {
+            double sum = 0.0;
+            for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
+            value[6 + k] = sum, column[6 + k] = start + k;
+        }
+        add_row(n, H, g, column, value, 6 + k0, r[i], HOLDS * unit);
+        left += unit * r[i] * r[i];
+    }
+    return left;
+}
+
+/* The row that brings the centre of mass to where a bound leaves a slack; what it costs not to be there, as below */
+static double add_bound(const climb_t *c, const double *bound, double slack, const double *center, const double *base,
+                      const placed_t *placed, const int *start, double weight, int n, double *H, double *g) {
+    const double size = sqrt(dot3(bound + 1, bound + 1)), short_of = slack + BEYOND - bound[0] - dot3(bound + 1, center);
+    if (!(short_of > -BEYOND) || !(size * c->length > 1e-6)) return 0.0;
+    double arm[3], lever[3], M[MOST_ANGLES][3], value[MOST_VARIABLES];
+    int column[MOST_VARIABLES], count = 6;
+    const double u[3] = {bound[1] / size, bound[2] / size, bound[3] / size};
+    minus3(center, base + 9, arm);
+    cross3(arm, u, lever);
+    for (int k = 0; k < 3; k++) value[k] = u[k], value[3 + k] = lever[k], column[k] = k, column[3 + k] = 3 + k;
+    for (int l = 0; l < c->limbs; l++) {
+        if (start[l] < 0) continue;
+        moment_jacobian(c->limb + l, placed + l, M);
+        for (int k = 0; k < c->limb[l].angles; k++, count++) value[count] = dot3(u, M[k]) / c->mass, column[count] = start[l] + k;
+    }
+    const double by = weight * (1.0 / (c->length * c->length));
+    add_row(n, H, g, column, value, count, -short_of / size, by);
+    return by * short_of * short_of / (size * size);
+}
+
+/* The row that keeps a pair further apart than it has to be */
+static double add_avoided(const climb_t *c, const int *contact, const double *off, const int *pair, double aside, const double *base,
+                        const placed_t *placed, const int *start, double weight, int n, double *H, double *g) {
+    double value[MOST_VARIABLES];
+    int column[MOST_VARIABLES], count = 6;
+    const double short_of = avoiding(c, contact, off, pair, base, placed, start, value, column, &count) - aside;
+    if (!(short_of < 0.0)) return 0.0;
+    const double by = weight * (1.0 / (c->length * c->length));
+    add_row(n, H, g, column, value, count, short_of, by);
+    return by * short_of * short_of;
 }
 
 /* One sweep of least squares; the largest move [m, rad]. `left`: sum of squared errors of the contacts before it [lengths squared] */
 static double sweep(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle, placed_t *placed,
                     double *left) {
-    double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3], J[MOST_ANGLES][6], M[MOST_ANGLES][3];
-    double E[6][6], r[6], value[MOST_VARIABLES];
-    int start[MOST_LIMBS], column[MOST_VARIABLES], n = 6;
+    double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3];
+    int start[MOST_LIMBS], n = 6;
     char out[MOST_VARIABLES] = {0};
     place_all(c, base, angle, placed, center);
     for (int l = 0; l < c->limbs; l++) {
-        start[l] = n;
+        start[l] = contact[l] < 0 ? -1 : n;
         if (contact[l] >= 0) n += c->limb[l].angles;
     }
     memset(H, 0, (size_t)(n * n) * sizeof *H), memset(g, 0, (size_t)n * sizeof *g);
@@ -127,29 +188,9 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
     *left = 0.0;
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
-        const limb_t *limb = c->limb + l;
-        const int k0 = limb->angles;
-        contact_error(limb, placed[l].tip, c->foothold + 12 * contact[l], r, E);
-        limb_jacobian(limb, placed + l, J);
-        double arm[3];
-        minus3(placed[l].tip + 9, base + 9, arm);
-        for (int i = 0; i < limb->rows; i++) {
-            double lever[3];
-            cross3(arm, E[i], lever); /* E (w x arm) = w (arm x E) */
-            for (int k = 0; k < 3; k++) {
-                value[k] = E[i][k], value[3 + k] = lever[k] + E[i][3 + k];
-                column[k] = k, column[3 + k] = 3 + k;
-            }
-            for (int k = 0; k < k0; k++) {
-                double sum = 0.0;
-                for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
-                value[6 + k] = sum, column[6 + k] = start[l] + k;
-            }
-            add_row(n, H, g, column, value, 6 + k0, r[i], HOLDS * unit);
-            *left += unit * r[i] * r[i];
-        }
-        for (int k = 0; k < k0; k++) {
-            const double off = angle[c->offset[l] + k] - limb->rest[k];
+        *left += add_contact(c, l, placed + l, c->foothold + 12 * contact[l], base, start[l], n, H, g);
+        for (int k = 0; k < c->limb[l].angles; k++) {
+            const double off = angle[c->offset[l] + k] - c->limb[l].rest[k];
             H[(start[l] + k) * (n + 1)] += wish->rest, g[start[l] + k] -= wish->rest * off;
         }
     }
@@ -161,32 +202,11 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
         turn_between(wish->pose, base, by);
         for (int i = 0; i < 3; i++) H[(3 + i) * (n + 1)] += wish->turn, g[3 + i] -= wish->turn * by[i];
     }
-    for (int s = 0; s < wish->supports; s++) {
-        const support_t *known = wish->support[s];
-        for (int b = 0; b < known->bounds; b++) {
-            const double *bound = known->bound[b], size = sqrt(dot3(bound + 1, bound + 1));
-            const double short_of = wish->slack + BEYOND - bound[0] - dot3(bound + 1, center);
-            if (!(short_of > -BEYOND) || !(size * c->length > 1e-6)) continue;
-            const double u[3] = {bound[1] / size, bound[2] / size, bound[3] / size};
-            double arm[3], lever[3];
-            minus3(center, base + 9, arm);
-            cross3(arm, u, lever);
-            int count = 6;
-            for (int k = 0; k < 3; k++) value[k] = u[k], value[3 + k] = lever[k], column[k] = k, column[3 + k] = 3 + k;
-            for (int l = 0; l < c->limbs; l++) {
-                if (contact[l] < 0) continue;
-                moment_jacobian(c->limb + l, placed + l, M);
-                for (int k = 0; k < c->limb[l].angles; k++, count++) value[count] = dot3(u, M[k]) / c->mass, column[count] = start[l] + k;
-            }
-            add_row(n, H, g, column, value, count, -short_of / size, BEARS * unit);
-        }
-    }
-    for (int k = 0; k < wish->avoided; k++) {
-        int count = 6;
-        const double far = avoiding(c, contact, wish->avoid[k], base, placed, start, value, column, &count);
-        const double short_of = far - ASIDE * c->length - wish->aside;
-        if (short_of < 0.0) add_row(n, H, g, column, value, count, short_of, BEARS * unit);
-    }
+    for (int s = 0; s < wish->supports; s++)
+        for (int b = 0; b < wish->support[s]->bounds; b++)
+            add_bound(c, wish->support[s]->bound[b], wish->slack, center, base, placed, start, BEARS, n, H, g);
+    for (int k = 0; k < wish->avoided; k++)
+        add_avoided(c, contact, 0, wish->avoid[k], ASIDE * c->length + wish->aside, base, placed, start, BEARS, n, H, g);
     /* Angles at a limit against which they are pulled stay there */
     for (int l = 0; l < c->limbs; l++)
         for (int k = 0; contact[l] >= 0 && k < c->limb[l].angles; k++) {

@@ -179,11 +179,18 @@ static void place_piece(const climb_t *c, int k, const double *base, const place
     compose(p->limb < 0 ? base : placed[p->limb].pose[p->step], p->place, out);
 }
 
-/* The distance that a piece keeps from a body, or (-1 - piece) from another piece [m] */
-static double kept_distance(const climb_t *c, const int *contact, int piece, int other) {
+/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold: wbc/climb/clear.py proves
+ * it in steps, which are below it between the instants looked at too */
+static double tip_distance(const climb_t *c, const piece_t *p, double off) {
+    return fmin(c->clear, 0.5 * off - p->depth);
+}
+
+/* The distance that a piece keeps from a body, or (-1 - piece) from another piece [m]; `off`: how far contacts are from their
+ * footholds [m], 0: all are there */
+static double kept_distance(const climb_t *c, const int *contact, const double *off, int piece, int other) {
     const piece_t *p = c->piece + piece;
     if (other < 0) return c->apart;
-    return p->tip && contact[p->limb] >= 0 && c->on[contact[p->limb]] == other ? -p->depth : c->clear;
+    return p->tip && contact[p->limb] >= 0 && c->on[contact[p->limb]] == other ? tip_distance(c, p, off ? off[p->limb] : 0.0) : c->clear;
 }
 
 static int left_out(const climb_t *c, const int *contact, int piece) {
@@ -220,9 +227,18 @@ static double moved_within(const double *from, const double *to, double radius) 
     return sqrt(dot3(by, by)) + radius * sqrt(turned);
 }
 
+/* Pairs, as of link_clearance, that keep less than `within` more than they have to [m], of links a share of that; `off`: as of
+ * kept_distance */
+#define MOST_NEAR 64
+#define OF_LINKS 0.2
+typedef struct {
+    double within, off[MOST_LIMBS];
+    int count, pair[MOST_NEAR][2];
+} near_t;
+
 /* Least distance less what is kept [m] of links from bodies and each other, as far as it may be below 0. `which`: piece, and body or
- * -1 - piece; links of limbs that are left out do not count */
-static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
+ * -1 - piece; links of limbs that are left out do not count. `near`: all pairs that are, 0: one that lacks is enough */
+static double clearance_near(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which, near_t *near) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     double pose[c->pieces ? c->pieces : 1][12], least = INFINITY, *const known = gap_rows(c);
     for (int k = 0; k < c->pieces; k++) place_piece(c, k, base, placed, pose[k]);
@@ -235,7 +251,8 @@ static double link_clearance(climb_t *c, const int *contact, const double *base,
             const int other = own ? c->pair[2 * (k - c->pieces) + 1] : j;
             const shape_t *b = c->shape + (own ? c->piece[other].shape : c->pieces + j);
             const double *at = own ? pose[other] : c->body + 12 * j;
-            const double keep = kept_distance(c, contact, i, own ? -1 - other : j);
+            const double least_kept = kept_distance(c, contact, near ? near->off : 0, i, own ? -1 - other : j);
+            const double keep = least_kept + (near ? near->within * (own ? OF_LINKS : 1.0) : 0.0);
             if (b->size[5] < 1e6) {
                 double apart[3];
                 minus3(pose[i] + 9, at + 9, apart);
@@ -261,11 +278,17 @@ static double link_clearance(climb_t *c, const int *contact, const double *base,
                 memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
                 copy3(found.normal, last + 25);
             }
-            if (found.gap - keep < least) least = found.gap - keep, which[0] = i, which[1] = own ? -1 - other : j;
-            if (least < 0.0) return least;
+            const int pair[2] = {i, own ? -1 - other : j};
+            if (near && found.gap < keep && near->count < MOST_NEAR) memcpy(near->pair[near->count++], pair, sizeof pair);
+            if (found.gap - least_kept < least) least = found.gap - least_kept, memcpy(which, pair, sizeof pair);
+            if (!near && least < 0.0) return least;
         }
     }
     return least;
+}
+
+static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
+    return clearance_near(c, contact, base, placed, which, 0);
 }
 
 #endif

@@ -82,12 +82,6 @@ static void mark_limbs(const climb_t *c, int a, const double *A, int b, const do
     }
 }
 
-/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold: wbc/climb/clear.py proves
- * it in steps, which are below it between the instants looked at too */
-static double tip_distance(const climb_t *c, const piece_t *p, double off) {
-    return fmin(c->clear, 0.5 * off - p->depth);
-}
-
 /* Marks the instants at which pieces of a limb (-1: of the body) are too near to bodies of the scene, to the body, or to each other.
  * `base`: poses of the body; `contact`: places that the limb holds, or comes from or to, and -1; `off`: how far it is from there; `stop`: whether one mark
  * is enough */

@@ -11,7 +11,7 @@ static int within(const plan_t *p, const double *x) {
     return 1;
 }
 
-static int is_free(plan_t *p, const double *x) { return within(p, x) && (!has_rows(p) || keeps(p, &p->path, x)) && clear(p, x, x); }
+static int is_free(plan_t *p, const double *x) { return within(p, x) && (!has_rows(p) || keeps(p, &p->path, x)) && is_clear(p, x); }
 
 /* Rows between two configurations that keep them: in the middle equalities may drift, and what the margins bend by there they
  * may bend by anywhere */
@@ -36,7 +36,7 @@ static int rows_between(plan_t *p, const double *x, const double *y) {
 
 static int edge(plan_t *p, const double *x, const double *y) {
     p->edges++;
-    return clear(p, x, y) && (!has_rows(p) || rows_between(p, x, y));
+    return proven(p, x, y, 0) == 1.0 && (!has_rows(p) || rows_between(p, x, y));
 }
 
 /* From x towards a target, no farther than `range`: configurations behind x that are free with their edges, into `out`, at most

@@ -10,9 +10,7 @@ void wbc_plan_prepare(plan_t *p) { prepare(p); }
 int wbc_plan_free(plan_t *p, const double *x) { return is_free(p, x); }
 
 /* The least distance of a pair at x less what it keeps, pads counted; infinite where there is none */
-double wbc_plan_margin(plan_t *p, const double *x) {
-    return least_margin(p, x, -INFINITY);
-}
+double wbc_plan_margin(plan_t *p, const double *x) { return least_margin(p, x, -INFINITY); }
 
 int wbc_plan_edge(plan_t *p, const double *x, const double *y) { return edge(p, x, y); }
 

@@ -4,6 +4,7 @@
 #define WBC_PLAN_H
 
 #include "sweep.c"
+#include "vector_lanes.h"
 
 /* So many pairs that were too near last are looked at first */
 #define RECENT 3
@@ -20,27 +21,25 @@ typedef struct {
     long long *iw;
 } kept_rows_t;
 
-/* How the first joints of its chain move a body within half a piece of a motion: a screw; turns; how far points go at most, and
- * the sums of the bound in proof.h */
-typedef struct {
-    double angular[3], linear[3], turned, off, reached, bent;
-} drift_t;
+/* Numbers of the motion of a core: of both ends as far as it is linear, the rest of the bound, how far points go at most, the turn */
+#define WAYS 11
+/* Beyond so large a turn the linear part says nothing [rad] */
+#define TURNED 1.5
 
 /* How a pair is seen to be far apart: by the balls about both, by a ball and a box in the world, or not so */
 enum { BALLS, BALL_BOX, UNSEEN };
 
-/* `ball` moves; `least`: what is required, with the radii; where in `offs` it stands how far both may be off */
+/* `ball` moves; `least`: what is required, with the radii; `core`: the radii of both about their cores; where in `offs` it stands how far
+ * both may be off; `round`: places are looked at together; `exact`: what stands is no less than the box about it */
 typedef struct {
-    double least;
-    int form, ball, other, ball_off, other_off;
+    double least, core;
+    int form, ball, other, ball_off, other_off, round, exact;
 } outline_t;
 
 typedef struct {
     sweep_t *sweep;
-    drift_t *drifts;  /* bodies x (depth + 1) */
     double *gone;     /* frames: how far joints go within half a piece */
     double *radius;   /* bodies: of the ball about each */
-    double *balls;    /* bodies x 4: about each, its centre and radius */
     double *normals;  /* pairs x 3: the directions that parted them last, or 0 */
     double half;      /* half of the piece at hand */
     double open;      /* what a proof may leave open of what is required [m] */
@@ -49,6 +48,10 @@ typedef struct {
     double *offs;        /* bodies x (depth + 1): how far the first joints of it may take them within half a piece */
     double *lane_pose;   /* frames x 12 x LANES: places that are looked at at once */
     double *lane_centre; /* bodies x 3 x LANES: of the balls there */
+    double *lane_ends;   /* bodies x 6 x LANES: of the cores of bodies there */
+    double *lane_ways;   /* bodies x (depth + 1) x WAYS x LANES: what joints do to these within half a piece: see lanes.h */
+    double *share;       /* LANES: 1, a piece of the motion; 0, its middle */
+    int *lane_stamp;     /* bodies: whether both are of the places at hand */
     outline_t *outlines; /* pairs */
     int *near;           /* LANES x pairs: what is near to each other there */
     int near_count[LANES];
@@ -56,7 +59,7 @@ typedef struct {
     const double *x, *y; /* ends of the motion at hand */
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
-    const double *weight;                   /* n: squares of what a coordinate counts */
+    const double *weight, *scale;           /* n: what a coordinate counts, its square and itself */
     int n, pairs, capacity, seeds, count[2];
     double range;     /* an edge is no longer */
     double step;      /* of edges with rows: between two projections */
@@ -66,10 +69,17 @@ typedef struct {
     unsigned long long random;
     kept_rows_t path, goal; /* rows of all configurations; with those of the goal's tasks */
     double *node[2];        /* capacity x n: trees from the start and from the goals */
+    double *lanes[2];       /* of these, blocks of n x LANES, times `scale`; infinite behind the last */
     int *parent[2];         /* -1: a root */
     double *work;           /* for one projection: see project.h */
     int meet[2];            /* nodes at which the trees met */
     int edges, projections, measured; /* since it was begun */
+    int struck;       /* the pair that was too near last */
+    int partial;      /* whether of an edge that is not free what is free of it counts */
+    unsigned alive;   /* places that are looked at together and still count */
+    unsigned ended;   /* the first of these is the end of the motion: 1 */
+    int lane_node; /* counts the places that were looked at together */
+    int lane;      /* the one at hand */
 } plan_t;
 
 static double metric(const plan_t *p, const double *x, const double *y) {

@@ -10,35 +10,39 @@
 #ifndef WBC_PROOF_H
 #define WBC_PROOF_H
 
-#include "places.h"
+#include "lanes.h"
 
 /* Edges are proven in pieces that are no longer [rad, or characteristic lengths] */
-#define PIECE 0.25
+#define PIECE 0.3
 /* and of LANES pieces, or less, one after so many others */
 #define STRIDE 5
 /* Pieces are not halved more often */
 #define PIECES 40
-/* Beyond so large a turn the linear part says nothing [rad] */
-#define TURNED 1.5
+
+/* What the first `stop` joints of its chain do to a body at the place at hand: of WAYS numbers the first, the others LANES behind each
+ * other; where it stands none */
+static const double *way_of(plan_t *p, int b, int stop) {
+    static const double none[LANES * WAYS];
+    if (!stop) return none;
+    stand_lanes(p, b);
+    return p->lane_ways + LANES * WAYS * ((p->sweep->depth + 1) * b + stop) + p->lane;
+}
 
 /* No point of a body is farther along n, at any instant of the piece; the first `stop` joints of its chain move it */
 static double top(plan_t *p, int b, int stop, const double *n) {
     const sweep_t *s = p->sweep;
     const shape_t *shape = s->shape + b;
-    const double *pose = s->body_pose + 12 * b, *ends = s->world_line + 6 * b, *line = s->line + 8 * b;
-    double local[3], rate[2] = {0.0, 0.0}, bend = 0.0, side = 0.0;
-    if (stop && p->half > 0.0) {
-        const drift_t *d = p->drifts + (s->depth + 1) * b + stop;
-        double across[3];
-        if (d->turned > TURNED) return INFINITY;
-        cross3(n, d->angular, across);
-        for (int e = 0; e < 2; e++) rate[e] = fabs(dot3(n, d->linear) + dot3(across, ends + 3 * e));
-        bend = 0.5 * d->bent + d->turned * d->reached;
-        side = line[7] * sqrt(dot3(across, across));
+    const double *pose = s->body_pose + 12 * b, *ends = s->world_line + 6 * b, *line = s->line + 8 * b, *way = way_of(p, b, stop);
+    double local[3], rate[2] = {0.0, 0.0}, turn[3], across[3];
+    for (int m = 0; m < 3; m++) {
+        for (int e = 0; e < 2; e++) rate[e] += n[m] * way[LANES * (3 * e + m)];
+        turn[m] = way[LANES * (8 + m)];
     }
-    if (is_round(shape)) return fmax(dot3(n, ends) + rate[0], dot3(n, ends + 3) + rate[1]) + line[6] + bend;
+    const double bend = way[LANES * 6], one = fabs(rate[0]), other = fabs(rate[1]);
+    if (is_round(shape)) return fmax(dot3(n, ends) + one, dot3(n, ends + 3) + other) + line[6] + bend;
     turn_back(pose, n, local);
-    return dot3(n, pose + 9) + reach(shape, local) + shape->size[4] + fmax(rate[0], rate[1]) + side + bend;
+    cross3(n, turn, across);
+    return dot3(n, pose + 9) + reach(shape, local) + shape->size[4] + fmax(one, other) + line[7] * sqrt(dot3(across, across)) + bend;
 }
 
 /* How far a pair is apart along n at least */
@@ -58,32 +62,15 @@ static double parted_any(plan_t *p, int k) {
     return dot3(down, W + 9) - top(p, other, other == i ? s->stop_first[k] : s->stop_second[k], down);
 }
 
-/* A bound from below of the distance of body j from the ball about body i */
-static double from_ball(const plan_t *p, int i, int j) {
-    const sweep_t *s = p->sweep;
-    const double *ball = p->balls + 4 * i, *other = p->balls + 4 * j, *pose = s->body_pose + 12 * j;
-    double d[3], x[3], off[3];
-    if (is_round(s->shape + j) || !is_box(s->shape + j)) {
-        minus3(ball, other, d);
-        return sqrt(dot3(d, d)) - other[3] - ball[3];
-    }
-    minus3(ball, pose + 9, d);
-    turn_back(pose, d, x);
-    beyond_box(x, s->shape[j].size, off);
-    return sqrt(dot3(off, off)) - s->shape[j].size[4] - ball[3];
-}
-
 /* One pair over one piece: 1 where both halves must be looked at */
 static int examine(plan_t *p, int k, int last) {
     sweep_t *s = p->sweep;
     const int i = s->first[k], j = s->second[k];
     stand(p, i);
     stand(p, j);
-    const double off = off_of(p, i, s->stop_first[k]) + off_of(p, j, s->stop_second[k]), required = s->required[k];
-    const int bounded = p->radius[i] < INFINITY && p->radius[j] < INFINITY;
+    const double off = way_of(p, i, s->stop_first[k])[7 * LANES] + way_of(p, j, s->stop_second[k])[7 * LANES], required = s->required[k];
     double *n = p->normals + 3 * k;
-    if (bounded && (is_round(s->shape + j) ? from_ball(p, j, i) : from_ball(p, i, j)) - off >= required) return 0;
-    if (!bounded && bound_of(s, i, j) - off >= required) return 0;
+    if (bound_of(s, i, j) - off >= required) return 0;
     if (dot3(n, n) > 0.0 && parted_any(p, k) >= required) return 0;
     answer_t found;
     distance_of(s, i, j, &found);
@@ -108,71 +95,82 @@ static void halve(plan_t *p, double low, double high, const int *pairs, int coun
     if (s->stopped < 0) halve(p, 0.5 * (low + high), high, room, left, depth + 1, room + left);
 }
 
-/* Whether none of the pairs that were too near last is so again, at y; others too where `all` */
-static int apart_at(plan_t *p, int all) {
-    const sweep_t *s = p->sweep;
-    if (!all && p->recent[0] < 0) return 1;
-    place_joints(p, 1.0, 0.0);
-    for (int k = 0; k < RECENT && s->stopped < 0; k++)
-        if (p->recent[k] >= 0) examine(p, p->recent[k], 1);
-    for (int k = 0; all && k < p->pairs && s->stopped < 0; k++) examine(p, k, 1);
-    return s->stopped < 0;
-}
-
-/* Pieces at once: `count` of the motion from number `from` on, of `pieces`, behind what else is looked at; or places that are evenly
- * spread, where `pieces` is 0. The first of few is y */
-static void look_along(plan_t *p, int from, int count, int pieces) {
-    sweep_t *s = p->sweep;
-    const double half = pieces ? 0.5 / pieces : 0.0;
-    const int ended = !pieces || count < LANES;
-    lanes_t t, share = {0};
-    for (int l = 0; l < LANES; l++) t[l] = 1.0;
-    for (int k = 0; k < count; k++) {
-        const int l = k + ended;
-        t[l] = pieces ? (from + k + 0.5) / pieces : (k + 1.0) / LANES, share[l] = pieces > 0;
+/* Lanes at `count` pieces of the motion from number `from` on, of `pieces`, or at places that are evenly spread, where that is 0; the first
+ * of few is y */
+static void place_pieces(plan_t *p, int from, int count, int pieces) {
+    lanes_t t;
+    p->half = pieces ? 0.5 / pieces : 0.0;
+    for (int l = 0; l < LANES; l++) {
+        const int k = l - p->ended, counts = k >= 0 && k < count;
+        t[l] = !counts ? 1.0 : pieces ? (from + k + 0.5) / pieces : (k + 1.0) / LANES, p->share[l] = counts && pieces;
     }
     place_lanes(p, t);
-    place_offs(p, half);
-    near_pairs(p, share);
-    /* What is far from each other is looked at first: what is in a body is so seen soonest */
-    for (int k = -ended; k < count && s->stopped < 0; k++) {
-        const int piece = k < 0 ? 0 : (STRIDE * (k + 1)) % count, l = k < 0 ? 0 : piece + ended, *near = p->near + p->pairs * l;
-        int left = 0;
-        if (!p->near_count[l]) continue;
-        stand_at(p, l, share[l] * half);
-        for (int m = 0; m < p->near_count[l] && s->stopped < 0; m++)
-            if (examine(p, near[m], 0)) s->list[left++] = near[m];
-        if (!left || s->stopped >= 0) continue;
-        const double low = (from + piece) / (double)pieces, high = (from + piece + 1.0) / pieces, middle = 0.5 * (low + high);
-        halve(p, low, middle, s->list, left, 1, s->list + left);
-        if (s->stopped < 0) halve(p, middle, high, s->list, left, 1, s->list + left);
-    }
 }
 
-/* Straight from x, which is clear, to y; only y where they are the same */
-static int clear(plan_t *p, const double *x, const double *y) {
+/* Pieces at once, behind what else is looked at: see place_pieces. How many of them are proven, the first ones */
+static int look_along(plan_t *p, int from, int count, int pieces) {
     sweep_t *s = p->sweep;
-    if (!p->pairs) return 1;
-    p->x = x, p->y = y;
-    s->stopped = -1;
-    if (apart_at(p, x == y) && x != y) {
-        const double wanted = metric(p, x, y) / PIECE;
-        if (wanted < LANES - 1) {
-            const int pieces = wanted <= 1.0 ? 1 : wanted <= 2.0 ? 2 : wanted <= 4.0 ? 4 : LANES - 1;
-            look_along(p, 0, pieces, pieces);
-        } else {
-            const int pieces = LANES * (int)ceil(wanted / LANES);
-            look_along(p, 0, LANES - 1, 0);
-            for (int k = 0; k < pieces && s->stopped < 0; k += LANES) look_along(p, k, LANES, pieces);
+    const int ended = !pieces || count < LANES;
+    p->ended = ended, p->alive = (1u << (count + ended)) - 1u;
+    place_pieces(p, from, count, pieces);
+    int node = p->lane_node;
+    place_offs(p);
+    near_pairs(p);
+    /* What is far from each other is looked at first: what is in a body is so seen soonest */
+    for (int k = -ended; k < count && s->stopped < 0; k++) {
+        const int piece = k < 0 ? 0 : p->partial ? k : (STRIDE * (k + 1)) % count, l = k < 0 ? 0 : piece + ended, *near = p->near + p->pairs * l;
+        int left = 0;
+        if (!(p->alive >> l & 1)) continue;
+        if (!p->near_count[l]) continue;
+        /* What was halved stands elsewhere */
+        if (p->lane_node != node) place_pieces(p, from, count, pieces), node = p->lane_node;
+        stand_at(p, l);
+        for (int m = 0; m < p->near_count[l] && s->stopped < 0; m++)
+            if (examine(p, near[m], 0)) s->list[left++] = near[m];
+        if (left && s->stopped < 0) {
+            const double low = (from + piece) / (double)pieces, high = (from + piece + 1.0) / pieces, middle = 0.5 * (low + high);
+            halve(p, low, middle, s->list, left, 1, s->list + left);
+            if (s->stopped < 0) halve(p, middle, high, s->list, left, 1, s->list + left);
         }
+        if (s->stopped < 0) continue;
+        const int stopped = s->stopped;
+        s->stopped = -1;
+        strike(p, stopped, 1u << l);
     }
-    if (s->stopped < 0) return 1;
+    return s->stopped < 0 ? __builtin_ctz(~(p->alive >> ended)) : 0;
+}
+
+/* How much of the motion straight from x, which is clear, to y is proven: all or, where that is not enough, nothing; or its first part,
+ * where `partial` */
+static double proven(plan_t *p, const double *x, const double *y, int partial) {
+    sweep_t *s = p->sweep;
+    if (!p->pairs) return 1.0;
+    p->x = x, p->y = y, p->partial = partial, p->struck = s->stopped = -1;
+    const double wanted = metric(p, x, y) / PIECE;
+    int pieces = wanted <= 1.0 ? 1 : wanted <= 2.0 ? 2 : wanted <= 4.0 ? 4 : LANES - 1, done = 0;
+    if (wanted < LANES - 1) {
+        done = look_along(p, 0, pieces, pieces);
+    } else {
+        pieces = LANES * (int)ceil(wanted / LANES);
+        if (!partial) look_along(p, 0, LANES - 1, 0);
+        for (int now = LANES; now == LANES && done < pieces && s->stopped < 0; done += now) now = look_along(p, done, LANES, pieces);
+    }
+    if (p->struck < 0) return 1.0;
     /* A pair that was too near is looked at first the next time */
     int k = 0;
-    while (k < RECENT - 1 && p->recent[k] != s->stopped) k++;
+    while (k < RECENT - 1 && p->recent[k] != p->struck) k++;
     memmove(p->recent + 1, p->recent, k * sizeof *p->recent);
-    p->recent[0] = s->stopped;
-    return 0;
+    p->recent[0] = p->struck;
+    return partial ? done / (double)pieces : 0.0;
+}
+
+/* The same from x to itself */
+static int is_clear(plan_t *p, const double *x) {
+    sweep_t *s = p->sweep;
+    p->x = p->y = x, s->stopped = -1;
+    place_joints(p, 1.0, 0.0);
+    for (int k = 0; k < p->pairs && s->stopped < 0; k++) examine(p, k, 1);
+    return s->stopped < 0;
 }
 
 /* The least distance of all pairs at x, less what each keeps; what is less than `enough` may be any */

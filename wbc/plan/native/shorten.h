@@ -42,11 +42,8 @@ static int place_at(const plan_t *p, const double *x, int points, double at, dou
 static int cut(plan_t *p, double *x, int points, int room, double *others, int most) {
     const int n = p->n;
     const double length = length_of(p, x, points);
-    double one = uniform(p) * length, other = uniform(p) * length;
-    if (one > other) {
-        const double swap = one;
-        one = other, other = swap;
-    }
+    const double first = uniform(p) * length, second = uniform(p) * length;
+    double one = fmin(first, second), other = fmax(first, second);
     double *from = others, *to = others + n, *way = others + 2 * n;
     int i = place_at(p, x, points, one, from), j = place_at(p, x, points, other, to), reached;
     if (i == j) return points;

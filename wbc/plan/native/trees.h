@@ -6,42 +6,67 @@
 
 /* Steps of one edge with rows */
 #define WALK 64
-/* Edges that lead to samples are tried as long as their range, then shorter, to this share of it */
-#define SHORTEST 0.05
-/* while a tree has no more nodes than this */
-#define FEW 20
+/* Edges of which less than this share is free are none */
+#define SLIGHT 0.1
 /* Samples are drawn so often until one lies on no longer path */
 #define INFORMED 20
 
+/* A node; beside its row in `node` it stands in `lanes`, where coordinates of LANES nodes are together, weighted */
 static int add(plan_t *p, int tree, const double *x, int parent) {
-    if (p->count[tree] == p->capacity) return -1;
-    copy_x(p, x, p->node[tree] + p->n * p->count[tree]);
-    p->parent[tree][p->count[tree]] = parent;
+    const int at = p->count[tree], n = p->n;
+    if (at == p->capacity) return -1;
+    copy_x(p, x, p->node[tree] + n * at);
+    double *lane = p->lanes[tree] + (long)LANES * n * (at / LANES) + at % LANES;
+    for (int m = 0; at % LANES == 0 && m < LANES * n; m++) lane[m] = INFINITY;
+    for (int k = 0; k < n; k++) lane[LANES * k] = p->scale[k] * x[k];
+    p->parent[tree][at] = parent;
     return p->count[tree]++;
 }
 
 static int nearest_node(const plan_t *p, int tree, const double *x) {
-    const double *y = p->node[tree];
-    double least = INFINITY;
-    int best = 0;
-    for (int k = 0; k < p->count[tree]; k++, y += p->n) {
-        double sum = 0.0;
-        for (int i = 0; i < p->n && sum < least; i++) sum += p->weight[i] * (x[i] - y[i]) * (x[i] - y[i]);
-        if (sum < least) least = sum, best = k;
+    const int n = p->n, blocks = (p->count[tree] + LANES - 1) / LANES;
+    const lanes_t *y = (const lanes_t *)p->lanes[tree];
+    lanes_t nearest = {0}, at = {0}, z[n];
+    nearest += INFINITY;
+    for (int k = 0; k < n; k++) z[k] = (lanes_t){0} + p->scale[k] * x[k];
+    for (int b = 0; b < blocks; b++) {
+        lanes_t sum = {0};
+        for (int k = 0; k < n; k++, y++) sum += (*y - z[k]) * (*y - z[k]);
+        const mask_t nearer = sum < nearest;
+        nearest = chosen(nearer, sum, nearest), at = chosen(nearer, (lanes_t){0} + b, at);
     }
-    return best;
+    int best = 0;
+    for (int l = 1; l < LANES; l++)
+        if (nearest[l] < nearest[best]) best = l;
+    return LANES * (int)at[best] + best;
 }
 
-/* From node `from` towards a target, no farther than `range`; the last node that was added, or -1 */
+/* From node `from` towards a target, no farther than `range`; the last node that was added, or -1. `reached`: the target, 1; not yet,
+ * 0; it is not to be reached so, -1 */
 static int extend(plan_t *p, int tree, int from, const double *target, double range, int *reached) {
     double out[WALK * p->n];
-    const int count = walk(p, p->node[tree] + p->n * from, target, range, out, has_rows(p) ? WALK : 1, reached);
-    int last = -1;
+    const double *x = p->node[tree] + p->n * from;
+    int count, last = -1;
+    if (has_rows(p)) {
+        count = walk(p, x, target, range, out, WALK, reached);
+        if (!count && *reached) return from;
+    } else {
+        const double whole = metric(p, x, target), share = fmin(1.0, range / whole);
+        if (whole == 0.0) return *reached = 1, from;
+        along_x(p, x, target, share, out);
+        p->edges++;
+        const double part = proven(p, x, out, 1);
+        *reached = part < 1.0 ? -1 : share == 1.0;
+        if (part < SLIGHT) return -1;
+        if (part < 1.0) along_x(p, x, target, part * share, out);
+        else if (*reached) copy_x(p, target, out);
+        count = 1;
+    }
     for (int k = 0; k < count; k++) {
         last = add(p, tree, out + k * p->n, last < 0 ? from : last);
         if (last < 0) *reached = 0;
     }
-    return last < 0 && *reached ? from : last;
+    return last;
 }
 
 /* A sample within limits that lies on a path no longer than the best one, as far as that can be told */
@@ -63,10 +88,7 @@ static int grow(plan_t *p, int samples) {
         draw(p, x);
         const int tree = p->count[0] > p->count[1];
         const int from = nearest_node(p, tree, x);
-        int node = extend(p, tree, from, x, p->range, &reached);
-        /* Out of narrow places only short edges lead */
-        for (double range = p->range; node < 0 && p->count[tree] < FEW && range > SHORTEST * p->range;)
-            node = extend(p, tree, from, x, range *= 0.25, &reached);
+        const int node = extend(p, tree, from, x, p->range, &reached);
         if (p->count[tree] == p->capacity) return -1;
         if (node < 0) continue;
         const double *target = p->node[tree] + p->n * node;
@@ -74,7 +96,7 @@ static int grow(plan_t *p, int samples) {
         do {
             other = extend(p, !tree, other, target, p->range, &reached);
         } while (other >= 0 && !reached);
-        if (!reached) continue;
+        if (reached != 1) continue;
         p->meet[tree] = node, p->meet[!tree] = other;
         return 1;
     }

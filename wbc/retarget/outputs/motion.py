@@ -16,6 +16,9 @@ from wbc.validation import Array
 if TYPE_CHECKING:
     from wbc.retarget.retargeted import Retargeted
 
+#: Columns of a root in a table
+ROOT = ("root.x", "root.y", "root.z", "root.qx", "root.qy", "root.qz", "root.qw")
+
 
 @dataclass(frozen=True)
 class JointColumns:
@@ -33,6 +36,11 @@ class JointColumns:
     root_quaternion: Array
     names: tuple[str, ...]
     positions: Array
+
+    @property
+    def table(self) -> Array:
+        """Root and joints side by side [frames, 7 + joints]."""
+        return np.column_stack((self.root_position, self.root_quaternion, self.positions))
 
     @classmethod
     def of(cls, motion: Retargeted) -> JointColumns:

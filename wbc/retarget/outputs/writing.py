@@ -1,4 +1,4 @@
-"""A motion as one file of a format."""
+"""A motion as one file of a format, or several as a dataset."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 import os
 import pathlib
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
@@ -17,7 +17,7 @@ from wbc import extras, validation
 from wbc.errors import ClipFileError, RangeError, ShapeError
 from wbc.log import Log
 from wbc.log.lerobot import write_lerobot_dataset
-from wbc.retarget.outputs.motion import JointColumns
+from wbc.retarget.outputs.motion import ROOT, JointColumns
 
 if TYPE_CHECKING:
     import mujoco
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 MOTION_FORMATS = {
     "npz": ".npz", "csv": ".csv", "csv-plain": ".csv", "gmr": ".pkl", "keyframes": ".xml", "log": ".npz",
 }  # fmt: skip
-#: Columns of a root in a table
-ROOT = ("root.x", "root.y", "root.z", "root.qx", "root.qy", "root.qz", "root.qw")
 
 
 def write_motion(
@@ -60,9 +58,7 @@ def write_motion(
     """
     validation.one_of("format", kind, MOTION_FORMATS)
     path = validation.file_path("file", file)
-    path = (
-        path.with_name(path.name + MOTION_FORMATS[kind]) if not path.suffix else path.with_suffix(MOTION_FORMATS[kind])
-    )
+    path = path.with_name(path.stem + MOTION_FORMATS[kind])
     columns = JointColumns.of(motion)
     if joints is not None:
         columns = columns.in_order(joints)
@@ -73,8 +69,10 @@ def write_motion(
             return wbc.log.save(log_of(motion), path.parent, "npz", path.stem)
         if kind == "keyframes":
             _write_keyframes(motion, fresh, model)
+        elif kind.startswith("csv"):
+            _write_table(motion, columns, fresh, plain=kind == "csv-plain")
         else:
-            _WRITERS[kind](motion, columns, fresh)
+            _write_arrays(motion, columns, fresh, kind)
         fresh.replace(path)
     return path
 
@@ -93,39 +91,34 @@ def log_of(motion: Retargeted) -> Log:
     return Log(columns, units, {"robot": robot.name, "rate": motion.rate, "kind": "retargeted"})
 
 
-def _write_npz(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
-    stances = {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
-    arrays: dict[str, Any] = {
-        "q": motion.q, "time": motion.time, "rate": np.array(motion.rate), "robot": np.array(motion.robot.name),
-        "joint_names": np.array(columns.names), "root_pos": columns.root_position, "root_rot": columns.root_quaternion,
-        "dof_pos": columns.positions, **stances,
+def _write_arrays(motion: Retargeted, columns: JointColumns, file: pathlib.Path, kind: str) -> None:
+    """Npz, or GMR's pickle."""
+    parts: dict[str, Any] = {
+        "root_pos": columns.root_position, "root_rot": columns.root_quaternion, "dof_pos": columns.positions,
     }  # fmt: skip
     with file.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+        if kind == "gmr":
+            whole = round(motion.rate)
+            parts |= {"fps": whole if abs(whole - motion.rate) < 1e-6 else motion.rate}
+            parts |= {"local_body_pos": None, "link_body_list": None, "joint_names": list(columns.names)}
+            pickle.dump(parts, stream)
+            return
+        parts |= {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
+        parts |= {"q": motion.q, "time": motion.time, "rate": np.array(motion.rate)}
+        parts |= {"robot": np.array(motion.robot.name), "joint_names": np.array(columns.names)}
+        np.savez_compressed(stream, allow_pickle=False, **parts)
 
 
-def _write_csv(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
+def _write_table(motion: Retargeted, columns: JointColumns, file: pathlib.Path, *, plain: bool) -> None:
+    """With a header, times and all digits, or numbers alone."""
+    if plain:
+        np.savetxt(file, columns.table, fmt="%.9g", delimiter=",")
+        return
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(["time", *ROOT, *columns.names])
-        table = np.column_stack((motion.time, columns.root_position, columns.root_quaternion, columns.positions))
+        table = np.column_stack((motion.time, columns.table))
         writer.writerows([[repr(number) for number in row] for row in table.tolist()])
-
-
-def _write_plain(_motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
-    table = np.column_stack((columns.root_position, columns.root_quaternion, columns.positions))
-    np.savetxt(file, table, fmt="%.9g", delimiter=",")
-
-
-def _write_gmr(motion: Retargeted, columns: JointColumns, file: pathlib.Path) -> None:
-    whole = round(motion.rate)
-    about = {
-        "fps": whole if abs(whole - motion.rate) < 1e-6 else motion.rate,
-        "root_pos": columns.root_position, "root_rot": columns.root_quaternion, "dof_pos": columns.positions,
-        "local_body_pos": None, "link_body_list": None, "joint_names": list(columns.names),
-    }  # fmt: skip
-    with file.open("wb") as stream:
-        pickle.dump(about, stream)
 
 
 def _write_keyframes(motion: Retargeted, file: pathlib.Path, model: mujoco.MjModel | None) -> None:
@@ -134,22 +127,13 @@ def _write_keyframes(motion: Retargeted, file: pathlib.Path, model: mujoco.MjMod
     from wbc.simulation import mujoco_model
 
     made = mujoco_model(motion.robot, drawn=False) if model is None else model
-    joints = MujocoJoints(made, motion.robot)
-    qpos = np.array(made.qpos0)
+    joints, qpos = MujocoJoints(made, motion.robot), np.array(made.qpos0)
     lines = [f"<mujoco model={quoteattr(motion.robot.name or 'robot')}>", "  <keyframe>"]
     for frame, (time, q) in enumerate(zip(motion.time, motion.q, strict=True)):
         joints.put_q(qpos, q)
         numbers = " ".join(f"{number:.9g}" for number in qpos)
         lines.append(f'    <key name="frame{frame}" time="{time:.9g}" qpos="{numbers}"/>')
     file.write_text("\n".join([*lines, "  </keyframe>", "</mujoco>", ""]), encoding="utf-8")
-
-
-_WRITERS: dict[str, Callable[[Retargeted, JointColumns, pathlib.Path], None]] = {
-    "npz": _write_npz,
-    "csv": _write_csv,
-    "csv-plain": _write_plain,
-    "gmr": _write_gmr,
-}
 
 
 def write_lerobot(
@@ -181,7 +165,7 @@ def write_lerobot(
         raise RangeError("motions", motions, "expected a motion at least, and a whole number of frames a second")
     if path.exists():
         raise ClipFileError("folder", str(path), "is there already")
-    states = [np.column_stack((own.root_position, own.root_quaternion, own.positions)) for own in columns]
+    states = [own.table for own in columns]
     episodes = [{"observation.state": q, "action": np.concatenate([q[1:], q[-1:]])} for q in states]
     names = dict.fromkeys(("observation.state", "action"), (*ROOT, *columns[0].names))
     with validation.writing("folder", path, ClipFileError):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+
 import numpy as np
 
-from wbc import validation
 from wbc.errors import RangeError
-from wbc.retarget.sources.body_words import numbers_of
+from wbc.retarget.body import BodyError, PointTree, find_body
+from wbc.retarget.clip import Array, ancestors, rest_places
 from wbc.retarget.sources.recorded import Recorded
-from wbc.validation import Array
+from wbc.retarget.words import numbers_of
 
 #: Axis that is up -> rotation of the file's axes to z up
 TO_Z_UP: dict[str, Array] = {
@@ -19,18 +22,13 @@ TO_Z_UP: dict[str, Array] = {
     "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
     "-x": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
 }
-#: Units of length by name [m]
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048, "cmu": 0.0254 / 0.45}
-#: Whole names of units
-UNIT_NAMES = {
-    "m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet",
-    "cmu": "units of 56.4 mm, as of CMU's clips",
+#: Units of length: [m], whole names, and a person's length from head to feet along the bones in them, from and to
+UNITS = {
+    "m": (1.0, "metres", (0.6, 4.0)), "ft": (0.3048, "feet", (4.0, 9.0)),
+    "cmu": (0.0254 / 0.45, "units of 56.4 mm, as of CMU's clips", (15.0, 42.0)),
+    "in": (0.0254, "inches", (42.0, 92.0)), "cm": (0.01, "centimetres", (92.0, 420.0)),
+    "mm": (0.001, "millimetres", (420.0, 4200.0)),
 }  # fmt: skip
-#: Length of a person from head to feet along the bones, in each unit, from and to
-PERSON_SIZES = (
-    ("m", 0.6, 4.0), ("ft", 4.0, 9.0), ("cmu", 15.0, 42.0), ("in", 42.0, 92.0), ("cm", 92.0, 420.0),
-    ("mm", 420.0, 4200.0),
-)  # fmt: skip
 #: A person stands up to this share of that length, in a frame or in the rest pose
 UPRIGHT = 0.75
 #: Size of what is no person who stands [m]: a dog, a person who crawls, a hand
@@ -66,65 +64,62 @@ def find_up(clip: Recorded) -> tuple[str, bool]:
     points = clip.points
     size = sizes(points) or 1.0
     standing = _standing(clip, size)
-    head, feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
+    head, feet = _head_and_feet(clip)
     above = np.zeros(3)
     if head and feet:
-        between = np.nanmean(points[:, head], axis=1) - np.nanmean(points[:, feet], axis=1)
-        above = np.nanmean(between, axis=0)
+        above = np.nanmean(np.nanmean(points[:, head], axis=1) - np.nanmean(points[:, feet], axis=1), axis=0)
         above = above / max(float(np.linalg.norm(above)), 1e-9)
-    rest = _rest_up(clip)
+    rest = _said_by_rest(clip)
     costs: dict[str, float] = {}
     for name, to_world in TO_Z_UP.items():
         up = to_world[2]
-        heights = points @ up
         cost = NOT_ABOVE * (1.0 - float(above @ up))
         if len(standing):
             here = standing @ up
-            cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(heights, 2.0))) / size
+            cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(points @ up, 2.0))) / size
         cost += NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (rest not in ("", name))
         costs[name] = cost
     best, second = sorted(costs, key=lambda name: costs[name])[:2]
     return best, costs[second] - costs[best] > UNSURE
 
 
-def _rest_up(clip: Recorded) -> str:
-    """The axis of the rest pose along which the head is above the feet; "" where that is not clear."""
-    if clip.offsets is None:
-        return ""
-    places = _rest_places(clip)
+def _head_and_feet(clip: Recorded) -> tuple[list[int], list[int]]:
+    """Numbers of points of head and feet, by name, else by the limbs of the rest pose."""
     head, feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
-    if not head or not feet:
+    if clip.offsets is not None and not (head and feet):
+        with contextlib.suppress(BodyError):
+            tree = PointTree(tuple(clip.names), tuple(clip.parents), rest_places(clip.parents, clip.offsets))
+            plan = find_body(tree)
+            legs = [chain[-1] for name, chain in plan.limbs.items() if name.endswith("leg")]
+            head, feet = head or list(plan.head[-1:]), feet or legs
+    return head, feet
+
+
+def _said_by_rest(clip: Recorded) -> str:
+    """The axis of the rest pose along which the head is above the feet; "" where that is not clear."""
+    head, feet = _head_and_feet(clip)
+    if clip.offsets is None or not head or not feet:
         return ""
+    places = rest_places(clip.parents, clip.offsets)
     between = places[head].mean(axis=0) - places[feet].mean(axis=0)
     best = max(TO_Z_UP, key=lambda name: float(TO_Z_UP[name][2] @ between))
     return best if float(TO_Z_UP[best][2] @ between) > 0.9 * float(np.linalg.norm(between)) > 0.0 else ""
 
 
-def _rest_places(clip: Recorded) -> Array:
-    """Joints in the rest pose [joints, 3]."""
-    assert clip.offsets is not None
-    places = np.zeros_like(clip.offsets)
-    for joint, parent in enumerate(clip.parents):
-        places[joint] = clip.offsets[joint] + (places[parent] if parent >= 0 else 0.0)
-    return places
-
-
 def rest_up(clip: Recorded, up: str) -> str:
     """The axis that is up in the rest pose: what its head and feet say, else that of the motion."""
-    return clip.rest_up or _rest_up(clip) or up
+    return clip.rest_up or _said_by_rest(clip) or up
 
 
 def _standing(clip: Recorded, size: float) -> Array:
     """Places of feet, or of all points where no feet are named, while they stand still [n, 3]."""
-    feet = numbers_of(clip.names, "foot") or list(range(len(clip.names)))
-    points = clip.points[:, feet]
+    points = clip.points[:, _head_and_feet(clip)[1] or list(range(len(clip.names)))]
     lag = max(1, min(len(points) - 1, round(STANDING_TIME * clip.rate)))
     every = max(1, len(points) // FRAMES)
     before, after = points[:-lag:every], points[lag::every]
     speed = np.linalg.norm(after - before, axis=2) * clip.rate / lag
     with np.errstate(invalid="ignore"):
-        still = speed < STANDING_SPEED * size
-    return np.asarray(before[still])
+        return np.asarray(before[speed < STANDING_SPEED * size])
 
 
 def mirrored(clip: Recorded, points: Array) -> bool:
@@ -132,20 +127,23 @@ def mirrored(clip: Recorded, points: Array) -> bool:
 
     The hips' line from right to left, and the feet's direction ahead, must be as y and x.
     """
-    left, right = (numbers_of(clip.names, "hip", side) for side in ("left", "right"))
-    toes = {side: numbers_of(clip.names, "toe", side) for side in ("left", "right")}
-    ankles = {
-        side: [k for k in numbers_of(clip.names, "ankle", side) if k not in toes[side]] for side in ("left", "right")
-    }
-    if not left or not right or not all(toes.values()) or not all(ankles.values()):
+    hips, toes, ankles = (
+        [numbers_of(clip.names, part, side) for side in (1, -1)] for part in ("hip", "toe", "hindfoot")
+    )
+    ankles = [[k for k in own if k not in toe] for own, toe in zip(ankles, toes, strict=True)]
+    if not all((*hips, *toes, *ankles)):
         return False
-    across = (points[:, left].mean(axis=1) - points[:, right].mean(axis=1))[:, :2]
-    ahead = sum((points[:, toes[side]].mean(axis=1) - points[:, ankles[side]].mean(axis=1))[:, :2] for side in toes)
+    left, right = (points[:, own].mean(axis=1) for own in hips)
+    across = (left - right)[:, :2]
+    feet = [
+        points[:, toe].mean(axis=1) - points[:, ankle].mean(axis=1) for toe, ankle in zip(toes, ankles, strict=True)
+    ]
+    ahead = (feet[0] + feet[1])[:, :2]
     turn = ahead[:, 0] * across[:, 1] - ahead[:, 1] * across[:, 0]
-    sizes_of = np.linalg.norm(ahead, axis=1) * np.linalg.norm(across, axis=1)
-    good = np.isfinite(turn) & (sizes_of > 0.0)
+    most = np.linalg.norm(ahead, axis=1) * np.linalg.norm(across, axis=1)
+    good = np.isfinite(turn) & (most > 0.0)
     # Ahead in nearly all frames: hips and feet may be across each other for a moment
-    return bool(good.any() and np.mean(turn[good] < -0.5 * sizes_of[good]) > 0.9)
+    return bool(good.any() and np.mean(turn[good] < -0.5 * most[good]) > 0.9)
 
 
 def find_unit(clip: Recorded, up: str) -> tuple[str, float]:
@@ -157,53 +155,29 @@ def find_unit(clip: Recorded, up: str) -> tuple[str, float]:
     size, heights = sizes(clip.points), clip.points @ TO_Z_UP[up][2]
     tall = float(np.nanmax(np.nanmax(heights, axis=1) - np.nanmin(heights, axis=1)))
     along = _head_to_feet(clip)
-    if clip.offsets is not None and (rest := _rest_up(clip)):
-        tall = max(tall, float(np.ptp(_rest_places(clip) @ TO_Z_UP[rest][2])))
+    if clip.offsets is not None and (rest := _said_by_rest(clip)):
+        tall = max(tall, float(np.ptp(rest_places(clip.parents, clip.offsets) @ TO_Z_UP[rest][2])))
     if along and tall > UPRIGHT * along:
-        for name, low, high in PERSON_SIZES:
+        for name, (_, _, (low, high)) in UNITS.items():
             if low <= along < high:
                 return name, along
     else:
-        name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(size, 1e-12) * UNITS[unit] / OTHER_SIZE)))
-        if 0.1 < size * UNITS[name] / OTHER_SIZE < 10.0:
+        name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
+        if 0.1 < size * UNITS[name][0] / OTHER_SIZE < 10.0:
             return name, size
     raise RangeError("unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft")
 
 
 def _head_to_feet(clip: Recorded) -> float:
     """Length of the bones from head to foot, or how far they are apart where bones are not known; 0 without them."""
-    heads, feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
-    if not heads or not feet:
-        return 0.0
-    lengths = [
-        float(np.nanmedian(np.linalg.norm(clip.points[:, joint] - clip.points[:, parent], axis=1)))
-        if parent >= 0
-        else 0.0
-        for joint, parent in enumerate(clip.parents)
-    ]
-    above = [_ancestors(clip.parents, joint) for joint in range(len(clip.parents))]
+    points, parents = clip.points, clip.parents
+    bones = [points[:, joint] - points[:, parent if parent >= 0 else joint] for joint, parent in enumerate(parents)]
+    lengths = [float(np.nanmedian(np.linalg.norm(bone, axis=1))) for bone in bones]
     longest = 0.0
-    for head in heads:
-        for foot in feet:
-            shared = set(above[head]) & set(above[foot])
-            if shared:
-                longest = max(longest, sum(lengths[k] for k in {*above[head], *above[foot]} - shared))
-            else:
-                apart = np.linalg.norm(clip.points[:, head] - clip.points[:, foot], axis=1)
-                longest = max(longest, float(np.nanmax(apart)))
+    for head, foot in itertools.product(*_head_and_feet(clip)):
+        above, below = set(ancestors(parents, head)), set(ancestors(parents, foot))
+        if above & below:
+            longest = max(longest, sum(lengths[k] for k in above ^ below))
+        else:
+            longest = max(longest, float(np.nanmax(np.linalg.norm(points[:, head] - points[:, foot], axis=1))))
     return longest
-
-
-def _ancestors(parents: list[int], joint: int) -> list[int]:
-    """A joint and all above it."""
-    out = [joint]
-    while parents[out[-1]] >= 0:
-        out.append(parents[out[-1]])
-    return out
-
-
-def unit_of(value: str | float) -> float:
-    """A unit by name, or as its length [m]."""
-    if isinstance(value, str):
-        return UNITS[validation.one_of("unit", value, UNITS)]
-    return validation.scalar("unit", value, low=1e-6, high=1e3, unit="m")

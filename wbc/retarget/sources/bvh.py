@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from wbc import validation
-from wbc.errors import ClipFileError
-from wbc.retarget.sources.recorded import Recorded, in_the_world, no_clip, unlike
-from wbc.validation import Array
+from wbc.retarget.clip import Array
+from wbc.retarget.sources.recorded import Recorded, in_the_world, no_clip, text_of, unlike
 
 #: Axes of channels, by their first letter
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -35,20 +34,27 @@ def read_bvh(path: pathlib.Path) -> Recorded:
     Raises:
         ClipFileError: it is none, or ends before its second frame; the text says in which line.
     """
-    lines = validation.text_of("clip", path, ClipFileError).splitlines()
-    tree, row = _hierarchy(path, lines)
+    lines = text_of(path).splitlines()
     notes: list[str] = []
-    count, rate, row = _motion_head(path, lines, row)
-    table = _frames(path, lines[row:], row, len(tree.channels), count, notes)
-    offsets = np.array(tree.offsets)
-    names = unlike(tree.names, notes)
-    missing = np.isnan(table)
+    tree, row = _hierarchy(path, lines)
+    table, rate = _motion(path, lines, row, len(tree.channels), notes)
+    offsets, names = np.array(tree.offsets), unlike(tree.names, notes)
+    missing = ~np.isfinite(table)
     seen = np.ones((len(table), len(names)), dtype=bool)
     if missing.any():
         for joint, parent in enumerate(tree.parents):
             columns = [column for column, (of, _, _) in enumerate(tree.channels) if of == joint]
             seen[:, joint] = ~missing[:, columns].any(axis=1) & (True if parent < 0 else seen[:, parent])
-        table = _filled(path, table, tree, notes)
+        for column, (joint, turning, _) in enumerate(tree.channels):
+            good = np.flatnonzero(~missing[:, column])
+            if not good.size:
+                raise no_clip(path, f"a channel of {names[joint]} has no number in any frame")
+            if good.size < len(table):
+                # Angles go the short way round
+                values = np.unwrap(table[good, column], period=360.0) if turning else table[good, column]
+                table[:, column] = np.interp(np.arange(len(table)), good, values)
+        lacking = f"{int(missing.any(axis=1).sum())} of {len(table)} frames"
+        notes.append(f"numbers are missing in {lacking}: filled in between their neighbours")
     own = np.broadcast_to(np.eye(3), (len(table), len(names), 3, 3)).copy()
     moves: dict[int, Array] = {}
     for column, (joint, turning, axis) in enumerate(tree.channels):
@@ -62,42 +68,37 @@ def read_bvh(path: pathlib.Path) -> Recorded:
             move += offsets[joint]
             notes.append(f"positions of {names[joint]} are counted from its offset")
     points, turns = in_the_world(tree.parents, offsets, own, moves)
-    return Recorded(
-        names, tree.parents, points, rate, offsets, turns, tree.ends, seen, usual="y", notes=notes,
-    )  # fmt: skip
+    return Recorded(names, tree.parents, points, rate, offsets, turns, tree.ends, seen, usual="y", notes=notes)
 
 
-def _hierarchy(path: pathlib.Path, lines: list[str]) -> tuple[_BvhTree, int]:
+def _hierarchy(path: pathlib.Path, lines: Sequence[str]) -> tuple[_BvhTree, int]:
+    """The tree, and the row behind MOTION."""
     tree, started = _BvhTree(), False
     open_joints: list[int] = []
     for row, line in enumerate(lines):
-        words = line.split()
+        words, shown = line.split(), f"line {row + 1}: {line.strip()[:60]!r}"
         if not words:
             continue
         word = words[0].upper()
         if word == "HIERARCHY":
             started = True
         elif not started:
-            raise no_clip(path, f"no BVH: line {row + 1} is {line.strip()[:40]!r}, expected HIERARCHY")
-        elif word in ("ROOT", "JOINT") or word == "END":
-            parent = open_joints[-1] if open_joints else -1
-            end = word == "END"
+            raise no_clip(path, f"no BVH: {shown}, expected HIERARCHY")
+        elif word in ("ROOT", "JOINT", "END"):
+            parent, end = open_joints[-1] if open_joints else -1, word == "END"
             if parent < 0 and word != "ROOT":
-                raise no_clip(path, f"line {row + 1}: a {words[0]} outside of a ROOT")
+                raise no_clip(path, f"{shown} outside of a ROOT")
             tree.names.append(f"{tree.names[parent]}End" if end else " ".join(words[1:]).rstrip("{").strip())
             tree.parents.append(parent)
             tree.offsets.append([0.0, 0.0, 0.0])
             tree.ends.append(end)
             open_joints.append(len(tree.names) - 1)
         elif word == "OFFSET" and open_joints:
-            tree.offsets[open_joints[-1]] = _numbers(path, row, words[1:], 3)
+            tree.offsets[open_joints[-1]] = _numbers(path, row, words[1:], "expected 3", 3)
         elif word == "CHANNELS" and open_joints:
-            kinds = words[2:]
-            if len(words) < 2 or not words[1].isdigit() or int(words[1]) != len(kinds):
-                raise no_clip(
-                    path, f"line {row + 1}: {line.strip()[:60]!r} has another number of channels than it says"
-                )
-            for kind in kinds:
+            if words[1:2] != [str(len(words) - 2)]:
+                raise no_clip(path, f"{shown} has another number of channels than it says")
+            for kind in words[2:]:
                 axis, what = AXES.get(kind[:1].lower()), kind[1:].lower()
                 if axis is None or what not in ("position", "rotation"):
                     raise no_clip(path, f"line {row + 1}: unknown channel {kind!r}; expected Xposition ... Zrotation")
@@ -109,85 +110,53 @@ def _hierarchy(path: pathlib.Path, lines: list[str]) -> tuple[_BvhTree, int]:
                 raise no_clip(path, f"line {row + 1}: the hierarchy is not closed before MOTION")
             return tree, row + 1
         elif word != "{":
-            raise no_clip(path, f"line {row + 1}: {line.strip()[:40]!r} is not understood")
+            raise no_clip(path, f"{shown} is not understood")
     raise no_clip(path, "the file is empty" if not started else "the file ends before MOTION: it is cut off")
 
 
-def _motion_head(path: pathlib.Path, lines: list[str], row: int) -> tuple[int, float, int]:
-    """Number of frames, frames a second, and the row of the first frame."""
-    count, time = -1, -1.0
-    first = row
-    for row in range(first, len(lines)):
-        name, colon, value = lines[row].partition(":")
-        if not lines[row].strip():
-            continue
-        if not colon:
-            break
-        number = _numbers(path, row, value.split()[:1], 1)[0]
-        if name.strip().lower() == "frames":
-            count = int(number)
-        elif name.strip().lower() == "frame time":
-            time = number
-    if count < 0:
+def _motion(path: pathlib.Path, lines: Sequence[str], row: int, columns: int, notes: list[str]) -> tuple[Array, float]:
+    """Numbers of all frames [frames, channels], and frames a second [Hz]."""
+    head: dict[str, float] = {}
+    while row < len(lines) and (not lines[row].strip() or ":" in lines[row]):
+        name, _, value = lines[row].partition(":")
+        if value:
+            head[name.strip().lower()] = _numbers(path, row, value.split()[:1], "expected 1")[0]
+        row += 1
+    if "frames" not in head:
         raise no_clip(path, "the file ends before the line 'Frames:': it is cut off")
+    count, time = int(head["frames"]), head.get("frame time", 0.0)
+    given = [(number, words) for number in range(row, len(lines)) if (words := lines[number].split())]
+    # Only the last line may be cut off
+    if given and len(given[-1][1]) < columns:
+        given.pop()
+    expected = f"where the hierarchy has {columns} channels"
+    table = np.array([_numbers(path, number, words, expected, columns) for number, words in given])
+    if len(table) < 2:
+        raise no_clip(path, f"the file has {len(table)} of {count} frames: a clip has at least 2")
+    if len(table) < count:
+        notes.append(f"the file is cut off: it has {len(table)} of {count} frames")
+    elif len(table) > count:
+        notes.append(f"the file has {len(table)} frames and says {count}: all are read")
     # A time of 0 says no rate
-    return count, 1.0 / time if time > 0.0 else 0.0, row
+    return table, 1.0 / time if time > 0.0 else 0.0
 
 
-def _frames(path: pathlib.Path, lines: list[str], row: int, columns: int, count: int, notes: list[str]) -> Array:
-    rows = []
-    for number, line in enumerate(lines):
-        words = line.split()
-        if not words:
-            continue
-        if len(words) != columns:
-            # Only the last line may be cut off
-            if any(rest.strip() for rest in lines[number + 1 :]) or len(words) > columns:
-                reason = f"line {row + number + 1} has {len(words)} numbers, where the hierarchy has {columns} channels"
-                raise no_clip(path, reason)
-            break
-        rows.append(_numbers(path, row + number, words, columns))
-    if len(rows) < 2:
-        raise no_clip(path, f"the file has {len(rows)} of {count} frames: a clip has at least 2")
-    if len(rows) < count:
-        notes.append(f"the file is cut off: it has {len(rows)} of {count} frames")
-    elif len(rows) > count:
-        notes.append(f"the file has {len(rows)} frames and says {count}: all are read")
-    return np.array(rows)
-
-
-def _numbers(path: pathlib.Path, row: int, words: list[str], count: int) -> list[float]:
+def _numbers(path: pathlib.Path, row: int, words: Sequence[str], expected: str, count: int = 1) -> list[float]:
     try:
         out = [float(word) for word in words]
     except ValueError as error:
         raise no_clip(path, f"line {row + 1}: {error}") from error
     if len(out) != count:
-        raise no_clip(path, f"line {row + 1} has {len(out)} numbers, expected {count}")
-    return out
-
-
-def _filled(path: pathlib.Path, table: Array, tree: _BvhTree, notes: list[str]) -> Array:
-    """Channels without gaps: angles go the short way round."""
-    out = np.where(np.isfinite(table), table, np.nan)
-    frames = np.arange(len(out))
-    for column, (joint, turning, _) in enumerate(tree.channels):
-        good = np.isfinite(out[:, column])
-        if good.all():
-            continue
-        if not good.any():
-            raise no_clip(path, f"a channel of {tree.names[joint]} has no number in any frame")
-        values = np.unwrap(out[good, column], period=360.0) if turning else out[good, column]
-        out[:, column] = np.interp(frames, frames[good], values)
-    gaps = int((~np.isfinite(table)).any(axis=1).sum())
-    notes.append(f"numbers are missing in {gaps} of {len(out)} frames: filled in between their neighbours")
+        raise no_clip(path, f"line {row + 1} has {len(out)} numbers, {expected}")
     return out
 
 
 def _turn(axis: int, angles: Array) -> Array:
-    cosines, sines = np.cos(angles), np.sin(angles)
+    """Rotations about a coordinate axis [frames, 3, 3]."""
     out = np.zeros((len(angles), 3, 3))
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out[:, axis, axis] = 1.0
-    out[:, i, i] = out[:, j, j] = cosines
-    out[:, j, i], out[:, i, j] = sines, -sines
+    out[:, i, i] = out[:, j, j] = np.cos(angles)
+    out[:, j, i] = np.sin(angles)
+    out[:, i, j] = -out[:, j, i]
     return out

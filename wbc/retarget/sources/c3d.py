@@ -29,11 +29,9 @@ def read_c3d(path: pathlib.Path) -> Recorded:
     extras.require("clips", "a C3D file", "ezc3d")
     import ezc3d
 
-    with path.open("rb") as stream:
-        start = stream.read(10)
-    size = path.stat().st_size
+    start, size = path.read_bytes()[:10], path.stat().st_size
     if len(start) < 10 or start[1] != KEY or size < 1024:
-        raise no_clip(path, "the file is empty" if size == 0 else "no C3D file, or it is cut off")
+        raise no_clip(path, "no C3D file, or it is cut off")
     try:
         data = ezc3d.c3d(str(path))
         about: Any = data["parameters"]["POINT"]
@@ -44,14 +42,13 @@ def read_c3d(path: pathlib.Path) -> Recorded:
         raise no_clip(path, f"no C3D file that can be read, or it is cut off: {error}") from error
     # ezc3d counts the frames that are there; the header has the numbers of the first and last one
     first, last = struct.unpack("<HH", start[6:10])
-    count = last - first + 1 if last < MOST else 0
-    notes: list[str] = []
-    if points.shape[1] == 0 or len(points) < 2:
-        raise no_clip(path, f"{len(points)} frames of {points.shape[1]} markers: no clip")
-    if len(points) < count:
-        notes.append(f"the file is cut off: it has {len(points)} of {count} frames")
-    names = [label.strip() or f"marker{number + 1}" for number, label in enumerate(labels[: points.shape[1]])]
-    names += [f"marker{number + 1}" for number in range(len(names), points.shape[1])]
+    frames, count = len(points), points.shape[1]
+    if count == 0 or frames < 2:
+        raise no_clip(path, f"{frames} frames of {count} markers: no clip")
+    cut = last < MOST and frames < last - first + 1
+    notes = [f"the file is cut off: it has {frames} of {last - first + 1} frames"] if cut else []
+    names = [label.strip() for label in labels[:count]]
+    names = [name or f"marker{k + 1}" for k, name in enumerate([*names, *[""] * (count - len(names))])]
     names = unlike(names, notes)
     # A marker that is lost is NaN, or all zeros where the software wrote no residual
     points = np.where((points == 0.0).all(axis=2, keepdims=True), np.nan, points)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
-from wbc.validation import Array
+from wbc.retarget.clip import Array, intervals, listed
 
 #: Gaps that are named in a note, the longest first
 GAPS_NAMED = 3
@@ -19,16 +18,18 @@ def fill_gaps(points: Array, parents: list[int], names: list[str], rate: float) 
     parent, of the bone's length, and a joint without a parent beside others by its offset from their middle. Before the
     first and after the last time that it was seen a joint keeps its offset. Joints that were never seen stay NaN.
     """
-    lost: NDArray[np.bool_] = np.asarray(~np.isfinite(points).all(axis=2))
+    lost = np.asarray(~np.isfinite(points).all(axis=2))
     if not lost.any():
         return points, []
     out = np.where(lost[:, :, None], np.nan, points)
     whole = [joint for joint in range(len(names)) if not lost[:, joint].any()]
     middle = out[:, whole].mean(axis=1) if whole else _centre(out)
+    gaps: list[tuple[int, int, str]] = []
     for joint, parent in enumerate(parents):
         gone = lost[:, joint]
         if not gone.any() or gone.all():
             continue
+        gaps += [(stop - start, start, names[joint]) for start, stop in intervals(gone)]
         free = parent < 0 or lost[:, parent].all()
         base = middle if free else out[:, parent]
         step = out[:, joint] - base
@@ -38,7 +39,9 @@ def fill_gaps(points: Array, parents: list[int], names: list[str], rate: float) 
         if not free and length > 0.0:
             filled = np.where(size > 1e-9, filled * (length / np.maximum(size, 1e-9)), filled)
         out[gone, joint] = (base + filled)[gone]
-    return out, _notes(lost, names, rate)
+    gaps.sort(reverse=True)
+    said = [f"{name} for {count / rate:.3g} s from {start / rate:.2f} s" for count, start, name in gaps]
+    return out, [f"filled {len(gaps)} gap{'s' if len(gaps) > 1 else ''}: {listed(said, GAPS_NAMED)}"] if gaps else []
 
 
 def _centre(points: Array) -> Array:
@@ -47,16 +50,13 @@ def _centre(points: Array) -> Array:
     """
     seen = np.isfinite(points[:, :, 0])
     middle = np.full((len(points), 3), np.nan)
-    known = seen.any(axis=1)
     # Moves from frame to frame, of what is seen in both
     last, at = None, np.zeros(3)
-    for frame in np.flatnonzero(known):
+    for frame in np.flatnonzero(seen.any(axis=1)):
         if last is None:
             at = np.nanmean(points[frame], axis=0)
-        else:
-            both = seen[frame] & seen[last]
-            if both.any():
-                at = at + np.mean(points[frame, both] - points[last, both], axis=0)
+        elif (both := seen[frame] & seen[last]).any():
+            at = at + np.mean(points[frame, both] - points[last, both], axis=0)
         middle[frame], last = at, frame
     return _between(middle)
 
@@ -69,21 +69,3 @@ def _between(values: Array) -> Array:
         return np.stack([np.interp(frames, good, values[good, axis]) for axis in range(3)], axis=1)
     inside = np.clip(np.arange(len(values)), good[0], good[-1])
     return np.asarray(Akima1DInterpolator(good, values[good])(inside))
-
-
-def _notes(lost: NDArray[np.bool_], names: list[str], rate: float) -> list[str]:
-    gaps = []
-    for joint in np.flatnonzero(lost.any(axis=0)):
-        if lost[:, joint].all():
-            continue
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], lost[:, joint], [False])).astype(int)))
-        gaps += [(int(stop - start), int(start), names[joint]) for start, stop in edges.reshape(-1, 2)]
-    if not gaps:
-        return []
-    gaps.sort(reverse=True)
-    longest = ", ".join(
-        f"{name} for {count / rate:.3g} s from {start / rate:.2f} s" for count, start, name in gaps[:GAPS_NAMED]
-    )
-    return [
-        f"filled {len(gaps)} gap{'s' if len(gaps) > 1 else ''}: {longest}{', ...' if len(gaps) > GAPS_NAMED else ''}"
-    ]

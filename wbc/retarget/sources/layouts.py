@@ -6,101 +6,84 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbc.retarget.sources.body_words import numbers_of
-from wbc.validation import Array
+from wbc.retarget.clip import Array
+from wbc.retarget.words import numbers_of
 
-#: Fingers of a hand as SMPL-H and SMPL-X have them
-FINGERS = ("index", "middle", "pinky", "ring", "thumb")
-#: SMPL's joints, with the number of each one's parent
-_BODY = (
-    ("pelvis", -1), ("left_hip", 0), ("right_hip", 0), ("spine1", 0), ("left_knee", 1), ("right_knee", 2),
-    ("spine2", 3), ("left_ankle", 4), ("right_ankle", 5), ("spine3", 6), ("left_foot", 7), ("right_foot", 8),
-    ("neck", 9), ("left_collar", 9), ("right_collar", 9), ("head", 12), ("left_shoulder", 13), ("right_shoulder", 14),
-    ("left_elbow", 16), ("right_elbow", 17), ("left_wrist", 18), ("right_wrist", 19),
-)  # fmt: skip
 #: A name and its parent's, "" for a root
 Layout = tuple[tuple[str, str], ...]
+#: Share of names that must be those of a layout for its parents to hold
+KNOWN = 0.8
+#: SMPL's joints
+_BODY = (
+    "pelvis, pelvis > left_hip, pelvis > right_hip, pelvis > spine1, left_hip > left_knee, right_hip > right_knee",
+    "spine1 > spine2, left_knee > left_ankle, right_knee > right_ankle, spine2 > spine3, left_ankle > left_foot",
+    "right_ankle > right_foot, spine3 > neck, spine3 > left_collar, spine3 > right_collar, neck > head",
+    "left_collar > left_shoulder, right_collar > right_shoulder, left_shoulder > left_elbow",
+    "right_shoulder > right_elbow, left_elbow > left_wrist, right_elbow > right_wrist",
+)
+#: Branches of LAFAN1's skeleton
+_LEG = "Hips > {0}UpLeg {0}Leg {0}Foot {0}ToeBase"
+_ARM = "{1} > {0}Shoulder {0}Arm {0}ForeArm {0}Hand"
+_SPINE = "Hips > Spine Spine1 Spine2 Neck Head"
+#: Fingers of a hand as SMPL-H and SMPL-X have them
+_FINGERS = "index middle pinky ring thumb"
 
 
-def _of_numbers(pairs: Sequence[tuple[str, int]]) -> Layout:
-    return tuple((name, pairs[parent][0] if parent >= 0 else "") for name, parent in pairs)
-
-
-def _hand(side: str, wrist: str, title: bool = False, fingers: Sequence[str] = FINGERS) -> Layout:
-    """Three joints of each finger, one after the other."""
+def _tree(*branches: str) -> Layout:
+    """Of branches between commas, each of a parent, ``>``, and joints one below the other; the first one has none."""
     out: list[tuple[str, str]] = []
-    for finger in fingers:
-        name = f"{side}{finger.title() if title else finger}"
-        out += [(f"{name}{k}", wrist if k == 1 else f"{name}{k - 1}") for k in (1, 2, 3)]
+    for branch in ", ".join(branches).split(", "):
+        parent, _, names = branch.rpartition(" > ")
+        chain = names.split()
+        out += zip(chain, (parent, *chain[:-1]), strict=True)
     return tuple(out)
 
 
-def _chain(*names: str, root: str = "") -> Layout:
-    return tuple(zip(names, (root, *names[:-1]), strict=True))
+def _hand(wrist: str, side: str, fingers: str = _FINGERS) -> str:
+    """Three joints of each finger, one after the other."""
+    return ", ".join(f"{wrist} > {side}{name}1 {side}{name}2 {side}{name}3" for name in fingers.split())
 
 
-SMPL_BODY = _of_numbers(_BODY)
-_MOCAP_FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
+_HANDS = (_hand("left_wrist", "left_"), _hand("right_wrist", "right_"))
+_LEGS = {side: _LEG.format(side) for side in ("Left", "Right")}
 #: Well-known orders, by name
 LAYOUTS: dict[str, Layout] = {
-    "smpl-body": SMPL_BODY,
-    "smpl": (*SMPL_BODY, ("left_hand", "left_wrist"), ("right_hand", "right_wrist")),
-    "smplh": (*SMPL_BODY, *_hand("left_", "left_wrist"), *_hand("right_", "right_wrist")),
-    "smplx": (
-        *SMPL_BODY, ("jaw", "head"), ("left_eye", "head"), ("right_eye", "head"),
-        *_hand("left_", "left_wrist"), *_hand("right_", "right_wrist"),
-    ),
+    "smpl-body": _tree(*_BODY),
+    "smpl": _tree(*_BODY, "left_wrist > left_hand, right_wrist > right_hand"),
+    "smplh": _tree(*_BODY, *_HANDS),
+    "smplx": _tree(*_BODY, "head > jaw, head > left_eye, head > right_eye", *_HANDS),
     # MuJoCo's order of SMPL-H, as of PHC and InterMimic
-    "smplh-mujoco": (
-        *_chain("Pelvis", "L_Hip", "L_Knee", "L_Ankle", "L_Toe"),
-        *_chain("R_Hip", "R_Knee", "R_Ankle", "R_Toe", root="Pelvis"),
-        *_chain("Torso", "Spine", "Chest", "Neck", "Head", root="Pelvis"),
-        *_chain("L_Thorax", "L_Shoulder", "L_Elbow", "L_Wrist", root="Chest"),
-        *_hand("L_", "L_Wrist", True),
-        *_chain("R_Thorax", "R_Shoulder", "R_Elbow", "R_Wrist", root="Chest"),
-        *_hand("R_", "R_Wrist", True),
+    "smplh-mujoco": _tree(
+        "Pelvis L_Hip L_Knee L_Ankle L_Toe, Pelvis > R_Hip R_Knee R_Ankle R_Toe",
+        "Pelvis > Torso Spine Chest Neck Head, Chest > L_Thorax L_Shoulder L_Elbow L_Wrist",
+        _hand("L_Wrist", "L_", _FINGERS.title()), "Chest > R_Thorax R_Shoulder R_Elbow R_Wrist",
+        _hand("R_Wrist", "R_", _FINGERS.title()),
     ),
-    "lafan": (
-        *_chain("Hips", "RightUpLeg", "RightLeg", "RightFoot", "RightToeBase"),
-        *_chain("LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", root="Hips"),
-        *_chain("Spine", "Spine1", "Spine2", "Neck", "Head", root="Hips"),
-        *_chain("RightShoulder", "RightArm", "RightForeArm", "RightHand", root="Spine2"),
-        *_chain("LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", root="Spine2"),
+    "lafan": _tree(
+        "Hips", _LEGS["Right"], _LEGS["Left"], _SPINE, _ARM.format("Right", "Spine2"), _ARM.format("Left", "Spine2")
     ),
-    "lafan-left": (
-        *_chain("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToe"),
-        *_chain("RightUpLeg", "RightLeg", "RightFoot", "RightToe", root="Hips"),
-        *_chain("Spine", "Spine1", "Spine2", "Neck", "Head", root="Hips"),
-        *_chain("LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", root="Spine2"),
-        *_chain("RightShoulder", "RightArm", "RightForeArm", "RightHand", root="Spine2"),
+    "lafan-left": _tree(
+        "Hips", _LEGS["Left"].replace("Base", ""), _LEGS["Right"].replace("Base", ""), _SPINE,
+        _ARM.format("Left", "Spine2"), _ARM.format("Right", "Spine2"),
     ),
-    "mocap": (
-        *_chain("Hips", "Spine", "Spine1", "Neck", "Head"),
-        *_chain("LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", root="Spine1"),
-        *_hand("LeftHand", "LeftHand", True, _MOCAP_FINGERS),
-        *_chain("RightShoulder", "RightArm", "RightForeArm", "RightHand", root="Spine1"),
-        *_hand("RightHand", "RightHand", True, _MOCAP_FINGERS),
-        *_chain("LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", root="Hips"),
-        *_chain("RightUpLeg", "RightLeg", "RightFoot", "RightToeBase", root="Hips"),
-        ("LeftFootMod", "LeftFoot"), ("RightFootMod", "RightFoot"),
+    "mocap": _tree(
+        "Hips Spine Spine1 Neck Head", _ARM.format("Left", "Spine1"),
+        _hand("LeftHand", "LeftHand", "Thumb Index Middle Ring Pinky"), _ARM.format("Right", "Spine1"),
+        _hand("RightHand", "RightHand", "Thumb Index Middle Ring Pinky"), _LEGS["Left"], _LEGS["Right"],
+        "LeftFoot > LeftFootMod, RightFoot > RightFootMod",
     ),
-    "human36m": (
-        *_chain("pelvis", "right_hip", "right_knee", "right_ankle"),
-        *_chain("left_hip", "left_knee", "left_ankle", root="pelvis"),
-        *_chain("spine", "thorax", "neck", "head", root="pelvis"),
-        *_chain("left_shoulder", "left_elbow", "left_wrist", root="thorax"),
-        *_chain("right_shoulder", "right_elbow", "right_wrist", root="thorax"),
+    "human36m": _tree(
+        "pelvis right_hip right_knee right_ankle, pelvis > left_hip left_knee left_ankle",
+        "pelvis > spine thorax neck head, thorax > left_shoulder left_elbow left_wrist",
+        "thorax > right_shoulder right_elbow right_wrist",
     ),
-    "coco": (
-        ("nose", ""), ("left_eye", "nose"), ("right_eye", "nose"), ("left_ear", "left_eye"), ("right_ear", "right_eye"),
-        ("left_shoulder", ""), ("right_shoulder", "left_shoulder"), ("left_elbow", "left_shoulder"),
-        ("right_elbow", "right_shoulder"), ("left_wrist", "left_elbow"), ("right_wrist", "right_elbow"),
-        ("left_hip", ""), ("right_hip", "left_hip"), ("left_knee", "left_hip"), ("right_knee", "right_hip"),
-        ("left_ankle", "left_knee"), ("right_ankle", "right_knee"),
+    "coco": _tree(
+        "nose, nose > left_eye, nose > right_eye, left_eye > left_ear, right_eye > right_ear, left_shoulder",
+        "left_shoulder > right_shoulder, left_shoulder > left_elbow, right_shoulder > right_elbow",
+        "left_elbow > left_wrist, right_elbow > right_wrist, left_hip, left_hip > right_hip, left_hip > left_knee",
+        "right_hip > right_knee, left_knee > left_ankle, right_knee > right_ankle",
     ),
 }  # fmt: skip
-#: Share of names that must be those of a layout for its parents to hold
-KNOWN = 0.8
 
 
 def best_layout(points: Array) -> str:
@@ -108,26 +91,26 @@ def best_layout(points: Array) -> str:
 
     Of two that differ in left and right alone it is the one whose person is no mirror image.
     """
+    frames = points[:: max(1, len(points) // 200)]
     fitting = [name for name, layout in LAYOUTS.items() if len(layout) == points.shape[1]]
 
     def cost(name: str) -> tuple[float, bool]:
-        return round(_stretch(points, parents_of(LAYOUTS[name])), 6), _is_mirrored(LAYOUTS[name], points)
+        return round(_stretch(frames, parents_of(LAYOUTS[name])), 6), _is_mirrored(LAYOUTS[name], frames)
 
     return min(fitting, key=cost, default="")
 
 
-def _is_mirrored(layout: Layout, points: Array) -> bool:
+def _is_mirrored(layout: Layout, frames: Array) -> bool:
     """Whether a person's left is to the right of where the toes point, with the head up."""
     names = [name for name, _ in layout]
-    frames = points[:: max(1, len(points) // 200)]
 
-    def middle(part: str, side: str = "") -> Array:
+    def middle(part: str, side: int = 0) -> Array:
         return np.asarray(frames[:, numbers_of(names, part, side)].mean(axis=1))
 
-    if not all(numbers_of(names, part) for part in ("hip", "toe", "ankle", "head")):
+    if not all(numbers_of(names, part) for part in ("hip", "toe", "hindfoot", "head")):
         return False
-    across = middle("hip", "left") - middle("hip", "right")
-    ahead, up = middle("toe") - middle("ankle"), middle("head") - middle("ankle")
+    across = middle("hip", 1) - middle("hip", -1)
+    ahead, up = middle("toe") - middle("hindfoot"), middle("head") - middle("hindfoot")
     return bool(np.nanmean(np.sum(np.cross(ahead, across) * up, axis=1)) < 0.0)
 
 
@@ -146,7 +129,7 @@ def parents_by_name(names: Sequence[str]) -> list[int]:
         parents = {_plain(name): _plain(parent) for name, parent in layout}
         shared = sum(name in parents for name in plain)
         if shared >= most:
-            best, most = [_first_there(name, parents, plain) for name in plain], shared + 1
+            best, most = [_nearest_ancestor(name, parents, plain) for name in plain], shared + 1
     return best
 
 
@@ -154,17 +137,16 @@ def _plain(name: str) -> str:
     return "".join(letter for letter in name.rpartition(":")[2].lower() if letter.isalnum())
 
 
-def _first_there(name: str, parents: dict[str, str], there: Sequence[str]) -> int:
-    """The nearest ancestor that is there."""
+def _nearest_ancestor(name: str, parents: dict[str, str], there: Sequence[str]) -> int:
+    """Number of the nearest ancestor that is there."""
     name = parents.get(name, "")
     while name and name not in there:
         name = parents.get(name, "")
     return there.index(name) if name else -1
 
 
-def _stretch(points: Array, parents: list[int]) -> float:
+def _stretch(frames: Array, parents: list[int]) -> float:
     """Mean change of the lengths of bones, as a share of the body's size."""
-    frames = points[:: max(1, len(points) // 200)]
     bones = [(joint, parent) for joint, parent in enumerate(parents) if parent >= 0]
     lengths = np.stack([np.linalg.norm(frames[:, a] - frames[:, b], axis=1) for a, b in bones], axis=1)
     spread = np.nanmean(np.nanstd(lengths, axis=0)) + 1e-3 * np.nanmean(lengths)

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
-from wbc.retarget.clip import Clip, Skeleton
+from wbc.retarget.clip import Array, Clip, Skeleton, listed
 from wbc.retarget.sources import axes
 from wbc.retarget.sources.gaps import fill_gaps
+from wbc.retarget.sources.keypoints import Names, of_points, read_csv, read_npz
+from wbc.retarget.sources.markers import joined
 from wbc.retarget.sources.recorded import Recorded, no_clip
 from wbc.retarget.sources.swaps import mend_swaps
-from wbc.validation import Array
 
 #: Suffixes of files that are read
 CLIP_SUFFIXES = (".bvh", ".c3d", ".npz", ".npy", ".csv", ".pkl", ".pt")
@@ -44,13 +43,15 @@ ABOVE = 0.3
 OTHER_UNIT = 5.0
 #: Bones shorter than this are said to have no length [m]
 NO_LENGTH = 1e-4
+#: Names of joints in a note, at most
+JOINTS_NAMED = 6
 
 
 def load_clip(
     path: str | os.PathLike[str],
     *,
     body_model: str | os.PathLike[str] | None = None,
-    names: str | Sequence[str] | None = None,
+    names: Names = None,
     rate: float | None = None,
     up: str | None = None,
     unit: str | float | None = None,
@@ -81,8 +82,7 @@ def load_clip(
     return _finished(recorded, file.stem, up, unit)
 
 
-def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: str | Sequence[str] | None) -> Recorded:
-    # Readers are imported for their own files only
+def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: Names) -> Recorded:
     kind = file.suffix.lower()
     if kind in CONVERTED:
         raise no_clip(file, CONVERTED[kind])
@@ -92,7 +92,7 @@ def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: 
         raise no_clip(file, validation.no_such(file))
     if file.stat().st_size == 0:
         raise no_clip(file, "the file is empty")
-    model = None if body_model is None else validation.file_path("body_model", body_model)
+    # Readers are imported for their own files only
     if kind == ".bvh":
         from wbc.retarget.sources.bvh import read_bvh
 
@@ -101,14 +101,15 @@ def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: 
         from wbc.retarget.sources.c3d import read_c3d
 
         return read_c3d(file)
-    from wbc.retarget.sources import keypoints, smpl
+    if kind == ".csv":
+        return read_csv(file, names)
+    from wbc.retarget.sources import arrays, smpl
 
-    if kind == ".pkl":
-        return smpl.read_smpl(file, smpl.read_smpl_pickle(file), model)
-    if kind == ".npz" and smpl.has_poses(data := keypoints.arrays_of(file)):
+    data = arrays.load(file)
+    if kind == ".pkl" or smpl.has_poses(data):
+        model = None if body_model is None else validation.file_path("body_model", body_model)
         return smpl.read_smpl(file, data, model)
-    readers = {".npz": keypoints.read_npz, ".npy": keypoints.read_npy, ".csv": keypoints.read_csv}
-    return readers.get(kind, keypoints.read_tensor)(file, names)
+    return read_npz(file, data, names) if isinstance(data, dict) else of_points(file, data, names)
 
 
 def _rate(given: float | None, recorded: Recorded) -> float:
@@ -129,42 +130,41 @@ def _rate(given: float | None, recorded: Recorded) -> float:
 def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float | None) -> Clip:
     """The clip with z up, in metres, with all points."""
     _without_unseen(recorded, name)
-    notes = recorded.notes
+    notes, names, parents, rate = recorded.notes, recorded.names, recorded.parents, recorded.rate
     # Axes and units are looked for in points without gaps
-    whole = replace(recorded, points=fill_gaps(recorded.points, recorded.parents, recorded.names, recorded.rate)[0])
+    whole = replace(recorded, points=fill_gaps(recorded.points, parents, names, rate)[0])
     up = _up(whole, up)
     length = _unit(whole, up, unit)
     to_world = axes.TO_Z_UP[up]
-    points = recorded.points @ to_world.T * length
-    turns = recorded.turns
+    points, turns = recorded.points @ to_world.T * length, recorded.turns
     mirror = np.eye(3)
     if axes.mirrored(whole, whole.points @ to_world.T):
         mirror = np.diag([1.0, -1.0, 1.0])
         points = points @ mirror
         notes.append("the file has left-handed axes: left and right are put right")
-    seen = np.isfinite(points).all(axis=2) if recorded.seen is None else recorded.seen
     if turns is None:
-        points, said = mend_swaps(points, recorded.names, recorded.rate)
+        points, said = mend_swaps(points, names, rate)
         notes += said
-        seen = np.isfinite(points).all(axis=2)
-    points, said = fill_gaps(points, recorded.parents, recorded.names, recorded.rate)
+    seen = recorded.seen if turns is not None else None
+    seen = np.asarray(np.isfinite(points).all(axis=2)) if seen is None else seen
+    points, said = fill_gaps(points, parents, names, rate)
     notes += said
     points = _on_the_ground(points, notes)
-    if recorded.offsets is None:
-        offsets = _offsets(points, recorded.parents)
+    apart = turns is None and sum(parent < 0 for parent in parents) > 1
+    if apart and (made := joined(names, points, seen)) is not None:
+        names, parents, points, seen = made
+        notes.append("hips, knees and all other joints are in the middle of markers of theirs")
+    if recorded.offsets is None or turns is None:
+        offsets = _offsets(points, parents)
     else:
         of_rest = mirror @ axes.TO_Z_UP[axes.rest_up(whole, up)]
         offsets = recorded.offsets @ of_rest.T * length
-        assert turns is not None
         turns = mirror @ to_world @ turns @ of_rest.T
     sizes = np.linalg.norm(offsets, axis=1)
-    joints = zip(recorded.names, recorded.parents, sizes, strict=True)
-    short = [joint for joint, parent, size in joints if parent >= 0 and size < NO_LENGTH]
-    if short:
-        notes.append(f"bones without length end at {', '.join(short[:6])}{', ...' if len(short) > 6 else ''}")
-    ends = tuple(recorded.ends) or (False,) * len(recorded.names)
-    skeleton = Skeleton(tuple(recorded.names), tuple(recorded.parents), offsets, ends)
-    return Clip(skeleton, recorded.rate, points, turns, np.asarray(seen), name, tuple(notes))
+    short = [names[k] for k, parent in enumerate(parents) if parent >= 0 and sizes[k] < NO_LENGTH]
+    notes += [f"bones without length end at {listed(short, JOINTS_NAMED)}"] if short else []
+    ends = tuple(recorded.ends) or (False,) * len(names)
+    return Clip(Skeleton(tuple(names), tuple(parents), offsets, ends), rate, points, turns, seen, name, tuple(notes))
 
 
 def _up(recorded: Recorded, given: str | None) -> str:
@@ -179,28 +179,32 @@ def _up(recorded: Recorded, given: str | None) -> str:
 
 def _unit(recorded: Recorded, up: str, given: str | float | None) -> float:
     """Length of the file's unit [m]."""
+    if isinstance(given, str):
+        return axes.UNITS[validation.one_of("unit", given, axes.UNITS)][0]
     if given is not None:
-        return axes.unit_of(given)
-    found, size = axes.find_unit(recorded, up) if not recorded.unit else ("", 0.0)
-    if recorded.unit:
-        try:
-            found, size = axes.find_unit(recorded, up)
-        except RangeError:
-            return recorded.unit
-        # Some files say a unit that they are not in; neighbours in size are left as they say
-        ratio = axes.UNITS[found] / recorded.unit
-        if max(ratio, 1.0 / ratio) <= OTHER_UNIT:
-            return recorded.unit
-        wrong = f"the file says units of {recorded.unit:g} m, which makes a body of {size * recorded.unit:.3g} m: "
-        recorded.notes.append(f"{wrong}taken as {axes.UNIT_NAMES[found]}")
-    elif found != "m":
-        recorded.notes.append(f"its unit is {axes.UNIT_NAMES[found]}: the body is {size:.4g} of them")
-    return axes.UNITS[found]
+        return validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
+    said = recorded.unit
+    try:
+        name, size = axes.find_unit(recorded, up)
+    except RangeError:
+        if said:
+            return said
+        raise
+    length, whole_name, _ = axes.UNITS[name]
+    # Some files say a unit that they are not in; neighbours in size are left as they say
+    if said and max(length / said, said / length) <= OTHER_UNIT:
+        return said
+    if said:
+        wrong = f"the file says units of {said:g} m, which makes a body of {size * said:.3g} m"
+        recorded.notes.append(f"{wrong}: taken as {whole_name}")
+    elif name != "m":
+        recorded.notes.append(f"its unit is {whole_name}: the body is {size:.4g} of them")
+    return length
 
 
 def _without_unseen(recorded: Recorded, name: str) -> None:
     """Take out joints without a point in any frame; their children hang from their parents."""
-    never: NDArray[np.bool_] = np.asarray(~np.isfinite(recorded.points).all(axis=2).any(axis=0))
+    never = np.asarray(~np.isfinite(recorded.points).all(axis=2).any(axis=0))
     if not never.any():
         return
     if never.all():
@@ -215,7 +219,7 @@ def _without_unseen(recorded: Recorded, name: str) -> None:
     recorded.parents = [number.get(parents[old], -1) for old in kept]
     recorded.names = [recorded.names[old] for old in kept]
     recorded.points = recorded.points[:, kept]
-    recorded.notes.append(f"never seen, and left out: {', '.join(gone[:6])}{', ...' if len(gone) > 6 else ''}")
+    recorded.notes.append(f"never seen, and left out: {listed(gone, JOINTS_NAMED)}")
 
 
 def _on_the_ground(points: Array, notes: list[str]) -> Array:
@@ -223,8 +227,7 @@ def _on_the_ground(points: Array, notes: list[str]) -> Array:
     lowest = float(np.percentile(points[:, :, 2].min(axis=1), 5.0))
     if lowest < -BELOW:
         notes.append(f"raised by {-lowest:.3g} m: its lowest points were below z = 0")
-        raised: Array = points - np.array([0.0, 0.0, lowest])
-        return raised
+        return np.asarray(points - np.array([0.0, 0.0, lowest]))
     if float(points[:, :, 2].min()) > ABOVE:
         notes.append(f"its lowest point is {points[:, :, 2].min():.3g} m above z = 0")
     return points
@@ -232,14 +235,11 @@ def _on_the_ground(points: Array, notes: list[str]) -> Array:
 
 def _offsets(points: Array, parents: list[int]) -> Array:
     """Offsets of a skeleton whose file has none: bones of median lengths, as in the frame in which it is tallest."""
-    tallest = points[int(np.argmax(np.ptp(points[:, :, 2], axis=1)))]
-    offsets = np.zeros((len(parents), 3))
+    tallest = int(np.argmax(np.ptp(points[:, :, 2], axis=1)))
+    offsets: Array = points[tallest].copy()
     for joint, parent in enumerate(parents):
-        if parent < 0:
-            offsets[joint] = tallest[joint]
-            continue
-        step = tallest[joint] - tallest[parent]
-        length = float(np.median(np.linalg.norm(points[:, joint] - points[:, parent], axis=1)))
-        size = float(np.linalg.norm(step))
-        offsets[joint] = step * (length / size) if size > 0.0 else step
+        if parent >= 0:
+            bone = points[:, joint] - points[:, parent]
+            length, size = float(np.median(np.linalg.norm(bone, axis=1))), float(np.linalg.norm(bone[tallest]))
+            offsets[joint] = bone[tallest] * (length / size if size > 0.0 else 1.0)
     return offsets

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import pathlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc.errors import ClipFileError
-from wbc.validation import Array
+from wbc.retarget.clip import Array, Marks
+
+#: Keys of frames a second in files of arrays
+RATES = ("rate", "fps", "mocap_framerate", "mocap_frame_rate", "frequency", "sample_rate")
 
 
 @dataclass
@@ -25,7 +30,6 @@ class Recorded:
         ends: joints that only end a bone.
         seen: whether a point was there [frames, joints]; None: where it is not NaN.
         unit: length of the file's unit [m]; 0 where the file does not say.
-        up: the axis that the file's format says is up, such as ``"z"``; "" where it does not say.
         usual: the axis that is usually up in such files; "" where there is none.
         rest_up: the axis that is up in the rest pose; "" where that is the file's.
         notes: what was found.
@@ -38,9 +42,8 @@ class Recorded:
     offsets: Array | None = None
     turns: Array | None = None
     ends: list[bool] = field(default_factory=list)
-    seen: NDArray[np.bool_] | None = None
+    seen: Marks | None = None
     unit: float = 0.0
-    up: str = ""
     usual: str = ""
     rest_up: str = ""
     notes: list[str] = field(default_factory=list)
@@ -59,8 +62,7 @@ def in_the_world(parents: list[int], offsets: Array, own: Array, moves: dict[int
     for joint, parent in enumerate(parents):
         step = moves.get(joint, offsets[joint])
         if parent < 0:
-            turns[:, joint] = own[:, joint]
-            points[:, joint] = step
+            turns[:, joint], points[:, joint] = own[:, joint], step
         else:
             turns[:, joint] = turns[:, parent] @ own[:, joint]
             step = np.broadcast_to(step, (len(own), 3))
@@ -79,6 +81,25 @@ def unlike(names: list[str], notes: list[str]) -> list[str]:
             notes.append(f"the name {name!r} is there more than once: one of them is now {fresh!r}")
         out.append(fresh)
     return out
+
+
+def first_of(data: Mapping[str, Any], keys: Sequence[str]) -> Any:
+    """The value of the first of some keys that is there; None where none is."""
+    return next((data[key] for key in keys if key in data), None)
+
+
+def rate_in(data: Mapping[str, Any]) -> float:
+    """Frames a second that arrays by name say [Hz]; 0 where they do not."""
+    rate = first_of(data, RATES)
+    return float(np.ravel(rate)[0]) if rate is not None and np.size(rate) == 1 else 0.0
+
+
+def text_of(path: pathlib.Path) -> str:
+    """What a text file holds, with or without a mark of its byte order; letters of other encodings are left open."""
+    try:
+        return path.read_bytes().decode("utf-8-sig", errors="replace")
+    except OSError as error:
+        raise no_clip(path, f"cannot be read: {error}") from error
 
 
 def no_clip(path: object, reason: str) -> ClipFileError:

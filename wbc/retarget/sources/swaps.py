@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from wbc.validation import Array
+from wbc.retarget.clip import Array, intervals, listed
 
 #: Points jump where they move further than this from where their motion leads [m]
 JUMP = 0.05
@@ -28,7 +28,7 @@ def mend_swaps(points: Array, names: list[str], rate: float) -> tuple[Array, lis
     count = points.shape[1]
     order: NDArray[np.intp] = np.arange(count)
     orders = np.tile(order, (len(points), 1)).astype(np.intp)
-    predicted, before = _last_seen(points[0]), points[0].copy()
+    predicted, before = np.where(np.isfinite(points[0]), points[0], np.inf), points[0].copy()
     for frame in range(1, len(points)):
         now = points[frame, order]
         off = np.linalg.norm(now - predicted, axis=1)
@@ -49,39 +49,24 @@ def mend_swaps(points: Array, names: list[str], rate: float) -> tuple[Array, lis
     wrong = orders != np.arange(count)
     if not wrong.any():
         return points, []
-    mended = np.take_along_axis(points, orders[:, :, None], axis=1)
-    return mended, _notes(wrong, orders, names, rate)
-
-
-def _last_seen(points: Array) -> Array:
-    return np.where(np.isfinite(points), points, np.inf)
+    swaps: list[tuple[int, str]] = []
+    for joint in np.flatnonzero(wrong.any(axis=0)):
+        for start, stop in intervals(wrong[:, joint]):
+            other = int(orders[start, joint])
+            if other > joint or orders[start, other] != joint:
+                when = f"from {start / rate:.2f} to {stop / rate:.2f} s"
+                swaps.append((start, f"{names[joint]} and {names[other]} {when}"))
+    said = listed([text for _, text in sorted(swaps)], SWAPS_NAMED, "; ")
+    return np.take_along_axis(points, orders[:, :, None], axis=1), [f"swapped, now mended: {said}"]
 
 
 def _swapped(now: Array, predicted: Array, off: Array, jumped: NDArray[np.intp]) -> NDArray[np.intp] | None:
     """Which of the jumped points stands in the place of each; None where no swap explains the jumps."""
-    there = np.isfinite(predicted[jumped, 0])
-    if not there.all():
+    if not np.isfinite(predicted[jumped, 0]).all():
         return None
     far = np.linalg.norm(predicted[jumped, None] - now[None, jumped], axis=2)
     places, stands = linear_sum_assignment(far)
     moved = places != stands
-    if not moved.any():
-        return None
-    left, was = far[places, stands][moved].sum(), off[jumped][moved].sum()
-    if left > EXPLAINED * was:
+    if not moved.any() or far[places, stands][moved].sum() > EXPLAINED * off[jumped][moved].sum():
         return None
     return np.asarray(stands)
-
-
-def _notes(wrong: NDArray[np.bool_], orders: NDArray[np.intp], names: list[str], rate: float) -> list[str]:
-    found: list[tuple[int, str]] = []
-    for joint in np.flatnonzero(wrong.any(axis=0)):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong[:, joint], [False])).astype(int)))
-        for start, stop in edges.reshape(-1, 2):
-            other = int(orders[start, joint])
-            if other > joint or orders[start, other] != joint:
-                when = f"from {start / rate:.2f} to {stop / rate:.2f} s"
-                found.append((int(start), f"{names[joint]} and {names[other]} {when}"))
-    found.sort()
-    listed = "; ".join(text for _, text in found[:SWAPS_NAMED])
-    return [f"swapped, now mended: {listed}{'; ...' if len(found) > SWAPS_NAMED else ''}"]

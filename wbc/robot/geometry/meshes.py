@@ -126,8 +126,9 @@ def box_mesh(half: Array) -> Mesh:
     return Mesh(signs * half, np.array(triangles, dtype=np.intp))
 
 
-def cylinder_mesh(radius: float, half: float, sides: int = 32) -> tuple[Mesh, float]:
-    """(a prism around a cylinder about z, how far it stands out of it [m])."""
+def cylinder_mesh(radius: float, half: float) -> tuple[Mesh, float]:
+    """(a prism of 32 sides around a cylinder about z, how far it stands out of it [m])."""
+    sides = 32
     turn = 2 * np.pi * np.arange(sides) / sides
     outer = radius / np.cos(np.pi / sides)
     ring = outer * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(sides)])

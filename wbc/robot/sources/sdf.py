@@ -28,6 +28,8 @@ KINDS: Mapping[str, Kind] = {
 WORLD = "world"
 #: Limits at or beyond this are none [rad, m]
 NONE = 1e15
+#: Largest difference of a quaternion's length from 1
+UNIT = 1e-3
 #: What a model may have that moves nothing: nothing is said of it
 _MUTE = ("link", "joint", "pose", "static", "self_collide", "frame", "enable_wind", "allow_auto_disable")
 
@@ -286,13 +288,19 @@ class _Reader:
         pose = element.find("pose")
         if pose is None:
             return own.SE3.Identity()
-        if pose.get("rotation_format", "euler_rpy") != "euler_rpy" or pose.get("degrees", "false") not in (
-            "false",
-            "0",
-        ):
-            raise self._error(f"the pose of {element.get('name') or element.tag!r} is not in roll, pitch and yaw [rad]")
-        values = self._numbers(pose.text or "0 0 0 0 0 0", 6, f"pose of {element.get('name') or element.tag}")
-        return own.SE3(own.rpy.rpyToMatrix(*values[3:]), values[:3])
+        what = f"pose of {element.get('name') or element.tag}"
+        form = pose.get("rotation_format", "euler_rpy")
+        if form == "quat_xyzw":
+            values = self._numbers(pose.text or "0 0 0 0 0 0 1", 7, what)
+            length = float(np.linalg.norm(values[3:]))
+            if abs(length - 1.0) > UNIT:
+                raise self._error(f"the {what} has no unit quaternion")
+            return own.XYZQUATToSE3(np.append(values[:3], values[3:] / length))
+        if form != "euler_rpy":
+            raise self._error(f"the {what} is in {form!r}, which is none of euler_rpy, quat_xyzw")
+        values = self._numbers(pose.text or "0 0 0 0 0 0", 6, what)
+        turn = np.radians(values[3:]) if pose.get("degrees", "false") in ("true", "1") else values[3:]
+        return own.SE3(own.rpy.rpyToMatrix(*turn), values[:3])
 
     def _number(self, element: ElementTree.Element, key: str, default: float) -> float:
         text = element.findtext(key)

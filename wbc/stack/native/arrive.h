@@ -15,48 +15,93 @@
 #define CLOSING_SHARE 0.1
 /* And those of velocities */
 #define BENT_SPEED 1.0
-/* Rows whose square without those before is below this share of it depend on them */
+/* Rows whose square without those before is below this share of it depend on them: where loops branch */
 #define DEPENDENT_SQUARE 1e-12
+/* How often accelerations are looked for whose velocities keep loops closed within the bounds */
+#define ARRIVALS 8
+/* Velocities are made to keep loops closed to so much [rad, or characteristic lengths, per second], by so many corrections at most: the
+ * squares of rows lose half of the digits */
+#define ROUNDED_RATE 1e-13
+#define PROJECTIONS 3
 /* The share of a bound that accelerations may pass it by, by rounding */
 #define ROUNDED_BOUND 1e-9
 
+/* The velocity at the end of the tick, and the mean one until then, of accelerations that are held */
+static void follow(wbc_tick *t, double *way) {
+    for (int i = 0; i < DOFS; i++) {
+        t->report.next_v[i] = t->v_last[i] + t->dt * t->report.v[i];
+        way[i] = t->v_last[i] + 0.5 * t->dt * t->report.v[i];
+    }
+}
+
 #if CLOSING > 0
 
-/* J W J' = L D L', L and 1 / D into `closing_factor`; 1 / D is 0 of rows that depend on those before. W is 0 of joints that are held */
-static void factor_closing(wbc_tick *t, const int *held) {
-    for (int i = 0; i < CLOSING; i++) {
-        const double *row = t->closing_rows + i * DOFS;
-        double *own = t->closing_factor + i * CLOSING, product[CLOSING + 1], square = 0.0;
-        for (int k = 0; k <= i; k++) {
-            const double *other = t->closing_rows + k * DOFS, *known = t->closing_factor + k * CLOSING;
-            double sum = 0.0;
-            for (int j = 0; j < DOFS; j++) sum += held[j] ? 0.0 : row[j] * other[j] * (dof_scale[j] * dof_scale[j]);
-            square = sum;
-            for (int n = 0; n < k; n++) sum -= product[n] * (k == i ? own[n] : known[n]);
-            product[k] = sum;
-            own[k] = k < i ? sum * known[k] : sum > DEPENDENT_SQUARE * square ? 1.0 / sum : 0.0;
+/* Numbers of a column of the loops' rows from the group of four that row `from` is in */
+#define EACH_FOUR(at, from) for (int at = (from) & ~3; at < CLOSING_ROOM; at += 4)
+
+/* J W J' = L D L': L by columns, then by rows, and 1 / D, which is 0 of rows that are left out, or depend on those before. W is `ease` */
+static void factor_closing(wbc_tick *t, const double *ease) {
+    double *columns = t->closing_factor, *rows = columns + CLOSING * CLOSING_ROOM, square[CLOSING + 1];
+    for (int c = 0; c < CLOSING; c++) {
+        /* The row has entries of its own linkage alone */
+        const int first = a_start[CLOSING_FIRST + c], end = a_end[CLOSING_FIRST + c];
+        EACH_FOUR(at, c) {
+            four sum = {0};
+            for (int e = first; e < end; e++) {
+                const double *joint = t->closing_columns + a_col[e] * CLOSING_ROOM;
+                sum = MADD(EACH(ease[a_col[e]] * joint[c]), GIVEN_FOUR(joint + at), sum);
+            }
+            FOUR(columns + c * CLOSING_ROOM + at) = sum;
         }
+        square[c] = columns[c * CLOSING_ROOM + c];
+    }
+    for (int c = 0; c < CLOSING; c++) {
+        double *own = columns + c * CLOSING_ROOM;
+        const int counts = own[c] > DEPENDENT_SQUARE * square[c] && !t->left_out[CLOSING_FIRST + c];
+        const double inverse = t->closing_inverse[c] = counts ? 1.0 / own[c] : 0.0;
+        for (int r = c + 1; r < CLOSING; r++) {
+            const double share = rows[r * CLOSING_ROOM + c] = own[r] * inverse;
+            double *other = columns + r * CLOSING_ROOM;
+            EACH_FOUR(at, r) FOUR(other + at) -= EACH(share) * GIVEN_FOUR(own + at);
+        }
+        EACH_FOUR(at, c) FOUR(own + at) *= EACH(inverse);
+        for (int r = c & ~3; r <= c; r++) own[r] = 0.0;
+        for (int r = c; r < CLOSING_ROOM; r++) rows[c * CLOSING_ROOM + r] = 0.0;
     }
 }
 
 /* The shortest change of joints that changes the rows by -e, which is changed */
-static void shortest_change(const wbc_tick *t, const int *held, double *e, double *change) {
-    for (int i = 0; i < CLOSING; i++)
-        for (int k = 0; k < i; k++) e[i] -= t->closing_factor[i * CLOSING + k] * e[k];
-    for (int i = 0; i < CLOSING; i++) e[i] *= t->closing_factor[i * CLOSING + i];
-    for (int i = CLOSING - 1; i >= 0; i--)
-        for (int k = i + 1; k < CLOSING; k++) e[i] -= t->closing_factor[k * CLOSING + i] * e[k];
+static void shortest_change(const wbc_tick *t, const double *ease, double *e, double *change) {
+    const double *columns = t->closing_factor, *rows = columns + CLOSING * CLOSING_ROOM;
+    for (int c = 0; c < CLOSING; c++)
+        EACH_FOUR(at, c) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(columns + c * CLOSING_ROOM + at);
+    for (int c = 0; c < CLOSING; c++) e[c] *= t->closing_inverse[c];
+    for (int c = CLOSING - 1; c > 0; c--)
+        for (int at = 0; at < c; at += 4) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(rows + c * CLOSING_ROOM + at);
     for (int j = 0; j < DOFS; j++) {
-        double sum = 0.0;
-        for (int i = 0; i < CLOSING; i++) sum -= t->closing_rows[i * DOFS + j] * e[i];
-        change[j] = held[j] ? 0.0 : sum * (dof_scale[j] * dof_scale[j]);
+        four sum = {0};
+        EACH_FOUR(at, 0) sum = MADD(GIVEN_FOUR(t->closing_columns + j * CLOSING_ROOM + at), GIVEN_FOUR(e + at), sum);
+        change[j] = -ease[j] * SUM_OF_FOUR(sum);
     }
+}
+
+/* e = J v; the largest of rows that corrections have, in units of rows */
+static double open_rate(const wbc_tick *t, const double *v, double *e) {
+    double most = 0.0;
+    EACH_FOUR(at, 0) {
+        four sum = {0};
+        for (int j = 0; j < DOFS; j++) sum = MADD(GIVEN_FOUR(t->closing_columns + j * CLOSING_ROOM + at), EACH(v[j]), sum);
+        FOUR(e + at) = sum;
+    }
+    for (int k = 0; k < CLOSING; k++)
+        if (t->closing_inverse[k] != 0.0) most = larger(most, fabs(e[k]) / row_scale[CLOSING_FIRST + k]);
+    return most;
 }
 
 /* Where `way` leads from a configuration, what the loops are open by there, and their rows; the largest that they are open by */
 static double arrive_at(wbc_tick *t, const double *from, const double *way) {
     const double *arg[4] = {from, way, t->p, &t->dt};
-    double *res[3] = {t->report.next_q, t->opened, t->closing_rows}, most = 0.0;
+    double *res[3] = {t->report.next_q, t->opened, t->closing_columns}, most = 0.0;
     arrival(arg, res, t->work_iw, t->work_w, 0);
     for (int k = 0; k < CLOSING; k++) {
         t->report.lost[CLOSING_FIRST + k] = t->opened[k];
@@ -76,31 +121,27 @@ static int adds(const double *change, double *sum, double most) {
     return within;
 }
 
-/* Loops closed to EXACT without the joints that are held, and the velocity `v` as near as keeps them closed; 0 where that takes larger
- * corrections than there may be */
-static int close_there(wbc_tick *t, const double *way, const int *held, double share, double *v) {
-    double from[NQ + 1], e[CLOSING + 1], change[NV], sum[NV] = {0};
+/* Loops closed to EXACT by joints as `ease` says, 0 of those that are held, and the velocity `v` as near as keeps them closed; 0 where
+ * that takes larger corrections than there may be. The factor is that of the rows before the last step: what that leaves is of second
+ * order. */
+static int close_there(wbc_tick *t, const double *way, const double *ease, double share, double *v) {
+    double from[NQ + 1], e[CLOSING_ROOM + 1] = {0}, change[NV], sum[NV] = {0};
     double fastest = 0.0, off = arrive_at(t, t->q, way);
     for (int i = 0; i < DOFS; i++) fastest = larger(fastest, fabs(way[i]) / dof_scale[i]);
-    factor_closing(t, held);
+    factor_closing(t, ease);
     for (int n = 0; n < CLOSING_STEPS && off > EXACT; n++) {
+        if (n > 0) factor_closing(t, ease);
         memcpy(e, t->opened, CLOSING * sizeof(double));
-        shortest_change(t, held, e, change);
+        shortest_change(t, ease, e, change);
         if (!adds(change, sum, (CLOSING_SPEED + share * fastest) * t->dt)) return 0;
         for (int i = 0; i < DOFS; i++) change[i] /= t->dt;
         memcpy(from, t->report.next_q, NQ * sizeof(double));
         off = arrive_at(t, from, change);
-        factor_closing(t, held);
     }
     if (!(off <= EXACT)) return 0;
     for (int i = 0; i < DOFS; i++) sum[i] = 0.0;
-    /* Twice, as the squares of rows lose half of the digits */
-    for (int n = 0; n < 2; n++) {
-        for (int k = 0; k < CLOSING; k++) {
-            e[k] = 0.0;
-            for (int j = 0; j < DOFS; j++) e[k] += t->closing_rows[k * DOFS + j] * v[j];
-        }
-        shortest_change(t, held, e, change);
+    for (int n = 0; n < PROJECTIONS && open_rate(t, v, e) > ROUNDED_RATE; n++) {
+        shortest_change(t, ease, e, change);
         if (!adds(change, sum, BENT_SPEED)) return 0;
         for (int i = 0; i < DOFS; i++) v[i] += change[i];
     }
@@ -115,64 +156,114 @@ INLINE int passes(double low, double high, double command, double number) {
 
 /* Joints that would pass bounds of acceleration, rows of them alone, or limits of position are held from now on; whether there are
  * any */
-static int hold_beyond(const wbc_tick *t, const double *v, int *held) {
-    int before = 0, after = 0;
+static int hold_beyond(const wbc_tick *t, const double *v, double *ease) {
+    int more = 0;
     double a[NV];
     for (int i = 0; i < DOFS; i++) {
         const double there = t->report.next_q[stop_q[i]];
-        before += held[i];
         a[i] = (v[i] - t->v_last[i]) / t->dt;
-        held[i] |= passes(t->low[i], t->high[i], t->report.v[i], a[i]);
-        held[i] |= stop_at[i] >= 0 && t->bound_enabled[stop_at[i]] != 0.0 && (there < stop_low[i] || there > stop_high[i]);
+        int held = passes(t->low[i], t->high[i], t->report.v[i], a[i]);
+        held |= stop_at[i] >= 0 && t->bound_enabled[stop_at[i]] != 0.0 && (there < stop_low[i] || there > stop_high[i]);
+        more |= held && ease[i] != 0.0;
+        if (held) ease[i] = 0.0;
     }
     for (int k = 0; k < MC; k++) {
         const int i = a_col[a_start[k]];
         const double factor = t->at[a_start[k]];
         if (a_end[k] - a_start[k] != 1 || i >= DOFS) continue;
-        held[i] |= passes(t->free_low[k], t->free_high[k], factor * t->report.v[i], factor * a[i]);
+        if (!passes(t->free_low[k], t->free_high[k], factor * t->report.v[i], factor * a[i])) continue;
+        more |= ease[i] != 0.0;
+        ease[i] = 0.0;
     }
-    for (int i = 0; i < DOFS; i++) after += held[i];
-    return after > before;
+    return more;
 }
 
-/* As above, with joints at their bounds held as far as the loops can be closed without them */
+/* The same with joints at their bounds held; 0 where the loops cannot be closed without them */
 static int close_within(wbc_tick *t, const double *way, double share) {
-    int held[NV], none[NV];
-    double v[NV];
-    for (int i = 0; i < DOFS; i++) held[i] = none[i] = 0;
+    double v[NV], ease[NV];
+    for (int i = 0; i < DOFS; i++) ease[i] = dof_scale[i] * dof_scale[i];
     for (int n = 0; n < CLOSING_TRIES; n++) {
         memcpy(v, t->report.next_v, DOFS * sizeof(double));
-        if (!close_there(t, way, held, share, v)) break;
-        if (!hold_beyond(t, v, held)) {
-            memcpy(t->report.next_v, v, DOFS * sizeof(double));
-            return 1;
-        }
+        if (!close_there(t, way, ease, share, v)) return 0;
+        if (hold_beyond(t, v, ease)) continue;
+        memcpy(t->report.next_v, v, DOFS * sizeof(double));
+        return 1;
     }
+    return 0;
+}
+
+/* And with none held */
+static int close_beyond(wbc_tick *t, const double *way, double share) {
+    double v[NV], all[NV];
+    for (int i = 0; i < DOFS; i++) all[i] = dof_scale[i] * dof_scale[i];
     memcpy(v, t->report.next_v, DOFS * sizeof(double));
-    if (!close_there(t, way, none, share, v)) return 0;
+    if (!close_there(t, way, all, share, v)) return 0;
     memcpy(t->report.next_v, v, DOFS * sizeof(double));
     return 1;
 }
 
-/* The share is for loops that are closed where the tick begins */
-static void close_arrival(wbc_tick *t, const double *way) {
+/* What corrections may come to as a share of the way: for loops that are closed where the tick begins */
+static double closing_share(wbc_tick *t) {
     double rest[NV] = {0};
-    if (close_within(t, way, 0.0)) return;
-    if (arrive_at(t, t->q, rest) <= 10.0 * EXACT && close_within(t, way, CLOSING_SHARE)) return;
+    return arrive_at(t, t->q, rest) <= 10.0 * EXACT ? CLOSING_SHARE : 0.0;
+}
+
+/* Whether the command leads to where loops are closed within the bounds */
+static int arrives_within(wbc_tick *t) {
+    double way[NV];
+    follow(t, way);
+    if (close_within(t, way, 0.0)) return 1;
+    const double share = closing_share(t);
+    return share > 0.0 && close_within(t, way, share);
+}
+
+/* Rows of loops that were closed where the tick begins and are not where it leads give way, by accelerations */
+static int report_open(wbc_tick *t, int flag) {
+    double way[NV];
+    if (closing_share(t) == 0.0) return flag;
+    follow(t, way);
     arrive_at(t, t->q, way);
+    for (int k = 0; k < CLOSING; k++)
+        if (fabs(t->opened[k]) > 10.0 * EXACT * row_scale[CLOSING_FIRST + k])
+            t->report.slack[CLOSING_FIRST + k] = 2.0 * fabs(t->opened[k]) / (t->dt * t->dt);
+    return (int)(t->report.flag = WBC_RELAXED);
+}
+
+/* Sides of the rows of loops that are held, moved so that the velocity at the end of the tick keeps loops closed where the command
+ * leads; 0 where it does not lead there */
+static int bend_arrival(wbc_tick *t) {
+    double way[NV], v[NV], rate[CLOSING_ROOM + 1];
+    follow(t, way);
+    memcpy(v, t->report.next_v, DOFS * sizeof(double));
+    if (!close_beyond(t, way, closing_share(t))) return 0;
+#if SOFT_ROWS > 0
+    unmelt(t);
+#endif
+    open_rate(t, v, rate);
+    for (int k = 0; k < CLOSING; k++) {
+        if (t->free_low[CLOSING_FIRST + k] != t->free_high[CLOSING_FIRST + k]) continue;
+        t->free_low[CLOSING_FIRST + k] -= rate[k] / t->dt;
+        t->free_high[CLOSING_FIRST + k] = t->free_low[CLOSING_FIRST + k];
+    }
+    t->prepared = 0;
+    memset(t->report.slack, 0, sizeof t->report.slack);
+    own_sides(t);
+    return 1;
 }
 
 #endif
 
-/* The velocity that the next tick counts from, and where loops are closed until then: at the mean velocity of accelerations that are
- * held */
+/* The velocity that the next tick counts from, and where loops are closed until then */
 EXPORT void wbc_tick_arrive(wbc_tick *t) {
-    for (int i = 0; i < DOFS; i++) t->report.next_v[i] = t->v_last[i] + t->dt * t->report.v[i];
-#if CLOSING > 0
     double way[NV];
-    for (int i = 0; i < DOFS; i++) way[i] = t->v_last[i] + 0.5 * t->dt * t->report.v[i];
-    if (CLOSING > 0) close_arrival(t, way);
+    if (!t->arrived) follow(t, way);
+#if CLOSING > 0
+    if (CLOSING > 0 && !t->arrived && !arrives_within(t)) {
+        follow(t, way);
+        if (!close_beyond(t, way, closing_share(t))) arrive_at(t, t->q, way);
+    }
 #endif
+    t->arrived = 0;
     memcpy(t->v_last, t->report.next_v, DOFS * sizeof(double));
 }
 

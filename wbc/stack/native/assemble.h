@@ -4,6 +4,7 @@
 
 #include "reach.h"
 #include "sensed.h"
+#include "spare.h"
 
 /* H += J' diag(w) J, g -= J' diag(w) desired, for `count` rows that share the `cols` columns listed from `first`. The rows
  * are spread to the groups of 8 columns that they have entries in; left of the diagonal numbers are added too. */
@@ -127,8 +128,9 @@ static void assemble(wbc_tick *t, int screen) {
 #if SENSED > 0
     sensed_rows(t, screen);
 #endif
-    (void)screen;
     if (CALM) brake_for_margins(t);
+    for (int n = 0; n < SPARED; n++) choose_rows(t, spare_first[n], spare_first[n + 1] - spare_first[n], spare_held[n]);
+    const int finite = all_finite(t->at, NNZA);
     for (int k = 0; k < MC; k++) {
         t->report.slack[k] = t->spring[k] = 0.0;
         if (t->far[k]) {
@@ -140,11 +142,12 @@ static void assemble(wbc_tick *t, int screen) {
         const int priced = price_at[k] >= 0, count = a_end[k] - a_start[k];
         const double price = priced ? smaller(t->p[price_at[k]], HIGHEST_PRICE) : 1.0;
         t->give[k] = priced && !MINIMISED(k) ? (price > 0.0 ? row_scale[k] * row_scale[k] / price : 1.0) : 0.0;
-        if (t->enabled[k] == 0.0 || price == 0.0) {
+        t->left_side[k] = t->free_low[k];
+        if (t->enabled[k] == 0.0 || price == 0.0 || t->left_out[k]) {
             memset(row, 0, count * sizeof(double));
             t->free_low[k] = -WBC_INF;
             t->free_high[k] = WBC_INF;
-        } else if (!(all_finite(row, count) && t->free_low[k] < WBC_INF && t->free_high[k] > -WBC_INF)) {
+        } else if (!((finite || all_finite(row, count)) && t->free_low[k] < WBC_INF && t->free_high[k] > -WBC_INF)) {
             t->unusable = 1.0;
         }
 #if BENDING > 0
@@ -157,7 +160,8 @@ static void assemble(wbc_tick *t, int screen) {
         if (t->free_high[k] > WBC_INF) t->free_high[k] = WBC_INF;
         t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
         t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
-        for (int e = a_start[k]; e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
+        /* A tick reads `at` alone */
+        for (int e = a_start[k]; !screen && e < a_end[k]; e++) t->A[k * NV + a_col[e]] = t->at[e];
     }
     t->prepared = t->curved = t->lost_known = t->reduced = t->whole = 0;
 #if SOFT_ROWS > 0

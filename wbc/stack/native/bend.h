@@ -45,6 +45,16 @@ static void lose(wbc_tick *t, const double *v) {
 }
 #endif
 
+#if BENDING > 0
+/* Whether loops are open at q, and their rows close them: those that are left out close with these, at rates of their own */
+static int closes_loops(const wbc_tick *t) {
+    int open = 0;
+    for (int k = 0; k < MC; k++)
+        open |= bent[k] == 2 && t->free_low[k] == t->free_high[k] && fabs(t->free_low[k] - t->bend[k]) * t->dt > 10.0 * EXACT * row_scale[k];
+    return open;
+}
+#endif
+
 /* What the equality rows lose at the command and do not make up for; the largest as a rate, in row units. `all`: what they miss
  * of moved sides, too, which is not what the order of sacrifice has taken. */
 EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
@@ -52,8 +62,13 @@ EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
     double worst = 0.0;
     if (all) change_of_kept(t, t->report.v);
     else lose(t, t->report.v);
+    const int looks = SPARED > 0 && all && !closes_loops(t);
     for (int k = 0; k < MC; k++) {
         if (all) t->report.lost[k] = 0.0;
+        if (looks && bent[k] && t->left_out[k] && isfinite(t->lost_there[k])) {
+            t->report.lost[k] = t->lost_there[k] - t->left_side[k] * t->dt;
+            worst = larger(worst, fabs(t->report.lost[k]) / row_scale[k]);
+        }
         if (!bent[k] || t->free_low[k] != t->free_high[k] || !isfinite(t->lost_there[k])) continue;
         /* What the rate says cancels where all is asked for */
         t->report.lost[k] = all ? t->lost_there[k] + (t->bend[k] - t->free_low[k]) * t->dt : t->report.lost[k] + t->bend[k] * t->dt;

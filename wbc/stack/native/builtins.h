@@ -27,7 +27,6 @@ ptrdiff_t PyDict_Size(PyObject *);
 int PyDict_Next(PyObject *, ptrdiff_t *, PyObject **, PyObject **);
 int PyUnicode_Compare(PyObject *, PyObject *);
 PyObject *PyType_GenericAlloc(PyObject *, ptrdiff_t);
-int PyObject_SetAttr(PyObject *, PyObject *, PyObject *);
 void Py_DecRef(PyObject *);
 void Py_IncRef(PyObject *);
 ptrdiff_t PyBytes_Size(PyObject *);
@@ -45,6 +44,17 @@ typedef struct {
     const int *plan;
     long long count;
 } wbc_request;
+
+/* An array of numpy, whose beginning is the same in all its versions: its numbers, their axes and what they are */
+typedef struct {
+    ptrdiff_t references;
+    const void *type;
+    const double *data;
+    int axes;
+    const ptrdiff_t *shape, *strides;
+    const void *base, *numbers;
+    int flags;
+} wbc_array;
 
 /* The flag of wbc_tick_step; `tick`: its address, as an integer */
 EXPORT PyObject *wbc_python_step(PyObject *tick, PyObject *none) {
@@ -87,9 +97,21 @@ static void float_on(const double *q, const double *v, double dt, double *to) {
     for (int i = 0; i < 4; i++) to[3 + i] = size * sum[i];
 }
 
+/* Where ticks are recorded: rows of pieces of the tick's memory, one after the other in a chunk. Python puts the chunk in
+ * its place, writes the last row of each, and all where anything but the tick itself has changed what the solver remembers */
+typedef struct {
+    long long ready, end, count; /* not 0: the next tick may be recorded here; bytes of the chunk that are full; ticks */
+    long long row, size;         /* of a tick, and of the chunk [bytes] */
+    char *chunk;
+    const long long *pieces;     /* of each: where it begins in the row, and in memory, its size [bytes] */
+    long long given, told;       /* pieces that are copied before the tick, and after it */
+    long long reset;             /* where in the row a number is 0: the solver remembers its active set [bytes] */
+} wbc_recording;
+
 /* A tick with its values in one call: a configuration, and what wbc_tick_take takes */
 typedef struct {
     wbc_tick *tick;
+    wbc_recording *const *recording; /* where the address of one is, or 0 */
     double *q, *staged;      /* the tick's configuration, and where values wait */
     const int *plan;
     long long count, coordinates, bytes; /* values, coordinates of q, and of what a step keeps of `report` */
@@ -97,8 +119,9 @@ typedef struct {
     const int *moves;        /* of each joint: whether it is a free base, its places in q and in v */
     long long joints, later; /* how many, and coordinates of q (+) v dt, which follows what a step keeps; 0: it does not */
     PyObject *const *names;  /* of the values, in their order */
-    PyObject *step;          /* the type of what is returned, and what all of its kind share, */
-    PyObject *context, *context_name, *data_name; /* as an attribute, beside what the step keeps */
+    const void *arrays, *doubles; /* types of numpy's arrays, 0 where they are not as wbc_array, and of doubles */
+    PyObject *step, *context;     /* the type of what is returned, and what all of its kind share; */
+    long long context_at, data_at; /* bytes before this, and before what a step keeps, in a step */
 } wbc_cycle;
 
 static void move_to_next(const wbc_cycle *c, double *to) {
@@ -122,8 +145,15 @@ static PyObject *kept(const wbc_cycle *c) {
 }
 
 /* The numbers of an array of doubles, row by row, of one axis or, of a pose, [4, 4]; 0 where it is none */
-static int numbers_of(PyObject *array, int pose, long long count, double *to) {
+static int numbers_of(const wbc_cycle *c, PyObject *array, int pose, long long count, double *to) {
+    const wbc_array *plain = (const wbc_array *)array;
     Py_buffer view;
+    /* What numpy says as a buffer takes it longer than the rest of the call */
+    if (c->arrays && plain->type == c->arrays && plain->numbers == c->doubles && (plain->flags & ARRAY_IN_A_ROW) == ARRAY_IN_A_ROW) {
+        if (pose ? plain->axes != 2 || plain->shape[0] != 4 || plain->shape[1] != 4 : plain->axes != 1 || plain->shape[0] != count) return 0;
+        memcpy(to, plain->data, (size_t)count * sizeof(double));
+        return 1;
+    }
     if (!PyObject_CheckBuffer(array)) return 0;
     if (PyObject_GetBuffer(array, &view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT)) {
         PyErr_Clear();
@@ -139,11 +169,14 @@ static int numbers_of(PyObject *array, int pose, long long count, double *to) {
 /* What `kept` has, as a step */
 static PyObject *step_of(const wbc_cycle *c) {
     PyObject *data = kept(c), *out = data ? PyType_GenericAlloc(c->step, 0) : 0;
-    if (out && (PyObject_SetAttr(out, c->data_name, data) || PyObject_SetAttr(out, c->context_name, c->context))) {
-        Py_DecRef(out);
-        out = 0;
+    if (!out) {
+        if (data) Py_DecRef(data);
+        return 0;
     }
-    if (data) Py_DecRef(data);
+    /* Its slots, which are empty */
+    Py_IncRef(c->context);
+    *(PyObject **)((char *)out + c->context_at) = c->context;
+    *(PyObject **)((char *)out + c->data_at) = data;
     return out;
 }
 
@@ -156,9 +189,14 @@ static int values_of(const wbc_cycle *c, PyObject *values) {
     for (long long k = 0; k < c->count; at += c->plan[3 * k++ + 2]) {
         if (!PyDict_Next(values, &next, &name, &value)) return 0;
         if (name != c->names[k] && PyUnicode_Compare(name, c->names[k])) return 0;
-        if (!numbers_of(value, c->plan[3 * k] == VALUE_POSE, c->plan[3 * k + 2], at)) return 0;
+        if (!numbers_of(c, value, c->plan[3 * k] == VALUE_POSE, c->plan[3 * k + 2], at)) return 0;
     }
     return 1;
+}
+
+static void copy_row(const wbc_recording *r, const char *memory, long long first, long long count) {
+    for (const long long *p = r->pieces + 3 * first, *end = p + 3 * count; p < end; p += 3)
+        memcpy(r->chunk + r->end + p[0], memory + p[1], (size_t)p[2]);
 }
 
 /* The step of a tick that is solved, else its flag; WBC_NOT_TAKEN, and nothing is changed, where an argument is refused.
@@ -168,15 +206,23 @@ EXPORT PyObject *wbc_python_cycle(PyObject *request, PyObject *const *given, ptr
     const wbc_cycle *c = PyLong_AsVoidPtr(request);
     const size_t size = (size_t)c->coordinates * sizeof(double);
     double before[c->coordinates + 1];
+    wbc_recording *const r = *c->recording;
+    if (r && (!r->ready || r->end + 2 * r->row > r->size)) return PyLong_FromLong(WBC_NOT_TAKEN);
     if (count != 2 || !values_of(c, given[1])) return PyLong_FromLong(WBC_NOT_TAKEN);
     memcpy(before, c->q, size);
-    if (!numbers_of(given[0], 0, c->coordinates, c->q)) return PyLong_FromLong(WBC_NOT_TAKEN);
+    if (!numbers_of(c, given[0], 0, c->coordinates, c->q)) return PyLong_FromLong(WBC_NOT_TAKEN);
     if (c->count && (wbc_tick_check(c->tick) || !wbc_tick_take(c->tick, c->staged, c->plan, (int)c->count))) {
         memcpy(c->q, before, size);
         wbc_tick_check(c->tick);
         return PyLong_FromLong(WBC_NOT_TAKEN);
     }
+    if (r) copy_row(r, c->report, 0, r->given);
     const int flag = wbc_tick_step(c->tick);
+    if (r && !flag) {
+        copy_row(r, c->report, r->given, r->told);
+        memset(r->chunk + r->end + r->reset, 0, sizeof(double));
+        r->end += r->row, r->count++;
+    } else if (r && flag > 0) r->ready = 0;
     return flag ? PyLong_FromLong(flag) : step_of(c);
 }
 

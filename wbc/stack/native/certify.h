@@ -129,7 +129,11 @@ static void examine(wbc_tick *t) {
     gradient(t, v, residual, size);
     add_forces(t, v, residual, size);
     out->violation = t->firm_missed = 0.0;
-    for (int k = 0; k < MC; k++) {
+    for (int k = 0, n = 0; k < MC; k++) {
+        if (REDUCES && n < t->reduced && t->equal_row[n] == k) {
+            count_violation(t, k, t->low[NV + k] + t->missed[n++]);
+            continue;
+        }
         if (t->low[NV + k] <= -WBC_INF && t->high[NV + k] >= WBC_INF) continue;
         if (SOFTENED(t, k) && (HELD(t, k) || t->sense[NV + k] & ACTIVE)) continue;
         count_violation(t, k, row_at(t, k, v));

@@ -82,8 +82,10 @@ static double squares(const wbc_tick *t, const wbc_search *s, int secondary, dou
 static int may_rest(const wbc_tick *t, double room) {
     for (int i = 0; i < NV; i++)
         if (!(t->low[i] <= room * dof_scale[i] && t->high[i] >= -room * dof_scale[i])) return 0;
-    for (int k = 0; k < MC; k++)
+    for (int k = 0; k < MC; k++) {
         if (!(t->low[NV + k] <= room * row_scale[k] && t->high[NV + k] >= -room * row_scale[k])) return 0;
+        if (t->left_out[k] && !(fabs(t->left_side[k]) <= room * row_scale[k])) return 0;
+    }
     return t->unusable == 0.0;
 }
 

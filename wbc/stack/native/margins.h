@@ -43,7 +43,7 @@ static void find_idle_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
         const double low = t->low[NV + k], high = t->high[NV + k];
         t->idle[k] = low <= -WBC_INF && high >= WBC_INF;
-        if (t->idle[k]) continue;
+        if (t->idle[k] || low == high) continue;
         double least = 0.0, most = 0.0;
         for (int e = a_start[k]; e < a_end[k]; e++) {
             const int i = a_col[e];
@@ -51,7 +51,7 @@ static void find_idle_rows(wbc_tick *t) {
             least += smaller(one, other);
             most += larger(one, other);
         }
-        t->idle[k] = low < high && least > low + TOLERANCE * row_scale[k] && most < high - TOLERANCE * row_scale[k];
+        t->idle[k] = least > low + TOLERANCE * row_scale[k] && most < high - TOLERANCE * row_scale[k];
     }
 }
 

@@ -6,10 +6,7 @@
 #ifndef WBC_REDUCED_H
 #define WBC_REDUCED_H
 
-#include "factor.h"
-
-/* Room for the variables that are left, in groups of four */
-#define THIN ((NV - (REDUCED < NV ? REDUCED : NV) + 3) / 4 * 4)
+#include "mirrored.h"
 
 INLINE double thin_dot(const double *x, const double *y) {
     four sum = {0};
@@ -22,57 +19,8 @@ INLINE void thin_add(double *out, const double *in, double f) {
     for (int at = 0; at < THIN; at += 4) FOUR(out + at) = MADD(each, GIVEN_FOUR(in + at), GIVEN_FOUR(out + at));
 }
 
-/* The equality rows, of length one, as columns of WIDE numbers; 0 where there are none, or variables are fixed besides */
-static int equality_rows(wbc_tick *t) {
-    int count = 0;
-    for (int i = 0; i < NV; i++)
-        if (t->low[i] == t->high[i]) return 0;
-    for (int i = 0; i < NV * WIDE; i += 4) FOUR(t->equal + i) = (four){0};
-    for (int k = 0; k < MC; k++) {
-        t->strength[k] = 0.0;
-        if (t->low[NV + k] != t->high[NV + k]) continue;
-        if (count == NV) return 0;
-        double even = 0.0, odd = 0.0;
-        int e = a_start[k];
-        for (; e + 1 < a_end[k]; e += 2) {
-            const double a = t->at[e] * dof_scale[a_col[e]], b = t->at[e + 1] * dof_scale[a_col[e + 1]];
-            even += a * a;
-            odd += b * b;
-        }
-        if (e < a_end[k]) even += t->at[e] * dof_scale[a_col[e]] * (t->at[e] * dof_scale[a_col[e]]);
-        if (!(even + odd > DEAD)) return 0;
-        const double scale = 1.0 / sqrt(even + odd);
-        for (e = a_start[k]; e < a_end[k]; e++) t->equal[a_col[e] * WIDE + count] = t->at[e] * dof_scale[a_col[e]] * scale;
-        t->equal_scale[count] = scale;
-        t->equal_row[count++] = k;
-    }
-    return count;
-}
-
-/* Variable j is given by the row, of those in `open`, whose entry is the largest; 0 where that is below `least`. Columns of the other
- * variables lose their entry there: those that are given are columns of P, and its own becomes one. */
-INLINE int give(wbc_tick *t, int j, int count, double least, double *open) {
-    double *own = t->equal + j * WIDE;
-    four most = {0};
-    int which = 0;
-    for (int i = 0; i < count; i += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(own + i)) * GIVEN_FOUR(open + i));
-    const double largest = larger(larger(most[0], most[2]), larger(most[1], most[3]));
-    if (!(largest >= least)) return 0;
-    while (fabs(own[which]) * open[which] != largest) which++;
-    const double inverse = 1.0 / own[which];
-    own[which] -= 1.0;
-    for (int i = 0; i < count; i += 4) FOUR(own + i) *= EACH(-inverse);
-    for (int c = 0; c < NV; c++) {
-        double *column = t->equal + c * WIDE;
-        const double f = column[which];
-        if (f == 0.0 || c == j) continue;
-        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(own + i), GIVEN_FOUR(column + i));
-    }
-    own[which] += 1.0;
-    open[which] = 0.0;
-    t->is_given[j] = 1;
-    t->given[which] = j;
-    return 1;
+INLINE int gives(wbc_tick *t, int j, int count, double least, double *open) {
+    return t->is_given[j] = give(t->equal, NV, j, count, least, open, t->given);
 }
 
 /* Variables for all of `count` rows; 0 where the rows depend on each other. Rows without forces give motions, first those that no
@@ -83,23 +31,25 @@ INLINE int give_all(wbc_tick *t, int count) {
     for (int i = 0; i < WIDE; i++) open[i] = 0.0;
     for (int i = 0; i < count; i++) open[i] = !(late[i] = late_row[t->equal_row[i]]);
     for (int j = 0; j < NV; j++) t->is_given[j] = 0;
-    for (int n = 0; n < DOFS && step < count; n++) step += give(t, give_order[n], count, CLEAR_PIVOT, open);
+    for (int n = 0; n < DOFS && step < count; n++) step += gives(t, give_order[n], count, CLEAR_PIVOT, open);
     for (int i = 0; i < count; i++)
         if (late[i]) open[i] = 1.0;
     for (double least = CLEAR_PIVOT; least >= PIVOT && step < count; least *= PIVOT / CLEAR_PIVOT)
         for (int n = 0; n < NV && step < count; n++) {
             const int j = n < NV - DOFS ? DOFS + n : give_order[n - (NV - DOFS)];
-            if (!t->is_given[j]) step += give(t, j, count, least, open);
+            if (!t->is_given[j]) step += gives(t, j, count, least, open);
         }
     return step == count;
 }
 
 /* Z and P of the rows at hand; 0 where they depend on each other, or are none */
 static int eliminate(wbc_tick *t) {
-    const int count = t->reduced = equality_rows(t);
+    const int count = t->reduced = find_equalities(t);
     int left = 0;
+    t->mirrored = FORCES > 0 && give_mirrored(t, count);
+    if (t->mirrored) return count;
     /* The usual number is known to the compiler */
-    const int ok = count == REDUCED ? give_all(t, REDUCED) : give_all(t, count);
+    const int ok = count > 0 && unit_rows(t, count) && (count == REDUCED ? give_all(t, REDUCED) : give_all(t, count));
     for (int j = 0; ok && j < NV; j++)
         if (!t->is_given[j]) t->left[left++] = j;
     t->width = left;
@@ -113,9 +63,6 @@ static int eliminate(wbc_tick *t) {
     }
     return count;
 }
-
-/* Column k of P: by how much each variable that was given moves with row k, in the order of the rows that give them */
-#define COLUMN(t, k) ((t)->equal + (t)->given[k] * WIDE)
 
 /* Whether the rows that were taken out are those that are equalities now */
 static int same_equalities(const wbc_tick *t) {
@@ -146,6 +93,10 @@ static void spread_given(const wbc_tick *t, const double *e, double *x) {
 /* x = P e: the variables that were given, for rows that are e, the others 0; `e`, of WIDE numbers, is changed */
 static void by_rows(const wbc_tick *t, double *e, double *x) {
     double moved[WIDE] = {0};
+    if (FORCES > 0 && t->mirrored) {
+        by_rows_mirrored(t, e, x, 0);
+        return;
+    }
     scale_rows(t, e);
     EACH_ROW_GROUP(t, i) {
         four sum = {0};
@@ -158,6 +109,10 @@ static void by_rows(const wbc_tick *t, double *e, double *x) {
 /* The same of sizes: no |P e| is larger where |e| are at most these */
 static void size_by_rows(const wbc_tick *t, double *e, double *x) {
     double moved[WIDE] = {0};
+    if (FORCES > 0 && t->mirrored) {
+        by_rows_mirrored(t, e, x, 1);
+        return;
+    }
     scale_rows(t, e);
     EACH_ROW_GROUP(t, i) {
         four sum = {0};
@@ -171,6 +126,10 @@ static void size_by_rows(const wbc_tick *t, double *e, double *x) {
  * there */
 static void multipliers_of(const wbc_tick *t, const double *r, double *lambda) {
     double push[WIDE] = {0};
+    if (FORCES > 0 && t->mirrored) {
+        multipliers_mirrored(t, r, lambda);
+        return;
+    }
     for (int k = 0; k < t->reduced; k++) push[k] = -r[t->given[k]] * dof_scale[t->given[k]];
     for (int k = 0; k < t->reduced; k++) {
         four sum = {0};

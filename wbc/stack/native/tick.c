@@ -192,6 +192,33 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
     return flag;
 }
 
+/* The velocity that accelerations lead to keeps loops closed, and within the bounds: where corrections of it would pass them, the
+ * accelerations are others, as far as there are any */
+static int arriving_answer(wbc_tick *t, int flag, int *nameless) {
+#if COMMAND != VELOCITY && CLOSING > 0
+    double low[MC + 1], high[MC + 1];
+    if (CLOSING == 0 || flag != WBC_SOLVED || (t->arrived = arrives_within(t))) return flag;
+    memcpy(low, t->free_low, sizeof t->free_low);
+    memcpy(high, t->free_high, sizeof t->free_high);
+    for (int n = 0; n < ARRIVALS && flag == WBC_SOLVED; n++) {
+        if (!bend_arrival(t)) {
+            if (n == 0) return report_open(t, flag);
+            break;
+        }
+        flag = answer(t, nameless);
+        if (flag == WBC_SOLVED && !unsound(t, flag) && (t->arrived = arrives_within(t))) return flag;
+    }
+    memcpy(t->free_low, low, sizeof t->free_low);
+    memcpy(t->free_high, high, sizeof t->free_high);
+    t->prepared = 0;
+    own_sides(t);
+    return answer(t, nameless);
+#else
+    (void)t, (void)nameless;
+    return flag;
+#endif
+}
+
 EXPORT int wbc_tick_step(wbc_tick *t) {
     const int bad = wbc_tick_check(t);
     if (bad) return bad;
@@ -202,6 +229,7 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     foresee(t);
 #endif
     int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
+    flag = arriving_answer(t, flag, &nameless);
     if (PRICES) report_soft_rows(t);
     for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++)
         if (t->spring[k] > 0.0) t->report.lambda[NV + k] = t->spring[k] * (row_at(t, k, t->report.v) - t->free_low[k]);

@@ -16,8 +16,12 @@
  *               have no such output
  *   REDUCED     rows of loops, and of torques that nothing gives, which are taken out of the QP, see reduced.h; 0 without loops
  *   REDUCED_NV  NV with such rows, else 0
+ *   FORCES FORCED_NV FORCE_FIRST row_torque   forces in loops, one a row of them, NV with such, else 0, and the first among the
+ *               variables; the joint whose torque each general row is that nothing gives (-1)
  *   give_order late_row   in which order they give velocities or accelerations, and which rows have forces, so that they give after
  *               the others
+ *   SPARED spare_first spare_row spare_held   linkages whose rows depend on each other wherever loops are closed: their rows one after
+ *               the other, and how many are independent, see spare.h
  *   CLOSING CLOSING_FIRST   rows of couplings and loops of a stack of accelerations whose loops a tick closes, and the first of them
  *               among the general rows; 0 without loops
  *   BENDING bent   general rows whose residual bends within a tick, and which they are: see bend.h
@@ -58,6 +62,8 @@
 #define M_ALL (NV + MC)
 #define WIDE ((NV + 7) / 8 * 8)
 #define TALL ((NV + 3) / 4 * 4)
+/* Rows of loops that a tick closes, in groups of four */
+#define CLOSING_ROOM ((CLOSING + 3) / 4 * 4)
 #define PACKED (NV * (NV + 1) / 2)
 #define WBC_INF 1e30
 
@@ -116,6 +122,8 @@ typedef struct {
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double curvature_entries[NNZK + 1]; /* of its upper triangle */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
+    int left_out[MC + 1];        /* rows of linkages that depend on others, and their sides */
+    double left_side[MC + 1];
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
@@ -150,11 +158,17 @@ typedef struct {
     int whole;                   /* it has been tried, and the problem is one for all variables */
     int width;                   /* variables that are left */
     int equal_row[NV], given[NV], left[NV], is_given[NV]; /* rows, the variables that they give, the others */
+    /* The same where forces in loops follow by the transposed of the loops' rows, see mirrored.h: slots of rows of torques by joint,
+     * those of joints that were not given, and what they give of the motions that rows of loops leave */
+    int mirrored, torque_slot[NV], rest, rest_slot[NV], moved[NV], is_moved[NV];
+    double second[FORCED_NV * WIDE + 1], lifted[FORCED_NV * WIDE + 1];
     double missed[NV], missed_size[NV]; /* by how much the command misses the rows, and the size of what was added up */
     double equal[REDUCED_NV * WIDE + 1], equal_scale[NV];
     double basis[REDUCED_NV * WIDE + 1], product_of_basis[REDUCED_NV * WIDE + 1], through[REDUCED_NV * WIDE + 1];
-    /* Loops at the end of the tick, see arrive.h: by how much they are open, their rows, and the factor of these */
-    double opened[CLOSING + 1], closing_rows[CLOSING * NV + 1], closing_factor[CLOSING * CLOSING + 1];
+    /* Loops at the end of the tick, see arrive.h: by how much they are open, their rows by columns, and the factor of these */
+    int arrived;                 /* `next_q` and `next_v` are those of the command */
+    double opened[CLOSING + 1], closing_columns[NV * CLOSING_ROOM + 1];
+    double closing_factor[2 * CLOSING * CLOSING_ROOM + 1], closing_inverse[CLOSING + 1];
     double gram[REDUCED_NV * WIDE + 1], reduced_R[REDUCED_NV * WIDE + 1], reduced_inverse[REDUCED_NV * WIDE + 1];
     double reduced_pivot[NV], seen[REDUCED_NV * M_ALL + 1];
     /* DAQP workspace on our own memory */

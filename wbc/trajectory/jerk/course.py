@@ -181,14 +181,14 @@ def backwards(course: Course) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return course.spans[::-1], tuple(-j for j in reversed(course.jerks))
 
 
-def polished(course: Course, end: Point, tolerance: float = 0.0, rounds: int = 2) -> Course:
+def polished(course: Course, end: Point, tolerance: float = 0.0) -> Course:
     """The same jerks with durations changed by the least that ends in ``end``, the sum of durations kept; as it is
     where that is nearer than ``tolerance``, velocities counted over the duration of the course.
 
     ruckig's last position is off by up to 1e-8 of its unit. A longer phase k moves the end by what its own end moves,
     (v, a, j) dt, carried over the time R that is left: (v + a R + j R^2/2, a + j R, j) dt.
     """
-    for _ in range(rounds):
+    for _ in range(2):
         points, span = course.points(), course.duration
         weight = (1.0, span, span * span)
         before = max(abs(x - y) * w for x, y, w in zip(end, points[-1], weight, strict=True))

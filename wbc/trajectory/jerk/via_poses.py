@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import ShapeError
-from wbc.rotations import matrices, quaternion
+from wbc.rotations import matrices
 from wbc.trajectory.jerk.joined_courses import STILL
 from wbc.trajectory.jerk.via_speeds import SpeedBounds, ViaCorners, corner_speeds
 from wbc.trajectory.laws.law import Law
@@ -26,7 +25,7 @@ from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.pose_path import PosePath
-from wbc.trajectory.paths.pose_paths import standing_pose
+from wbc.trajectory.paths.pose_paths import placed_poses, standing_pose
 from wbc.trajectory.paths.turning import TwoTurns, turn_between
 from wbc.validation import Array
 
@@ -80,24 +79,12 @@ def via_points(
     turn_speed = np.inf
     if angular_speed is not None:
         turn_speed = validation.scalar("angular_speed", angular_speed, low=0.0, open_low=True, unit="rad/s")
-    points, quaternions = _poses(poses)
+    points, quaternions = placed_poses("poses", poses)
     limits = MotionLimits(
         velocity=np.repeat([bounds.speed, turn_speed], 3), acceleration=np.repeat([bounds.acceleration, turning], 3)
     )
     path = _path(points, quaternions, bounds, turning, turn_speed)
     return Law(path, Timing.identity(STILL if path.degree == 0 else path.length), limits)
-
-
-def _poses(poses: Sequence[Any]) -> tuple[Array, Array]:
-    """Points m x 3, unit quaternions m x 4."""
-    try:
-        given = list(poses)
-    except TypeError as error:
-        raise ShapeError("poses", poses, "expected a sequence of poses") from error
-    if len(given) < 2:
-        raise ShapeError("poses", len(given), "expected at least two poses")
-    checked = [validation.pose(f"poses[{k}]", pose) for k, pose in enumerate(given)]
-    return np.array([p.translation for p in checked]), np.array([quaternion(p.rotation) for p in checked])
 
 
 def _path(points: Array, quaternions: Array, bounds: SpeedBounds, turning: float, turn_speed: float) -> PosePath:

@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc import style, validation
 from wbc.errors import LawFileError, ShapeError
-from wbc.rotations import quaternion
+from wbc.rotations import continuous_quaternions, quaternion
 from wbc.trajectory.laws.certificate import ORDERS, LawPieces, Worst
 from wbc.trajectory.laws.law import Law
 from wbc.validation import Array
@@ -126,7 +126,8 @@ def _pose_panels(law: Law, pieces: LawPieces, share: Array) -> list[list[Panel]]
         if order == 0:
             poses = values.reshape(-1, 4, 4)
             origin.append(Panel("position", "m", "xyz", poses[:, :3, 3]))
-            turning.append(Panel("orientation", "quaternion", "xyzw", _quaternions(poses)))
+            turns = continuous_quaternions(np.array([quaternion(pose[:3, :3]) for pose in poses]))
+            turning.append(Panel("orientation", "quaternion", "xyzw", turns))
             continue
         six = values.reshape(-1, 6)
         lower, upper = _limits(law, name)
@@ -138,14 +139,6 @@ def _pose_panels(law: Law, pieces: LawPieces, share: Array) -> list[list[Panel]]
             panel = Panel(f"{word} {name}", f"{unit}{_PER[name]}", "xyz", six[:, part], below, above, here, first)
             panels.append(panel)
     return [origin, turning]
-
-
-def _quaternions(poses: Array) -> Array:
-    """x, y, z, w of each, with the sign that is nearer to the one before."""
-    out = np.array([quaternion(pose[:3, :3]) for pose in poses])
-    flips = np.where(np.einsum("mi,mi->m", out[1:], out[:-1]) < 0.0, -1.0, 1.0)
-    out[1:] *= np.cumprod(flips)[:, None]
-    return out
 
 
 def _limits(law: Law, name: str) -> tuple[Array | None, Array | None]:

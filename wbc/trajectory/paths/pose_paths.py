@@ -57,22 +57,14 @@ class Poses:
         Raises:
             ShapeError, NotFiniteError, RotationError: no poses. RangeError: a turn larger than ``largest``.
         """
-        try:
-            count = len(values)
-        except TypeError as error:
-            raise ShapeError("path.poses", values, "expected a sequence of poses") from error
-        if count < 2:
-            raise ShapeError("path.poses", values, "expected at least two poses")
-        placed = [validation.pose(f"path.poses[{k}]", value) for k, value in enumerate(values)]
-        points = np.array([pose.translation for pose in placed])
-        quaternions = np.array([quaternion(pose.rotation) for pose in placed])
+        points, quaternions = placed_poses("path.poses", values)
 
         def between(i: int, j: int) -> float:
             turn = float(np.linalg.norm(turn_between(quaternions[i], quaternions[j])))
             return distance(points[i], points[j]) + radius * turn
 
         size = max(float(np.abs(points).max()), radius)
-        numbers = kept("path.poses", count, between, size)
+        numbers = kept("path.poses", len(points), between, size)
         pairs = list(pairwise(numbers))
         turns = np.array([turn_between(quaternions[i], quaternions[j]) for i, j in pairs]).reshape(-1, 3)
         for (_, number), turn in zip(pairs, turns, strict=True):
@@ -89,6 +81,22 @@ class Poses:
     def standing(self) -> PosePath:
         """The path that stays at the first."""
         return standing_pose(self.points[0], matrices(self.quaternions[:1]))
+
+
+def placed_poses(field: str, values: Any) -> tuple[Array, Array]:
+    """Points m x 3 and unit quaternions m x 4 of two poses or more.
+
+    Raises:
+        ShapeError, NotFiniteError, RotationError: no poses, or less than two.
+    """
+    try:
+        given = list(values)
+    except TypeError as error:
+        raise ShapeError(field, values, "expected a sequence of poses") from error
+    if len(given) < 2:
+        raise ShapeError(field, len(given), "expected at least two poses")
+    placed = [validation.pose(f"{field}[{k}]", value) for k, value in enumerate(given)]
+    return np.array([pose.translation for pose in placed]), np.array([quaternion(pose.rotation) for pose in placed])
 
 
 def geodesic_path(start: Any, end: Any, radius: float = RADIUS) -> PosePath:

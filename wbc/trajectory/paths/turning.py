@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from wbc.errors import RangeError
-from wbc.rotations import exponential, matrices
+from wbc.rotations import exponential, matrices, relative_quaternion
 from wbc.trajectory.paths import bernstein
 from wbc.trajectory.paths.path import Index, PolynomialPath
 from wbc.validation import Array
@@ -108,14 +108,14 @@ class QuaternionSpline:
         if order == 0:
             return matrices(parts[0] / np.sqrt(size))
         value, rate = parts[:2]
-        n = 2.0 * _product(rate, value)
+        n = 2.0 * relative_quaternion(rate, value)[:, :3]
         if order == 1:
             return np.asarray(n / size)
-        dn = 2.0 * _product(parts[2], value)
+        dn = 2.0 * relative_quaternion(parts[2], value)[:, :3]
         dsize = 2.0 * np.einsum("mi,mi->m", value, rate)[:, None]
         if order == 2:
             return np.asarray(dn / size - n * dsize / size**2)
-        ddn = 2.0 * (_product(parts[3], value) + _product(parts[2], rate))
+        ddn = 2.0 * (relative_quaternion(parts[3], value) + relative_quaternion(parts[2], rate))[:, :3]
         ddsize = 2.0 * np.einsum("mi,mi->m", rate, rate)[:, None]
         ddsize += 2.0 * np.einsum("mi,mi->m", value, parts[2])[:, None]
         out = ddn / size - (2.0 * dn * dsize + n * ddsize) / size**2 + 2.0 * n * dsize**2 / size**3
@@ -124,21 +124,10 @@ class QuaternionSpline:
 
 def turn_between(first: Array, second: Array) -> Array:
     """The shortest rotation vector [rad], in the world, from one unit quaternion to another."""
-    step = _full_product(second, first)
+    step = relative_quaternion(second, first)
     if step[3] < 0.0:
         step = -step
     sine = float(np.linalg.norm(step[:3]))
     if sine == 0.0:
         return np.zeros(3)
     return np.asarray(step[:3] * (2.0 * np.arctan2(sine, step[3]) / sine))
-
-
-def _product(left: Array, right: Array) -> Array:
-    """Vector parts of left times the conjugate of right, m x 3."""
-    p, q = left[:, :3], right[:, :3]
-    return np.asarray(right[:, 3:] * p - left[:, 3:] * q - np.cross(p, q))
-
-
-def _full_product(left: Array, right: Array) -> Array:
-    """left times the conjugate of right."""
-    return np.append(_product(left[None], right[None])[0], left @ right)

@@ -1,0 +1,72 @@
+/* Equality rows as columns of numbers, and the variables that they give: see reduced.h. */
+#ifndef WBC_GIVEN_H
+#define WBC_GIVEN_H
+
+#include "factor.h"
+
+/* Room for the variables that are left, in groups of four */
+#define THIN ((NV - (REDUCED < NV ? REDUCED : NV) + 3) / 4 * 4)
+
+/* Which rows are equalities, and how many; 0 where variables are fixed besides */
+static int find_equalities(wbc_tick *t) {
+    int count = 0;
+    for (int i = 0; i < NV; i++)
+        if (t->low[i] == t->high[i]) return 0;
+    for (int k = 0; k < MC; k++) {
+        t->strength[k] = 0.0;
+        if (t->low[NV + k] != t->high[NV + k]) continue;
+        if (count == NV) return 0;
+        t->equal_row[count++] = k;
+    }
+    return count;
+}
+
+/* The first `count` of them, of length one, as columns of WIDE numbers; 0 where one has no length */
+static int unit_rows(wbc_tick *t, int count) {
+    for (int i = 0; i < NV * WIDE; i += 4) FOUR(t->equal + i) = (four){0};
+    for (int n = 0; n < count; n++) {
+        const int k = t->equal_row[n];
+        double even = 0.0, odd = 0.0;
+        int e = a_start[k];
+        for (; e + 1 < a_end[k]; e += 2) {
+            const double a = t->at[e] * dof_scale[a_col[e]], b = t->at[e + 1] * dof_scale[a_col[e + 1]];
+            even += a * a;
+            odd += b * b;
+        }
+        if (e < a_end[k]) even += t->at[e] * dof_scale[a_col[e]] * (t->at[e] * dof_scale[a_col[e]]);
+        if (!(even + odd > DEAD)) return 0;
+        const double scale = t->equal_scale[n] = 1.0 / sqrt(even + odd);
+        for (e = a_start[k]; e < a_end[k]; e++) t->equal[a_col[e] * WIDE + n] = t->at[e] * dof_scale[a_col[e]] * scale;
+    }
+    return 1;
+}
+
+/* Variable j of `total` is given by the row, of those in `open`, whose entry is the largest; 0 where that is below `least`. Columns of
+ * the other variables lose their entry there: those that are given are columns of P, and its own becomes one. */
+INLINE int give(double *columns, int total, int j, int count, double least, double *open, int *given) {
+    double *own = columns + j * WIDE;
+    four most = {0};
+    int which = 0;
+    for (int i = 0; i < count; i += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(own + i)) * GIVEN_FOUR(open + i));
+    const double largest = larger(larger(most[0], most[2]), larger(most[1], most[3]));
+    if (!(largest >= least)) return 0;
+    while (fabs(own[which]) * open[which] != largest) which++;
+    const double inverse = 1.0 / own[which];
+    own[which] -= 1.0;
+    for (int i = 0; i < count; i += 4) FOUR(own + i) *= EACH(-inverse);
+    for (int c = 0; c < total; c++) {
+        double *column = columns + c * WIDE;
+        const double f = column[which];
+        if (f == 0.0 || c == j) continue;
+        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(own + i), GIVEN_FOUR(column + i));
+    }
+    own[which] += 1.0;
+    open[which] = 0.0;
+    given[which] = j;
+    return 1;
+}
+
+/* Column k of P: by how much each variable that was given moves with row k, in the order of the rows that give them */
+#define COLUMN(t, k) ((t)->equal + (t)->given[k] * WIDE)
+
+#endif
