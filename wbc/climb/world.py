@@ -34,8 +34,6 @@ from wbc.validation import Array
 TURNS = 12
 #: What postures keep more than motions have to [m]: between two postures links may come nearer
 SPARE = 1e-3
-#: Stands for the contact of a limb whose links do not count
-LEFT_OUT = -2
 #: Rows of a cone and singular values below this are none
 TINY = 1e-12
 
@@ -55,14 +53,12 @@ class CloseLinks(NamedTuple):
 
     Attributes:
         row: of the state. names: of both. limbs: of which they are. lacks: how far they are to be further apart [m].
-        away: direction in which a link is to go from a body of the scene, in the world; None: these are two links.
     """
 
     row: int
     names: str
     limbs: frozenset[int]
     lacks: float
-    away: Array | None
 
 
 class SampleAims(NamedTuple):
@@ -352,10 +348,10 @@ class ClimbWorld:
 
     def first_touch(self, contacts: NDArray[np.int32], states: Array) -> CloseLinks | None:
         """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may
-        be; None: in none. Links of limbs whose contact is ``LEFT_OUT`` do not count.
+        be; None: in none.
         """
         contacts, states = np.ascontiguousarray(contacts, dtype=np.int32), np.ascontiguousarray(states)
-        which, lacks = np.zeros(4, dtype=np.int32), np.zeros(4)
+        which, lacks = np.zeros(4, dtype=np.int32), np.zeros(1)
         row = self._code.wbc_first_touch(
             self._world, ctypes.c_long(len(states)), _at(contacts), _at(states), _at(which), _at(lacks)
         )
@@ -363,7 +359,7 @@ class ClimbWorld:
             return None
         pieces = [which[0]] if which[1] >= 0 else [which[0], -1 - which[1]]
         limbs = frozenset(self._piece_limbs[k] for k in pieces) - {-1}
-        return CloseLinks(int(row), self.touching(which), limbs, float(lacks[0]), lacks[1:] if which[1] >= 0 else None)
+        return CloseLinks(int(row), self.touching(which), limbs, float(lacks[0]))
 
     def band(
         self, aims: SampleAims, bounds: Array, slack: float, aside: float, states: Array

@@ -246,19 +246,14 @@ int wbc_fastest(long n, int rows, int sided, const double *s, const double *a, c
 }
 
 /* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there, `lacks`: by
- * how much, and the direction in which the first of them has to go */
+ * how much */
 long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state, int *which, double *lacks) {
     placed_t placed[MOST_LIMBS];
-    double center[3], value[MOST_VARIABLES];
-    int column[MOST_VARIABLES], count = 6;
-    const int start[MOST_LIMBS] = {0};
+    double center[3];
     for (long k = 0; k < n; k++) {
         const double *at = state + k * (12 + c->offset[c->limbs]);
         place_all(c, at, at + 12, placed, center);
-        if ((lacks[0] = -link_clearance(c, contact + k * c->limbs, at, placed, which)) <= 0.0) continue;
-        avoiding(c, contact + k * c->limbs, 0, which, at, placed, start, value, column, &count);
-        copy3(value, lacks + 1);
-        return k;
+        if ((*lacks = -link_clearance(c, contact + k * c->limbs, at, placed, which)) > 0.0) return k;
     }
     return n;
 }
