@@ -155,7 +155,7 @@ class Clearances:
             return []
         foothold, out = self.scene.footholds[row], list[Exemption]()
         mount, point = _scene_name(foothold.on), foothold.pose.translation
-        for body, sink, deepest in self._tips[limb]:
+        for body, sink, deepest in sunk_tips(self.climber)[limb]:
             if why_apart(body.shape, self.scene.bodies[foothold.on].shape):
                 continue
             for stair, share in list(enumerate(STAIRS))[since:]:
@@ -167,16 +167,12 @@ class Clearances:
         return out
 
     @cached_property
-    def _tips(self) -> list[list[SunkTip]]:
-        return sunk_tips(self.climber)
-
-    @cached_property
     def _pairs(self) -> tuple[list[Pair], tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
         """All pairs; of each the body of the scene (the last: none), the limb (the last: none) and the stair."""
         pairs = self_pairs(self.climber.robot, self.apart - TOLERANCE)
         none = len(self.scene.bodies), len(self.climber.limbs)
         told = [(none[0], none[1], -1)] * len(pairs)
-        limb_of = {body.name: limb for limb, tips in enumerate(self._tips) for body, *_ in tips}
+        limb_of = {body.name: limb for limb, tips in enumerate(sunk_tips(self.climber)) for body, *_ in tips}
         mounts = {foothold.on for foothold in self.scene.footholds}
         for k, (name, placed) in enumerate(self.scene.bodies.items()):
             for body in climber_bodies(self.climber):
@@ -196,7 +192,7 @@ class Clearances:
     def _sweeper(self) -> Sweeper:
         robot = self.climber.robot
         model, bodies = robot.model, {body.name: body for body in climber_bodies(self.climber)}
-        for limb, tips in zip(self.climber.limbs, self._tips, strict=True):
+        for limb, tips in zip(self.climber.limbs, sunk_tips(self.climber), strict=True):
             contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement.translation
             for body, *_ in tips:
                 grasp = model.frames[frame_index(model, body.link)].placement.actInv(contact)
@@ -239,27 +235,6 @@ class Clearances:
         return np.array([b.shape.reach for b in self.scene.bodies.values()])
 
 
-@lru_cache(maxsize=16)
-def climber_bodies(climber: Climber) -> list[SweptBody]:
-    """Shapes of a climber's links, and a ball about each contact's point that lies out of all those which move with it:
-    the links' shapes may end before the point, or there may be none.
-    """
-    model, bodies = climber.robot.model, bodies_of(climber.robot)
-    points = list[SweptBody]()
-    for limb, chain in zip(climber.limbs, climber.chains, strict=True):
-        frame = model.frames[frame_index(model, limb.frame)]
-        point = frame.placement * limb.placement.translation
-        off = np.inf
-        for body in bodies:
-            on = model.frames[frame_index(model, body.link)]
-            if on.parentJoint == chain[-1]:
-                inside = (on.placement * (body.placement or pin.SE3.Identity())).actInv(point)
-                off = min(off, float(segments_from(body.shape, inside, inside)))
-        if off > SINK:
-            points.append(SweptBody(f"contact of {limb.name}", Sphere(POINT), limb.frame, limb.placement))
-    return bodies + points
-
-
 class SunkTip(NamedTuple):
     """A body that a limb's last joint moves.
 
@@ -273,23 +248,37 @@ class SunkTip(NamedTuple):
     deepest: float
 
 
+@lru_cache(maxsize=16)
 def sunk_tips(climber: Climber) -> list[list[SunkTip]]:
-    """Of each limb the bodies that its last joint moves."""
-    model, out = climber.robot.model, []
+    """Of each limb the bodies that its last joint moves, and a ball about its contact's point where that lies out of
+    all of these: shapes may end before the point, or there may be none.
+    """
+    model, bodies, out = climber.robot.model, bodies_of(climber.robot), []
     for limb, chain in zip(climber.limbs, climber.chains, strict=True):
-        tips = []
+        tips, off = list[SunkTip](), np.inf
         contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement
-        for body in climber_bodies(climber):
+        for body in bodies:
             on = model.frames[frame_index(model, body.link)]
-            if on.parentJoint == chain[-1]:
-                placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
-                sink = _beyond(placed, contact, limb.contact.fixed == "position")
-                tips.append(SunkTip(body, sink, sink + (SINK if body.shape.reach > POINT else POINT_SINK)))
+            if on.parentJoint != chain[-1]:
+                continue
+            placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
+            sink = _beyond(placed, contact, limb.contact.fixed == "position")
+            tips.append(SunkTip(body, sink, sink + SINK))
+            point = placed.placement.actInv(contact.translation)
+            off = min(off, float(segments_from(placed.shape, point, point)))
+        if off > SINK:
+            ball = SweptBody(f"contact of {limb.name}", Sphere(POINT), limb.frame, limb.placement)
+            tips.append(SunkTip(ball, POINT, POINT + POINT_SINK))
         out.append(tips)
     return out
 
 
-@lru_cache(maxsize=16)
+def climber_bodies(climber: Climber) -> list[SweptBody]:
+    """Shapes of a climber's links, and the balls of :func:`sunk_tips`."""
+    bodies = {body.name: body for body in bodies_of(climber.robot)}
+    return list((bodies | {tip.body.name: tip.body for tips in sunk_tips(climber) for tip in tips}).values())
+
+
 def stray_of(climber: Climber) -> float:
     """How far contacts may be off their curves near footholds [m]: half of how deep any tip may sink in there."""
     return min((tip.deepest - tip.sink for tips in sunk_tips(climber) for tip in tips), default=SINK) / 2.0

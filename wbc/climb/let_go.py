@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wbc.climb.clear import Clearances, climber_bodies
+from wbc.climb.clear import Clearances, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.motion import MotionOptions, MoveError, carry_out
 from wbc.climb.plan import ContactPlan
@@ -102,10 +102,7 @@ def joined(first: ContactPlan, then: ContactPlan) -> ContactPlan:
 
 def _links(climber: Climber, limb: int) -> set[str]:
     """Names of the links that a limb's last joint moves, and of their pieces."""
-    model = climber.robot.model
-    last = climber.chains[limb][-1]
-    on = [body for body in climber_bodies(climber) if model.frames[model.getFrameId(body.link)].parentJoint == last]
-    return {body.link for body in on} | {body.name for body in on}
+    return {name for tip in sunk_tips(climber)[limb] for name in (tip.body.link, tip.body.name)}
 
 
 def _frame(climber: Climber, scene: ClimbScene, start: Stance, limb: int) -> pin.SE3:

@@ -178,28 +178,18 @@ static int hold_beyond(const wbc_tick *t, const double *v, double *ease) {
     return more;
 }
 
-/* The same with joints at their bounds held; 0 where the loops cannot be closed without them */
-static int close_within(wbc_tick *t, const double *way, double share) {
+/* The same, where `within`, with joints at their bounds held; 0 where the loops cannot be closed so */
+static int closes(wbc_tick *t, const double *way, double share, int within) {
     double v[NV], ease[NV];
     for (int i = 0; i < DOFS; i++) ease[i] = dof_scale[i] * dof_scale[i];
     for (int n = 0; n < CLOSING_TRIES; n++) {
         memcpy(v, t->report.next_v, DOFS * sizeof(double));
         if (!close_there(t, way, ease, share, v)) return 0;
-        if (hold_beyond(t, v, ease)) continue;
+        if (within && hold_beyond(t, v, ease)) continue;
         memcpy(t->report.next_v, v, DOFS * sizeof(double));
         return 1;
     }
     return 0;
-}
-
-/* And with none held */
-static int close_beyond(wbc_tick *t, const double *way, double share) {
-    double v[NV], all[NV];
-    for (int i = 0; i < DOFS; i++) all[i] = dof_scale[i] * dof_scale[i];
-    memcpy(v, t->report.next_v, DOFS * sizeof(double));
-    if (!close_there(t, way, all, share, v)) return 0;
-    memcpy(t->report.next_v, v, DOFS * sizeof(double));
-    return 1;
 }
 
 /* What corrections may come to as a share of the way: for loops that are closed where the tick begins */
@@ -212,9 +202,9 @@ static double closing_share(wbc_tick *t) {
 static int arrives_within(wbc_tick *t) {
     double way[NV];
     follow(t, way);
-    if (close_within(t, way, 0.0)) return 1;
+    if (closes(t, way, 0.0, 1)) return 1;
     const double share = closing_share(t);
-    return share > 0.0 && close_within(t, way, share);
+    return share > 0.0 && closes(t, way, share, 1);
 }
 
 /* Rows of loops that were closed where the tick begins and are not where it leads give way, by accelerations */
@@ -235,7 +225,7 @@ static int bend_arrival(wbc_tick *t) {
     double way[NV], v[NV], rate[CLOSING_ROOM + 1];
     follow(t, way);
     memcpy(v, t->report.next_v, DOFS * sizeof(double));
-    if (!close_beyond(t, way, closing_share(t))) return 0;
+    if (!closes(t, way, closing_share(t), 0)) return 0;
 #if SOFT_ROWS > 0
     unmelt(t);
 #endif
@@ -258,9 +248,9 @@ EXPORT void wbc_tick_arrive(wbc_tick *t) {
     double way[NV];
     if (!t->arrived) follow(t, way);
 #if CLOSING > 0
-    if (CLOSING > 0 && !t->arrived && !arrives_within(t)) {
+    if (!t->arrived && !arrives_within(t)) {
         follow(t, way);
-        if (!close_beyond(t, way, closing_share(t))) arrive_at(t, t->q, way);
+        if (!closes(t, way, closing_share(t), 0)) arrive_at(t, t->q, way);
     }
 #endif
     t->arrived = 0;
