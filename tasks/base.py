@@ -154,10 +154,9 @@ class Sensor(Protocol):
     def reset(self) -> None:
         """Forget what was sensed before."""
 
-    def missing(self, v: NDArray[np.float64], dt: float, braking: NDArray[np.float64]) -> int:
-        """How much of what its row would allow a pair without a row uses at a command, at most; see
-        :meth:`wbc.proximity.PairSensor.missing`. 0 of a sensor that gives everything a row.
-        """
+    @property
+    def addresses(self) -> tuple[int, ...]:
+        """What a tick asks in C, see :meth:`wbc.proximity.PairSensor.addresses`."""
 
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """What the sensed rows were about in the last call: names of both bodies and their distance [m]."""

@@ -12,23 +12,8 @@ import pinocchio as pin
 from tests.closed_loop.eyes import cross
 from tests.models import placement
 from tests.tasks.robots import velocity
+from wbc import tasks
 from wbc.robot import Robot
-from wbc.tasks import (
-    AxisAlign,
-    Damping,
-    FrameVelocityLimit,
-    Hold,
-    LineContact,
-    LookAt,
-    Mechanism,
-    Momentum,
-    PitchPlane,
-    RigidGrasp,
-    Rolling,
-    RollingContact,
-    SlidingContact,
-    Wheel,
-)
 from wbc.tasks.rolling import FLAT
 
 AXIS, AROUND, OFFSET = (0.0, -1.0, 2.0), (1.0, 1.0, 0.0), (0.1, -0.2, 0.05)
@@ -47,11 +32,11 @@ def relative_twist(robot: Robot, frame: str, base: str, q: np.ndarray, v: np.nda
     return own - np.concatenate([carrier[:3] + np.cross(carrier[3:], arm), carrier[3:]])
 
 
-def damping(item: Damping, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def damping(item: tasks.Damping, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return v
 
 
-def frame_velocity(item: FrameVelocityLimit, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def frame_velocity(item: tasks.FrameVelocityLimit, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     twist = relative_twist(robot, item.frame, item.relative_to, q, v)
     turn = placement(robot, item.axes, q).rotation.T
     seen = np.concatenate([turn @ twist[:3], turn @ twist[3:]])
@@ -59,23 +44,23 @@ def frame_velocity(item: FrameVelocityLimit, robot: Robot, q: np.ndarray, v: np.
     return np.array([seen[labels.index(row.label)] for row in item.rows(robot)])
 
 
-def hold(item: Hold, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def hold(item: tasks.Hold, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     twist = velocity(robot, item.frame, q, v)
     if item.kind == "axis":
         return np.concatenate([twist[:3], (placement(robot, item.frame, q).rotation.T @ twist[3:])[:2]])
     return {"pose": twist, "position": twist[:3], "orientation": twist[3:]}[item.kind]
 
 
-def line_contact(item: LineContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def line_contact(item: tasks.LineContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     twist = velocity(robot, item.frame, q, v)
     return np.concatenate([twist[:3], (placement(robot, item.frame, q).rotation.T @ twist[3:])[1:]])
 
 
-def sliding(item: SlidingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def sliding(item: tasks.SlidingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.array([TILTED.rotation[:, 2] @ velocity(robot, item.frame, q, v)[:3]])
 
 
-def rolling_contact(item: RollingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def rolling_contact(item: tasks.RollingContact, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Velocity of the wheel's material at the point of its rim that is nearest to the ground's plane, downwards."""
     pose, twist, normal = placement(robot, item.frame, q), velocity(robot, item.frame, q, v), TILTED.rotation[:, 2]
     axis = pose.rotation @ np.array(item.axis)
@@ -88,16 +73,16 @@ def rolling_contact(item: RollingContact, robot: Robot, q: np.ndarray, v: np.nda
     return np.array([along @ slip, np.cross(normal, along) @ slip, normal @ slip])
 
 
-def contact(item: RigidGrasp, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def contact(item: tasks.RigidGrasp, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return velocity(robot, item.frame, q, v)[: item.components]
 
 
-def mechanism(item: Mechanism, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def mechanism(item: tasks.Mechanism, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     mimics = [v[c.follower] - c.ratio * v[c.leader] for c in robot.couplings]
     return np.array(mimics + [v[i] for i in robot.locked_dofs])
 
 
-def plane(item: PitchPlane, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def plane(item: tasks.PitchPlane, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular velocity of the body that carries the axis, along the line between the offset pitch axes."""
     model, data = robot.model, robot.model.createData()
     pin.forwardKinematics(model, data, q, v)
@@ -116,7 +101,7 @@ def pin_jacobians(model: pin.Model, q: np.ndarray) -> pin.Data:
     return data
 
 
-def axes(item: AxisAlign | LookAt) -> np.ndarray:
+def axes(item: tasks.AxisAlign | tasks.LookAt) -> np.ndarray:
     """Columns b1, b2 and the axis, in the frame; for a z axis without ``around`` they are those of the frame."""
     if item.around is None:
         assert item.axis == (0.0, 0.0, 1.0)
@@ -127,19 +112,19 @@ def axes(item: AxisAlign | LookAt) -> np.ndarray:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def line_of_sight(item: LookAt, robot: Robot, q: np.ndarray, target: Any) -> np.ndarray:
+def line_of_sight(item: tasks.LookAt, robot: Robot, q: np.ndarray, target: Any) -> np.ndarray:
     """From the camera to the target, in the world [m]."""
     camera = placement(robot, item.frame, q).act(np.array(item.offset))
     return np.array(placement(robot, item.relative_to, q).act(np.array(target)) - camera)
 
 
-def spin_across(item: AxisAlign, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def spin_across(item: tasks.AxisAlign, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """The relative angular velocity about b1 and b2."""
     spin = velocity(robot, item.frame, q, v)[3:] - velocity(robot, item.relative_to, q, v)[3:]
     return (placement(robot, item.frame, q).rotation @ axes(item)).T[:2] @ spin
 
 
-def spin_past_sight(item: LookAt, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def spin_past_sight(item: tasks.LookAt, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """The angular velocity about b1 and b2 less that of the line of sight, from its values 4e-6 s apart."""
     step = 2e-6
     before, after = (line_of_sight(item, robot, pin.integrate(robot.model, q, t * v), SEEN) for t in (-step, step))
@@ -149,7 +134,7 @@ def spin_past_sight(item: LookAt, robot: Robot, q: np.ndarray, v: np.ndarray) ->
     return (placement(robot, item.frame, q).rotation @ axes(item)).T[:2] @ spin
 
 
-def momentum(item: Momentum, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def momentum(item: tasks.Momentum, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     h = np.array(pin.computeCentroidalMomentum(robot.model, robot.model.createData(), q, v).vector)
     return {"both": h, "linear": h[:3], "angular": h[3:]}[item.kind]
 
@@ -174,7 +159,7 @@ def wheel_axis(robot: Robot, joint: str, q: np.ndarray) -> np.ndarray:
     return np.array(pin.getVelocity(robot.model, data, robot.model.getJointId(joint), pin.WORLD).angular)
 
 
-def slip(robot: Robot, wheel: Wheel, ground: pin.SE3, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def slip(robot: Robot, wheel: tasks.Wheel, ground: pin.SE3, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Velocity of the wheel's material point that touches the ground."""
     data, point = data_of(robot), touching(robot, wheel, ground, q)[0]
     pin.forwardKinematics(robot.model, data, q, v)
@@ -182,7 +167,7 @@ def slip(robot: Robot, wheel: Wheel, ground: pin.SE3, q: np.ndarray, v: np.ndarr
     return np.array(twist.linear + cross(twist.angular, point))
 
 
-def rolling(item: Rolling, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def rolling(item: tasks.Rolling, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """What of the contact points' velocities must vanish or keep them on the ground."""
     out, normal = [], GROUND.rotation[:, 2]
     for wheel in item.wheels:
@@ -198,7 +183,7 @@ def rolling(item: Rolling, robot: Robot, q: np.ndarray, v: np.ndarray) -> np.nda
     return np.array(out)
 
 
-def touching(robot: Robot, wheel: Wheel, ground: pin.SE3, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def touching(robot: Robot, wheel: tasks.Wheel, ground: pin.SE3, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(lowest point of a wheel's rim, horizontal direction across its axis that it rolls to)."""
     data, normal = data_of(robot), ground.rotation[:, 2]
     axis = wheel_axis(robot, wheel.joint, q)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.refusals import assert_refused
 from wbc import validation
 from wbc.errors import NotFiniteError, RotationError, ShapeError
 
@@ -43,14 +44,11 @@ def test_a_pose_is_a_copy() -> None:
 @pytest.mark.parametrize("check", [validation.pose, validation.pose_numbers])
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
 def test_numbers_that_are_not_finite_are_refused(number: float, check: Callable[[str, object], object]) -> None:
-    with pytest.raises(NotFiniteError, match="target"):
-        check("target", pin.SE3(TURN, np.array([0.0, number, 0.0])))
+    assert_refused(lambda: check("target", pin.SE3(TURN, np.array([0.0, number, 0.0]))), NotFiniteError, "target")
     broken = TURN.copy()
     broken[1, 2] = number
-    with pytest.raises(NotFiniteError, match="target"):
-        check("target", pin.SE3(broken, PLACE))
-    with pytest.raises(NotFiniteError, match="target"):
-        validation.rotation("target", broken)
+    assert_refused(lambda: check("target", pin.SE3(broken, PLACE)), NotFiniteError, "target")
+    assert_refused(lambda: validation.rotation("target", broken), NotFiniteError, "target")
 
 
 @pytest.mark.parametrize(
@@ -59,8 +57,7 @@ def test_numbers_that_are_not_finite_are_refused(number: float, check: Callable[
     ids=["scaled", "mirrored", "zero", "not orthonormal"],
 )
 def test_matrices_that_are_no_rotations_are_refused(matrix: np.ndarray) -> None:
-    with pytest.raises(RotationError, match="target"):
-        validation.rotation("target", matrix)
+    assert_refused(lambda: validation.rotation("target", matrix), RotationError, "target")
     for check in (validation.pose, validation.pose_numbers):
         with pytest.raises(RotationError, match="target"):
             check("target", pin.SE3(matrix, PLACE))
@@ -76,13 +73,10 @@ def test_the_tolerance_is_the_frobenius_norm(seed: int) -> None:
     inside, outside = (rotation + factor * validation.ROTATION_TOLERANCE * push for factor in (0.99, 1.01))
     np.testing.assert_array_equal(validation.rotation("target", inside), inside)
     np.testing.assert_array_equal(validation.pose_numbers("target", pin.SE3(inside, PLACE))[:3], inside[:, 0])
-    with pytest.raises(RotationError):
-        validation.rotation("target", outside)
-    with pytest.raises(RotationError):
-        validation.pose_numbers("target", pin.SE3(outside, PLACE))
+    assert_refused(lambda: validation.rotation("target", outside), RotationError, "")
+    assert_refused(lambda: validation.pose_numbers("target", pin.SE3(outside, PLACE)), RotationError, "")
 
 
 @pytest.mark.parametrize("value", [np.eye(2), np.zeros(5), "identity", None, [[1.0, 2.0], [3.0]]])
 def test_other_shapes_are_refused(value: object) -> None:
-    with pytest.raises(ShapeError, match="target"):
-        validation.pose("target", value)
+    assert_refused(lambda: validation.pose("target", value), ShapeError, "target")

@@ -113,6 +113,7 @@ def main() -> None:
     parser.add_argument("--robots", default=",".join(problems.ROBOTS))
     parser.add_argument("--scenes", default=",".join(problems.SCENES))
     parser.add_argument("--seeds", type=int, default=19)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first problem")
     parser.add_argument("--peers-python", default="")
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--constrained", action="store_true")
@@ -133,7 +134,10 @@ def main() -> None:
     peers = {n: Peer(options.peers_python, n, options.core) for n in CONTENDERS[1:]} if options.peers_python else {}
     begun, rows = stamp(), [json.loads(line) for file in options.join for line in file.open() if line.startswith("{")]
     asked = [
-        (r, s, n) for r in options.robots.split(",") for s in options.scenes.split(",") for n in range(options.seeds)
+        (r, s, n)
+        for r in options.robots.split(",")
+        for s in options.scenes.split(",")
+        for n in range(options.first, options.seeds)
     ]
     try:
         for robot, scene, seed in () if rows else asked:

@@ -56,6 +56,9 @@ def ompl_of(problem: dict[str, Any]) -> Plan:
 
     def plan(seed: int, seconds: float) -> tuple[list[list[float]] | None, float]:
         begin = time.process_time()
+        # Before a goal that is not free it sleeps until its time is over
+        if not (is_valid(problem["start"]) and is_valid(problem["goal"])):
+            return None, time.process_time() - begin
         information = base.SpaceInformation(space)
         information.setStateValidityChecker(is_valid)
         information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())

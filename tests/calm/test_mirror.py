@@ -7,7 +7,6 @@ from importlib import resources
 
 import pytest
 
-from wbc.controller import watch
 from wbc.ik import descent, search
 
 
@@ -16,10 +15,6 @@ def native(file: str, name: str) -> float:
     found = re.search(rf"^#define {name} (\S+)$", text, re.MULTILINE)
     assert found is not None, name
     return float(found.group(1))
-
-
-def test_of_margins() -> None:
-    assert native("margins.h", "BRAKING_MARGIN") == watch.BRAKING_MARGIN
 
 
 @pytest.mark.parametrize(

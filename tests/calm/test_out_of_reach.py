@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.calm.best import best, cost, random_starts
-from tests.calm.scenes import TIPS, built, machine, run, still, tip_pose
+from tests.calm.scenes import built, machine, run, still, tip_pose
 from tests.repeats import covering
 
 #: Reach of the arm from its base, about [m]
@@ -172,8 +172,3 @@ def test_noise_is_not_amplified_beyond_the_gain(gain: float) -> None:
     target = far_target("panda", DIRECTIONS["panda"][0])
     done = run(built("panda", 0.01), gain, still(target), 1000, lag=0.02, noise=noise)
     assert np.sqrt((done.v[900:] ** 2).mean()) < 3.0 * max(gain, 2.0) * noise + 1e-4
-
-
-def test_frames_exist() -> None:
-    for name, tip in TIPS.items():
-        assert tip in machine(name).frame_names

@@ -34,7 +34,7 @@ from wbc.errors import (
     UnsupportedJointError,
     WbcError,
 )
-from wbc.shapes import Capsule, HalfSpace, Sphere
+from wbc.shapes import HalfSpace, Sphere
 
 TREE = free_tree()
 HAND = SweptBody("hand", Sphere(0.1), "universe", grasp=np.zeros(3))
@@ -138,13 +138,3 @@ def test_joints_that_are_no_turns_and_shifts_by_scalars_are_refused() -> None:
     model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
     with pytest.raises(UnsupportedJointError, match="ball"):
         Tree.of_model(model)
-
-
-def test_two_solids_may_both_move() -> None:
-    model = random_arms(np.random.default_rng(1))
-    tree = Tree.of_model(model)
-    found = SweptScene(
-        tree, [SweptBody("a", Capsule(0.1, 0.2), "a3_link"), SweptBody("b", Sphere(0.1), "b1_link")], [Pair("a", "b")]
-    )
-    swept = Sweeper(found).sweep(Motion.linear(tree, [0.0, 1.0], np.zeros((2, 8))))
-    assert swept.measured[1] == 1

@@ -17,7 +17,6 @@ from tests.clearance.world import (
     random_arms,
     random_motion,
     random_pose,
-    still,
 )
 from tests.repeats import repeats
 from wbc.clearance import (
@@ -33,7 +32,6 @@ from wbc.clearance import (
     bodies_of,
     self_pairs,
 )
-from wbc.clearance.motion import quaternion_matrices
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Solid, Sphere
 from wbc.validation import Array
 
@@ -350,16 +348,6 @@ def test_times_of_an_exemption_are_those_of_the_hold(z: Array, since: float, unt
     assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 
-def test_a_body_that_stands_in_something_is_seen() -> None:
-    tree = free_tree()
-    scene = SweptScene(
-        tree, [SweptBody("a", Sphere(0.1), "universe"), SweptBody("b", Box((2.0, 2.0, 2.0)))], [Pair("a", "b")]
-    )
-    swept = Sweeper(scene).sweep(still(pin.SE3.Identity()))
-    assert swept.violation is not None
-    assert swept.violation.distance == pytest.approx(-1.1)
-
-
 def test_pairs_can_be_chosen_and_far_ones_cost_one_bound() -> None:
     rng = np.random.default_rng(6)
     model = random_arms(rng)
@@ -425,10 +413,3 @@ def test_two_things_that_fly_past_each_other() -> None:
         assert swept.clear is clear
         least = Sweeper(scene).sweep(motion, aim="least", far=inf, tolerance=1e-6)
         assert least.found[0] == pytest.approx(off - 0.2, abs=1e-6)
-
-
-def test_quaternions_become_rotations() -> None:
-    rng = np.random.default_rng(7)
-    poses = [random_pose(rng, 1.0) for _ in range(20)]
-    found = quaternion_matrices(np.array([numbers(pose)[3:] for pose in poses]))
-    assert found == pytest.approx(np.array([pose.rotation for pose in poses]), abs=1e-14)

@@ -1,4 +1,4 @@
-"""``wbc coordinates advise`` as a user types it."""
+"""Modes, advice, restrictions and surveys of wbc coordinates as a user types them."""
 
 from __future__ import annotations
 
@@ -43,11 +43,28 @@ def test_a_survey_of_random_configurations() -> None:
     assert float(ratio) <= quantiles[0] < quantiles[1] < quantiles[2] <= 1.0
 
 
-def test_bad_input() -> None:
-    assert run("advise", "spherical_4r", "--at", "0.3")[0] == 2
-    assert run("advise", "spherical_4r", "--at", "a,b,c,d")[0] == 2
-    assert run("advise", "spherical_4r", "--mode", "M6")[0] == 2
-    assert "did you mean 'M1'" in run("advise", "spherical_4r", "--mode", "m1")[2]
-    assert run("advise", "srms")[0] == 2
-    assert run("survey", "spherical_4r", "--count", "-3")[0] == 2
+PAGE = Path(__file__).parents[2] / "docs" / "coordinates.md"
+
+
+def test_table_of_all_arms() -> None:
+    code, out, err = run()
+    assert code == 0
+    assert "ssrms" in out
+    assert "M7 carrier with held hands" in err
+
+
+def test_one_arm() -> None:
+    code, out, _ = run("modes", "spdm")
+    assert code == 0
+    assert "M6 two arms: arm1_xi | the rest" in out
+    assert "M7 carrier with held hands: no carrier" in out
+
+
+def test_the_page_has_the_table() -> None:
+    code, out, _ = run("--markdown")
+    assert code == 0
+    assert out.strip() in PAGE.read_text()
+
+
+def test_a_pair_that_is_none_is_refused() -> None:
     assert run("advise", "spherical_4r", "--current", "alpha")[0] == 2

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 import wbc.robots
 from tests.cli.test_commands import run
 
@@ -60,22 +58,3 @@ def test_an_srdf_file_and_exact_shapes(tmp_path: Path) -> None:
     assert ["LF_FOOT", "RF_FOOT", "dropped", "srdf:", "User", "-"] in rows(out)
     assert "box" in out
     assert "the SRDF file also names gone" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["kinova"], "no link of this robot has shapes"),
-        (["ur5", "--samples", "-1"], "samples: expected 0 or more"),
-        (["ur5", "--shapes", "ft"], "shapes: unknown name, did you mean 'fit'?"),
-        (["ur5", "--srdf", "gone.srdf"], "there is no such file"),
-        (["ur5", "--pairs", "gone.toml"], "pairs: cannot be read"),
-        (["ur5", "--pairs", "gone.toml", "--samples", "3"], "leave out --samples"),
-        (["ur5", "--samples", "0", "--save", "no/such/folder.toml"], "there is no such folder"),
-    ],
-)
-def test_bad_input_is_one_line(arguments: list[str], message: str) -> None:
-    code, out, err = run("robots", "pairs", *arguments)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert err.count("\n") == 1

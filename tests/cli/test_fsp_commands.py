@@ -196,36 +196,3 @@ def test_explore_panda(tmp_path: Path) -> None:
     done = RUN.invoke(app, ["ik", "explore", "panda", "--start", at, "--seeds", "0", "--out", str(tmp_path), "--force"])
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in tmp_path.iterdir()) == ["self_motion.npz", "self_motion.png", "summary.json"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["ik", "explore", "pnda"], "panda"),
-        (["ik", "explore", "panda", "--kind", "place"], "position"),
-        (["ik", "explore", "panda", "--rates", "1,2"], "shape"),
-        (["ik", "explore", "panda", "--rates", "1,x"], "numbers"),
-        (["published", "ikor", "--case", "4"], "valid: 1, 2, 3"),
-        (["published", "ikor-run", "--line", "1,2"], "X,Y,Z"),
-        (["published", "ikor-run", "--arc", "0,0,9", "--line", "1,2,3"], "expected one of"),
-        (["published", "ikor-run", "--line", "-0.8,-0.3,0.6", "--film", "mov"], "gif"),
-        (["published", "ikor", "--case", "1", "--resolver", "stack"], "consistent"),
-        (["published", "ikor-run", "--start", "1,2,3"], "expected one of"),
-        (["published", "ikor-run", "--line", "1,2,3", "--start", "1,2"], "X,Y,Z"),
-        (["published", "ikor-run", "--arc", "1,2"], "X,Y,DEGREES"),
-        (["published", "ikor-run", "--line", "1,2,3", "--weights", "1,2"], "shape (7,)"),
-        (["published", "ikor-run", "--line", "1,2,3", "--weights", "1,1,1,0,1,1,1"], "above 0"),
-        (["published", "ikor-run", "--line", "1,2,3", "--criterion", "torqe"], "torque"),
-        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4"], "POINT:"),
-        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4:base=off"], "platform"),
-        (["published", "ikor-run", "--line", "1,2,3", "--switch", "4:platform=of"], "off"),
-        (["ik", "explore", "panda", "--to", "1,2"], "X,Y,Z"),
-        (["published", "ikor-run", "--trajectory", "no_such_file"], "no_such_file"),
-        (["published", "ikor-run", "--robot", "hermes", "--trajectory", "x"], "hermes"),
-    ],
-)
-def test_refused(arguments: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = RUN.invoke(app, arguments)
-    assert done.exit_code == 2
-    assert word in " ".join(done.output.split())

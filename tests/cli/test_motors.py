@@ -32,20 +32,3 @@ def test_bounds_are_those_of_the_library_and_say_what_binds() -> None:
         number, row, joint = re.findall(r": ([\d.e+]+) .*: (\w+) of (\w+) at", line)[0]
         assert float(number) == pytest.approx(bound.value, rel=1e-3)
         assert (row, joint) == (bound.row, bound.joint)
-
-
-@pytest.mark.parametrize(
-    ("motors", "said"),
-    [
-        (["1,48"], "expected 4 to 7 numbers"),
-        (["1,48,0.05,x"], "expected 4 to 7 numbers"),
-        (["elbow=1,48,0.05,0.4"], "elbow_joint"),
-        (["1,48,0.05,0.4", "2,48,0.05,0.4"], "two motors of all other joints"),
-        (["elbow_joint=1,48,0.05,0.4"], "shoulder_pan_joint"),
-        (["1,48,0.05,-0.4"], "resistance"),
-    ],
-)
-def test_bad_motors_are_named(motors: list[str], said: str) -> None:
-    code, out = run("ur5", *(word for one in motors for word in ("--motor", one)))
-    assert code == 2
-    assert said in out

@@ -50,20 +50,3 @@ def test_parts_of_the_system(words: tuple[str, ...], shown: list[str], tmp_path:
     with (tmp_path / f"{words[0]}.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) in (1, 3, 4)
     assert words[0] in json.loads((tmp_path / "summary.json").read_text())
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (("meassuring",), "did you mean 'measuring'"),
-        (("measuring", "--angles", "1,2"), "4 numbers"),
-        (("master-slave", "--backlash", "-1"), "backlash"),
-        (("master-slave", "--carried", "0.5"), "B: expected"),
-        (("holding", "--period", "0"), "period"),
-    ],
-)
-def test_bad_words_are_named(words: tuple[str, ...], named: str, tmp_path: Path) -> None:
-    done = RUN.invoke(app, ["published", "relative-motion", *words, "--out", str(tmp_path / "run")])
-    assert done.exit_code == 2
-    assert named in done.output
-    assert not (tmp_path / "run" / "summary.json").exists()

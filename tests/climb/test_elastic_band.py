@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -11,15 +12,18 @@ import pytest
 from tests.climb.referee import between, least_distances, slipped
 from wbc.climb import BodyPlace, first_stance
 from wbc.climb.balance import Equilibrium
+from wbc.climb.elastic_band import BandRows, ElasticBand
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, Mover, carry_out
 from wbc.climb.move_path import SwingShape
-from wbc.climb.scene import size_of
+from wbc.climb.scene import SceneBody, size_of
 from wbc.climb.scenes import draw, placed
 from wbc.climb.search import StanceOptions, find_stances
 from wbc.climb.stance import StancePath
 from wbc.climb.world import ClimbWorld, SampleAims
 from wbc.errors import InfeasibleError
+from wbc.shapes import Sphere
+from wbc.symbolic.joint_steps import place
 
 #: Step of differences [m, rad]
 STEP = 1e-6
@@ -87,3 +91,25 @@ def test_every_move_over_stairs_has_a_motion(name: str, monkeypatch: pytest.Monk
             mine, other_links = least_distances(plan, q[:: max(1, len(q) // INSTANTS)])
             assert mine > 0.001 - 1e-4
             assert other_links > 0.01 - 1e-4
+
+
+@pytest.mark.parametrize("still", [True, False])
+def test_a_body_that_stays_is_not_moved_by_what_its_limb_goes_round(still: bool) -> None:
+    robot = climber("hexapod")
+    size, x = size_of(robot), np.linspace(0.0, 1.0, 11)[:, None]
+    course = draw("stairs", size)
+    q = first_stance(robot, course.scene, placed(robot, course.start)).q
+    tip = robot.contact_pose(robot.with_limb(q, 0, robot.angles(q, 0) + [0.0, -0.3, 0.0]), 0)
+    ball = SceneBody(Sphere(0.05 * size), tip)
+    world = ClimbWorld(
+        robot, dataclasses.replace(course.scene, bodies={**course.scene.bodies, "ball": ball}), clear=0.01
+    )
+    states = np.tile(world.state_of(q), (11, 1))
+    states[:, 12:15] += [0.0, -0.3, 0.0] + (2.0 * x - 1.0) * [0.5, 0.0, 0.0]
+    poses = np.tile([place(robot.contact_pose(q, limb)) for limb in range(6)], (11, 1, 1))
+    closed = np.tile(np.arange(6) > 0, (11, 1))
+    rows = BandRows(np.zeros((11, 6), dtype=np.int32), poses, closed, closed, np.zeros(6, dtype=np.int32))
+    band = ElasticBand(world, still=still).relaxed(states, rows)
+    moved = np.abs(band[:, :12] - states[:, :12]).max()
+    assert np.abs(band[:, 12:] - states[:, 12:]).max() > 0.01
+    assert moved == 0.0 if still else moved > 1e-5

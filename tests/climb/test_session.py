@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import wbc.log
+from wbc.climb import machines
 from wbc.climb.folder import PART, read_folder, resumed
 from wbc.climb.grids import cylinder_grid, plane_grid
 from wbc.climb.loop import ClimbLoop, ClimbOutcome
@@ -27,6 +28,7 @@ from wbc.climb.request import (
     request_of,
 )
 from wbc.climb.scene_files import save_scene
+from wbc.climb.search import NoStancesError
 from wbc.climb.session import ClimbDone, ClimbHooks, check_folder, climb, climber_of, scene_of, setup_of
 from wbc.climb.sources import still_to_go
 from wbc.errors import RangeError, ShapeError, UnknownNameError, WbcError
@@ -204,6 +206,27 @@ def test_robots_that_cannot_be_are_refused(tmp_path: pathlib.Path) -> None:
             ClimbRequest(PathRequest(points=("nowhere",)), ClimberRequest("hexapod"), SceneRequest(scene="stairs"))
         )
     assert len(climber_of(ClimberRequest(str(file), limbs=("arm1, arm2",), hold="grip")).limbs) == 2
+
+
+def test_feet_that_only_press_do_not_hold_what_does_not_weigh() -> None:
+    request = ClimbRequest(climber=ClimberRequest("hexapod"), scene=SceneRequest(scene="stairs", gravity=(0, 0, 0)))
+    with pytest.raises(NoStancesError, match=r"not borne.*nothing weighs, and feet that only press"):
+        climb(request)
+
+
+def test_joints_without_a_limit_of_speed_get_one_that_is_said(
+    tmp_path: pathlib.Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As no MJCF file has one; those that are known stay."""
+    leg = '<body pos="{} 0 0"><joint name="j{}" axis="0 1 0"/><geom size="0.1"/><site name="foot{}"/></body>'
+    file = tmp_path / "legs.xml"
+    body = "<freejoint/><geom size='0.1'/>" + leg.format(1, 1, 1) + leg.format(-1, 2, 2)
+    file.write_text(f"<mujoco><worldbody><body>{body}</body></worldbody></mujoco>")
+    limits = climber_of(ClimberRequest(str(file), limbs=("foot1", "foot2"))).robot.limits
+    assert limits.velocity[6:].tolist() == [machines.RATE] * 2
+    assert limits.acceleration[6:].tolist() == [machines.QUICK] * 2
+    assert np.isinf(limits.velocity[:6]).all()
+    assert "at 10 rad/s or m/s at most: j1, j2" in caplog.text
 
 
 def test_what_is_left_of_a_way() -> None:

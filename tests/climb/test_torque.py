@@ -11,7 +11,7 @@ from tests.climb.by_hand import TRIPODS, climber, gait
 from tests.repeats import ALL, MORE, repeats
 from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, Equilibrium, first_stance, plan_climb, scenes
 from wbc.climb.checker import CheckRules, check
-from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions, PlanReference
+from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LimbState, LoopOptions, PlanReference
 from wbc.climb.plants import ClimbPlant, PlantErrors
 from wbc.climb.scene import size_of
 
@@ -31,6 +31,10 @@ def _carried_out(plan: ContactPlan, errors: PlantErrors, most: float = 10.0) -> 
     loop, ratio = ClimbLoop(plan, plant, options=LoopOptions(delay=errors.delay)), 0.0
     while not loop.ended and loop.time < most:
         loop.tick()
+        for move in loop.coming:
+            # What comes after a landing counts on it
+            landing = loop.states[move.limb] in (LimbState.REACHING, LimbState.LATCHING)
+            assert not landing or loop.path_time <= move.land + 1e-9
         forces = plant.contact_forces()
         pressing = forces[:, 0] > 5.0
         if pressing.any():

@@ -58,23 +58,6 @@ def test_rounding_where_the_number_of_ticks_changes_costs_nothing(ticks_to_stop:
     assert bound(d, a, dt, shortest=dt) == pytest.approx(n * a * dt, rel=1e-14)
 
 
-@given(a=accelerations, dt=ticks, x=st.floats(1e-3, 1e4), seed=st.integers(0, 2**32 - 1))
-def test_any_ticks_stop_in_time(a: float, dt: float, x: float, seed: int) -> None:
-    d = x * a * dt**2
-    v = bound(d, a, dt)
-    later = dt * np.random.default_rng(seed).uniform(0.01, 8.0, 100 * enough(v, a, dt))
-    assert stopping_distance(v, a, np.concatenate([[dt], later])) <= d * (1 + 1e-12)
-
-
-@pytest.mark.parametrize("x", [0.01, 1.0, 30.0])
-def test_any_ticks_is_the_largest_speed_for_all_tick_lengths(x: float) -> None:
-    a, dt = 3.0, 0.01
-    d = x * a * dt**2
-    v = bound(d, a, dt) * (1 + 1e-3)
-    fine = np.concatenate([[dt], np.full(int(v / (a * dt * 1e-4)) + 2, dt * 1e-4)])
-    assert stopping_distance(v, a, fine) > d
-
-
 @given(
     a=accelerations, shortest=st.floats(1e-4, 0.02), ratio=st.floats(1.0, 8.0), x=st.floats(1e-2, 1e4),
     seed=st.integers(0, 2**32 - 1),
@@ -100,27 +83,3 @@ def test_ends_of_the_range(shortest: float | None) -> None:
     assert bound(0.01, np.inf, 0.005, shortest) == 2.0
     assert bound(1e300, 1e-300, 0.005, shortest) < np.inf
     assert bound(1e-9, 10.0, 0.005, shortest) == pytest.approx(2e-7, rel=1e-4)
-
-
-def run_to_the_limit(largest_speed: object, a: float, dt: float, start: float) -> tuple[int, float]:
-    """Full speed at a limit ``start`` away: ticks whose bounds cross, and how far the limit is passed."""
-    d, v, crossed, passed = start, 0.0, 0, 0.0
-    for _ in range(2000):
-        upper = largest_speed(d)
-        crossed += upper < v - a * dt - 1e-12
-        v = max(min(v + a * dt, upper), v - a * dt)
-        d -= v * dt
-        passed = max(passed, -d)
-    return crossed, passed
-
-
-def test_textbook_bound_contradicts_itself_and_ours_does_not() -> None:
-    """sqrt(2 a d) is right in continuous time only: at a = 10, dt = 5 ms it runs into the limit."""
-    a, dt = 10.0, 0.005
-    crossed, passed = run_to_the_limit(lambda d: np.sqrt(2 * a * max(d, 0.0)), a, dt, start=0.5)
-    assert crossed > 40
-    assert 4e-3 < passed < 6e-3
-    for shortest in (None, dt):
-        ours = run_to_the_limit(lambda d, s=shortest: bound(max(d, 0.0), a, dt, s), a, dt, start=0.5)
-        assert ours[0] == 0
-        assert ours[1] < 1e-15

@@ -1,4 +1,4 @@
-"""Fixed joints: at rest they stay, moving they brake at the acceleration limit, in accord with JointLimits."""
+"""Fixed joints, in accord with JointLimits, and the rows of FrameVelocityLimit."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from tests.constraints.robots import NAMES, robot
 from tests.evaluation import probe, random_configuration
 from wbc.tasks.base import SacrificeOrder
 from wbc.tasks.fixed import Fixed
+from wbc.tasks.frame_velocity_limit import FrameVelocityLimit
 from wbc.tasks.joint_limits import JointLimits
 
 
@@ -63,3 +64,15 @@ def test_rows_and_order() -> None:
     bot = robot("talos")
     assert tuple(r.label for r in Fixed(bot.joint_names[0]).rows(bot)) == bot.dof_names
     assert Fixed.order == SacrificeOrder.HOLD
+
+
+def test_limits_are_run_time_values_and_rows_are_the_limited_axes() -> None:
+    bot = robot("panda")
+    item = FrameVelocityLimit("panda_hand", linear=(np.inf, 0.2, 0.3), angular=(np.inf, np.inf, 1.0))
+    assert [(r.label, r.unit) for r in item.rows(bot)] == [("y", "m/s"), ("z", "m/s"), ("rz", "rad/s")]
+    assert [(i.name, i.size, i.unit) for i in item.inputs(bot)] == [("linear", 2, "m/s"), ("angular", 1, "rad/s")]
+    full = probe(FrameVelocityLimit("panda_hand", linear=1.0, angular=1.0), bot)(bot.neutral)[0]
+    matrix, _, upper = probe(item, bot)(bot.neutral)
+    assert matrix == pytest.approx(full[[1, 2, 5]])
+    assert upper.tolist() == [0.2, 0.3, 1.0]
+    assert probe(item, bot)(bot.neutral, linear=[0.0, 4.0])[2].tolist() == [0.0, 4.0, 1.0]

@@ -162,24 +162,6 @@ def test_any_limits_and_tick_lengths(seed: int, dt: float, promise: bool, spread
     check(attack(draw(rng, 24), lengths, dt if promise else None, seed))
 
 
-def test_promise_of_equal_ticks_that_is_broken_passes_the_limit() -> None:
-    """Why ``shortest_dt`` is a promise: the bound for 8 ms ticks is too fast when 1 ms ticks follow."""
-    joints = Joints(np.array([-1.0]), np.array([1.0]), np.array([np.inf]), np.array([10.0]))
-    passed = {}
-    for shortest in (None, 0.008):
-        interval = Buffered(joints.interval(shortest))
-        q, v, passed[shortest] = np.zeros(1), np.zeros(1), 0.0
-        for tick in range(4000):
-            # Long ticks up to the limit, short ones where the brake must hold
-            dt = 0.008 if tick < 50 else 0.001
-            _, upper = interval(q, v, dt, 1.0)
-            v = upper.copy()
-            q = q + v * dt
-            passed[shortest] = max(passed[shortest], float(q[0] - 1.0))
-    assert passed[None] <= 1e-15
-    assert passed[0.008] > 1e-3
-
-
 def returning(joints: Joints, start: np.ndarray, speed: np.ndarray, dt: float, rng: np.random.Generator) -> np.ndarray:
     """Violation over time, ticks x joints, under an adversary that pushes outwards half of the time."""
     interval = Buffered(joints.interval(None))

@@ -76,3 +76,9 @@ def test_too_few_rows_are_said_and_nothing_overlaps(caplog: pytest.LogCaptureFix
                 assert np.isfinite(step.margins["self"]).all()
     assert Status.BRAKED in status
     assert caplog.text.count("more pairs push at once than have rows; give them a larger closest") == 1
+
+
+def test_an_item_whose_only_row_is_measured() -> None:
+    bot = panda(8.0)
+    made = Stack(bot, DT).add(Posture()).add(SelfCollision(method="sensed", closest=1, corners=0), name="self")
+    assert made.compile(backend="vm").step(bot.neutral).margins["self"].shape == (1,)

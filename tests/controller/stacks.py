@@ -12,23 +12,12 @@ import wbc
 from tests.constraints.robots import robot as limited_robot
 from tests.evaluation import sample
 from tests.tasks.robots import FRAMES, random_configuration
+from wbc import tasks
 from wbc.api import Controller, Stack
 from wbc.controller import core_of
 from wbc.native import toolchain
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, Sphere
-from wbc.tasks import (
-    CenterOfMass,
-    Damping,
-    Elbow,
-    EndEffector,
-    Fixed,
-    FrameVelocityLimit,
-    Hold,
-    JointLimits,
-    Obstacle,
-    Posture,
-)
 
 DT = 0.005
 NAMES = ("panda", "ur5", "kinova", "talos")
@@ -48,21 +37,23 @@ def everything(name: str, calm: bool = True) -> Stack:
     bot, f = robot(name), FRAMES[name]
     link = next(iter(bot.shapes))
     stack = Stack(bot, DT, calm=calm)
-    stack.add(EndEffector(f.tip), name="hand")
-    stack.add(EndEffector(f.tip, relative_to=f.base, axes="frame", weights=(1, 2, 3, 4, 5, 0)), name="hand_in_base")
-    stack.add(EndEffector(f.tip, kind="position", relative_to=f.base, axes=f.middle), name="hand_place")
-    stack.add(EndEffector(f.tip, kind="orientation", axes=f.base), name="hand_turn", weight=0.3)
-    stack.add(Elbow(f.middle, offset=(0.1, -0.2, 0.05), axes=f.tip), name="elbow")
-    stack.add(CenterOfMass(), name="com")
-    stack.add(Posture(joints=(bot.joint_names[-1], bot.joint_names[0], bot.joint_names[2])), name="posture")
-    stack.add(Damping(weights=range(1, bot.nv + 1)), name="damping", weight=1e-3)
-    stack.add(Hold(f.middle), name="hold")
-    stack.add(Hold(f.tip, kind="orientation"), name="hold_turn")
-    stack.add(FrameVelocityLimit(f.tip, linear=0.5, angular=1.0, axes=f.tip, relative_to=f.base), name="speed")
-    stack.add(Obstacle(Sphere(0.1), margin=0.02), name="ball")
-    stack.add(Obstacle(HalfSpace(), links=link), name="floor")
-    stack.add(JointLimits(margin=1e-3), name="limits")
-    stack.add(Fixed(bot.joint_names[1:3]), name="fixed")
+    stack.add(tasks.EndEffector(f.tip), name="hand")
+    stack.add(
+        tasks.EndEffector(f.tip, relative_to=f.base, axes="frame", weights=(1, 2, 3, 4, 5, 0)), name="hand_in_base"
+    )
+    stack.add(tasks.EndEffector(f.tip, kind="position", relative_to=f.base, axes=f.middle), name="hand_place")
+    stack.add(tasks.EndEffector(f.tip, kind="orientation", axes=f.base), name="hand_turn", weight=0.3)
+    stack.add(tasks.Elbow(f.middle, offset=(0.1, -0.2, 0.05), axes=f.tip), name="elbow")
+    stack.add(tasks.CenterOfMass(), name="com")
+    stack.add(tasks.Posture(joints=(bot.joint_names[-1], bot.joint_names[0], bot.joint_names[2])), name="posture")
+    stack.add(tasks.Damping(weights=range(1, bot.nv + 1)), name="damping", weight=1e-3)
+    stack.add(tasks.Hold(f.middle), name="hold")
+    stack.add(tasks.Hold(f.tip, kind="orientation"), name="hold_turn")
+    stack.add(tasks.FrameVelocityLimit(f.tip, linear=0.5, angular=1.0, axes=f.tip, relative_to=f.base), name="speed")
+    stack.add(tasks.Obstacle(Sphere(0.1), margin=0.02), name="ball")
+    stack.add(tasks.Obstacle(HalfSpace(), links=link), name="floor")
+    stack.add(tasks.JointLimits(margin=1e-3), name="limits")
+    stack.add(tasks.Fixed(bot.joint_names[1:3]), name="fixed")
     return stack
 
 
@@ -74,11 +65,11 @@ def linear(name: str) -> Stack:
 def arm(name: str = "panda", posture: float = 1e-3, obstacle: bool = True, calm: bool = True) -> Stack:
     """A hand, a posture, joint limits and a ball: the usual stack."""
     stack = Stack(robot(name), DT, calm=calm)
-    stack.add(EndEffector(FRAMES[name].tip), name="hand")
-    stack.add(Posture(), name="posture", weight=posture)
-    stack.add(JointLimits(), name="limits")
+    stack.add(tasks.EndEffector(FRAMES[name].tip), name="hand")
+    stack.add(tasks.Posture(), name="posture", weight=posture)
+    stack.add(tasks.JointLimits(), name="limits")
     if obstacle:
-        stack.add(Obstacle(Sphere(0.05)), name="ball")
+        stack.add(tasks.Obstacle(Sphere(0.05)), name="ball")
     return stack
 
 
@@ -86,13 +77,13 @@ def conflicts() -> Stack:
     """A Panda with what can contradict: two holds, a ball, a speed limit, joint limits, a fixed joint."""
     bot, f = robot("panda"), FRAMES["panda"]
     stack = Stack(bot, DT)
-    stack.add(EndEffector(f.tip), name="hand")
-    stack.add(Posture(), name="posture", weight=1e-3)
-    stack.add(JointLimits(), name="limits")
-    stack.add(Hold(f.tip, kind="position"), name="hold")
-    stack.add(Hold(f.middle, kind="position"), name="hold_elbow")
-    stack.add(Obstacle(Sphere(0.05), links=("panda_link5", "panda_link8")), name="ball")
-    stack.add(FrameVelocityLimit(f.tip, linear=0.3), name="speed")
+    stack.add(tasks.EndEffector(f.tip), name="hand")
+    stack.add(tasks.Posture(), name="posture", weight=1e-3)
+    stack.add(tasks.JointLimits(), name="limits")
+    stack.add(tasks.Hold(f.tip, kind="position"), name="hold")
+    stack.add(tasks.Hold(f.middle, kind="position"), name="hold_elbow")
+    stack.add(tasks.Obstacle(Sphere(0.05), links=("panda_link5", "panda_link8")), name="ball")
+    stack.add(tasks.FrameVelocityLimit(f.tip, linear=0.3), name="speed")
     return stack
 
 
@@ -100,13 +91,13 @@ def humanoid(calm: bool = True) -> Stack:
     """Talos: feet held, hands and centre of mass commanded, posture, joint limits."""
     bot = robot("talos")
     stack = Stack(bot, DT, calm=calm)
-    stack.add(Hold("left_sole_link"), name="left_foot")
-    stack.add(Hold("right_sole_link"), name="right_foot")
-    stack.add(EndEffector("gripper_left_base_link"), name="left_hand")
-    stack.add(EndEffector("gripper_right_base_link", kind="position"), name="right_hand")
-    stack.add(CenterOfMass(), name="com")
-    stack.add(Posture(), name="posture", weight=1e-3)
-    stack.add(JointLimits(), name="limits")
+    stack.add(tasks.Hold("left_sole_link"), name="left_foot")
+    stack.add(tasks.Hold("right_sole_link"), name="right_foot")
+    stack.add(tasks.EndEffector("gripper_left_base_link"), name="left_hand")
+    stack.add(tasks.EndEffector("gripper_right_base_link", kind="position"), name="right_hand")
+    stack.add(tasks.CenterOfMass(), name="com")
+    stack.add(tasks.Posture(), name="posture", weight=1e-3)
+    stack.add(tasks.JointLimits(), name="limits")
     return stack
 
 

@@ -180,23 +180,6 @@ def test_rows_that_are_left_out_hold_whatever_the_joints_do(name: str, calm: boo
     assert bound > 20
 
 
-class Halved(Obstacle):
-    """Another formula than that of the class which names the rows."""
-
-    def margins(self, robot: wbc.Robot, kin: Any, inputs: Any) -> Any:
-        return super().margins(robot, kin, inputs) / 2
-
-
-def test_a_class_with_margins_of_its_own_keeps_them() -> None:
-    machine = robot("panda")
-    steps = {}
-    for kind in (Obstacle, Halved):
-        controller = wbc.Stack(machine, DT).add(kind(Sphere(0.1)), name="ball").compile(backend="native")
-        controller["ball"].pose = pin.SE3.Identity()
-        steps[kind] = controller.step(machine.neutral).margins["ball"]
-    assert np.abs(steps[Halved] - steps[Obstacle] / 2).max() < 1e-14
-
-
 def test_other_shapes_are_no_balls() -> None:
     machine = robot("panda")
     boxed = machine.with_shapes({"panda_link5": [PlacedShape(Box((0.1, 0.1, 0.1)), pin.SE3.Identity())]})

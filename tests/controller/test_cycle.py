@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import inspect
 import pickle
 import sys
+import weakref
 from typing import Any
 
 import numpy as np
@@ -12,7 +15,8 @@ import pytest
 
 from tests.backends import COMPILED
 from tests.controller.stacks import DT, everything
-from wbc import Controller, Policy, Stack, WbcError, robots
+from tests.stack import small
+from wbc import Controller, Stack, Step, WbcError, robots
 from wbc.controller import core_of
 from wbc.tasks import EndEffector, Posture
 from wbc.tick import native
@@ -45,13 +49,18 @@ def targets(controller: Controller, rng: np.random.Generator) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", ["panda", "ur5"])
 def test_it_is_what_setting_and_stepping_are(name: str) -> None:
-    """Also with a measured velocity, another dt, what relaxes, resets, and without targets."""
+    """Also with a measured velocity, another dt, what relaxes or is capped, resets, and without targets."""
     together, apart = pair(name)
     rng, q = np.random.default_rng(3), together.stack.robot.neutral
     for controller in (together, apart):
         controller.step(q)
     for k in range(60):
         given = targets(apart, rng) if k % 3 else {}
+        # In any order, also names that were made at run time, with and without some of them
+        names = [rng.permutation(list(given)).tolist(), list(given)[k % 2 :], list(given)][k % 4 % 3]
+        given = {"".join(list(name)): given[name] for name in names}
+        for controller in (together, apart):
+            controller.iteration_cap = 1 if k % 11 == 10 else None
         more = {"v": 0.1 * rng.normal(size=together.stack.robot.nv)} if k % 7 == 6 else {}
         more |= {"dt": 1.5 * DT} if k % 5 == 4 else {}
         step = together.step(q, **more, **given)
@@ -83,16 +92,6 @@ def test_arrays_that_are_not_as_known_are_asked_of_numpy(monkeypatch: pytest.Mon
                 controller.step(bad)
     for alike in (np.repeat(q, 2)[::2], q.astype(">f8"), q.view(np.rec.recarray), list(q)):
         assert known.step(alike)._data == asked.step(alike)._data
-
-
-@pytest.mark.parametrize("solver", ["daqp", "osqp"])
-def test_first_steps_take_targets(solver: str) -> None:
-    together, apart = pair("ur5", solver=solver)
-    q, pose = together.stack.robot.neutral, np.eye(4)
-    pose[:3, 3] = 0.3
-    name = next(n for n in targets_of_poses(together))
-    apart.set(**{name: pose})
-    assert together.step(q, **{name: pose})._data == apart.step(q)._data
 
 
 def targets_of_poses(controller: Controller) -> list[str]:
@@ -129,19 +128,6 @@ def test_what_is_bad_changes_nothing() -> None:
     assert core_of(controller).tick.state.tobytes() == before
 
 
-def test_policies_and_escapes_are_asked() -> None:
-    together, apart = pair("panda")
-    for controller in (together, apart):
-        controller.policy = Policy(escape=True)
-        controller.step(controller.stack.robot.neutral)
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        given = targets(apart, rng)
-        apart.set(**given)
-        q = together.stack.robot.neutral
-        assert together.step(q, **given)._data == apart.step(q)._data
-
-
 @pytest.mark.parametrize("backend", [COMPILED, "vm"])
 @pytest.mark.parametrize(
     ("name", "base", "frame"),
@@ -165,24 +151,6 @@ def test_the_next_configuration_is_that_of_the_robot(name: str, base: str, frame
         assert not step.q_next.flags.writeable
         turned = max(turned, float(np.linalg.norm(step.v[3:6]) * DT))
     assert base != "floating" or turned > 0.5
-
-
-def test_names_are_taken_in_any_order() -> None:
-    """Also names that were made at run time, and turns with and without some of them."""
-    together, apart = pair("panda")
-    rng, q = np.random.default_rng(8), together.stack.robot.neutral
-    together.step(q)
-    apart.step(q)
-    for k in range(20):
-        given = targets(apart, rng)
-        names = [rng.permutation(list(given)).tolist(), list(given)[k % 2 :], list(given)][k % 3]
-        chosen = {"".join(list(name)): given[name] for name in names}
-        for controller in (together, apart):
-            controller.iteration_cap = 1 if k % 4 == 3 else None
-        step = together.step(q, **chosen)
-        apart.set(**chosen)
-        assert step._data == apart.step(q)._data
-        q = step.q_next
 
 
 def test_a_step_keeps_what_its_arrays_show() -> None:
@@ -215,3 +183,34 @@ def test_a_step_keeps_what_its_arrays_show() -> None:
     again = pickle.loads(pickle.dumps(step))
     assert np.array_equal(again.v, step.v)
     assert np.array_equal(again.q_next, step.q_next)
+
+
+def test_step_is_the_method_that_it_stands_for() -> None:
+    """Its name, text and signature; the same bits; and it outlives the name of its controller."""
+    one, other = small.stack().compile(backend="vm"), small.stack().compile(backend="vm")
+    method, step, q = Controller.step, one.step, np.array(small.Q)
+    assert (step.__name__, step.__doc__) == (method.__name__, method.__doc__)
+    assert list(inspect.signature(step).parameters) == list(inspect.signature(method).parameters)[1:]
+    del one
+    gc.collect()
+    for k in range(4):
+        given = {"hand": np.array([0.1 * k, 0.4, 0.0])} if k else {}
+        assert step(q, **given)._data == method(other, q, **given)._data
+    kept = weakref.ref(step.__self__[1].__self__)
+    del step
+    gc.collect()
+    assert kept() is None, "nothing else holds the controller"
+
+
+def test_a_step_of_a_class_made_from_controllers_is_its_own() -> None:
+    class Counting(Controller):
+        count = 0
+
+        def step(self, *given: object, **targets: object) -> Step:
+            self.count += 1
+            return super().step(*given, **targets)
+
+    made = small.stack().compile(backend="vm")
+    other = Counting(made.stack, made._artifact, made.solver, core_of(made).assembly.twin())
+    assert other.step(np.array(small.Q))._data == made.step(np.array(small.Q))._data
+    assert other.count == 1

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from tests.controller.stacks import aim, arm, controller, inside, robot
+from tests.models import placement
 from wbc.api import Controller
 from wbc.controller import Status, core_of
 from wbc.errors import RangeError, SolverError
@@ -26,10 +27,7 @@ def hard(c: Controller, rng: np.random.Generator) -> np.ndarray:
         c["ball"].pose = pin.SE3(np.eye(3), np.array([5.0, 0.0, 0.0]))
         return q
     c["hand"].target = pin.SE3(np.eye(3), rng.uniform(-1.0, 1.0, 3))
-    model = robot("panda").model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    place = data.oMf[model.getFrameId("panda_link5")].translation + np.array([0.0, 0.0, 0.25])
+    place = placement(robot("panda"), "panda_link5", q).translation + np.array([0.0, 0.0, 0.25])
     c["ball"].set(pose=pin.SE3(np.eye(3), place), velocity=np.zeros(6))
     return q
 

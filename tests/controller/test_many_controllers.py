@@ -77,17 +77,6 @@ def test_threads_with_sensors() -> None:
     assert found == wanted
 
 
-def test_threads_that_make_clones_while_others_step() -> None:
-    first = controller("arm", "panda", backend="native")
-    wanted = [work(first.clone(), seed, 50) for seed in range(6)]
-
-    def make_and_work(seed: int) -> list[bytes]:
-        return work(first.clone() if seed % 2 else first.stack.compile(backend="native"), seed, 50)
-
-    with ThreadPoolExecutor(6) as pool:
-        assert list(pool.map(make_and_work, range(6))) == wanted
-
-
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_clone_goes_on_as_its_original_would(backend: str) -> None:
     """After a reset of the solver: that is the one thing that it does not take over."""
@@ -169,15 +158,6 @@ def test_one_controller_in_two_threads_is_an_error() -> None:
     assert found[0]._data == fresh.step(small.Q)._data
     core_of(one).call = call
     assert one.step(small.Q)._data == fresh.step(small.Q)._data
-
-
-def test_a_refused_step_leaves_the_controller_free() -> None:
-    one = small.stack().compile(backend="vm")
-    for bad in ((np.nan, 0.0), (0.0,), "x"):
-        with pytest.raises((ValueError, Exception)) as caught:
-            one.step(bad)
-        assert not isinstance(caught.value, BusyError)
-    assert one.step(small.Q).status == "solved"
 
 
 def test_inputs_may_be_written_while_another_thread_steps() -> None:

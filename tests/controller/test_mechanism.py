@@ -67,25 +67,6 @@ def test_rows_are_there_and_hold(name: str) -> None:
     assert violation(bot, tick.step(q).v) > 1e-4
 
 
-def test_a_platform_drives_round_its_sideways_direction() -> None:
-    """A wish straight to the side: the base turns and drives, and its lateral velocity stays 0 in its own axes."""
-    tick = build("tiago", COMPILED)
-    bot = tick.stack.robot
-    q = bot.neutral.copy()
-    tick.reset(q)
-    tick["posture"].enabled = False
-    goal = tick["hand"].target.copy()
-    goal.translation = goal.translation + np.array([0.0, 0.6, 0.0])
-    tick["hand"].target = goal
-    data, frame = bot.model.createData(), bot.model.getFrameId(TIPS["tiago"])
-    for _ in range(1200):
-        step = tick.step(q)
-        assert abs(step.v[1]) < 1e-9
-        q = pin.integrate(bot.model, q, step.v * DT)
-    pin.framesForwardKinematics(bot.model, data, q)
-    assert data.oMf[frame].translation == pytest.approx(goal.translation, abs=0.02)
-
-
 @pytest.mark.parametrize("backend", [IN_PYTHON, COMPILED])
 def test_a_configuration_that_does_not_fit_is_brought_back(backend: str) -> None:
     bot = wbc.robots.load("talos_full", base="fixed") if backend == IN_PYTHON else coupled_arm()

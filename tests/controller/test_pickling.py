@@ -5,10 +5,8 @@ from __future__ import annotations
 import copy
 import dataclasses
 import pickle
-import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import cloudpickle
@@ -17,7 +15,6 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.controller.stacks import controller, near_limits, randomise
 from tests.items import ITEMS
 from tests.stack import small
 from tests.tasks.robots import robot
@@ -26,9 +23,8 @@ from wbc.errors import PicklingError
 from wbc.robot import Coupling, Robot
 from wbc.shapes import Convex, PlacedShape, Sphere
 from wbc.stack.key import key
-from wbc.tasks import Expression, Item, Limit, Obstacle, Posture
+from wbc.tasks import Expression, Item, Limit, Posture
 
-TOP = Path(__file__).parents[2]
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
 
 
@@ -100,59 +96,11 @@ def test_shapes_stay_read_only() -> None:
 # Steps
 
 
-def states(one: wbc.Controller, seed: int) -> list[bytes]:
-    """Reports of some ticks from a reset at random states and run-time values."""
-    rng = np.random.default_rng(seed)
-    bot = one.stack.robot
-    one.reset(near_limits(bot, rng))
-    randomise(one, rng)
-    return [one.step(near_limits(bot, rng), rng.normal(size=bot.nv))._data for _ in range(8)]
-
-
-@pytest.mark.parametrize("backend", ["vm", "native"])
-def test_an_unpickled_stack_is_in_the_cache_and_gives_the_same_bits(backend: str) -> None:
-    first = controller("arm", "panda", backend=backend)
-    for other in (
-        through_pickle(first.stack),
-        copy.deepcopy(first.stack),
-        cloudpickle.loads(cloudpickle.dumps(first.stack)),
-    ):
-        again = other.compile(backend=backend)
-        assert again.cached
-        assert states(again, 3) == states(first, 3)
-
-
 def test_copies_are_independent() -> None:
     stack = small.stack()
     for other in (through_pickle(stack), copy.deepcopy(stack), copy.copy(stack)):
         other.add(Posture(), name="more")
         assert "more" not in stack
-
-
-CHILD = """
-import pickle, sys
-from tests.controller.test_pickling import states
-stack = pickle.load(sys.stdin.buffer)
-controller = stack.compile(backend="vm")
-sys.stdout.buffer.write(pickle.dumps((controller.cached, states(controller, 5))))
-"""
-
-
-def test_a_stack_crosses_to_a_fresh_process() -> None:
-    """With a lambda in it, whose traced formula is in the key of the cache."""
-    here = small.stack().add(Expression(lambda kin, p: kin.q[0] - 0.3, units="rad"), name="mine").compile(backend="vm")
-    done = subprocess.run(
-        [sys.executable, "-c", CHILD], input=pickle.dumps(here.stack), cwd=TOP, capture_output=True, check=True
-    )
-    assert pickle.loads(done.stdout) == (True, states(here, 5))
-
-
-def test_a_step_crosses_processes() -> None:
-    step = small.stack().compile(backend="vm").step(small.Q)
-    other = through_pickle(step)
-    assert np.array_equal(other.v, step.v)
-    assert other.status == step.status
-    assert str(other.residuals) == str(step.residuals)
 
 
 # Functions
@@ -243,11 +191,3 @@ def test_controllers_stay_in_their_process() -> None:
     for attempt in (pickle.dumps, cloudpickle.dumps, copy.deepcopy, copy.copy):
         with pytest.raises(PicklingError, match=r"pickle controller\.stack"):
             attempt(here)
-
-
-def test_meshes() -> None:
-    """Arrays within items, as large as a user's mesh is."""
-    points = np.random.default_rng(0).normal(size=(200, 3))
-    machine = robot("panda")
-    stack = Stack(machine, 0.005).add(Obstacle([Convex(points), Convex(points + 1.0)]), name="mesh")
-    assert key(through_pickle(stack), "1") == key(stack, "1")

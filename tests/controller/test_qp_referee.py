@@ -1,5 +1,6 @@
-"""The whole QP (H, g, A, bounds, errors, margins) of the linear model against an independent numpy and Pinocchio
-build. What is added to it out of reach is judged by tests/calm."""
+"""The whole QP (H, g, A, bounds, errors, margins) of the linear model against an independent assembly by numpy. What is
+added to it out of reach is judged by tests/calm.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ STATES = 6
 def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:
     """Largest relative difference over random states, targets, rates, weights, masks and switches."""
     tick, rng, worst = controller("linear", name, backend=backend, solver=solver), np.random.default_rng(11), 0.0
-    bot = tick.stack.robot
+    bot, referee = tick.stack.robot, Referee(everything(name))
     for _ in range(states):
         q, v, dt = near_limits(bot, rng), rng.normal(0.0, 1.0, bot.nv), DT * rng.uniform(0.25, 2.0)
         written = randomise(tick, rng)
@@ -24,7 +25,7 @@ def check(name: str, backend: str, states: int, solver: str = "daqp") -> float:
         # the step has moved the last command on: the QP of the step is the one about v
         core_of(tick).tick.v_last[:] = v
         found = tick.qp()
-        wanted = Referee(everything(name), q, v, dt).qp(written)
+        wanted = referee.qp(q, v, dt, written)
         errors = np.concatenate([r.values for r in step.residuals.values()])
         margins = np.concatenate(list(step.margins.values()))
         for a, b in zip((found.H, found.g, found.A, found.lower, found.upper, errors, margins), wanted, strict=True):

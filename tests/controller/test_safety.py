@@ -15,23 +15,10 @@ from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, controller, near_limits, quarrel, robot
 from tests.controller.test_sacrifice import within_actuators
 from tests.models import placement
+from wbc import tasks
 from wbc.api import Stack
 from wbc.controller import Status, Step, core_of
 from wbc.shapes import Capsule, PlacedShape, Sphere
-from wbc.tasks import (
-    Bounds,
-    Constraint,
-    EndEffector,
-    Expression,
-    Input,
-    JointLimits,
-    Obstacle,
-    PitchPlane,
-    Posture,
-    Row,
-    Rows,
-    SacrificeOrder,
-)
 
 BACKENDS = (COMPILED, IN_PYTHON)
 
@@ -85,9 +72,9 @@ def test_degenerate_geometry(backend: str) -> None:
     bot, f = robot("panda"), FRAMES["panda"]
     dot = PlacedShape(Capsule(0.05, 0.0), pin.SE3.Identity())
     bot = bot.with_shapes({"panda_link5": (dot, PlacedShape(Sphere(0.0), pin.SE3.Identity()))})
-    stack = Stack(bot, DT).add(EndEffector(f.tip), name="hand").add(Posture(), name="posture", weight=1e-3)
-    stack.add(PitchPlane("panda_link3", "panda_link3", "panda_link5"), name="plane")
-    stack.add(JointLimits(), name="limits").add(Obstacle(Sphere(0.05)), name="ball")
+    stack = Stack(bot, DT).add(tasks.EndEffector(f.tip), name="hand").add(tasks.Posture(), name="posture", weight=1e-3)
+    stack.add(tasks.PitchPlane("panda_link3", "panda_link3", "panda_link5"), name="plane")
+    stack.add(tasks.JointLimits(), name="limits").add(tasks.Obstacle(Sphere(0.05)), name="ball")
     tick = stack.compile(**way(backend))
     link = placement(bot, "panda_link5", bot.neutral)
     tip = placement(bot, f.tip, bot.neutral)
@@ -102,62 +89,62 @@ def test_degenerate_geometry(backend: str) -> None:
 
 
 @dataclass(frozen=True)
-class Broken(Constraint):
+class Broken(tasks.Constraint):
     """A constraint whose numbers are what its input says: NaN and infinite ones included."""
 
     where: str = "lower"
 
-    def inputs(self, robot: Any) -> tuple[Input, ...]:
-        return (Input("x", default=1.0),)
+    def inputs(self, robot: Any) -> tuple[tasks.Input, ...]:
+        return (tasks.Input("x", default=1.0),)
 
-    def rows(self, robot: Any) -> tuple[Row, ...]:
-        return (Row("row", "rad/s"),)
+    def rows(self, robot: Any) -> tuple[tasks.Row, ...]:
+        return (tasks.Row("row", "rad/s"),)
 
-    def velocity_rows(self, robot: Any, kin: Any, inputs: Any, dt: ca.SX) -> Rows:
+    def velocity_rows(self, robot: Any, kin: Any, inputs: Any, dt: ca.SX) -> tasks.Rows:
         value = ca.sqrt(inputs["x"])  # NaN for x < 0
         matrix = ca.SX(1, robot.nv)
         matrix[0, 2] = value if self.where == "matrix" else 1
         lower = value - 2 if self.where == "lower" else ca.SX(-2)
-        return Rows(matrix, lower, value + 2 if self.where == "upper" else ca.SX(2))
+        return tasks.Rows(matrix, lower, value + 2 if self.where == "upper" else ca.SX(2))
 
 
 @dataclass(frozen=True)
-class BrokenBounds(Constraint):
+class BrokenBounds(tasks.Constraint):
     """Simple bounds [lower, upper] on one joint, NaN where lower > 100."""
 
-    order: ClassVar[SacrificeOrder] = SacrificeOrder.SOFT
+    order: ClassVar[tasks.SacrificeOrder] = tasks.SacrificeOrder.SOFT
 
-    def inputs(self, robot: Any) -> tuple[Input, ...]:
-        return (Input("lower", default=-1.0), Input("upper", default=1.0))
+    def inputs(self, robot: Any) -> tuple[tasks.Input, ...]:
+        return (tasks.Input("lower", default=-1.0), tasks.Input("upper", default=1.0))
 
-    def rows(self, robot: Any) -> tuple[Row, ...]:
-        return tuple(Row(name, "rad/s") for name in robot.dof_names)
+    def rows(self, robot: Any) -> tuple[tasks.Row, ...]:
+        return tuple(tasks.Row(name, "rad/s") for name in robot.dof_names)
 
-    def bounds(self, robot: Any, kin: Any, inputs: Any, dt: ca.SX) -> Bounds:
+    def bounds(self, robot: Any, kin: Any, inputs: Any, dt: ca.SX) -> tasks.Bounds:
         lower, upper = -ca.SX.inf(robot.nv), ca.SX.inf(robot.nv)
         lower[2], upper[2] = inputs["lower"] + 0 * ca.sqrt(100 - inputs["lower"]), inputs["upper"]
-        return Bounds(lower, upper)
+        return tasks.Bounds(lower, upper)
 
 
 @dataclass(frozen=True)
-class BrokenMargin(Constraint):
+class BrokenMargin(tasks.Constraint):
     """h = sqrt(q_3 - x), NaN beyond."""
 
-    def inputs(self, robot: Any) -> tuple[Input, ...]:
-        return (Input("x", default=-3.0),)
+    def inputs(self, robot: Any) -> tuple[tasks.Input, ...]:
+        return (tasks.Input("x", default=-3.0),)
 
-    def rows(self, robot: Any) -> tuple[Row, ...]:
-        return (Row("root", "rad"),)
+    def rows(self, robot: Any) -> tuple[tasks.Row, ...]:
+        return (tasks.Row("root", "rad"),)
 
     def margins(self, robot: Any, kin: Any, inputs: Any) -> ca.SX:
         return ca.sqrt(kin.q[2] - inputs["x"])
 
 
 def fragile(backend: str) -> Any:
-    root = Expression(
-        lambda kin, p: ca.sqrt(kin.joint("panda_joint3") + p["x"]), units="rad", inputs=(Input("x", default=1.0),)
+    root = tasks.Expression(
+        lambda kin, p: ca.sqrt(kin.joint("panda_joint3") + p["x"]), units="rad", inputs=(tasks.Input("x", default=1.0),)
     )
-    stack = Stack(robot("panda"), DT).add(Posture(), name="posture").add(JointLimits(), name="limits")
+    stack = Stack(robot("panda"), DT).add(tasks.Posture(), name="posture").add(tasks.JointLimits(), name="limits")
     stack.add(root, name="root", weight=0.1)
     for where in ("matrix", "lower", "upper"):
         stack.add(Broken(where), name=where)

@@ -11,7 +11,7 @@ from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.softness import Wish, jacobian, optimum
 from tests.controller.stacks import DT, robot
 from wbc.api import Controller, Stack
-from wbc.controller import Status, core_of
+from wbc.controller import Status
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.tasks import AxisAlign, Damping, Elbow, EndEffector, Hold, JointLimits, Posture
 
@@ -91,20 +91,6 @@ def test_a_hand_that_is_asked_for_too_much_goes_straight(backend: str) -> None:
 def test_without_the_option_it_leaves_the_line() -> None:
     beside, _, _ = along_the_line(slow(False).compile(backend=COMPILED))
     assert beside > 0.03, "41 mm when this was written"
-
-
-def test_nothing_changes_where_nothing_limits() -> None:
-    plain, kept = (slow(scaled, calm=False).compile(solver=IN_PYTHON) for scaled in (False, True))
-    q = Q
-    for c in (plain, kept):
-        c.reset(q)
-        c["posture"].weight = 0.0
-        c["hand"].target = jacobian(c.stack.robot, q, TIP)[0] + np.array([0.01, 0.01, 0.0])
-    step = kept.step(q)
-    assert step.v == pytest.approx(plain.step(q).v, abs=1e-5)
-    assert step.scales == {"hand": pytest.approx(1.0, abs=1e-4)}
-    assert core_of(plain).layout.variables == 7
-    assert plain.step(q).scales == {}
 
 
 def test_weights_masks_and_switches_of_the_task_count_for_its_direction(two: Controller) -> None:

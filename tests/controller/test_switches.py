@@ -6,32 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import COMPILED, IN_PYTHON, way
-from tests.controller.stacks import DT, FRAMES, controller, everything, near_limits, randomise, robot
+from tests.backends import IN_PYTHON
+from tests.controller.stacks import DT, controller, everything, near_limits, randomise, robot
 from wbc.api import Stack
-from wbc.tasks import EndEffector, Obstacle, Posture
-
-
-@pytest.mark.parametrize("backend", [IN_PYTHON, COMPILED])
-def test_weights_gains_and_rates_equal_those_declared(backend: str) -> None:
-    """One controller with numbers set at run time, one that was declared with them."""
-    bot, f = robot("panda"), FRAMES["panda"]
-    one, two = Stack(bot, DT), Stack(bot, DT)
-    for stack, w, gain, weights in ((one, 1.0, None, None), (two, 0.25, 3.5, (1, 2, 0, 0.5, 1, 3))):
-        stack.add(EndEffector(f.tip, weights=weights, gain=gain), name="hand", weight=w)
-        stack.add(Posture(), name="posture", weight=1e-3 * w)
-    changed, declared = one.compile(**way(backend)), two.compile(**way(backend))
-    changed["hand"].weight, changed["hand"].gain, changed["posture"].weight = 0.25, 3.5, 0.25e-3
-    changed["hand"].mask = (1, 2, 0, 0.5, 1, 3)
-    target = pin.SE3(pin.exp3(np.array([0.1, 0.2, -0.3])), np.array([0.4, 0.2, 0.6]))
-    rng = np.random.default_rng(0)
-    for each in (changed, declared):
-        each["hand"].target = target
-    for _ in range(10):
-        q = near_limits(bot, rng)
-        for each in (changed, declared):
-            each["posture"].target = bot.neutral
-        assert np.array_equal(changed.step(q).v, declared.step(q).v)
+from wbc.tasks import Obstacle
 
 
 def test_written_values_read_back() -> None:

@@ -19,6 +19,7 @@ import wbc
 from tests.closed_loop.machines import anywhere, near
 from tests.evaluation import numbers, sample
 from tests.items import ITEMS, SWITCHED
+from tests.models import placement
 from tests.repeats import covering
 from tests.tasks.robots import FRAMES, robot
 from wbc.api import Controller
@@ -62,9 +63,8 @@ class Motion:
     def begin(self, q: np.ndarray, goal: np.ndarray) -> None:
         """At rest at q, with the hand and every joint pulled to where they are at a goal."""
         self.controller.reset(q)
-        data, number = self.machine.model.createData(), self.machine.model.getFrameId(FRAMES[self.machine.name].tip)
-        pin.framesForwardKinematics(self.machine.model, data, goal)
-        self.controller["reach"].target, self.controller["rest"].target = data.oMf[number].translation, goal
+        tip = placement(self.machine, FRAMES[self.machine.name].tip, goal)
+        self.controller["reach"].target, self.controller["rest"].target = tip.translation, goal
 
     def tick(self, q: np.ndarray) -> tuple[np.ndarray, Step]:
         """One step, which must be finite and within what the actuators can do, and the configuration after it."""

@@ -92,11 +92,3 @@ def test_configurations_are_of_unit_length() -> None:
     # What its check admits is taken, whichever code checks
     one.set(posture=np.where(np.arange(q.size) == 6, 1.0 + 0.9e-6, q))
     assert numbers(one).tolist() != before.tolist()
-
-
-def test_what_was_set_does_not_follow_the_first_configuration() -> None:
-    one = controller("arm", "panda", backend="native")
-    one.set(hand=POSE)
-    one.step(robot("panda").neutral)
-    np.testing.assert_allclose(one["hand"].target.homogeneous, POSE.homogeneous)
-    np.testing.assert_array_equal(one["posture"].target, robot("panda").neutral)

@@ -8,6 +8,7 @@ import pytest
 
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, robot
+from tests.models import placement
 from tests.soak.both import feasible
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -35,10 +36,7 @@ def hand(level: int | None, scaled: bool = True) -> Stack:
 
 def reached(q: np.ndarray, frame: str = TIP) -> pin.SE3:
     """Pose of a frame."""
-    model = robot("panda").model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    return data.oMf[model.getFrameId(frame)]
+    return placement(robot("panda"), frame, q)
 
 
 def anywhere(rng: np.random.Generator, share: float = 0.0) -> np.ndarray:
@@ -159,13 +157,3 @@ def test_many_soft_rows_at_once(backend: str) -> None:
             assert step.v == pytest.approx(found.solution.x[:7], abs=step.certificate.error_bound + 1e-9)
         given = max(given, len(step.relaxed))
     assert given > 20
-
-
-def test_the_virtual_machine_raises_nothing_whatever_the_weights() -> None:
-    controller, rng, statuses = wild(1, IN_PYTHON), np.random.default_rng(0), []
-    for _ in range(50):
-        provoke(controller, rng)
-        statuses.append(
-            controller.step(core_of(controller).tick.q.copy(), core_of(controller).tick.v_last[:7].copy()).status
-        )
-    assert statuses.count(Status.SOLVED) > 40

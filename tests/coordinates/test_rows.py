@@ -149,6 +149,22 @@ def test_what_has_no_integral_is_told_its_drift() -> None:
     assert expressions.rate_only(ROBOT, part).tolist() == [False] * 3 + [True] * 2
 
 
+def test_values_of_a_set_are_distances_from_it() -> None:
+    place, axis = (1.0, 0.0, 1.0), (0.0, 1.0, 2.0)
+    for x in np.random.default_rng(0).normal(size=(5, 3)):
+        off = x - place
+        height = off @ axis / np.sqrt(5.0)
+        aside, far = np.sqrt(off @ off - height**2), np.linalg.norm(off)
+        for point_set, expected in (
+            (OnPlane(place, axis), [height]),
+            (OnSphere(place, 2.0), [far - 2.0]),
+            (OnCylinder(place, axis, 2.0), [aside - 2.0]),
+            (OnCircle(place, axis, 2.0), [height, far - 2.0]),
+        ):
+            assert ca.DM(point_set.values(ca.SX(x))).full()[:, 0] == pytest.approx(expected)
+        assert np.linalg.norm(ca.DM(OnLine(place, axis).values(ca.SX(x))).full()) == pytest.approx(aside)
+
+
 def test_three_points_stand_for_a_pose() -> None:
     """sum |v + w x d_i|^2 = e'We with W's published eigenvalues at d = 1, whatever the axes of the rows."""
     one = np.ones(3)

@@ -1,4 +1,4 @@
-"""Exports compile as strict C99, give Python's commands, and never touch the heap in a step."""
+"""Exports compile as strict C99 without a warning, give Python's commands, and never touch the heap in a step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.export.cases import CASES, STRICT, TRAP, WRAP, exported, run
+import wbc
+from tests.export.cases import CASES, STRICT, TRAP, WRAP, build, exported, run
+from tests.repeats import ALL, MORE
+from tests.stack import small
+from wbc.tasks import EndEffector, JointLimits, Posture
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -68,3 +72,41 @@ def test_there_is_no_global_state_and_no_name_but_ours(name: str, root: Path) ->
     assert all(symbol.startswith("wbc_") for kind, symbol in kinds if kind.isupper())
     solver = run("nm", "daqp/libdaqp.a", folder=folder).stdout
     assert not re.findall(r"^[0-9a-f]+ [bBdDcC] (\S+)$", solver, re.MULTILINE)
+
+
+#: Warnings of unset variables need some optimisation; more of it takes twice as long
+QUICK = "-O2" if MORE >= ALL else "-O1"
+
+
+def made(kind: str) -> wbc.Stack:
+    stack = wbc.Stack(small.arm(), dt=0.01, calm=kind != "linear")
+    if kind == "only rows":
+        stack.add(wbc.tasks.FrameVelocityLimit("tip", linear=0.5), name="speed")
+    elif kind == "only bounds":
+        stack.add(JointLimits(), name="limits")
+    elif kind == "only a posture":
+        stack.add(Posture(), name="posture")
+    else:
+        stack.add(EndEffector("tip", kind="position"), name="hand")
+        stack.add(Posture(), name="posture")
+    return stack
+
+
+@pytest.mark.parametrize(
+    ("kind", "flags"),
+    [
+        ("only rows", QUICK),
+        ("only bounds", QUICK),
+        ("only a posture", QUICK),
+        ("linear", QUICK),
+        ("curved", "-O2"),
+    ],
+)
+def test_parts_that_are_missing_leave_no_warning(kind: str, flags: str, tmp_path: Path) -> None:
+    c = made(kind).compile(backend="vm")
+    c.reset(small.Q)
+    folder = c.export(tmp_path / "out", states=20)
+    build(folder, f"TICK_FLAGS={flags}")
+    done = run("make", "run", f"CFLAGS={' '.join(STRICT)}", folder=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " 0 differ" in done.stdout

@@ -133,6 +133,52 @@ def state(**positions: Any) -> dict[str, Any]:
     return {"joints": [{"name": name, "position": value} for name, value in positions.items()]}
 
 
+def stated(time: float, **positions: Any) -> dict[str, Any]:
+    return state(**positions) | {"timestamp": {"sec": int(time), "nsec": round(time % 1 * NANO)}}
+
+
+PLACED = {"parent_frame_id": "m", "child_frame_id": "c", "translation": dict.fromkeys("xyz", 0.0)}
+PLACED |= {"rotation": dict.fromkeys("xyz", 0.0) | {"w": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("times", "t", "remark"),
+    [
+        ([0, 1, 2], [0, 1, 2], ""),  # a simulation, whose first message says 0
+        ([1, 2, 0], [0, 1, 2], "s: time goes back, by 2 s at most"),
+        ([1, 1, 2], [0, 1], "several states at one time, of which the last is taken: a"),
+        ([50, 51, 52], [50, 51, 52], "s begins 48 s after c c ends: are they of one clock?"),
+    ],
+)
+def test_times_that_are_odd_are_said(times: list[float], t: list[float], remark: str, tmp_path: Path) -> None:
+    joints = ("foxglove.JointStates", [stated(time, a=k) for k, time in enumerate(times)])
+    other = {"c": ("foxglove.FrameTransform", [PLACED] * 3)} if remark.startswith("s begins") else {}
+    motion = read_motion(foxglove(tmp_path / "x.mcap", {"s": joints, **other}))
+    assert motion.t.tolist() == t
+    assert [said[: len(remark)] for said in motion.remarks] == [remark] * bool(remark)
+
+
+def test_a_message_that_is_none_is_named(tmp_path: Path) -> None:
+    file = foxglove(tmp_path / "x.mcap", {"s": ("foxglove.JointStates", [state(a=0.0), {}])})
+    assert_refused(lambda: read_motion(file), FormatError, "s: is no foxglove.JointStates")
+
+
+def test_a_file_cut_anywhere_gives_its_whole_chunks(tmp_path: Path) -> None:
+    """As a killed recorder leaves it: every cut is read, or refused as one without messages."""
+    whole = foxglove(tmp_path / "x.mcap", {"s": ("foxglove.JointStates", [state(a=float(k)) for k in range(3)])})
+    data, counts, reasons = whole.read_bytes(), list[int](), list[str]()
+    for size in range(8, len(data)):
+        whole.write_bytes(data[:size])
+        try:
+            counts.append(len(read_motion(whole).t))
+        except FormatError as error:
+            reasons.append(str(error))
+            counts.append(0)
+    assert counts == sorted(counts)
+    assert counts[-1] == 3
+    assert all("has neither" in reason for reason in reasons)
+
+
 def test_what_is_no_motion_is_refused(tmp_path: Path) -> None:
     def read(**topics: Any) -> RecordedMotion:
         return read_motion(foxglove(tmp_path / "x.mcap", topics))
@@ -171,11 +217,11 @@ MOVED = {"translation": dict.fromkeys("xyz", 0.0), "rotation": {"x": 0.0, "y": 0
     ("message", "reason"),
     [
         ("{", "JSONDecodeError"),
-        ("[]", "cannot be read"),
+        ("[]", "is no foxglove.JointStates"),
         ("{}", "no attribute 'joints'"),
         ('{"joints": []}', "neither joint states"),
         ('{"joints": [{"name": null, "position": 1}]}', "no name"),
-        ('{"joints": [{"name": "a", "position": "far"}]}', "cannot be read"),
+        ('{"joints": [{"name": "a", "position": "far"}]}', "could not convert string"),
         ('{"joints": [{"name": "a", "position": 1}, {"name": "a", "position": 2}]}', "two states"),
         ('{"timestamp": {"sec": 1e400, "nsec": 0}, "joints": [{"name": "a", "position": 1}]}', "timestamp"),
         ([MOVED | {"parent_frame_id": name, "child_frame_id": "b"} for name in "ac"], "second parent of 'b'"),

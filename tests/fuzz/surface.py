@@ -107,7 +107,8 @@ def _of_subject(goods: Goods, subject: str) -> Iterator[Callee]:
     for name in dir(value):
         if name.startswith("_") or name in INTERNAL:
             continue
-        static = inspect.getattr_static(value, name, None)
+        # A controller has the C of its step in place of the method
+        static = inspect.getattr_static(kind, name, inspect.getattr_static(value, name, None))
         if isinstance(static, property) and static.fset is None:
             continue
         if inspect.isfunction(static) or isinstance(static, classmethod | staticmethod):

@@ -84,13 +84,6 @@ def flange(q: Array) -> Array:
     return half @ np.asarray(tip(arm("ur5"), q, "tool0").homogeneous)
 
 
-def test_the_closed_form_is_of_this_robot() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        q = rng.uniform(-np.pi, np.pi, 6)
-        np.testing.assert_allclose(forward(q), flange(q), atol=1e-6)
-
-
 def test_all_branches_of_the_ur5_are_found() -> None:
     robot, rng, ik, counts = arm("ur5"), np.random.default_rng(1), solver("ur5"), []
     for _ in range(repeats(5)):

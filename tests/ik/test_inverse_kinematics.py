@@ -87,21 +87,6 @@ def test_the_tolerance_is_kept() -> None:
         assert ik.solve(robot.neutral, budget=None, tolerance=tolerance).error <= tolerance
 
 
-def test_the_virtual_machine_gives_the_same_answers() -> None:
-    robot, rng = arm("panda"), np.random.default_rng(8)
-    for _ in range(4):
-        answers = []
-        goal = tip(robot, random_q(robot, rng), TIPS["panda"])
-        for backend in ("native", "vm"):
-            ik = solver("panda", backend)
-            assert ik.backend == backend
-            ik["hand"].target = goal
-            answers.append(ik.solve(robot.neutral, budget=None))
-        assert answers[0].ticks == answers[1].ticks
-        assert answers[0].descents == answers[1].descents
-        np.testing.assert_allclose(answers[0].q, answers[1].q, atol=1e-8)
-
-
 def test_one_seed_gives_one_answer() -> None:
     robot, ik = arm("panda"), solver()
     found = {}

@@ -88,20 +88,6 @@ def test_redundant_levels_change_nothing() -> None:
     assert (twice.levels[1].share <= 1e-12).all()
 
 
-def test_a_contradicting_level_gives_way_whole() -> None:
-    rows = np.array([[1.0, 2.0, 0.5]])
-    found = answer([level(rows, np.array([0.4])), level(rows, np.array([-5.0]))])
-    assert float(rows[0] @ found.x) == pytest.approx(0.4, abs=1e-12)
-
-
-def test_weights_of_a_level_count_only_beside_each_other() -> None:
-    rng = np.random.default_rng(1)
-    rows, b = rng.normal(size=(4, 3)), rng.normal(size=4)
-    weight = np.array([1.0, 0.5, 0.1, 1e-3])
-    wanted = np.linalg.lstsq(np.sqrt(weight)[:, None] * rows, np.sqrt(weight) * b, rcond=None)[0]
-    assert np.abs(answer([level(rows, b, weight)]).x - wanted).max() <= 1e-12
-
-
 def test_no_damping_away_from_rank_loss_and_a_price_near_it() -> None:
     b = np.array([1.0, 0.5])
     for sigma, exact in ((1.0, True), (ONSET, True), (1e-3, False), (1e-5, False)):

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import NAMED, random_linkage
+from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors
 from tests.repeats import covering, repeats
 from wbc.errors import RangeError
 from wbc.robot import Robot
@@ -63,6 +63,33 @@ def test_no_tick_gives_way(command: str, acceleration: float, room: float, seed:
         assert np.abs(change).max() <= acceleration * DT * (1.0 + 1e-9)
         speeds.append(np.abs(step.v).max())
     assert max(speeds) > 0.1, "nothing moved"
+
+
+#: A delta at 2e-3 rad from its dead point
+STRETCHED = (
+    (-0.232703544986, 0.000379579776, 0.162257463238, 0.738189961128, -0.235519671012, 0.043515018359)
+    + (-0.370371168085, 0.897475417822, -1.912754444782, -0.198422051658, 0.841120044341, 0.495772246058)
+    + (0.085765030535, -1.910059474211, -0.4349964297, -0.660919075523, 0.309434730459, -0.527460168491)
+)
+
+
+@pytest.mark.parametrize("command", ["acceleration", "torque"])
+def test_a_linkage_at_rest_next_to_its_dead_point_sets_off_as_slowly_as_loops_stay_closed(command: str) -> None:
+    """The first tick may lead beyond the dead point where limits of acceleration are wide."""
+    text = with_motors(NAMED["delta"], MOTORS["delta"])
+    robot = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=200.0)
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, q = stack.compile(command=command, backend="vm"), robot.closed(STRETCHED)
+    assert robot.dead_points(q, within=1.0)[0].distance < 3e-3
+    for seed in range(6):
+        controller.reset(q)
+        change = 3.0 * np.random.default_rng(seed).normal(size=robot.nv)
+        controller["posture"].target = pin.integrate(robot.model, q, change)
+        step = controller.step(q, np.zeros(robot.nv))
+        assert step.status == "solved"
+        assert max(robot.loop_gaps(step.q_next).values()) < 1e-9
+        assert np.abs(step.a).max() <= 200.0 * (1.0 + 1e-9)
+        assert np.abs(step.v).max() > 0.05, "nothing moved"
 
 
 def test_a_dead_point_is_named_from_afar() -> None:

@@ -15,7 +15,6 @@ import wbc.robots
 from wbc.multibody import PINOCCHIO, pin
 
 FILE = Path(__file__).parent / "answers.npz"
-KEYS = ("q", "v", "poses", "twist", "moments", "masses", "bias", "gravity")
 
 
 def summary(algebra: Any, model: Any, q: np.ndarray, v: np.ndarray) -> dict[str, np.ndarray]:

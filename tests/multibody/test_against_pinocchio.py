@@ -188,8 +188,6 @@ CHANGES: dict[str, Callable[[np.random.Generator, str], str]] = {
     ),
     "extra": lambda rng, text: replaced(rng, text, r"(?=<axis)", str(rng.choice(EXTRAS))),
 }
-ELEMENTS = "mass|inertia|origin|axis|limit|parent|child|mimic"
-TYPES = ("fixed", "screw", "", "planar")
 VERSIONS = ("1.0", "1.1", "1.2", "1.3", "2.0", "1", "", "x.y", "+1.0", "01.0", "1.02", "1.0a", "-1.0")
 EXTRAS = (
     "<dynamics/>", '<dynamics damping="1"/>', '<dynamics damping="y"/>', "<safety_controller/>",

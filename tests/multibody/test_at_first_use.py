@@ -1,4 +1,4 @@
-"""Pinocchio is imported when something of it is asked for, and not by a program that reads, declares and ticks."""
+"""What is imported: Pinocchio when something of it is asked for, and no module that only Unix has."""
 
 from __future__ import annotations
 
@@ -95,3 +95,32 @@ def test_a_placement_is_handed_out_as_pinocchios() -> None:
         assert isinstance(placed.placement, pin.SE3)
         np.testing.assert_array_equal(placed.placement.homogeneous, pose.homogeneous)
         assert isinstance(pickle.loads(pickle.dumps(placed)).place, own.SE3)
+
+
+#: Windows has msvcrt, whose locks do nothing here; numpy and casadi are imported as on this platform
+PROGRAM = """
+import sys, types
+import casadi, ctypes, multiprocessing, numpy, os, platformdirs, scipy, subprocess, tempfile
+for name in ("fcntl", "grp", "pwd", "resource", "termios", "tty"):
+    sys.modules[name] = None
+for name in ("fork", "getuid", "register_at_fork", "sched_getaffinity", "sched_setscheduler", "statvfs"):
+    vars(os).pop(name)
+sys.modules["msvcrt"] = types.SimpleNamespace(locking=lambda *_: None, LK_LOCK=1, LK_NBLCK=2, LK_UNLCK=0)
+sys.platform = "win32"
+import importlib, pkgutil
+import wbc
+for part in ("api", "ik", "log", "record", "replaying", "robot", "simulation", "study", "terminal", "tasks"):
+    package = importlib.import_module(f"wbc.{part}")
+    for module in pkgutil.walk_packages(getattr(package, "__path__", []), f"wbc.{part}."):
+        importlib.import_module(module.name)
+robot = wbc.robots.load("panda")
+stack = wbc.Stack(robot, dt=0.005)
+stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
+print(robot.pose(robot.neutral, "panda_hand_tcp").translation.round(6))
+"""
+
+
+def test_the_core_imports_and_loads_without_unix() -> None:
+    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.strip()

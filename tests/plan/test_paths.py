@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -180,3 +182,16 @@ def test_an_edge_that_is_proven_is_clear_by_coal(seed: int) -> None:
             missed += min(margins) > 1e-3
     assert proven > 20
     assert missed == 0
+
+
+def test_what_a_coordinate_does_for_nothing_is_left_out() -> None:
+    """A round base turns to and fro while it drives closely around a wall."""
+    stack = wbc.Stack(base_with_a_body(), dt=0.01)
+    stack.add(wbc.tasks.Obstacle(Box((1.0, 2.0, 1.0)), pose=at(1.5, 0.0, 0.5)), name="wall")
+    planner = stack.planner()
+    native = planner.native(stack.robot.neutral)
+    points = np.array([[0.0, 0.0, 0.0], [0.6, 1.31, 0.8], [2.4, 1.31, -0.8], [3.0, 0.0, 0.0]])
+    assert all(native.edge(x, y) for x, y in pairwise(points))
+    shortened = native.shortened(points, cuts=0, rounds=1)
+    np.testing.assert_array_equal(shortened[:, 2], 0.0)
+    assert all(native.edge(x, y) for x, y in pairwise(shortened))

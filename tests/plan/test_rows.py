@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -122,6 +124,24 @@ def test_fingers_that_mimic_follow() -> None:
     np.testing.assert_allclose(
         path.q[:, index[c.follower]], c.ratio * path.q[:, index[c.leader]] + c.offset, atol=1e-12
     )
+    goal[index[c.follower]] += 0.002
+    for what, start, end in (("goal", robot.neutral, goal), ("q0", goal, robot.neutral)):
+        with pytest.raises(InfeasibleError, match=rf"{what}: panda_finger_joint2 follows .*joint1 and is 0.002 m from"):
+            stack.plan(start, end)
+
+
+@pytest.mark.filterwarnings("error:divide")
+def test_a_follower_that_stands_still_limits_nothing(tmp_path: Path) -> None:
+    joints = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>'
+        f'<axis xyz="0 0 1"/><limit lower="0" upper="1" velocity="1" effort="1"/>{mimic}</joint>'
+        for k, parent, mimic in ((0, "base", ""), (1, "l0", '<mimic joint="j0" multiplier="0"/>'))
+    )
+    file = tmp_path / "two.urdf"
+    file.write_text(f'<robot name="two"><link name="base"/>{joints}</robot>')
+    stack = wbc.Stack(wbc.robots.load(file), dt=0.01)
+    stack.add(wbc.tasks.JointLimits())
+    assert stack.plan(np.zeros(2), np.array([0.5, 0.0])).q[-1].tolist() == [0.5, 0.0]
 
 
 def test_without_a_compiler_rows_run_on_the_virtual_machine(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from tests.evaluation import random_configuration
 from tests.models import spherical_seven
-from tests.proximity.world import NAMES, SHAPES, Referee, all_pairs, place, robot, sensor
+from tests.proximity.world import NAMES, Referee, all_pairs, place, robot, sensor
 from wbc.proximity import Body, distances, witnesses
 from wbc.shapes import Box, Capsule, Convex, Cylinder, Shape, Sphere
 
@@ -30,30 +28,6 @@ def reach(shape: Shape, pose: pin.SE3, direction: np.ndarray) -> np.ndarray:
         assert isinstance(shape, (Sphere, Capsule))
         own = shape.radius + (shape.length / 2 * np.abs(n[:, 2]) if isinstance(shape, Capsule) else 0.0)
     return np.asarray(own + direction @ pose.translation)
-
-
-def deepest(first: Shape, second: Shape, poses: tuple[pin.SE3, pin.SE3], start: np.ndarray) -> float:
-    """The largest clearance -h_A(n) - h_B(-n) over all n, by search: it is the signed distance of convex shapes."""
-    rng = np.random.default_rng(0)
-
-    def clear(n: np.ndarray) -> np.ndarray:
-        return -reach(first, poses[0], n) - reach(second, poses[1], -n)
-
-    axes = [*poses[0].rotation.T, *poses[1].rotation.T]
-    crossed = [np.cross(a, b) for a in axes[:3] for b in axes[3:]]
-    tries = np.vstack([rng.normal(size=(600, 3)), start, *axes, *(c for c in crossed if c @ c > 1e-12)])
-    tries = np.vstack([tries, -tries]) / np.linalg.norm(np.vstack([tries, tries]), axis=1)[:, None]
-    values = clear(tries)
-    best, value, step = tries[values.argmax()], values.max(), 0.1
-    while step > 1e-7:
-        near = best + step * rng.normal(size=(24, 3))
-        near /= np.linalg.norm(near, axis=1)[:, None]
-        values = clear(near)
-        if values.max() > value:
-            best, value = near[values.argmax()], values.max()
-        else:
-            step *= 0.6
-    return float(value)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -82,35 +56,6 @@ def test_every_pair_is_as_coal_says(name: str) -> None:
         assert not numbers["drift"].any()
     assert overlapping > 10, "overlapping pairs are among the tests"
     assert sensing.pairs()[3][:2] == (pairs[3][0].name, pairs[3][1].name)
-
-
-@pytest.mark.parametrize("first", SHAPES, ids=lambda s: type(s).__name__)
-def test_signed_distances_are_those_of_support_functions(first: Shape) -> None:
-    """Random places, and places on a grid with aligned axes, where closed forms and EPA fail."""
-    bot, rng = spherical_seven(), np.random.default_rng(3)
-    q, grid = bot.neutral, [-0.1, -0.05, 0.0, 0.0, 0.05, 0.1]
-    doubtful = 0
-    for second, case in itertools.product(SHAPES, range(5)):
-        poses = (place(rng), place(rng))
-        if case % 2:
-            turns = (QUARTERS[rng.integers(9)], QUARTERS[rng.integers(9)])
-            poses = (pin.SE3(turns[0], rng.choice(grid, 3)), pin.SE3(turns[1], rng.choice(grid, 3)))
-        if case in (3, 6, 9):
-            onto_axis = poses[0].translation + rng.choice(grid) * poses[0].rotation[:, 2]
-            poses = (poses[0], pin.SE3(poses[1].rotation, onto_axis))
-        a, b = Body("a", "world", poses[0], first), Body("b", "world", poses[1], second)
-        there, back = witnesses(bot, [(a, b), (b, a)], q)
-        truth = deepest(first, second, poses, there.normal)
-        for witness, sign in ((there, 1.0), (back, -1.0)):
-            assert witness.distance == pytest.approx(truth, abs=1.2e-5)
-            proof = -reach(first, poses[0], sign * witness.normal[None]) - reach(
-                second, poses[1], -sign * witness.normal[None]
-            )
-            assert witness.distance == pytest.approx(float(proof[0]), abs=1.2e-5)
-            gap = witness.on_second - witness.on_first
-            assert gap == pytest.approx(witness.distance * witness.normal, abs=1e-9)
-            doubtful += witness.doubtful
-    assert first != SHAPES[1] or doubtful > 5, "places without a normal are among the tests"
 
 
 def test_centres_on_each_other_have_declared_normals() -> None:

@@ -56,7 +56,8 @@ def test_what_has_no_row_is_found_where_it_needs_one(name: str, limited: bool) -
         over = -rows @ v - allowed(h, drift, weighed)
         without = np.ones(len(pairs), dtype=bool)
         without[sensing._sensing.pairs] = False
-        worst, urgent = sensing.missing(v, DT, braking), np.array(sensing._sensing.urgent)
+        screws = pin.computeJointJacobians(bot.model, bot.model.createData(), q).T
+        worst, urgent = sensing.missing(screws, v, DT, braking), np.array(sensing._sensing.urgent)
         assert (worst >= TOO_MUCH) == bool((over[without] > 1e-8).any())
         clear = np.abs(over) > 1e-6
         assert (urgent[without & clear & (over > 0.0)] == ALL).all()
@@ -74,8 +75,8 @@ def test_a_sensor_that_measured_nothing_or_has_all_pairs_misses_none() -> None:
     bot, rng = robot("panda"), np.random.default_rng(23)
     pairs, pose = all_pairs(bot, rng), place(rng, 0.4)
     sensing = PairSensor(bot, pairs, 3, numbers_of(bot, 3, pose, np.zeros(6)))
-    v, braking = np.full(bot.nv, 2.0), np.full(bot.nv, np.inf)
-    assert sensing.missing(v, DT, braking) == LITTLE
+    screws, v, braking = np.ones((bot.nv, 6)), np.full(bot.nv, 2.0), np.full(bot.nv, np.inf)
+    assert sensing.missing(screws, v, DT, braking) == LITTLE
     everything = PairSensor(bot, pairs, len(pairs), numbers_of(bot, len(pairs), pose, np.zeros(6)))
     everything.sense(bot.neutral)
-    assert everything.missing(v, DT, braking) == LITTLE
+    assert everything.missing(screws, v, DT, braking) == LITTLE

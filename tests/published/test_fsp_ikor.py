@@ -21,7 +21,7 @@ from PIL import Image
 
 import wbc
 import wbc.published.ikor.driver
-from wbc.errors import InfeasibleError, RangeError, UnknownNameError, WbcError
+from wbc.errors import RangeError, UnknownNameError, WbcError
 from wbc.published.ikor import (
     Code,
     CourseRun,
@@ -45,11 +45,10 @@ from wbc.published.ikor import (
     without_platform,
 )
 from wbc.published.ikor.avoidance import gaps
-from wbc.published.ikor.cases import BETWEEN, unmatched
-from wbc.published.ikor.legacy import legacy_hermies
+from wbc.published.ikor.cases import unmatched
 from wbc.published.ikor.lines import euler_angles, rotation_of
 from wbc.published.ikor.settings import AXES
-from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal, parametric
+from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal
 from wbc.teleop import Order
 
 #: Published runs that several tests look at
@@ -78,19 +77,6 @@ def test_1_tool_at_home() -> None:
     np.testing.assert_allclose(np.degrees(euler_angles(rotation)), [90, 0, -90], atol=1e-9)
     sigma = np.linalg.svd(hermies().jacobian(hermies().home)[:3], compute_uv=False)
     np.testing.assert_allclose(sigma, [1.404214, 1.298916, 0.495305], atol=1e-6)
-
-
-def test_2_jacobian() -> None:
-    J = [
-        [0.359593, -0.632706, -0.063577, -0.079430, -0.081451, -0.136957, 0.0],
-        [-0.462125, -0.111563, 0.770102, -0.131177, -0.043320, 0.345650, 0.0],
-        [0.0, -0.517547, -0.041059, -0.809011, -0.308670, -0.012370, 0.0],
-        [0.0, 0.173648, -0.492404, -0.128522, -0.128522, -0.252828, -0.894725],
-        [0.0, -0.984808, -0.086824, -0.976851, -0.976851, -0.134467, -0.344340],
-        [1.0, 0.0, -0.866025, 0.171010, 0.171010, -0.958121, 0.284425],
-    ]
-    np.testing.assert_allclose(hermies().place(BENT)[0], [-0.462125, -0.359593, 0.642466], atol=1e-6)
-    np.testing.assert_allclose(hermies().jacobian(BENT), J, atol=1e-6)
 
 
 def formula(q: np.ndarray) -> np.ndarray:
@@ -165,22 +151,6 @@ def test_3_printed_norms(trajectory: str, config: str, count: int) -> None:
     assert as_printed.stop is consistent.stop is Stop.DONE
 
 
-@pytest.mark.parametrize(
-    ("trajectory", "config", "first", "last"),
-    [
-        ("1", "3x7", 0.103820, 0.311383),
-        ("1", "3x10", 0.055882, 0.105140),
-        ("3", "3x7", 0.208086, 0.489083),
-        ("3", "3x10", 0.065670, 0.091494),
-    ],
-)
-def test_3_first_and_last_printed_norm(trajectory: str, config: str, first: float, last: float) -> None:
-    found = once(trajectory, config).norms
-    assert found[0] == pytest.approx(first, rel=1e-3)
-    assert found[-1] == pytest.approx(last, rel=1e-3)
-    assert printed()[trajectory, config].fsp[0] == first
-
-
 @pytest.mark.parametrize("config", ["3x7", "3x10"])
 def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
     """Printed: to 1e-5 of the norms; here the steps to 1e-9."""
@@ -216,18 +186,6 @@ def test_3_all_printed_norms(trajectory: str, config: str, count: int, median: f
     assert Counter(row[-1] for row in unmatched(run, trajectory, config)) == differ
 
 
-def test_3_other_whole_degrees_do_not_give_the_norms() -> None:
-    """A degree off in any joint that moves the tool is ten times the noise floor."""
-    for joint in range(1, 6):
-        steps, first, last, _ = BETWEEN["2"]
-        start = np.radians(first)
-        start[joint] += math.radians(1.0)
-        machine = legacy_hermies()
-        way = machine.place(np.radians(last))[0] - machine.place(start)[0]
-        run = Driver(machine, Settings(Method.PSEUDO_INVERSE)).run(straight(machine, way / steps, steps, start))
-        assert rms(differences(run, "2", "3x7")) > 2e-3
-
-
 def test_5_four_vectors_where_six_joints_act() -> None:
     machine = hermies()
     for make in (blocked, orthogonal):
@@ -240,15 +198,6 @@ def test_5_four_vectors_where_six_joints_act() -> None:
         np.testing.assert_allclose(J @ space.at(t - 0.25), 0.0, atol=1e-12)
         other = best(space, rows=[joint_row("joint 2", 1, 7, 0.3)]).v
         assert space.coordinates(other)[1] < 1e-12
-
-
-def test_6_least_norm_in_one_shot() -> None:
-    """The extraction lists no numbers 6 and 9: here least norm, and the second step."""
-    J = hermies().jacobian(BENT)[:3]
-    for make in (blocked, orthogonal):
-        space = make(J, [0.01, 0.0, 0.0])
-        for v in (best(space).v, space.at(parametric(space))):
-            np.testing.assert_allclose(v, np.linalg.pinv(J) @ [0.01, 0.0, 0.0], atol=1e-12)
 
 
 def test_7_joint_limit_in_one_shot() -> None:
@@ -285,61 +234,6 @@ def test_8_obstacle_in_one_shot_and_10_as_an_inequality() -> None:
     np.testing.assert_allclose(home_step(Settings(Method.OBSTACLES, resolver="stack")), wanted, atol=1e-5)
     far = [(-0.40, -0.356, 0.40, 0.08)]
     np.testing.assert_allclose(home_step(Settings(Method.OBSTACLES, resolver="stack"), far), free, atol=1e-8)
-
-
-def test_9_the_second_step_is_self_motion() -> None:
-    """Two steps: the least norm, then self-motion by the null-space form, which the tool does not feel."""
-    machine = hermies()
-    J = machine.jacobian(BENT)[:3]
-    for make in (blocked, orthogonal):
-        first = best(make(J, [0.01, 0.0, 0.0])).v
-        space, back = make(J, [0.01, 0.0, 0.0]), joint_row("joint 4", 3, 7, -0.002 - first[3])
-        second = space.at(parametric(space, [back], null=True))
-        np.testing.assert_allclose(second, best(make(J, np.zeros(3)), rows=[back]).v, atol=1e-12)
-        np.testing.assert_allclose(J @ second, 0.0, atol=1e-12)
-        assert (first + second)[3] == pytest.approx(-0.002, abs=1e-12)
-    # In one shot the same, here: least norm and its correction are across each other
-    one = best(orthogonal(J, [0.01, 0.0, 0.0]), rows=[joint_row("joint 4", 3, 7, -0.002)]).v
-    np.testing.assert_allclose(first + second, one, atol=1e-12)
-
-
-def test_11_many_constraints() -> None:
-    machine = hermies("holonomic")
-    J = machine.jacobian(np.concatenate((BENT, [0.1, 0.2, 0.3])))[:3]
-    space = orthogonal(J, LINE, free=True)
-    # Not all seven joints of the arm: the roll of the tool moves nothing
-    order = [9, 8, 0, 1, 2, 3, 6, 4]
-    for count in range(1, 8):
-        rows = [joint_row(f"joint {k}", k, 10, 0.001 * (k + 1)) for k in order[:count]]
-        found = best(space, rows=rows)
-        np.testing.assert_allclose(found.v[order[:count]], 0.001 * (np.array(order[:count]) + 1), atol=1e-9)
-        np.testing.assert_allclose(J @ found.v, LINE, atol=1e-9)
-    J[:] = np.random.default_rng(11).normal(size=J.shape)
-    space = orthogonal(J, LINE)
-    eight = [joint_row(f"joint {k}", k, 10, 0.001) for k in range(8)]
-    with pytest.raises(InfeasibleError, match="joint 7"):
-        best(space, rows=eight)
-    assert best(space, rows=eight, in_order=True).left_out == ("joint 7",)
-    six = [(2.0, 2.0, z, 0.1) for z in range(6)]
-    assert run(machine, Settings(Method.BOTH), straight(machine, LINE, 3), six).stop is Stop.DONE
-
-
-@pytest.mark.parametrize("make", [blocked, orthogonal])
-def test_12_rank_loss(make: Any) -> None:
-    J = hermies().jacobian(BENT)
-    twice, x = np.vstack((J[:3], J[:1])), np.array([0.01, -0.02, 0.005, 0.01])
-    space = make(twice, x)
-    assert (space.rank, str(space.status)) == (3, "dependent rows")
-    np.testing.assert_allclose(best(space).v, np.linalg.pinv(J[:3]) @ x[:3], atol=1e-12)
-    with pytest.raises(InfeasibleError, match="contradict each other"):
-        make(twice, x + [0, 0, 0, 0.01])
-    near = make(twice, x + [0, 0, 0, 0.01], project=True)
-    assert (str(near.status), near.missed) == ("inconsistent", pytest.approx(0.005))
-    np.testing.assert_allclose(best(near).v, np.linalg.pinv(J[:3]) @ (x[:3] + [0.005, 0, 0]), atol=1e-12)
-    empty = make(np.vstack((J[:3], np.zeros(7))), [*x[:3], 0.0])
-    np.testing.assert_allclose(best(empty).v, best(space).v, atol=1e-12)
-    assert not np.any(best(make(J[:3], np.zeros(3))).v)
-    assert not np.any(make(J[:3], x[:3]).vectors[:, 6])
 
 
 def test_12_rank_loss_does_not_stop_the_driver() -> None:
@@ -426,25 +320,6 @@ def test_15_a_differential_platform_on_the_stack() -> None:
     machine = hermies("differential")
     one, other = (run(machine, Settings(resolver=r), straight(machine, LINE, 20)) for r in ("fsp", "stack"))
     np.testing.assert_allclose(one.q, other.q, atol=1e-7)
-
-
-def test_16_orientation_on_off_and_in_part() -> None:
-    machine = hermies()
-    path = straight(machine, LINE, 60)
-    spans = {}
-    for rows in (AXES[:3], (*AXES[:3], "pitch", "roll"), AXES):
-        driver = Driver(machine, Settings(rows=rows))
-        J, x = driver.task(machine.home, path.points[0], path.euler[0], None)
-        spans[rows] = blocked(J, x).span
-        found = driver.run(path)
-        assert found.stop is Stop.DONE
-        # At rest at the end what is left of the errors goes
-        last = Trajectory(found.q[-1], np.tile(path.points[-1], (4, 1)), np.tile(path.euler[-1], (4, 1)))
-        assert driver.run(last).errors[-1] < 1e-10
-    assert spans[(*AXES[:3], "pitch", "roll")] == spans[AXES] + 1
-    on = run(machine, Settings(rows=AXES), path)
-    other = Trajectory(on.q[-1], path.points[::-1], path.euler)
-    assert run(machine, Settings(), other).stop is Stop.DONE
 
 
 def test_17_feedback() -> None:
@@ -704,16 +579,6 @@ def test_criteria_of_ones_own() -> None:
         Settings(resolver="stack", criterion=Criterion(weight))
 
 
-def test_weights_set_the_platform_against_the_arm() -> None:
-    machine = hermies("holonomic")
-    moved = []
-    for b in (0.1, 1.0, 10.0):
-        weighted = replace(machine, weights=np.concatenate((np.ones(7), np.full(3, b))))
-        q = run(weighted, Settings(), straight(machine, LINE, 60)).q
-        moved.append(np.abs(q[-1, 7:]).max())
-    assert moved[0] > 1.3 * moved[1] > 13 * moved[2]
-
-
 def test_what_the_stack_cannot_do_is_explained() -> None:
     """A link within a sphere, and all joints at their limits."""
     machine = hermies()
@@ -758,14 +623,6 @@ def test_random_settings_end_with_a_reason() -> None:
         assert np.abs(np.diff(found.q, axis=0)).max(initial=0.0) <= settings.step_limit * (1 + 1e-9)
         assert (found.stop is Stop.DONE) == (len(found.norms) == 12)
         assert bool(found.message) == (found.stop is not Stop.DONE)
-
-
-def test_any_robot_runs() -> None:
-    robot = wbc.robots.load("panda", shapes="none")
-    machine = machine_of(robot, robot.frames["tip"])
-    for rows in (AXES[:3], AXES):
-        found = run(machine, Settings(rows=rows), straight(machine, (0.002, 0.001, -0.002), 40))
-        assert (found.stop, found.errors[-1] < 1e-4) == (Stop.DONE, True)
 
 
 SPHERE_AHEAD = {

@@ -19,7 +19,6 @@ from wbc.motion_control.comparison import (
     compare,
 )
 from wbc.published.newton_euler.comparison import PUBLISHED, published_scenario
-from wbc.published.newton_euler.three_link import BASE, tip
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +74,6 @@ def test_a_controller_refuses_what_is_no_measurement(scenario: ControlScenario) 
         law = make(scenario.robot, scenario.motion, 0.01)
         with pytest.raises(NotFiniteError):
             law.command(0.0, np.array([0.0, np.nan, 0.0]), np.zeros(3))
-
-
-def test_the_tip(scenario: ControlScenario) -> None:
-    q = np.array([0.3, 0.7, 0.45])
-    np.testing.assert_allclose(scenario.robot.pose(q, "tip").translation, tip(q) - BASE, atol=1e-12)
 
 
 def test_bad_input_of_the_comparison(scenario: ControlScenario) -> None:

@@ -14,22 +14,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.jacobians import jacobians
-from wbc.analysis import (
-    Analysis,
-    Exact,
-    ExactModel,
-    Notation,
-    Relation,
-    SymbolicJacobian,
-    analyse,
-    candidate_rows,
-    certify,
-    factored_determinant,
-    joint_roots,
-    published_sets,
-    sub_determinant_locus,
-    symbolic_jacobian,
-)
+from wbc import analysis
 from wbc.analysis.algebra.points import real_point
 from wbc.analysis.jacobians.numeric import NumericRows, rank
 
@@ -37,14 +22,14 @@ STATE = np.array([0.3, 0.4, -0.5, 1.2, 0.7, -0.6, 0.9])
 L, D = 7.11, -0.7026
 
 
-def lines(found: Analysis) -> set[str]:
-    return set(Notation(found.exact.half).branches(found.locus.branches))
+def lines(found: analysis.Analysis) -> set[str]:
+    return set(analysis.Notation(found.exact.half).branches(found.locus.branches))
 
 
 @cache
-def run(name: str, chosen: str) -> Analysis:
-    sets = published_sets(name)
-    return analyse(ExactModel(sets.robot, sets.symbols), sets.task, sets.sets[chosen])
+def run(name: str, chosen: str) -> analysis.Analysis:
+    sets = analysis.published_sets(name)
+    return analysis.analyse(analysis.ExactModel(sets.robot, sets.symbols), sets.task, sets.sets[chosen])
 
 
 #: det of task and one constraint; alpha without its factor 1/|r|, |r| = L sqrt(2 (1 + c4)) or its like
@@ -64,11 +49,11 @@ DETERMINANTS = {
 @pytest.mark.parametrize(("name", "chosen"), DETERMINANTS)
 def test_determinants_in_factors(name: str, chosen: str) -> None:
     """Sections 4.3 to 4.6; the last one is of the arm with all offsets, on which the published programs failed."""
-    sets = published_sets(name)
-    model = ExactModel(sets.robot, sets.symbols)
+    sets = analysis.published_sets(name)
+    model = analysis.ExactModel(sets.robot, sets.symbols)
     rows = (*sets.task, *sets.sets[chosen])
-    J = symbolic_jacobian(model, rows)
-    det = factored_determinant(Exact(model.ring), J)
+    J = analysis.symbolic_jacobian(model, rows)
+    det = analysis.factored_determinant(analysis.Exact(model.ring), J)
     assert det.text() == DETERMINANTS[name, chosen]
     q = STATE[: model.robot.nv]
     numeric = abs(np.linalg.det(NumericRows(model.robot).value(rows, q)))
@@ -77,16 +62,16 @@ def test_determinants_in_factors(name: str, chosen: str) -> None:
 
 def test_a3_planar_arm_and_rows_of_its_middle() -> None:
     """det of rows 2 to 4 is L1 L2 L3 s2 / 2; the task's entry (2, 2) in the axes of link 3 is printed without L3."""
-    sets = published_sets("planar_3r")
-    model = ExactModel(sets.robot, sets.symbols)
-    J = symbolic_jacobian(model, (*sets.task, *sets.sets["middle"]))
+    sets = analysis.published_sets("planar_3r")
+    model = analysis.ExactModel(sets.robot, sets.symbols)
+    J = analysis.symbolic_jacobian(model, (*sets.task, *sets.sets["middle"]))
     assert str(J.matrix[1][1]) == "c3*L2 + L3"
-    square = SymbolicJacobian(J.ring, J.matrix[1:], J.names[1:], J.axes)
-    det = factored_determinant(Exact(model.ring), square)
+    square = analysis.SymbolicJacobian(J.ring, J.matrix[1:], J.names[1:], J.axes)
+    det = analysis.factored_determinant(analysis.Exact(model.ring), square)
     assert det.text() == "2/5 L1 L3 s2"  # L2 = 0.8, the middle at 0.4
     assert abs(model.ring.value(det.poly, [0.3, 0.7, -0.4])) == pytest.approx(0.1288435374, abs=1e-10)
     for chosen in ("sub_determinants", "singular_vectors"):
-        found = analyse(model, sets.task, sets.sets["middle"], algorithm=chosen)
+        found = analysis.analyse(model, sets.task, sets.sets["middle"], algorithm=chosen)
         assert lines(found) == {"q2 in {0, pi} and q3 in {0, pi}"}
         assert found.verdict == "loose"
 
@@ -95,9 +80,9 @@ def test_a14_alpha_and_beta_complete_the_spherical_arm_on_more_than_is_printed()
     """(4.10) repeats the second branch of (4.2); on it the set has full rank, so it is no branch."""
     found = run("spherical_4r", "alpha, beta")
     assert lines(found) == {"q4 in {0, pi}"}
-    sets = published_sets("spherical_4r")
-    task = symbolic_jacobian(ExactModel(sets.robot, sets.symbols), sets.task)
-    printed = [b for b in sub_determinant_locus(found.exact, task.matrix).branches if b.relations]
+    sets = analysis.published_sets("spherical_4r")
+    task = analysis.symbolic_jacobian(analysis.ExactModel(sets.robot, sets.symbols), sets.task)
+    printed = [b for b in analysis.sub_determinant_locus(found.exact, task.matrix).branches if b.relations]
     assert len(printed) == 2
     rng = np.random.default_rng(0)
     for branch in printed:
@@ -108,11 +93,11 @@ def test_a14_alpha_and_beta_complete_the_spherical_arm_on_more_than_is_printed()
 
 def test_a15_simplified_space_station_arm() -> None:
     """(4.20) and (4.21)."""
-    sets = published_sets("ssrms_simplified")
-    model = ExactModel(sets.robot, sets.symbols)
-    exact = Exact(model.ring)
-    task = sub_determinant_locus(exact, symbolic_jacobian(model, sets.task).matrix)
-    assert set(Notation(exact.half).branches(task.branches)) == {
+    sets = analysis.published_sets("ssrms_simplified")
+    model = analysis.ExactModel(sets.robot, sets.symbols)
+    exact = analysis.Exact(model.ring)
+    task = analysis.sub_determinant_locus(exact, analysis.symbolic_jacobian(model, sets.task).matrix)
+    assert set(analysis.Notation(exact.half).branches(task.branches)) == {
         "q4 in {0, pi}",
         "q2 = +-pi/2 and q6 = +-pi/2",
         "q2 = +-pi/2 and q4 = pi - 2 q3",
@@ -141,7 +126,7 @@ def test_a21_elbow_beta_gamma_complete_the_space_station_arm() -> None:
     assert time.process_time() - began < 60.0
 
 
-def relation_of(found: Analysis) -> Relation:
+def relation_of(found: analysis.Analysis) -> analysis.Relation:
     (relation,) = {r for b in found.locus.branches for r in b.relations}
     return relation
 
@@ -153,16 +138,19 @@ def test_a20_flight_software_and_pitch_plane_of_the_space_station_arm() -> None:
     assert lines(yaw) == {"q2 = +-pi/2", "q4 in {0, pi}", "q6 = +-pi/2", "L (s3 + s34) + D (1 - c345) = 0"}
     bracket = "2 L cos(q4/2) + D (sin(q3 + q4/2) + sin(q4/2 + q5))"
     assert lines(plane) == {"q2 = +-pi/2", "q4 in {0, pi}", "q6 = +-pi/2", f"{bracket} = 0"}
-    solved = Notation(plane.exact.half).solved(relation_of(plane))
+    solved = analysis.Notation(plane.exact.half).solved(relation_of(plane))
     assert solved == "tan(q4/2) = (-2 L - D (s3 + s5)) / (D (c3 + c5))"
-    assert Notation(roll.exact.half).solved(relation_of(roll)) == "tan(q3) = (L (1 + c4) + D s45) / (L s4 - D c45)"
-    closed = Notation(yaw.exact.half).solved(relation_of(yaw))
+    assert (
+        analysis.Notation(roll.exact.half).solved(relation_of(roll))
+        == "tan(q3) = (L (1 + c4) + D s45) / (L s4 - D c45)"
+    )
+    closed = analysis.Notation(yaw.exact.half).solved(relation_of(yaw))
     assert closed == "q5 = atan2(-D s34, D c34) +- acos((L (s3 + s34) + D) / sqrt((D c34)^2 + (-D s34)^2))"
     cases = ((roll, {3: 1.2, 4: 0.7}, 2, -2.187788992), (yaw, {2: -0.55, 3: 1.2}, 4, 0.7548913334))
     for found, changes, joint, value in (*cases, (plane, {2: -0.5, 4: 0.7}, 3, 2.978321908)):
         q = STATE.copy()
         q[list(changes)] = list(changes.values())
-        roots = joint_roots(found.exact.half, relation_of(found), joint, q)
+        roots = analysis.joint_roots(found.exact.half, relation_of(found), joint, q)
         assert min(abs(r - value) for r in roots) < 1e-8
         assert found.verdict == "incomplete"
 
@@ -175,7 +163,7 @@ def test_a20_the_printed_pitch_plane_formula_is_no_root() -> None:
     corrected = atan2(-D * (c3 + c5) * (2 * L + D * (s3 + s5)), -cross)
     q = STATE.copy()
     q[[2, 4]] = q3, q5
-    (root,) = joint_roots(found.exact.half, relation_of(found), 3, q)
+    (root,) = analysis.joint_roots(found.exact.half, relation_of(found), 3, q)
     assert root == pytest.approx(corrected, abs=1e-12)
     assert abs(root - 0.162021849) > 2.8
 
@@ -203,7 +191,7 @@ def test_a22_dexterous_arm() -> None:
     ):
         q = STATE.copy()
         q[list(changes)] = list(changes.values())
-        roots = joint_roots(found.exact.half, relation_of(found), joint, q)
+        roots = analysis.joint_roots(found.exact.half, relation_of(found), joint, q)
         assert min(abs(r - value) for r in roots) < 1e-8
         assert min(abs(r + 0.438881090) for r in roots) > 0.1
 
@@ -227,7 +215,9 @@ def test_a23_dexterous_arm_with_both_rolls() -> None:
 
 def test_dexterous_arm_with_all_offsets_by_subdivision() -> None:
     """The published programs failed on it. Elbow and both rolls locked suffice at every configuration."""
-    sets, rows = published_sets("spdm_arm"), candidate_rows("spdm_arm")
-    found = certify(ExactModel(sets.robot), sets.task, [rows[name] for name in ("elbow", "q1", "q7")], workers=1)
+    sets, rows = analysis.published_sets("spdm_arm"), analysis.candidate_rows("spdm_arm")
+    found = analysis.certify(
+        analysis.ExactModel(sets.robot), sets.task, [rows[name] for name in ("elbow", "q1", "q7")], workers=1
+    )
     assert (found.verdict, found.everywhere, found.joints) == ("complete", True, (2, 3, 4))
     assert found.counts.regular_part == pytest.approx(1.0, abs=1e-9)

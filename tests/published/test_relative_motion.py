@@ -16,6 +16,7 @@ import pytest
 
 import wbc
 from tests.models import placement
+from tests.refusals import assert_refused
 from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 from wbc.published.relative_motion import (
@@ -116,12 +117,10 @@ def test_2_a_yaw_of_ninety_degrees_is_no_singularity(level: dict[int | None, Lev
 
 def test_2_no_wrist_levels_a_vertical_axis() -> None:
     # x4 up: a quarter turn of joint 2
-    with pytest.raises(RangeError, match="x4 is vertical"):
-        levelled(np.radians([0.0, 90.0, 0.0, 0.0, 0.0, 0.0]))
+    assert_refused(lambda: levelled(np.radians([0.0, 90.0, 0.0, 0.0, 0.0, 0.0])), RangeError, "x4 is vertical")
     with pytest.raises(RangeError, match="no inverse"):
         LevelHand().step(np.radians([0.0, 0.0, 90.0, 0.0, 0.0, 0.0]), np.array([0.01, 0.0, 0.0]))
-    with pytest.raises(InfeasibleError, match="not reached"):
-        LevelHand().reach(HOME, np.array([0.0, 2.5, 0.0, 0.0]))
+    assert_refused(lambda: LevelHand().reach(HOME, np.array([0.0, 2.5, 0.0, 0.0])), InfeasibleError, "not reached")
 
 
 def test_3_jacobians(level: dict[int | None, LevelHand]) -> None:
@@ -256,13 +255,6 @@ def test_7_the_data_are_of_order_0(table: str, axis: int, constant: float, affin
     """What was published as the first order fits a Jacobian that was never moved, in three columns."""
     found = [float(rms(residuals(table, method))[axis]) for method in ("order 0", "order 1")]
     np.testing.assert_allclose(found, [constant, affine], atol=0.001)
-
-
-def test_7_whole_tables() -> None:
-    expected = {"4.6": (0.126, 0.124, 0.102), "4.7": (0.165, 0.163, 0.150), "4.8": (0.140, 0.127, 0.084)}
-    for table, numbers in expected.items():
-        found = [float(np.sqrt(np.mean(residuals(table, m) ** 2))) for m in ("exact", "order 1", "order 0")]
-        np.testing.assert_allclose(found, numbers, atol=0.001)
 
 
 def test_8_smaller_steps(level: dict[int | None, LevelHand]) -> None:
@@ -434,10 +426,6 @@ def test_12_registration() -> None:
     np.testing.assert_allclose(left(turn), [0.211, 0.136, 0.025], atol=0.002)
 
 
-def at_rest(t: float) -> tuple[np.ndarray, np.ndarray]:
-    return swaying(0.0)[0], np.zeros(4)
-
-
 def test_13_compensation() -> None:
     def operator(t: float) -> np.ndarray:
         return np.array([0.5 * INCH, -0.4 * INCH, 0.3 * INCH, 0.1])
@@ -449,19 +437,6 @@ def test_13_compensation() -> None:
         assert low < np.linalg.norm(off, axis=1).max() < high
         for q in held.q[::5]:
             np.testing.assert_allclose(pose(manipulator(), q).rotation[2, :2], 0.0, atol=1e-6)
-
-
-def test_13_the_operator_sees_a_table_at_rest() -> None:
-    """The hand's path on the table for the same commands: equal up to half the table's acceleration over a cycle."""
-
-    def operator(t: float) -> np.ndarray:
-        return np.array([0.3 * INCH * t, 0.1 * INCH * math.sin(t), -0.2 * INCH * t, 0.02 * t])
-
-    still = hold_on_table(HOME, at_rest, operator, 2.0)
-    moving = hold_on_table(HOME, swaying, operator, 2.0, feedforward=True)
-    np.testing.assert_array_equal(still.commanded, moving.commanded)
-    assert np.abs(still.relative - still.commanded).max() < 1e-9
-    assert np.abs(still.relative - moving.relative)[:, :3].max() / INCH < 1.2e-3
 
 
 @pytest.mark.parametrize(
@@ -508,8 +483,7 @@ def test_14_recursion_with_and_without_table() -> None:
     np.testing.assert_allclose(rest[0][-1], (master + slave) / 2, atol=1e-6)
     np.testing.assert_array_equal(rest[0], moving[0])
     np.testing.assert_allclose(moving[1][1:] - waves, rest[1][1:], atol=1e-15)
-    with pytest.raises(ShapeError):
-        MasterSlave().run(master, slave[:3], waves)
+    assert_refused(lambda: MasterSlave().run(master, slave[:3], waves), ShapeError, "")
 
 
 @pytest.mark.parametrize("seed", range(repeats(20)))
@@ -528,8 +502,7 @@ def test_14_arms_with_backlash_meet_up_to_a_part_of_it(seed: int) -> None:
     drives = arms.A * found[1][2:-1] + (1 - arms.A) * found[0][2:-1] + arms.B * (found[0][2:-1] - found[0][:-3])
     assert np.abs(drives - found[0][3:]).max() <= 0.5 * backlash * (1.0 + 1e-9)
     np.testing.assert_array_equal(arms.run(master, slave, still, 0.0), arms.run(master, slave, still))
-    with pytest.raises(RangeError, match="backlash"):
-        arms.run(master, slave, still, -backlash)
+    assert_refused(lambda: arms.run(master, slave, still, -backlash), RangeError, "backlash")
 
 
 def test_6_a_line_turns_the_hand_only_where_a_yaw_is_asked_for() -> None:
@@ -577,10 +550,8 @@ def test_15_transmissions_of_any_robot() -> None:
         np.testing.assert_allclose(gears.to_drives(q + v) - gears.to_drives(q), gears.drive_rates(v), atol=1e-12)
     with pytest.raises(RangeError, match="do not follow from the drives"):
         Transmission(("a", "b"), {"x": {"a": 1.0}, "y": {"a": 2.0}})
-    with pytest.raises(UnknownNameError, match="did you mean 'elbow'"):
-        Transmission(("elbow",), {"x": {"elbw": 1.0}})
-    with pytest.raises(ShapeError, match="as many drives"):
-        Transmission(("a", "b"), {"x": {"a": 1.0}})
+    assert_refused(lambda: Transmission(("elbow",), {"x": {"elbw": 1.0}}), UnknownNameError, "did you mean 'elbow'")
+    assert_refused(lambda: Transmission(("a", "b"), {"x": {"a": 1.0}}), ShapeError, "as many drives")
     # Limits of drives are rows of a stack
     stack = wbc.Stack(manipulator(), dt=0.01)
     stack.add(wbc.tasks.Limit(wbc.tasks.JointCoupling(list(wrist_drives().drives.values())), upper=0.3))
@@ -610,5 +581,4 @@ def test_taylor_of_any_robot(name: str, frame: str) -> None:
             J = pin.computeFrameJacobian(robot.model, data, q, robot.model.getFrameId(frame), pin.LOCAL_WORLD_ALIGNED)
             off.append(np.abs(taylor.at(q) - J[:3]).max())
         assert math.log2(off[0] / off[1]) == pytest.approx(order + 1, abs=0.35)
-    with pytest.raises(RangeError):
-        TaylorJacobian(kinematics, rows, 3)
+    assert_refused(lambda: TaylorJacobian(kinematics, rows, 3), RangeError, "")

@@ -27,7 +27,6 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from tests import models
 from tests.published.arm_machine import STATE, Machine, rank
 from wbc.coordinates import parts
 from wbc.robots import operator_arm
@@ -293,11 +292,3 @@ def test_a23_dexterous_arm_with_both_rolls() -> None:
         q[3], q[joint] = 0.0, value
         J = arm.rows("tip", q)
         assert (rank(J), rank(np.vstack((J, arm.rows("end3", q, 3))))) == (5, 6)
-
-
-def test_dimensions_are_those_of_the_models_joint_by_joint() -> None:
-    """The chains of the package and those that other tests build from the same source."""
-    for made, built in (("ssrms", models.ssrms()), ("spherical_4r", models.four_joint_arm())):
-        a, b = Machine(operator_arm(made).robot), Machine(built)
-        q = np.random.default_rng(9).uniform(-pi, pi, a.robot.nv)
-        np.testing.assert_allclose(a.rows("tip", q), b.rows("tip", q), atol=1e-12)

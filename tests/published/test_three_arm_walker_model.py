@@ -50,9 +50,3 @@ def test_6_the_nominal_frame_is_a_zyz_matrix_and_back() -> None:
         # Back: alpha and gamma from the third column and row, beta = 90 degrees
         assert np.arctan2(rotation[1, 2], rotation[0, 2]) == pytest.approx(-angle)
         assert np.arctan2(rotation[2, 1], -rotation[2, 0]) == pytest.approx(heading)
-
-
-def test_there_are_25_by_24_holds_at_radius_100() -> None:
-    assert len(SCENE.footholds) == 600
-    assert [SCENE.footholds[k].id for k in (0, -1)] == ["1,1", "25,24"]
-    np.testing.assert_allclose(np.hypot(*SCENE.positions[:, :2].T) / INCH, 100.0, rtol=1e-14)

@@ -158,15 +158,6 @@ def test_joint_rates_break_the_wrist(singular: Any, speed: float, time: float, a
     assert (log.supporting.sum(axis=1) >= 2).all()
 
 
-def test_joint_rates_hold_on_while_the_body_stands() -> None:
-    walker = PublishedWalker((13, 12), tracking="rates")
-    outcome = walker.handhold(1, (14, 15))
-    assert outcome.reason == "reached"
-    log = walker.log.part(outcome.rows)
-    assert np.linalg.norm(log.bodies[:, :3, 3] - log.bodies[0, :3, 3], axis=1).max() < 0.1 * INCH
-    assert hold_offsets(walker.log).max() <= 1.0
-
-
 def test_the_log_is_in_metres() -> None:
     walker = PublishedWalker((13, 12), heading=0.2)
     outcome = walker.drive((0.0, 0.05, 0.01), 1.0)

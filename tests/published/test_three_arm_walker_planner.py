@@ -93,13 +93,6 @@ def test_08_the_text_has_the_outer_circle_only() -> None:
     assert found == pytest.approx([4.1751], abs=1e-3)
 
 
-def test_08_margins_of_three_arms_at_once_are_those_of_each() -> None:
-    twist = body_twist(BODY, np.array(SPIN), 52.0)
-    view, places = View(SHOULDERS, BODY), np.array(HELD, dtype=float)
-    at_once = margins(view, np.arange(3), twist, places)
-    assert np.array_equal(at_once, [margins(view, k, twist, places[k : k + 1])[0] for k in range(3)])
-
-
 def listed(arm: int, terrain: Terrain) -> list[Place]:
     view = View(SHOULDERS, BODY)
     hand = view.place(frame(*HELD[arm])[:3, 3])

@@ -6,8 +6,6 @@ Source: M. R. Patterson's thesis on a three-armed grasping walker, 4.3, (4-46) t
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -105,20 +103,6 @@ def test_the_five_cases(case: int, falling: bool) -> None:
         assert (top, bottom, even) == pytest.approx((fast, 0.0, rest * (1.0 - 2.0 * mean / slow)), abs=2e-3)
 
 
-@pytest.mark.parametrize("falling", [False, True])
-@pytest.mark.parametrize("case", [1, 2, 4, 5])
-def test_speeds_are_matched_early_or_late(case: int, falling: bool) -> None:
-    """At the side of the slower corner where the middle is fast, at that of the faster one where it is slow."""
-    poses, turning, corners, _ = case_of(case, falling)
-    times, _, pushes = straight_part(law_of(poses, turning), poses)
-    matching = float(corners.fast[1] - corners.slow[1]) / ACCELERATION
-    first = (case in (1, 2)) != falling
-    sign = -1.0 if falling else 1.0
-    inside = times < matching - 1e-3 if first else times > times[-1] - matching + 1e-3
-    assert inside.sum() > 10
-    assert pushes[inside] == pytest.approx(np.full(inside.sum(), sign * ACCELERATION), rel=1e-9)
-
-
 def test_a_corner_is_slowed_where_a_hand_must_wait() -> None:
     """(4-46), (4-47): with no room to stop in a segment, both speeds are lowered to v^2 = a d / (1 + U + U')."""
     poses = bent(0.5, False)
@@ -136,18 +120,6 @@ def test_a_corner_is_slowed_where_a_hand_must_wait() -> None:
     assert slowed.squares[1] / ACCELERATION < slowed.straight[1]
     exact = 2.0 * ACCELERATION * 0.5 / (2.0 + bends)
     assert exact / ACCELERATION == pytest.approx(0.5 - exact * bends / (2.0 * ACCELERATION), rel=1e-12)
-
-
-def test_only_the_faster_corner_is_slowed_where_that_will_do() -> None:
-    """v_hi^2 = (2 a (d - d_tr,lo) - v_lo^2) / (1 + U_hi), so that the hand just stops."""
-    poses = bent(0.5, False, bends=(2.4, 0.5))
-    free = corners_of(poses, [0.0, 0.0, 0.0])
-    assert np.isfinite(free.most_times()[1])
-    slowed = corners_of(poses, [0.0, 1e3, 0.0])
-    assert slowed.squares[1] == free.squares[1]
-    assert slowed.squares[2] < free.squares[2]
-    stop = (slowed.squares[1] + slowed.squares[2]) / (2.0 * ACCELERATION)
-    assert stop == pytest.approx(slowed.straight[1], rel=1e-12)
 
 
 def test_segments_are_too_short_for_a_change_of_speed() -> None:
@@ -188,23 +160,3 @@ def test_random_poses(seed: int, count: int, slowness: float) -> None:
     for pose in poses:
         near = np.linalg.norm(state.position[:, :3, 3] - pose[:3, 3], axis=1).min()
         assert near <= DEVIATION + 0.5 * SPEED * times[1]
-
-
-@pytest.mark.parametrize("slowness", [0.1, 1.0, 10.0])
-def test_segments_turn_as_long_as_they_move(slowness: float) -> None:
-    random = np.random.default_rng(5)
-    poses = [place(*random.normal(size=3), turn=0.7 * k) for k in range(6)]
-    law = law_of(poses, slowness)
-    lengths = [np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in pairwise(poses)]
-    corners = corners_of(poses, [2.0 * np.sqrt(0.7 / slowness)] * 5)
-    blends = 2.0 * corners.reaches[1:-1] / np.sqrt(corners.squares[1:-1])
-    spans = np.maximum(corners.least_times(SPEED)[0], 2.0 * np.sqrt(0.7 / slowness))
-    assert law.duration == pytest.approx(float(spans.sum() + blends.sum()), rel=1e-12)
-    begin = 0.0
-    for k, span in enumerate(spans):
-        state = law.at(np.array([begin, begin + 0.5 * span, begin + span]))
-        turned = [pin.log3(poses[k][:3, :3].T @ pose[:3, :3])[2] for pose in state.position]
-        assert turned == pytest.approx([0.0, 0.35, 0.7], abs=1e-9)
-        moved = np.linalg.norm(state.position[-1, :3, 3] - state.position[0, :3, 3])
-        assert moved == pytest.approx(lengths[k] - corners.reaches[k] - corners.reaches[k + 1], abs=1e-9)
-        begin += span + (blends[k] if k < 4 else 0.0)

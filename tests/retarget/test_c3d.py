@@ -11,6 +11,7 @@ from tests.retarget import clips
 from wbc.errors import ClipFileError
 from wbc.extras import MissingPackageError
 from wbc.retarget import load_clip
+from wbc.retarget.sources.c3d import read_c3d
 
 #: Markers of Plug-in Gait, and the joints whose places they take here
 MARKERS = {
@@ -64,6 +65,22 @@ def test_a_unit_that_is_not_the_files(tmp_path: Path) -> None:
     clip = load_clip(file)
     np.testing.assert_allclose(clip.points, POINTS, atol=1e-6)
     assert "the file says units of 0.001 m" in " ".join(clip.notes)
+
+
+@pytest.mark.parametrize(("markers", "frames"), [(300, 3), (1, 65_535), (1, 66_000)])
+def test_more_than_a_header_can_hold(tmp_path: Path, markers: int, frames: int) -> None:
+    import ezc3d
+
+    made = ezc3d.c3d()
+    made["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    made["parameters"]["POINT"]["LABELS"]["value"] = [f"m{k}" for k in range(markers)]
+    made["data"]["points"] = np.random.default_rng(0).uniform(1.0, 2.0, (4, markers, frames))
+    file = tmp_path / "long.c3d"
+    made.write(str(file))
+    recorded = read_c3d(file)
+    assert recorded.names == [f"m{k}" for k in range(markers)]
+    said = [note for note in recorded.notes if "frames, of which ezc3d reads" in note]
+    assert bool(said) == (frames > len(recorded.points))
 
 
 def test_without_the_package_and_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

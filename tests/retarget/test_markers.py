@@ -186,10 +186,22 @@ def test_a_table_with_a_header(tmp_path: Path) -> None:
     assert clip.seen.sum() == clip.seen.size - 1
     np.testing.assert_allclose(clip.points[8:], WALK.points[8:], atol=1e-8)
     assert "columns that are no points: force" in " ".join(clip.notes)
-    for text, reason in (("a,b\n1,2\n", "no header"), ("LeftFoot_x,LeftFoot_y,LeftFoot_z\n1,2,three\n", "line 2")):
+    for text, reason in (
+        ("a,b\n1,2\n", "no header"),
+        ("a_x,a_y,a_z,a_x\n1,2,3,4\n", "two columns a_x"),
+        ("LeftFoot_x,LeftFoot_y,LeftFoot_z\n1,2,three\n", "line 2"),
+    ):
         file.write_text(text)
         with pytest.raises(ClipFileError, match=reason):
             load_clip(file, rate=30.0)
+
+
+def test_points_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    file = tmp_path / "walk.npz"
+    np.savez(file, points=WALK.points, names=[*NAMES[:-1], NAMES[-2]], fps=30)
+    clip = load_clip(file)
+    assert clip.skeleton.names == (*NAMES[:-1], f"{NAMES[-2]}_2")
+    assert f"the name {NAMES[-2]!r} is there more than once" in " ".join(clip.notes)
 
 
 def test_an_array_without_names_is_known_by_its_bones(tmp_path: Path) -> None:

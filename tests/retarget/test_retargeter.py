@@ -113,6 +113,24 @@ def test_all_links_of_one_who_crawls_stay_above_ground_as_they_are_drawn() -> No
     check(found)
 
 
+def test_hands_rise_where_forearms_would_sink() -> None:
+    assert motion("talos", "crawl", 0.4, 3.4).errors.figures["penetration"] < DEPTH
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_foot_on_its_toes_is_no_steeper_against_its_shank_than_its_ankle_turns(side: str) -> None:
+    found = motion("g1", "crawl", 0.4, 3.4)
+    robot, leg, limb = found.robot, found.body.limbs[f"{side}_leg"], found.plan.limbs[f"{side}_leg"]
+    knee, ankle, sole = (robot.pose(robot.neutral, frame) for frame in (leg.middle, leg.wrist, leg.end))
+    rest = sole.rotation.T @ (knee.translation - ankle.translation)
+    assert limb.rotation is not None
+    shanks = np.einsum("tji,tj->ti", limb.rotation, limb.middle - limb.wrist)[limb.stands]
+    angles = np.arctan2(rest[0], rest[2]) - np.arctan2(shanks[:, 0], shanks[:, 2])
+    hinge = robot.dof_names.index(f"{side}_ankle_pitch_joint")
+    assert robot.limits.position_lower[hinge] < angles.min()
+    assert angles.max() < robot.limits.position_upper[hinge]
+
+
 def test_a_hull_of_few_corners_is_that_of_all() -> None:
     random = np.random.default_rng(5)
     balls = LinkBalls(random.normal(0.0, 0.1, (400, 3)), random.uniform(0.0, 0.02, 400))

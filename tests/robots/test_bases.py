@@ -62,19 +62,6 @@ def test_differential_and_planar_bases_have_different_fingerprints() -> None:
     assert a.dof_units[:3] == ("m", "m", "rad")
 
 
-@pytest.mark.parametrize("base", ["floating", "planar"])
-def test_the_base_of_a_model_is_found(base: str) -> None:
-    again = wbc.robots.load(wbc.robots.load("ur5", base=base).model)
-    assert again.base == base
-    fixed = wbc.robots.load(again.model, base="fixed")
-    assert (fixed.base, fixed.nv) == ("fixed", 6)
-
-
-def test_a_planar_model_may_be_driven_differentially() -> None:
-    robot = wbc.robots.load(wbc.robots.load("pr2").model, base="differential")
-    assert robot.locked_dofs == (1,)
-
-
 def test_bad_bases() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'floating'"):
         wbc.robots.load("ur5", base="floatin")

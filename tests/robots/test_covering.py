@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 import wbc.robots
 from tests.robots.files import example
-from tests.robots.test_shapes import hull_distance, outside, surface, urdf_points
+from tests.robots.test_shapes import hull_distance, outside, surface
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robot.geometry.covering import cover, least_excess_ball
 from wbc.robot.geometry.hull import Hull
@@ -154,23 +154,6 @@ def urdf(path: Path, geometry: str, origin: str = "") -> Path:
     return path
 
 
-def test_spheres_around_a_cylinder_and_their_bound(tmp_path: Path) -> None:
-    path = urdf(tmp_path / "r.urdf", '<cylinder radius="0.1" length="0.8"/>')
-    shapes = wbc.robots.fit_shapes(wbc.robots.load(path), kind="spheres", count=6).shapes["l"]
-    assert 3 <= len(shapes) <= 6
-    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 60), np.linspace(-0.4, 0.4, 81))
-    points = np.stack([0.1 * np.cos(turn), 0.1 * np.sin(turn), height], axis=-1).reshape(-1, 3)
-    assert outside(shapes, points) <= 1e-9
-    for shape in shapes:
-        out = surface(shape, 4000)
-        gap = np.hypot(
-            np.maximum(np.hypot(out[:, 0], out[:, 1]) - 0.1, 0), np.maximum(np.abs(out[:, 2]) - 0.4, 0)
-        ).max()
-        assert gap <= shape.excess <= gap + 0.003
-    capsules = wbc.robots.fit_shapes(wbc.robots.load(path), count=2).shapes["l"]
-    assert max(s.excess for s in capsules) <= wbc.robots.load(path).shapes["l"][0].excess
-
-
 def test_boxes_and_cylinders_kept_as_they_are(tmp_path: Path) -> None:
     origin = '<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/>'
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0]))
@@ -205,17 +188,6 @@ def test_bodies_without_volume(text: str, tmp_path: Path) -> None:
         shapes = wbc.robots.load(path, shapes=choice).shapes["l"]
         assert outside(shapes, points) <= 1e-9
         assert all(np.isfinite(s.excess) for s in shapes)
-
-
-def test_links_of_a_robot_as_spheres() -> None:
-    panda = wbc.robots.load("panda")
-    robot = wbc.robots.fit_shapes(panda, ["panda_link5", "panda_hand"], kind="spheres", count=5)
-    points = urdf_points(panda)
-    for link in ("panda_link5", "panda_hand"):
-        assert outside(robot.shapes[link], points[link]) <= 1e-9
-        assert max(s.excess for s in robot.shapes[link]) < panda.shapes[link][0].excess
-    assert robot.shapes["panda_link6"] == panda.shapes["panda_link6"]
-    assert robot.self_pairs == panda.self_pairs
 
 
 def test_bad_styles() -> None:

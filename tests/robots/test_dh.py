@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.refusals import assert_refused
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.robots import DHRow
 
@@ -101,23 +102,13 @@ def test_limits_of_rows_and_their_overrides() -> None:
 
 
 def test_bad_rows() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'revolute'"):
-        DHRow(joint="revolut")
-    with pytest.raises(UnknownNameError):
-        DHRow(convention="craig")
-    with pytest.raises(NotFiniteError):
-        DHRow(a=float("nan"))
-    with pytest.raises(BoundsError):
-        DHRow(lower=1, upper=0)
-    with pytest.raises(RangeError):
-        DHRow(velocity=-1)
-    with pytest.raises(RangeError, match="NaN"):
-        DHRow(upper=float("nan"))
-    with pytest.raises(ShapeError):
-        wbc.robots.from_dh([])
-    with pytest.raises(ShapeError):
-        wbc.robots.load([1, 2])
-    with pytest.raises(DuplicateNameError):
-        wbc.robots.from_dh([DHRow(name="a"), DHRow(name="a")])
-    with pytest.raises(UnknownNameError):
-        wbc.robots.from_dh([DHRow()], speed=1.0)
+    assert_refused(lambda: DHRow(joint="revolut"), UnknownNameError, "did you mean 'revolute'")
+    assert_refused(lambda: DHRow(convention="craig"), UnknownNameError, "")
+    assert_refused(lambda: DHRow(a=float("nan")), NotFiniteError, "")
+    assert_refused(lambda: DHRow(lower=1, upper=0), BoundsError, "")
+    assert_refused(lambda: DHRow(velocity=-1), RangeError, "")
+    assert_refused(lambda: DHRow(upper=float("nan")), RangeError, "NaN")
+    assert_refused(lambda: wbc.robots.from_dh([]), ShapeError, "")
+    assert_refused(lambda: wbc.robots.load([1, 2]), ShapeError, "")
+    assert_refused(lambda: wbc.robots.from_dh([DHRow(name="a"), DHRow(name="a")]), DuplicateNameError, "")
+    assert_refused(lambda: wbc.robots.from_dh([DHRow()], speed=1.0), UnknownNameError, "")

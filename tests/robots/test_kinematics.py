@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
+from tests.refusals import assert_refused
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 
 ROBOTS = ("panda", "tiago", "talos")
@@ -78,20 +79,13 @@ def test_random_configurations_keep_joints_that_follow_where_they_belong() -> No
 
 def test_bad_values_are_refused() -> None:
     robot = wbc.robots.load("talos")
-    with pytest.raises(UnknownNameError, match="frame"):
-        robot.pose(robot.neutral, "hand")
-    with pytest.raises(UnknownNameError, match="relative_to"):
-        robot.pose(robot.neutral, "world", "hand")
-    with pytest.raises(UnknownNameError):
-        robot.jacobian(robot.neutral, "hand")
-    with pytest.raises(ShapeError):
-        robot.integrate(robot.neutral, [1.0])
-    with pytest.raises(NotFiniteError):
-        robot.integrate(robot.neutral, np.zeros(robot.nv), np.nan)
-    with pytest.raises(RotationError):
-        robot.difference(robot.neutral, np.zeros(robot.nq))
-    with pytest.raises(RangeError):
-        robot.random(-1)
+    assert_refused(lambda: robot.pose(robot.neutral, "hand"), UnknownNameError, "frame")
+    assert_refused(lambda: robot.pose(robot.neutral, "world", "hand"), UnknownNameError, "relative_to")
+    assert_refused(lambda: robot.jacobian(robot.neutral, "hand"), UnknownNameError, "")
+    assert_refused(lambda: robot.integrate(robot.neutral, [1.0]), ShapeError, "")
+    assert_refused(lambda: robot.integrate(robot.neutral, np.zeros(robot.nv), np.nan), NotFiniteError, "")
+    assert_refused(lambda: robot.difference(robot.neutral, np.zeros(robot.nq)), RotationError, "")
+    assert_refused(lambda: robot.random(-1), RangeError, "")
 
 
 def test_objects_say_in_a_line_what_they_are() -> None:
@@ -101,34 +95,14 @@ def test_objects_say_in_a_line_what_they_are() -> None:
     assert repr(stack) == "<Stack of 'panda', dt 0.01 s: rest (Damping)>"
 
 
-def test_values_as_users_write_them() -> None:
+def test_some_joints_of_a_posture_are_written_alone() -> None:
     robot = wbc.robots.load("panda")
     stack = wbc.Stack(robot, dt=0.01)
     stack.add(wbc.tasks.EndEffector("panda_hand_tcp"), name="hand")
     stack.add(wbc.tasks.Posture(joints=("panda_joint6", "panda_joint2")), name="posture")
     controller = stack.compile(backend="vm")
     controller.reset(robot.neutral)
-    hand, posture = controller["hand"], controller["posture"]
-
-    turn = pin.Quaternion(pin.exp3(np.array([0.1, 0.2, 0.3])))
-    hand.target = ((0.4, 0.1, 0.5), turn.coeffs())
-    np.testing.assert_allclose(
-        hand.target.homogeneous, pin.SE3(turn, np.array([0.4, 0.1, 0.5])).homogeneous, atol=1e-15
-    )
-    hand.target = (np.array([0.4, 0.1, 0.5]), turn.matrix())
-    np.testing.assert_allclose(hand.target.rotation, turn.matrix(), atol=1e-15)
-    with pytest.raises(ValueError, match="read-only"):
-        hand.target.translation[:] += 0.1
-    with pytest.raises(ValueError, match="read-only"):
-        hand.target.rotation[0, 0] = 2.0
-    own = hand.target.copy()
-    own.translation[2] += 0.1
-    hand.target = own
-    np.testing.assert_allclose(hand.target.translation, [0.4, 0.1, 0.6])
-    for bad, error in (((1.0, 2.0), ShapeError), (([0.0] * 3, [0.0, 0.0, 0.0, 2.0]), RotationError)):
-        with pytest.raises(error):
-            hand.target = bad
-
+    posture = controller["posture"]
     posture.target = [2.0, -0.5]
     assert posture.target[[5, 1]].tolist() == [2.0, -0.5]
     with pytest.raises(ShapeError, match="expected 2 numbers for panda_joint6, panda_joint2, or 7 for all joints"):

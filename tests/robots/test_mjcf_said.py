@@ -8,15 +8,12 @@ import resource
 from collections.abc import Iterator
 
 import mujoco
-import numpy as np
 import pytest
 
 import wbc
 from tests.refusals import assert_refused
 from wbc.errors import RobotFileError
 from wbc.robots import LoopError, MujocoJoints
-from wbc.simulation import MujocoPlant
-from wbc.simulation.plant import Command, CommandKind
 
 
 def link(name: str, x: float, joint: str = "", inner: str = "", body: str = "") -> str:
@@ -190,24 +187,6 @@ def test_names_are_found_whatever_shares_them() -> None:
     for frame, place in (("body2_", data.xpos[2]), ("body2", data.xpos[3]), ("universe_body", data.xpos[4])):
         assert robot.pose(q, frame).translation == pytest.approx(place, abs=1e-12)
     assert robot.pose(q, "a_site_").translation == pytest.approx(data.site("a").xpos, abs=1e-12)
-
-
-def test_motors_of_one_joint_give_their_sum() -> None:
-    motors = (
-        '<motor joint="a" ctrlrange="-10 10"/><motor joint="a" gear="-3" ctrlrange="-10 10"/>'
-        '<motor joint="b" forcerange="-7 7" ctrlrange="-2 2" gear="2"/><motor joint="b" group="3" ctrlrange="-9 9"/>'
-    )
-    text = document(PAIR, f'<actuator>{motors}</actuator><option actuatorgroupdisable="3"/>')
-    model = mujoco.MjModel.from_xml_string(text)
-    robot = wbc.robots.load(model)
-    assert robot.limits.effort == pytest.approx([40.0, 4.0])
-    plant = MujocoPlant(model, robot)
-    plant.apply(Command(CommandKind.TORQUE, np.array([40.0, 1.0])))
-    plant.advance(plant.time_step)
-    assert plant.data.qfrc_actuator[0] == pytest.approx(40.0)
-    plant.apply(Command(CommandKind.TORQUE, np.array([-8.0, 0.0])))
-    plant.advance(plant.time_step)
-    assert plant.data.qfrc_actuator[0] == pytest.approx(-8.0)
 
 
 def test_a_robot_of_a_text_is_pickled_locked_and_put_on_a_base() -> None:

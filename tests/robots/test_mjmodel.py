@@ -13,7 +13,6 @@ import pytest
 import wbc
 from tests.refusals import assert_refused
 from wbc.errors import RobotFileError, ShapeError, UnknownNameError, UnsupportedJointError
-from wbc.extras import MissingPackageError
 from wbc.robots import MujocoJoints
 
 SCENE = """<mujoco model="cell"><include file="arm.xml"/><worldbody><geom name="floor" type="plane" size="1 1 .1"/>
@@ -53,11 +52,6 @@ def test_a_scene_is_its_robot(cell: Path) -> None:
     controller = stack.compile(backend="vm")
     controller["wall"].pose = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.1]))
     assert controller.step(robot.neutral).status == "solved"
-
-
-def test_without_mujoco_a_scene_says_what_to_install(cell: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
-    assert_refused(lambda: wbc.robots.load(cell), MissingPackageError, "pip install 'wbc[mujoco]'")
 
 
 def test_other_robots_and_other_weights_are_not_silent(cell: Path, caplog: pytest.LogCaptureFixture) -> None:

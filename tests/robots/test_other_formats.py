@@ -79,6 +79,9 @@ def test_a_xacro_file_that_cannot_be_expanded_is_refused(tmp_path: Path) -> None
     bad.write_text('<robot name="a" xmlns:xacro="x"><xacro:include filename="$(find nowhere)/x.xacro"/></robot>')
     assert_refused(lambda: wbc.robots.load(bad), RobotFileError, "nowhere")
     assert_refused(lambda: wbc.robots.load(tmp_path / "none.xacro"), RobotFileError, "no such file")
+    named_urdf = tmp_path / "bad.urdf"
+    named_urdf.write_text(bad.read_text().replace('"x"', '"http://www.ros.org/wiki/xacro"'))
+    assert_refused(lambda: wbc.robots.load(named_urdf), RobotFileError, "call it bad.xacro")
     stage = tmp_path / "x.usda"
     stage.write_text("#usda 1.0\n")
     assert_refused(lambda: wbc.robots.load(stage, arguments={"a": 1}), RobotFileError, "only xacro")

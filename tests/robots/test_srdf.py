@@ -51,17 +51,6 @@ def test_mass_matrices_are_those_of_pinocchio_with_its_rotors(name: str) -> None
     assert robot.notes["armature"].startswith("rotors of the SRDF file")
 
 
-def test_torques_of_a_tick_drive_the_rotors() -> None:
-    robot = wbc.robots.load("talos_left_arm", shapes="none")
-    stack = wbc.Stack(robot, dt=0.002).add(wbc.tasks.Posture(gain=20.0), name="posture")
-    tick = stack.compile(command="torque", backend="vm")
-    tick["posture"].target = robot.neutral + 0.1
-    step = tick.step(robot.neutral, np.zeros(robot.nv))
-    assert np.abs(step.a).max() > 10.0
-    want = pin.rnea(robot.model, robot.model.createData(), robot.neutral, np.zeros(robot.nv), step.a)
-    np.testing.assert_allclose(step.torque, want, atol=1e-9)
-
-
 @pytest.mark.parametrize("base", [None, "floating"])
 def test_rotors_of_random_files(tmp_path: Path, base: str | None) -> None:
     """Joints without a rotor have none, joints that the robot does not have are left out, as of Pinocchio."""

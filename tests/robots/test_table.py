@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 import pathlib
-import time
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -22,6 +21,7 @@ from wbc.robot.sources.table import read_robot
 from wbc.robots import catalogue
 
 TABLE = {recipe.name: recipe for recipe in wbc.robots.table()}
+CASSIE = "cassie_description/robots/cassie"
 LOADABLE = [name for name, recipe in TABLE.items() if not recipe.problem]
 
 
@@ -31,21 +31,17 @@ def bare(name: str) -> Robot:
     return wbc.robots.load(name, shapes="none")
 
 
-def test_every_urdf_of_the_wheel_has_one_row() -> None:
-    files = sorted(str(p.relative_to(example_data_folder())) for p in example_data_folder().rglob("*.urdf"))
-    rows = sorted(recipe.file for recipe in TABLE.values() if recipe.file.endswith(".urdf"))
-    assert rows == files
-    assert len(files) == 69
-
-
-def test_the_folder_is_that_of_the_wheel_s_own_list() -> None:
-    assert example_data_folder() == listed_data_folder()
-
-
-def test_every_folder_of_the_wheel_has_a_row() -> None:
-    folders = {p.name for p in example_data_folder().iterdir() if p.is_dir()}
+def test_every_description_of_the_wheel_has_one_row() -> None:
+    """69 URDF files, of which one has no link, and Cassie's SDF; the folder is that of the wheel's own list."""
+    folder = example_data_folder()
+    assert folder == listed_data_folder()
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*.urdf"))
+    assert sorted(recipe.file for recipe in TABLE.values()) == sorted([*files, f"{CASSIE}_v2.sdf"])
+    folders = {p.name for p in folder.iterdir() if p.is_dir()}
     assert {recipe.file.split("/")[0] for recipe in TABLE.values()} == folders
-    assert len(folders) == 39
+    assert (len(files), len(folders)) == (69, 39)
+    assert [recipe.file for name, recipe in TABLE.items() if name not in LOADABLE] == ["ur_description/urdf/ur3.urdf"]
+    assert not list(ElementTree.parse(example("ur_description/urdf/ur3.urdf")).getroot())
 
 
 @pytest.mark.parametrize("name", [name for name, recipe in TABLE.items() if recipe.problem])
@@ -62,16 +58,7 @@ def test_a_row_read_alone_is_that_of_the_table(name: str) -> None:
     assert read_robot(pathlib.Path(catalogue.__file__).parent, name) == TABLE.get(name)
 
 
-def test_of_seventy_descriptions_the_one_that_does_not_load_has_no_link() -> None:
-    """69 URDF files and Cassie's SDF; beside them are four more SDF files of Cassie, and two of macros."""
-    assert len(TABLE) == 70
-    assert [recipe.file for name, recipe in TABLE.items() if name not in LOADABLE] == ["ur_description/urdf/ur3.urdf"]
-    assert not list(ElementTree.parse(example("ur_description/urdf/ur3.urdf")).getroot())
-    assert [recipe.file for recipe in TABLE.values() if not recipe.file.endswith(".urdf")] == [f"{CASSIE}_v2.sdf"]
-
-
 #: Files of the wheel that are no row -> why they do not load; "": they do
-CASSIE = "cassie_description/robots/cassie"
 OTHERS = {
     f"{CASSIE}.sdf": "is of type 'gearbox'",
     f"{CASSIE}_reduced.sdf": "no configuration was found that closes it",
@@ -168,13 +155,3 @@ def test_neutral_configuration_is_the_srdf_state(name: str) -> None:
         elif joint == "root_joint" and robot.base == "floating" and len(values) == 7:
             np.testing.assert_allclose(robot.neutral[:7], values, atol=1e-5)
     assert compared >= 2
-
-
-def test_loading_is_fast() -> None:
-    wbc.robots.load("panda")
-    spans = []
-    for _ in range(5):
-        start = time.process_time()
-        wbc.robots.load("panda")
-        spans.append(time.process_time() - start)
-    assert min(spans) < 0.3

@@ -5,15 +5,12 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from typer.testing import CliRunner
 
 import wbc
 import wbc.robots
-from wbc.cli.app import app
 from wbc.errors import CommandError, RangeError, RobotFileError
 from wbc.simulation import mujoco_spec
 
@@ -105,22 +102,6 @@ def test_a_plane_that_stands_upright_has_no_motors_to_hold_a_weight(tmp_path: Pa
         stack.compile(command="torque", backend="vm")
 
 
-@pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1", "0 1 0", "1 -2 0.5"])
-def test_planes_are_those_of_mujoco(tmp_path: Path, axis: str) -> None:
-    path = write(tmp_path, joint("plane", "planar", "a", "b", "", axis), joint("hip", "revolute", "b", "c"))
-    robot = wbc.robots.load(path)
-    text = path.read_text().replace("</robot>", '<mujoco><compiler fusestatic="false"/></mujoco></robot>')
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    data.qpos[:] = [0.3, -0.7, 0.9, 0.4]
-    mujoco.mj_forward(model, data)
-    q = np.array([0.3, -0.7, np.cos(0.9), np.sin(0.9), 0.4])
-    for name in ("b", "c"):
-        pose = robot.pose(q, name)
-        np.testing.assert_allclose(pose.translation, data.body(name).xpos, atol=1e-9)
-        np.testing.assert_allclose(pose.rotation, data.body(name).xmat.reshape(3, 3), atol=1e-9)
-
-
 ENDLESS = '<limit effort="7" velocity="3"/>'
 
 
@@ -201,19 +182,3 @@ def test_links_with_an_incomplete_inertial_weigh_nothing(tmp_path: Path, caplog:
     path.write_text(path.read_text().replace('izz="0.01"', 'izz="nan"'))
     wbc.robots.load(path)
     assert "weighs nothing" in caplog.text
-
-
-@pytest.mark.parametrize("axis", ["0 0 0", "1 1"])
-def test_the_command_line_names_the_file(tmp_path: Path, axis: str) -> None:
-    path = write(tmp_path, joint("turn", "revolute", "a", "b", axis=axis))
-    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robots", "show", str(path)])
-    assert result.exit_code == 2
-    assert str(path) in result.stderr
-    assert "turn" in result.stderr
-
-
-def test_the_command_line_names_the_file_of_a_circle(tmp_path: Path) -> None:
-    path = write(tmp_path, joint("turn", "revolute", "a", "b", LIMIT + '<mimic joint="turn"/>'))
-    result = CliRunner(env={"COLUMNS": "400"}).invoke(app, ["robots", "show", str(path)])
-    assert str(path) in result.stderr
-    assert "circle (got 'turn')" in result.stderr

@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.refusals import assert_refused
 from wbc.errors import NotFiniteError, RangeError, RobotFileError, ShapeError, UnknownNameError
 from wbc.robots import TwoEndedData, Walker, WalkerData, walker
 from wbc.robots.walker_data import FILE, INCH, WALKER_DIGEST
@@ -273,25 +274,14 @@ def test_bad_data_files_are_refused(old: str, new: str, said: str, tmp_path: Pat
 
 
 def test_bad_arguments_are_refused() -> None:
-    with pytest.raises(RangeError, match="arms"):
-        walker(1)
-    with pytest.raises(RangeError, match="shoulder_radius"):
-        walker(shoulder_radius=-0.1)
-    with pytest.raises(UnknownNameError, match="clearance"):
-        WalkerData.read(clearence=0.1)
-    with pytest.raises(NotFiniteError, match="hand_length"):
-        WalkerData.read(hand_length=np.nan)
-    with pytest.raises(ShapeError, match="joint_rates"):
-        WalkerData.read(joint_rates=[1.0, 2.0])
-    with pytest.raises(RangeError, match="joint_rates"):
-        WalkerData.read(joint_rates=[1.0, 2.0, 0.0, 1.0, 1.0, 1.0])
-    with pytest.raises(ShapeError, match="TwoEndedData"):
-        walker(two_ended=True, data=WalkerData.read())
-    with pytest.raises(RangeError, match="two_ended"):
-        walker(two_ended=True, shoulder_radius=0.3)
-    with pytest.raises(UnknownNameError, match="prism"):
-        walker(body_shape="prisma")
-    with pytest.raises(UnknownNameError, match="arm1"):
-        MACHINES["three"].arm("arm4")
-    with pytest.raises(RobotFileError, match="written"):
-        MACHINES["three"].urdf("/nowhere/at/all.urdf")
+    assert_refused(lambda: walker(1), RangeError, "arms")
+    assert_refused(lambda: walker(shoulder_radius=-0.1), RangeError, "shoulder_radius")
+    assert_refused(lambda: WalkerData.read(clearence=0.1), UnknownNameError, "clearance")
+    assert_refused(lambda: WalkerData.read(hand_length=np.nan), NotFiniteError, "hand_length")
+    assert_refused(lambda: WalkerData.read(joint_rates=[1.0, 2.0]), ShapeError, "joint_rates")
+    assert_refused(lambda: WalkerData.read(joint_rates=[1.0, 2.0, 0.0, 1.0, 1.0, 1.0]), RangeError, "joint_rates")
+    assert_refused(lambda: walker(two_ended=True, data=WalkerData.read()), ShapeError, "TwoEndedData")
+    assert_refused(lambda: walker(two_ended=True, shoulder_radius=0.3), RangeError, "two_ended")
+    assert_refused(lambda: walker(body_shape="prisma"), UnknownNameError, "prism")
+    assert_refused(lambda: MACHINES["three"].arm("arm4"), UnknownNameError, "arm1")
+    assert_refused(lambda: MACHINES["three"].urdf("/nowhere/at/all.urdf"), RobotFileError, "written")

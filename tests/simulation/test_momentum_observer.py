@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from tests.refusals import assert_refused
@@ -52,6 +53,15 @@ def test_a_limp_motor_is_found_by_its_joint(scale: float, found: list[int], dela
             assert tick % LOOKS == 0
             watch.see(plant.state.q, plant.state.v, np.zeros(ROBOT.nv))
     assert watch.limp == found
+
+
+def test_mimic_joints_of_pinocchio_are_refused() -> None:
+    joint = '<joint name="{}" type="revolute"><parent link="{}"/><child link="{}"/><axis xyz="0 0 1"/>{}</joint>'
+    joints = joint.format("lead", "a", "b", ""), joint.format("tip", "b", "c", '<mimic joint="lead" multiplier="2"/>')
+    text = '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>' + "".join(joints) + "</robot>"
+    limits = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    model = pin.buildModelFromXML(text.replace("</joint>", limits + "</joint>"), mimic=True)
+    assert_refused(lambda: MomentumObserver(model, 50.0, 0.001), RangeError, "model")
 
 
 def test_gains_that_are_none_are_refused() -> None:

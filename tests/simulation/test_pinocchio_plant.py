@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -166,27 +165,6 @@ def test_encoders_round_and_err_and_the_base_does_not() -> None:
     counts = read[-1].q[7:] / 1e-4
     assert counts == pytest.approx(np.round(counts), abs=1e-6)
     assert plant.read() is plant.read()
-
-
-def test_a_saved_state_goes_on_to_the_same_bits() -> None:
-    motors = Motors(delay=0.003, lag=0.002, noise=0.5, coulomb=0.2)
-    plant = PinocchioPlant(ROBOT, motors=motors, encoders=Encoders(position=1e-4), seed=2)
-    held(plant, 2, GripKind.AXIS)
-    plant.apply(torque(random_torque(ROBOT, 5.0)))
-    plant.advance(0.01)
-    plant.slip(HANDS[0], (0.01, 0.0, 0.0), 0.01)
-    saved = pickle.loads(pickle.dumps(plant.save()))
-    plant.apply(torque(random_torque(ROBOT, 5.0, 1)))
-    plant.advance(0.02)
-    end = plant.read()
-    again = PinocchioPlant(ROBOT, motors=motors, encoders=Encoders(position=1e-4), seed=99)
-    again.restore(saved)
-    again.apply(torque(random_torque(ROBOT, 5.0, 1)))
-    again.advance(0.02)
-    assert (again.read().q == end.q).all()
-    assert (again.read().v == end.v).all()
-    assert set(again.grips) == {HANDS[0], HANDS[1]}
-    assert_refused(lambda: PinocchioPlant(wbc.robots.load("panda")).restore(saved), RangeError, "another robot")
 
 
 def ball_on_ground(

@@ -1,12 +1,15 @@
-"""The seam to a robot: what fits a loop, what is refused, and what a loop does with readings that are none."""
+"""The seam to a robot: what fits a loop, what is refused, bad readings, and that only plants integrate."""
 
 from __future__ import annotations
+
+import ast
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wbc
+from tests.project.layout import ROOT, nodes, relative, sources
 from wbc.errors import RangeError, ShapeError, WbcError
 from wbc.robot import Robot
 from wbc.simulation import Command, CommandKind, Connection, KinematicPlant, Plant, PlantError, PlantState
@@ -126,3 +129,19 @@ def test_a_plant_that_writes_into_its_arrays_does_not_change_what_was_read() -> 
     state = Connection(plant, robot, 0.01).reset(robot.neutral)
     plant.said.q[:] = 7.0  # type: ignore[attr-defined]
     assert (state.q == robot.neutral).all()
+
+
+LOOPS = ("wbc/track", "wbc/teleop")
+
+
+@pytest.mark.parametrize("folder", LOOPS)
+def test_no_loop_integrates_rates(folder: str) -> None:
+    files = [path for path in sources("wbc") if relative(path).startswith(f"{folder}/")]
+    assert files, ROOT
+    found = [
+        f"{relative(path)}:{node.lineno}"
+        for path in files
+        for node in nodes(path)
+        if isinstance(node, ast.Attribute) and node.attr in ("integrate", "difference")
+    ]
+    assert found == []

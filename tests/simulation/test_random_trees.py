@@ -4,6 +4,7 @@ simulators.
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import mujoco
@@ -194,12 +195,22 @@ def test_saved_states_go_on_to_the_same_bits(seed: int) -> None:
             plant.grasp("a_tip", robot.pose(at, "a_tip"), GripKind.POSITION)
             plant.apply(Command(CommandKind.TORQUE, tau))
             plant.advance(0.005)
+            plant.slip("a_tip", (0.01, 0.0, 0.0), 0.01)
+            plant.limp(robot.joint_names[-1])
             saved = plant.save()
+            carried = pickle.loads(pickle.dumps(saved))
             plant.advance(0.01)
-            ends.append(plant.read())
-            plant.restore(saved)  # type: ignore[arg-type]
-            plant.advance(0.01)
-            ends.append(plant.read())
-        for end in ends[1:]:
-            assert end.q.tobytes() == ends[0].q.tobytes()
-            assert end.v.tobytes() == ends[0].v.tobytes()
+            ends.append((plant.read(), plant.wrenches, plant.given))
+            plant.release("a_tip")
+            for again in (saved, carried, saved):
+                plant.restore(again)
+                plant.advance(0.01)
+                ends.append((plant.read(), plant.wrenches, plant.given))
+        first, wrenches, given = ends[0]
+        for end, *others in ends[1:]:
+            assert end.q.tobytes() == first.q.tobytes()
+            assert end.v.tobytes() == first.v.tobytes()
+            assert others[0]["a_tip"].tobytes() == wrenches["a_tip"].tobytes()
+            assert others[1].tobytes() == given.tobytes()
+    other = PinocchioPlant(wbc.robots.load("panda"))
+    assert_refused(lambda: other.restore(saved), RangeError, "another robot")

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.constraints import test_rows_by_need
 from tests.controller.stacks import DT, arm, everything, humanoid, randomise
 from tests.levels import arms
 from tests.repeats import repeats
@@ -39,6 +40,7 @@ FAMILY: dict[str, Callable[[], tuple[Stack, str]]] = {
     "panda": lambda: (everything("panda"), "velocity"),
     "ur5, plain": lambda: (everything("ur5", calm=False), "velocity"),
     "humanoid": lambda: (humanoid(), "velocity"),
+    "measured": lambda: (test_rows_by_need.stack(test_rows_by_need.panda(8.0), 3), "velocity"),
     "levels": lambda: (arms.levels(), "velocity"),
     "torque": lambda: (problems.stack("panda"), "torque"),
     "acceleration": lambda: (arm("panda"), "acceleration"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import json
 import logging
 import os
 import pathlib
+import pwd
 import re
 import shutil
 import subprocess
@@ -466,6 +468,44 @@ def test_unusable_folders_are_replaced(
     instead = cache._instead(cache.root(), reason)
     assert instead.stat().st_mode & 0o777 == 0o700
     assert len(entries(instead)) == 2
+
+
+def test_a_full_disk_is_replaced(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    seal = cache._seal
+
+    def sealed(fresh: Folder) -> None:
+        if fresh.parent == folder:
+            raise OSError(errno.ENOSPC, "")
+        seal(fresh)
+
+    monkeypatch.setattr(cache, "_seal", sealed)
+    one, two = (small.stack().compile(backend="vm") for _ in range(2))
+    assert (small.command(one), two.cached) == (small.command(two), True)
+    assert caplog.text.count("No space left on device") == 1
+    assert entries(folder) == []
+
+
+def test_folders_may_have_any_name(tmp_path: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one of bytes that are no letters of the locale."""
+    monkeypatch.setenv("WBC_CACHE", os.fsdecode(bytes(tmp_path) + b"/\xfc c"))
+    one, two = (small.stack().compile(backend="vm") for _ in range(2))
+    assert [one.cached, two.cached] == [False, True]
+    assert small.command(one) == small.command(two)
+
+
+def test_a_user_without_a_home_has_a_cache(tmp_path: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a container that runs under any user id."""
+
+    def unknown(user: int) -> None:
+        raise KeyError(user)
+
+    for name in ("WBC_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert cache.root() == tmp_path / f"wbc-{os.getuid()}"
 
 
 def test_temporary_folder_goes_with_its_process(tmp_path: Folder) -> None:

@@ -1,8 +1,9 @@
-"""The reference of the angle of an arm's plane, and full turns of the self-motion."""
+"""The reference of the angle of an arm's plane, full turns of the self-motion, and limits of the angle."""
 
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -10,14 +11,18 @@ import pinocchio as pin
 import pytest
 
 from tests.tasks.planes import (
+    LIMIT,
     SPHERICAL,
     TILTED,
     clear,
     evaluate,
     robot,
+    seen,
+    states,
     wrap,
 )
 from wbc.tasks import _stereographic as stereo
+from wbc.tasks.pitch_plane_limit import PitchPlaneLimit
 
 
 @functools.cache
@@ -91,3 +96,36 @@ def test_full_turn_of_the_self_motion(seed: int) -> None:
         rows.append(jacobian)
     assert total == pytest.approx(2 * np.pi, abs=1e-12)
     np.testing.assert_allclose(rows[0], rows[-1], atol=1e-9)
+
+
+LIMITS: dict[str, tuple[str, PitchPlaneLimit]] = {
+    "panda": ("panda", PitchPlaneLimit("panda_link2", "panda_link4", "panda_link6", lower=-1.0, upper=0.2)),
+    "spherical": ("spherical", LIMIT),
+    "range across pi": ("spherical", replace(LIMIT, lower=2.5, upper=4.0)),
+    "axis": ("ssrms", PitchPlaneLimit("F3", "F4", "F5", axis="joint3", lower=-1.0, upper=1.0)),
+}
+
+
+@pytest.mark.parametrize("case", LIMITS)
+def test_margins_are_the_distances_to_the_bounds(case: str) -> None:
+    name, item = LIMITS[case]
+    for q in clear(name, item, 20, seed=14):
+        middle, half = (item.lower + item.upper) / 2, (item.upper - item.lower) / 2
+        off = wrap(seen(name, item, q).psi - middle)
+        np.testing.assert_allclose(evaluate(name, item, q)[0], [half + off, half - off], atol=1e-11)
+
+
+@pytest.mark.parametrize("case", LIMITS)
+def test_margin_derivative_includes_the_fading(case: str) -> None:
+    """Central differences of the margins themselves, at random states and inside the faded zones."""
+    name, item = LIMITS[case]
+    model = robot(name).model
+    states_here = list(states(name, 10, seed=15))
+    if name == "spherical":
+        states_here += [np.array([0.3, 0.9, 0.2, bend, 0.4, 0.5, 0.6]) for bend in (0.05, 0.1, 0.15, 0.2)]
+        assert 0.0 < evaluate(name, item, states_here[-2])[2][0] < 1.0
+    for q in states_here:
+        jacobian = evaluate(name, item, q)[1]
+        for k, direction in enumerate(1e-6 * np.eye(model.nv)):
+            change = evaluate(name, item, q + direction)[0] - evaluate(name, item, q - direction)[0]
+            np.testing.assert_allclose(jacobian[:, k], change / 2e-6, atol=1e-6 * (1 + np.abs(jacobian).max() ** 2))

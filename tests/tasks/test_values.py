@@ -136,15 +136,6 @@ def test_posture_is_the_difference_on_the_manifold(name: str) -> None:
         np.testing.assert_allclose(whole(q, values)["value"], wanted[rest], rtol=0, atol=1e-11)
 
 
-def test_posture_turns_an_unbounded_joint_the_short_way() -> None:
-    machine = robot("kinova")
-    found = numbers(Posture(), machine)
-    q = pin.integrate(machine.model, machine.neutral, np.array([3.0, 0, 0, 0, 0, 0]))
-    target = pin.integrate(machine.model, machine.neutral, np.array([-3.0, 0, 0, 0, 0, 0]))
-    error = found(q, {"target": target, "feedforward": np.zeros(6)})["value"]
-    np.testing.assert_allclose(error, [6.0 - 2 * np.pi, 0, 0, 0, 0, 0], rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("item", "limit"),
     [

@@ -126,21 +126,3 @@ def test_a_known_push_reaches_the_feet() -> None:
     needed = pin.rnea(bot.model, bot.model.createData(), q, v, step.a) - total
     assert needed[:6] == pytest.approx(np.zeros(6), abs=1e-6)
     assert needed[6:] == pytest.approx(step.torque[6:], abs=1e-6)
-
-
-def test_divergent_component_of_motion_converges_where_the_centre_of_mass_is_so_damped() -> None:
-    """xi = c + dc/dt / omega: stiffness omega k and damping omega + k are  d xi/dt = -k (xi - target)."""
-    bot, k = robot("walker"), 3.0
-    omega = float(np.sqrt(9.81 / 0.8))
-    made = Stack(bot, dt=DT).add(CenterOfMass(), name="com")
-    tick = made.compile(command="acceleration", backend="vm")
-    q, v = bot.neutral.copy(), np.random.default_rng(1).uniform(-0.1, 0.1, bot.nv)
-    tick.reset(q)
-    tick["com"].set(stiffness=omega * k, damping=omega + k)
-    data = bot.model.createData()
-    target = pin.centerOfMass(bot.model, data, q, v).copy() + np.array([0.02, -0.01, 0.0])
-    tick["com"].target = target
-    step = tick.step(q, v)
-    pin.centerOfMass(bot.model, data, q, v, step.a)
-    xi, rate = data.com[0] + data.vcom[0] / omega, data.vcom[0] + data.acom[0] / omega
-    assert rate == pytest.approx(-k * (xi - target), abs=1e-6)

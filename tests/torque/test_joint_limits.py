@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, strategies as st
 
 import wbc.robots
 from tests.repeats import repeats
@@ -19,7 +18,7 @@ from wbc.api import Stack
 from wbc.controller import core_of
 from wbc.robot import Coupling, Robot
 from wbc.tasks import JointLimits, Posture
-from wbc.tasks.stopping import allowed_accelerations, stopping_deceleration
+from wbc.tasks.stopping import allowed_accelerations
 
 #: Ticks of an adversary
 TICKS = 10_000
@@ -128,45 +127,6 @@ def test_no_adversary_breaks_a_limit_and_the_textbook_version_fails_beside_it() 
     assert max(worst.values()) < 1e-11, worst
     naive = adversary(textbook(limits), limits, 300, 1)
     assert naive["empty"] > 0.1, "limits for the next tick alone contradict each other"
-
-
-@given(
-    st.floats(-1.0, 1.0),
-    st.floats(-1.0, 1.0),
-    st.floats(0.05, 1.0),
-    st.floats(-4.0, 0.8),
-    st.floats(-1.5, 1.0),
-    st.floats(-0.5, 3.0),
-)
-def test_from_every_viable_state_there_is_an_acceleration(
-    place: float, pace: float, share: float, width: float, speed: float, acceleration: float
-) -> None:
-    """Not clipped: the three limits alone have a common point, and its next state is viable."""
-    u, V, A = 10.0**width / 2, 10.0**speed, 10.0**acceleration
-    q, dt = place * u, share * LONGEST
-    B = stopping_deceleration(A, V, 2 * u, LONGEST)
-    v = pace * min(V, np.sqrt(2 * B * (u - q if pace > 0 else q + u)))
-    symbols = [ca.SX.sym(n) for n in "qvt"]
-    # without velocity and acceleration limits nothing is clipped; they are asked for here
-    ends = allowed_accelerations(
-        *symbols,
-        position=(-u, u),
-        velocity=V,
-        acceleration=A,
-        velocity_scale=ca.SX(1.0),
-        return_rate=ca.SX(5.0),
-        longest=LONGEST,
-    )
-    low, high = (float(x) for x in ca.Function("f", symbols, list(ends))(q, v, dt))
-    assert low <= high
-    for a in (low, high, 0.5 * (low + high)):
-        later, w = q + v * dt + 0.5 * a * dt * dt, v + a * dt
-        room = 1e-9 * (2 * u)
-        assert abs(a) <= A * (1 + 1e-12)
-        assert abs(w) <= V * (1 + 1e-9)
-        assert abs(later) <= u + room
-        stop = w * w / (2 * B)
-        assert stop <= (u - later if w > 0 else later + u) + room + 1e-9 * stop
 
 
 def test_bounds_of_a_tick_are_those_of_a_search() -> None:

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from hypothesis import given, strategies as st
 
 from tests.constraints.robots import with_test_shapes
 from tests.torque.problems import robot
@@ -15,26 +14,6 @@ from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, Obstacle, Posture, WorkspaceBox
 
 DT = 0.005
-
-
-@given(
-    st.floats(0.0, 3.0),
-    st.floats(-3.0, 3.0),
-    st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(0.0, 5.0)), min_size=1, max_size=60),
-)
-def test_the_row_keeps_a_margin_whose_second_derivative_it_decides(
-    start: float, pace: float, ticks: list[tuple[float, float]]
-) -> None:
-    """h'' anywhere at or above what the row says, for ticks of any length up to 1 / rate."""
-    rate = 10.0
-    h, dh = start, max(pace, -rate * start)
-    for share, more in ticks:
-        dt = share / rate
-        second = -rate * (2 * dh + rate * h) / (1 + 0.5 * rate * dt) + more
-        least = h * (1 - 0.5 * rate * dt) / (1 + 0.5 * rate * dt)
-        h, dh = h + dh * dt + 0.5 * second * dt * dt, dh + second * dt
-        assert h >= least - 1e-12
-        assert dh + rate * h >= -1e-12
 
 
 @cache

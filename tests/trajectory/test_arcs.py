@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, strategies as st
 
 from tests.trajectory.path_checks import random_poses
-from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.trajectory import Path, arc_path, arc_through
 from wbc.validation import Array
 
@@ -69,36 +68,3 @@ def test_through_three_points(seed: int, scale: float) -> None:
     np.testing.assert_allclose(between[:3, 3], points[1], atol=1e-9 * reach)
     turn = np.linalg.norm(pin.log3(end.rotation @ start.rotation.T))
     assert path.length == pytest.approx(reach * angles[1] + 0.5 * turn, rel=1e-8)
-
-
-def test_what_is_no_circle_is_refused() -> None:
-    a, b = random_poses(5, 2)
-    a.translation, b.translation = np.zeros(3), np.array([1.0, 0.0, 0.0])
-    for via in ([0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.5, 1e-11, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]):
-        with pytest.raises(RangeError, match=r"path\.via"):
-            arc_through(a, via, b)
-    with pytest.raises(RangeError, match=r"path\.via"):
-        arc_through(a, [0.5, 1.0, 0.0], a)
-    with pytest.raises(RangeError, match="the same"):
-        arc_through(a, a.translation, a)
-    half = pin.SE3(a.rotation @ pin.exp3(np.array([np.pi, 0.0, 0.0])), b.translation)
-    with pytest.raises(RangeError, match="half a turn"):
-        arc_through(a, [0.5, 1.0, 0.0], half)
-
-
-def test_bad_input_is_named() -> None:
-    start = pin.SE3.Identity()
-    axis = [0.0, 0.0, 1.0]
-    with pytest.raises(ShapeError, match=r"path\.center"):
-        arc_path(start, [0.0, 1.0], axis)
-    with pytest.raises(NotFiniteError, match=r"path\.turn"):
-        arc_path(start, [0.0, 1.0, 0.0], [0.0, np.nan, 0.0])
-    with pytest.raises(UnknownNameError, match="carried"):
-        arc_path(start, [0.0, 1.0, 0.0], axis, "free")  # type: ignore[arg-type]
-    for radius in (0.0, -1.0):
-        with pytest.raises(RangeError, match=r"path\.radius"):
-            arc_path(start, [0.0, 1.0, 0.0], axis, radius=radius)
-    with pytest.raises(RangeError, match=r"at most 1e\+60 in size"):
-        arc_path(start, [0.0, 1e200, 0.0], [0.0, 0.0, 1e200])
-    with pytest.raises(ShapeError, match=r"path\.via"):
-        arc_through(start, "between", start)

@@ -8,7 +8,6 @@ from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tests.trajectory.path_checks import steps_at_knots
-from wbc.errors import NotFiniteError, RangeError
 from wbc.trajectory import Law, MotionLimits, PolynomialPath, Timing, blend_path
 from wbc.validation import Array
 
@@ -106,16 +105,3 @@ def test_laws_along_it_have_exact_certificates() -> None:
     # q'' is largest in the middle of the corner: 1.5 |v - u| / 2 d by joint
     reach = 0.05 / (3.0 / 16.0 * np.sqrt(2.0))
     assert worst["acceleration"].ratio == pytest.approx(1.5 / (2.0 * reach) / 100.0, rel=1e-9)
-
-
-def test_bad_deviation_is_named() -> None:
-    points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
-    for bad in (0.0, -1.0):
-        with pytest.raises(RangeError, match=r"path\.deviation"):
-            blend_path(points, bad)
-    with pytest.raises(NotFiniteError, match=r"path\.deviation"):
-        blend_path(points, np.nan)
-    with pytest.raises(RangeError, match="at least") as told:
-        blend_path(points, 1e-13)
-    least = float(str(told.value).split("at least ")[1].split(" ")[0])
-    assert blend_path(points, 1.01 * least).degree == 4

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path as FilePath
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings, strategies as st
 
 from tests.trajectory.random_laws import ragged, smooth
 from wbc import trajectory
@@ -92,15 +90,6 @@ def test_every_kind_of_path_is_saved_by_a_test(tmp_path: FilePath) -> None:
         with np.load(tmp_path / name) as archive:
             words |= {str(archive[key]) for key in archive.files if key.endswith("kind")}
     assert words == set(files.KINDS)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(0, 9), st.integers(1, 4))
-@settings(max_examples=10)
-def test_random_laws(tmp_path_factory: pytest.TempPathFactory, seed: int, path_degree: int, timing_degree: int) -> None:
-    law = ragged(seed, path_degree, timing_degree)
-    file = tmp_path_factory.mktemp("laws") / "law.npz"
-    law.save(file)
-    assert_same(trajectory.load(file), law)
 
 
 def test_a_file_that_is_there_is_replaced(tmp_path: FilePath) -> None:
@@ -205,10 +194,3 @@ def test_damaged_contents(key: str, value: np.ndarray | None, match: str, tmp_pa
     np.savez(file, **arrays)
     with pytest.raises(LawFileError, match=match):
         trajectory.load(file)
-
-
-def test_files_are_plain_archives(tmp_path: FilePath) -> None:
-    smooth(0).save(tmp_path / "law.npz")
-    with zipfile.ZipFile(tmp_path / "law.npz") as archive:
-        assert archive.testzip() is None
-        assert "path.coefficients.npy" in archive.namelist()

@@ -106,22 +106,3 @@ def test_a_path_that_stands_takes_a_moment():
     assert 0.0 < law.duration <= 1e-6
     assert np.array_equal(law.at(law.duration).position, [0.2, 0.3])
     assert law.certificate.ratio == 0.0
-
-
-@pytest.mark.parametrize(
-    ("changes", "error", "field"),
-    [
-        ({"velocity": 0.0}, errors.RangeError, "limits.velocity"),
-        ({"jerk": [1.0, 1.0]}, errors.ShapeError, "limits.jerk"),
-        ({"acceleration": np.nan}, errors.NotFiniteError, "limits.acceleration"),
-        ({"cells": 2}, errors.RangeError, "cells"),
-        ({"stops": "yes"}, errors.ShapeError, "stops"),
-        ({"path": POINTS}, errors.ShapeError, "path"),
-        ({"lower": -0.2, "upper": 2.0, "cells": 30}, errors.BoundsError, "position of joint 0"),
-    ],
-)
-def test_bad_input(changes, error, field):
-    arguments = {"path": spline_path(POINTS), **SIZES, **changes}
-    with pytest.raises(error) as caught:
-        jerk_limited_along(arguments.pop("path"), **arguments)
-    assert caught.value.field == field

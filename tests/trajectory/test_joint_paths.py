@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.trajectory.path_checks import steps_at_knots, worst_derivative
-from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.trajectory import Law, PolynomialPath, Timing, blend_path, spline_path, standing_path, straight_path
 
 WAYPOINTS = np.random.default_rng(4).normal(size=(6, 7))
@@ -132,29 +131,3 @@ def test_equal_waypoints_stand(size: float) -> None:
     law = Law(paths[0], Timing.identity(1.0))
     assert law.at(0.3).position.tolist() == [1.0, -2.0]
     assert not law.at(0.3).velocity.any()
-
-
-def test_bad_waypoints_are_named() -> None:
-    for make in (spline_path, lambda w: blend_path(w, 0.1)):
-        for bad in ([0.0, 1.0], [[0.0, 1.0]], [[], []], "here", [[0.0], [0.0, 1.0]], None):
-            with pytest.raises(ShapeError, match=r"path\.waypoints"):
-                make(bad)
-        for value in (np.nan, np.inf):
-            with pytest.raises(NotFiniteError, match=r"path\.waypoints"):
-                make([[0.0], [value]])
-        with pytest.raises(RangeError, match="at most 1e\\+60 in size"):
-            make([[-1.7e308], [1.7e308]])
-
-
-def test_bad_ends_and_vectors_are_named() -> None:
-    with pytest.raises(UnknownNameError, match="not-a-knot"):
-        spline_path(WAYPOINTS, "periodic")  # type: ignore[arg-type]
-    with pytest.raises(ShapeError, match=r"path\.start"):
-        straight_path(1.0, 2.0)
-    with pytest.raises(ShapeError, match=r"path\.end"):
-        straight_path([1.0], [1.0, 2.0])
-    with pytest.raises(NotFiniteError, match=r"path\.end"):
-        straight_path([1.0], [np.nan])
-    for bad in (1.0, [], [[1.0]]):
-        with pytest.raises(ShapeError, match=r"path\.position"):
-            standing_path(bad)

@@ -280,22 +280,6 @@ def test_bad_input_changes_nothing(call, error, field):
         assert np.array_equal(one.acceleration, other.acceleration)
 
 
-@pytest.mark.parametrize(
-    ("changes", "error"),
-    [
-        ({"dt": 0.0}, errors.RangeError),
-        ({"dof": 0}, errors.RangeError),
-        ({"jerk": None}, errors.ShapeError),
-        ({"velocity": [1.0, np.inf]}, errors.NotFiniteError),
-        ({"synchronisation": "tim"}, errors.UnknownNameError),
-    ],
-)
-def test_bad_filters_are_refused(changes, error):
-    arguments = {"dof": 2, "dt": 0.01, "velocity": 1.0, "acceleration": 1.0, "jerk": 1.0, **changes}
-    with pytest.raises(error):
-        online(arguments.pop("dof"), arguments.pop("dt"), **arguments)
-
-
 @pytest.mark.parametrize("synchronisation", SYNCHRONISATIONS)
 @pytest.mark.parametrize("far", [1e3, 1e6])
 def test_moves_of_hours_are_begun(far, synchronisation):

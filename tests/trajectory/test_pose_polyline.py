@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
-from wbc.trajectory import Law, MotionLimits, Path, PosePath, Timing, geodesic_path, pose_polyline
+from wbc.trajectory import Law, MotionLimits, Path, Timing, geodesic_path, pose_polyline
 from wbc.validation import Array
 
 SEEDS = st.integers(0, 10**6)
@@ -147,31 +146,3 @@ def test_certificates_are_exact_where_each_corner_turns_about_one_axis() -> None
         seen = np.abs(law.at(np.linspace(0.0, law.duration, 4001)).acceleration).max() / 10.0
         assert law.certificate.worst["acceleration"].ratio >= seen - 1e-12
     assert kinds == ["exact", "sampled"]
-
-
-def test_bad_input_is_named() -> None:
-    a, b = random_poses(9, 2)
-    for bad in ([], [a], 3.0, [a, "there"], [a, np.zeros((3, 3))]):
-        with pytest.raises(ShapeError, match=r"path\.poses"):
-            pose_polyline(bad, 0.1)  # type: ignore[arg-type]
-    with pytest.raises(NotFiniteError, match=r"path\.poses\[1\]"):
-        geodesic_path(a, [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    with pytest.raises(RotationError, match=r"path\.poses\[1\]"):
-        geodesic_path(a, 2.0 * np.eye(4))
-    bad_numbers = {"deviation": (0.0, 0.1, 0.5), "turn_deviation": (0.1, -1.0, 0.5), "radius": (0.1, 0.1, 0.0)}
-    for name, numbers in bad_numbers.items():
-        with pytest.raises(RangeError, match=rf"path\.{name}:"):
-            pose_polyline([a, b], *numbers)
-    half = pin.SE3(a.rotation @ pin.exp3(np.array([np.pi, 0.0, 0.0])), a.translation)
-    with pytest.raises(RangeError, match="too far from the orientation before it"):
-        geodesic_path(a, half)
-    with pytest.raises(RangeError, match=r"path\.turn_deviation: .* at least"):
-        pose_polyline(random_poses(9, 3), 0.1, 1e-12)
-
-
-def test_parts_with_other_knots_are_refused() -> None:
-    first, second = (geodesic_path(*random_poses(seed, 2)) for seed in (0, 1))
-    with pytest.raises(RangeError, match="same knots"):
-        PosePath(first.position, second.turning)
-    with pytest.raises(ShapeError, match="dof 3"):
-        PosePath(first, first.turning)

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.trajectory.path_checks import off_orthonormal, random_poses
-from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.errors import RangeError
 from wbc.trajectory import geodesic_path, pose_spline
 
 ENDS = ("not-a-knot", "clamped", "natural")
@@ -74,19 +74,6 @@ def test_repeated_poses_are_dropped_and_equal_ones_stand() -> None:
     standing = pose_spline([poses[0]] * 3)
     assert standing.degree == 0
     assert not standing.evaluate(np.array([0.5]), 1).any()
-
-
-def test_bad_input_is_named() -> None:
-    poses = random_poses(9, 3)
-    with pytest.raises(UnknownNameError, match="natural"):
-        pose_spline(poses, "free")  # type: ignore[arg-type]
-    with pytest.raises(ShapeError, match=r"path\.poses"):
-        pose_spline(poses[:1])
-    with pytest.raises(RangeError, match=r"path\.radius"):
-        pose_spline(poses, radius=0.0)
-    far = pin.SE3(poses[0].rotation @ pin.exp3(np.array([3.0, 0.0, 0.0])), poses[1].translation)
-    with pytest.raises(RangeError, match=r"path\.poses\[1\].* at most 170 deg"):
-        pose_spline([poses[0], far, poses[2]])
 
 
 def test_orientations_that_change_too_unevenly_are_refused() -> None:

@@ -120,13 +120,6 @@ def test_limits_of_very_different_sizes(velocity, acceleration):
     assert max(ratios(law)) > 1.0 - 1e-6
 
 
-def test_longer_duration_on_request():
-    waypoints, velocity, acceleration = random_problem(np.random.default_rng(11), 5)
-    law = time_optimal(waypoints, velocity, acceleration, duration=12.0)
-    assert law.duration == pytest.approx(12.0, rel=1e-12)
-    assert max(ratios(law)) < 1.0
-
-
 def test_a_path_and_its_waypoints_are_alike():
     waypoints, velocity, acceleration = random_problem(np.random.default_rng(12), 5)
     given = time_optimal(spline_path(waypoints), velocity, acceleration)

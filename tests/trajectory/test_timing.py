@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from tests.trajectory.random_laws import ragged
-from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.trajectory import Timing
 from wbc.validation import Array
 
@@ -93,47 +92,3 @@ def test_constant_accelerations() -> None:
     assert timing.times.tolist() == [0.0, 1.0, 2.0]
     assert timing.evaluate(np.array([0.0, 0.5, 1.5, 2.0])).tolist() == [0.0, 0.25, 2.0, 3.0]
     assert timing.evaluate(np.array([0.5, 1.5]), 2).tolist() == [2.0, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("times", "coefficients", "error", "field"),
-    [
-        ([0.0, 1.0, 1.0], np.zeros((2, 2)), RangeError, "timing.times"),
-        ([0.0, 2.0, 1.0], np.zeros((2, 2)), RangeError, "timing.times"),
-        ([1.0, 2.0], np.zeros((2, 1)), RangeError, "timing.times"),
-        ([0.0], np.zeros((2, 0)), ShapeError, "timing.times"),
-        ([[0.0, 1.0]], np.zeros((2, 1)), ShapeError, "timing.times"),
-        ([0.0, np.nan], np.zeros((2, 1)), NotFiniteError, "timing.times"),
-        ([0.0, np.inf], np.zeros((2, 1)), NotFiniteError, "timing.times"),
-        ([0.0, 1.0], np.zeros((2, 2)), ShapeError, "timing.coefficients"),
-        ([0.0, 1.0], np.zeros(2), ShapeError, "timing.coefficients"),
-        ([0.0, 1.0], np.zeros((0, 1)), ShapeError, "timing.coefficients"),
-        ([0.0, 1.0], [[np.nan], [0.0]], NotFiniteError, "timing.coefficients"),
-        ("now", np.zeros((2, 1)), ShapeError, "timing.times"),
-    ],
-)
-def test_bad_timings(times: Any, coefficients: Any, error: type[Exception], field: str) -> None:
-    with pytest.raises(error, match=field.replace(".", r"\.")):
-        Timing(times, coefficients)
-
-
-@pytest.mark.parametrize(
-    ("s", "speed", "error", "field"),
-    [
-        ([0.0, 1.0], [0.0, 0.0], RangeError, "speed"),
-        ([0.0, 1.0], [1.0, -0.5], RangeError, "speed"),
-        ([0.0, 1.0, 0.5], [1.0, 1.0, 1.0], RangeError, "timing.s"),
-        ([0.0, 0.0], [1.0, 1.0], RangeError, "timing.s"),
-        ([0.0, 1.0], [1.0, 1.0, 1.0], ShapeError, "speed"),
-        ([0.0, 1.0], [1.0, np.nan], NotFiniteError, "speed"),
-    ],
-)
-def test_bad_path_speeds(s: Any, speed: Any, error: type[Exception], field: str) -> None:
-    with pytest.raises(error, match=field.replace(".", r"\.")):
-        Timing.accelerations(np.array(s), np.array(speed))
-
-
-@pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf])
-def test_bad_durations(duration: float) -> None:
-    with pytest.raises((RangeError, NotFiniteError), match=r"timing\.times"):
-        Timing.identity(duration)

@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 from tests.published.via_walker import place
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError
 from wbc.trajectory import Law, via_points
 
 BOUNDS: dict[str, Any] = {"speed": 0.5, "acceleration": 2.0, "angular_acceleration": 4.0, "deviation": 0.02}
@@ -117,35 +116,3 @@ def test_every_form_of_a_pose_is_taken() -> None:
     laws = [law_of([place(0.0), form]) for form in (matrix, whole, numbers, numbers.tolist())]
     ends = [law.at(law.duration).position for law in laws]
     assert np.abs(np.array(ends) - matrix).max() < 1e-15
-
-
-@pytest.mark.parametrize("name", ["speed", "acceleration", "angular_acceleration", "deviation", "angular_speed"])
-@pytest.mark.parametrize(
-    ("value", "error"), [(-1.0, RangeError), (np.nan, NotFiniteError), ([1.0, 2.0], ShapeError), ("fast", ShapeError)]
-)
-def test_bad_bounds(name: str, value: Any, error: type[Exception]) -> None:
-    with pytest.raises(error, match=name):
-        law_of([place(0.0), place(0.1)], **{name: value})
-
-
-@pytest.mark.parametrize("name", ["speed", "acceleration", "angular_acceleration", "angular_speed"])
-def test_bounds_of_zero(name: str) -> None:
-    with pytest.raises(RangeError, match=name):
-        law_of([place(0.0), place(0.1)], **{name: 0.0})
-
-
-@pytest.mark.parametrize(
-    ("poses", "error", "field"),
-    [
-        ([], ShapeError, "poses"),
-        ([np.eye(4)], ShapeError, "poses"),
-        (3, ShapeError, "poses"),
-        ([np.eye(4), np.eye(3)], ShapeError, r"poses\[1\]"),
-        ([np.eye(4), np.full((4, 4), np.nan)], NotFiniteError, r"poses\[1\]"),
-        ([2.0 * np.eye(4), np.eye(4)], RotationError, r"poses\[0\]"),
-        ([np.eye(4), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]], RotationError, r"poses\[1\]"),
-    ],
-)
-def test_bad_poses(poses: Any, error: type[Exception], field: str) -> None:
-    with pytest.raises(error, match=field):
-        law_of(poses)

@@ -1,4 +1,4 @@
-"""The viewer beside a loop of the user's own: a process, shared memory, and its end."""
+"""The viewer beside a loop of the user's own: a process, shared memory, messages over ZeroMQ, and its end."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import zmq
 from websockets.sync.client import connect
 
 from tests.repeats import ALL, MORE
 from tests.viewer import arms
 from wbc.viewer import ViewerError, show
+from wbc.viewer.errors import require_local
 
 
 def test_a_loop_is_driven_and_its_viewer_lost() -> None:
@@ -67,3 +69,33 @@ def test_bad_arguments_start_nothing() -> None:
     controller = arms.fresh()
     with pytest.raises(ViewerError, match="viewer"):
         show(controller, host="192.0.2.1", open_browser=False)
+
+
+@pytest.mark.parametrize("address", ["tcp://0.0.0.0:5555", "tcp://*:5555", "tcp://192.168.0.1:1", "inproc://a", "5555"])
+def test_addresses_of_other_machines_are_refused(address: str) -> None:
+    with pytest.raises(ViewerError, match="this machine"):
+        require_local(address)
+
+
+def test_a_peer_operates_and_is_lost_when_it_is_silent(tmp_path: object) -> None:
+    controller = arms.fresh()
+    q, address = controller.stack.robot.neutral, f"ipc://{tmp_path}/socket"
+    with (
+        show(controller, open_browser=False, zeromq=address, silence=0.5) as viewer,
+        zmq.Context() as context,
+        context.socket(zmq.DEALER) as peer,
+    ):
+        peer.linger = 0
+        peer.connect(address)
+        for message in ({"type": "operate"}, {"type": "set", "item": "posture", "values": {"weight": 0.25}}):
+            peer.send_string(json.dumps(message))
+        until = time.monotonic() + 20.0
+        while controller["posture"].weight != 0.25:
+            assert time.monotonic() < until
+            viewer.update(controller.step(q))
+            time.sleep(0.01)
+        assert json.loads(peer.recv())["type"] == "hello"
+        while not viewer.stopped:
+            assert time.monotonic() < until
+            viewer.update(controller.step(q))
+            time.sleep(0.01)

@@ -52,8 +52,8 @@ class Batch:
         _require_count("count", count)
         if threads is not None:
             _require_count("threads", threads)
-        if core.sensors:
-            names = ", ".join(repr(handle.item_name) for _, handle in core.sensors)
+        if core.measured:
+            names = ", ".join(repr(item.handle.item_name) for item in core.measured)
             raise SolverError("batch", names, "measures distances with a library, which a batch does not")
         if controller.policy.escape:
             raise SolverError("batch", controller.policy, "a batch has no escape; set a policy without it")

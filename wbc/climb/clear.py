@@ -250,23 +250,23 @@ class SunkTip(NamedTuple):
 
 @lru_cache(maxsize=16)
 def sunk_tips(climber: Climber) -> list[list[SunkTip]]:
-    """Of each limb the bodies that its last joint moves, and a ball about its contact's point where that lies out of
-    all of these: shapes may end before the point, or there may be none.
+    """Of each limb the bodies that its last joint moves, and a ball about its contact's point where these do not keep
+    it out: where it lies out of them all, and where tips tilt, so that how deep they are does not say where it is.
     """
     model, bodies, out = climber.robot.model, bodies_of(climber.robot), []
     for limb, chain in zip(climber.limbs, climber.chains, strict=True):
-        tips, off = list[SunkTip](), np.inf
+        tips, off, tilts = list[SunkTip](), np.inf, limb.contact.fixed == "position"
         contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement
         for body in bodies:
             on = model.frames[frame_index(model, body.link)]
             if on.parentJoint != chain[-1]:
                 continue
             placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
-            sink = _beyond(placed, contact, limb.contact.fixed == "position")
+            sink = _beyond(placed, contact, tilts)
             tips.append(SunkTip(body, sink, sink + SINK))
             point = placed.placement.actInv(contact.translation)
             off = min(off, float(segments_from(placed.shape, point, point)))
-        if off > SINK:
+        if tilts or off > SINK:
             ball = SweptBody(f"contact of {limb.name}", Sphere(POINT), limb.frame, limb.placement)
             tips.append(SunkTip(ball, POINT, POINT + POINT_SINK))
         out.append(tips)

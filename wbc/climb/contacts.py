@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -33,6 +33,23 @@ class ContactKind(ABC):
     fixed: ClassVar[Fixed] = "pose"
     #: Whether the contact can pull the robot towards the surface
     pulls: ClassVar[bool] = False
+
+    def lower(self, friction: float, share: float = 1.0) -> Self:
+        """The kind on a surface of a friction, with a share of the lower one of both and of the sole.
+
+            PointFoot(0.6).lower(0.5, 0.8)          # PointFoot(0.4)
+
+        Args:
+            friction: of the surface [1]. share: of friction, and of lengths by which a sole bears moments [1].
+        """
+        own: float | None = getattr(self, "friction", None)
+        if own is None or (share == 1.0 and friction >= own):
+            return self
+        return replace(self, friction=share * min(own, friction), **self._soles(share))  # type: ignore[call-arg]  # kinds that have it
+
+    def _soles(self, share: float) -> dict[str, Any]:
+        """Fields of a shorter sole."""
+        return {}
 
     @abstractmethod
     def cone(self) -> tuple[Array, Array]:
@@ -82,6 +99,9 @@ class FlatFoot(ContactKind):
         for value in lengths:
             validation.scalar("FlatFoot.half_lengths", value, low=0.0, unit="m")
         object.__setattr__(self, "half_lengths", (float(lengths[0]), float(lengths[1])))
+
+    def _soles(self, share: float) -> dict[str, Any]:
+        return {"half_lengths": (share * self.half_lengths[0], share * self.half_lengths[1])}
 
     def cone(self) -> tuple[Array, Array]:
         """Rows: friction, normal, then pressure and yaw."""
@@ -149,6 +169,9 @@ class SuctionPad(ContactKind):
 
     def __post_init__(self) -> None:
         _positive(self, "pull", "radius", "friction")
+
+    def _soles(self, share: float) -> dict[str, Any]:
+        return {"radius": share * self.radius}
 
     def cone(self) -> tuple[Array, Array]:
         """The cone of a flat foot, moved by the pull."""

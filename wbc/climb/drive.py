@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from wbc import validation
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.climber import Climber
-from wbc.climb.goal import BodyPlace
+from wbc.climb.goal import BodyPlace, LimbAt
 from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop import ClimbLoop
 from wbc.climb.motion import MoveError
@@ -110,7 +111,9 @@ class ClimbDrive:
 
     def finish(self, loop: ClimbLoop) -> None:
         """It comes to rest and the run ends."""
-        self._ends = True
+        if not self._ends:
+            # Limbs that found nothing near by are tried again, now that the body may go along
+            self._ends, self._aloft = True, ((), np.zeros(3))
         self.steer(np.zeros(6), loop)
 
     def onward(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
@@ -166,21 +169,28 @@ class ClimbDrive:
         return np.asarray(self.climber.body_pose(q).actInv(self._about).toActionMatrix() @ self._twist)
 
     def _landing(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
-        """A limb in the air comes down to a foothold that is near; None: none can, or none could from near by."""
+        """A limb in the air comes down to a foothold that is near, and the body goes along where the drive ends and it
+        has to; None: none can, or none could from near by.
+        """
         place = self.climber.body_pose(stance.q).translation
         contacts, before = self._aloft
         if contacts == stance.contacts and np.linalg.norm(place - before) < ELSEWHERE:
             return None
-        for limb, at in enumerate(stance.contacts):
-            if at != FREE_LIMB:
-                continue
-            away = np.linalg.norm(scene.positions - self.climber.contact_pose(stance.q, limb).translation, axis=1)
-            for row in np.argsort(away)[:LANDINGS]:
-                name, foothold = self.climber.limbs[limb].name, scene.footholds[int(row)].id
-                try:
-                    return plan_limb_work(self.climber, scene, stance, name, [foothold], self.options.motion)
-                except (InfeasibleError, RangeError):
-                    continue
+        near = [
+            (self.climber.limbs[limb].name, scene.footholds[int(row)].id)
+            for limb, at in enumerate(stance.contacts)
+            if at == FREE_LIMB
+            for row in np.argsort(
+                np.linalg.norm(scene.positions - self.climber.contact_pose(stance.q, limb).translation, axis=1)
+            )[:LANDINGS]
+        ]
+        for limb, foothold in near:
+            with contextlib.suppress(InfeasibleError, RangeError):
+                return plan_limb_work(self.climber, scene, stance, limb, [foothold], self.options.motion)
+        freely = replace(self._freely(0.0, 0.0), motion=self.options.motion)
+        for limb, foothold in near if self._ends else []:
+            with contextlib.suppress(NoStancesError, MoveError):
+                return plan_climb(self.climber, scene, stance, LimbAt(limb, foothold), freely)
         self._aloft = tuple(stance.contacts), place
         return None
 

@@ -82,12 +82,14 @@ class ElasticBand:
         world: the climber and what it climbs.
         balance: in which slack is told; None: it does not count. slack: that there is to be at least [weights].
         aside: how much further apart than they have to be links are led, in parts of ``ASIDE``.
+        still: whether the body stays where it is.
     """
 
     world: ClimbWorld
     balance: ClimbWorld | None = None
     slack: float = 0.0
     aside: float = 1.0
+    still: bool = False
 
     def relaxed(self, states: Array, rows: BandRows) -> Array:
         """The band from a first one, whose ends stay.
@@ -173,8 +175,8 @@ class _BandDescent:
         matrix[i - j, :, j] = look.H[:, i, j].T
         for k in range(3):
             matrix[k * size, : self._count - k] += np.diagonal(self._tension, -k)[:, None] * self._scale
-        if not free:
-            matrix[0][:, :6] += HELD_BODY * self._scale[:6]
+        held = HARD if self._band.still else 0.0 if free else HELD_BODY
+        matrix[0][:, :6] += held * self._scale[:6]
         angles = states[1:-1, 12:]
         stopped = ((angles <= self._low) & (g[:, 6:] < 0.0)) | ((angles >= self._high) & (g[:, 6:] > 0.0))
         matrix[0][:, 6:][stopped] += HARD
@@ -186,6 +188,8 @@ class _BandDescent:
         damping = matrix.copy()
         damping[0] += damped * self._scale
         move = solveh_banded(damping.reshape(len(damping), -1), g.ravel(), lower=True).reshape(g.shape)
+        if self._band.still:
+            move[:, :6] = 0.0
         longest = max(float(np.abs(move[:, :3]).max()) / self._band.world.length, float(np.abs(move[:, 3:]).max()))
         return np.asarray(move * min(1.0, LONGEST_STEP / max(longest, LONGEST_STEP)))
 

@@ -73,6 +73,8 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
     reason += f" ({counted(outcomes)})" if outcomes else ""
     if np.isfinite(best):
         reason += f"; the best lacks {given.margin - best:.3g} of the weight"
+    if world.numbers.weightless and not any(limb.contact.pulls for limb in climber.limbs):
+        reason += "; nothing weighs, and feet that only press hold it where they press against each other alone"
     raise no_stances("q", at[:3].round(3).tolist(), reason, "start")
 
 

@@ -9,14 +9,13 @@ import numpy as np
 
 from wbc.climb.clear import Clearances, sunk_tips
 from wbc.climb.climber import Climber
+from wbc.climb.closure import CLOSED, Closure
 from wbc.climb.motion import MotionOptions, MoveError, carry_out
 from wbc.climb.plan import ContactPlan
-from wbc.climb.reach import LimbReach
 from wbc.climb.scene import ClimbScene, Foothold, size_of
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.surfaces import frame_on
 from wbc.multibody import pin
-from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
 #: How far such a limb is lifted, as shares of the shortest limb's reach, the first that can be
@@ -68,19 +67,18 @@ def let_go(
     if not footholds:
         return None, start
     freed = [limb for limb, at in enumerate(contacts) if at >= held]
-    reach, first = LimbReach(climber), Stance(tuple(contacts), start.q)
+    closure, first = Closure(climber), Stance(tuple(contacts), start.q)
     ways = [lifts(climber, start.q, limb, left.normals[contacts[limb]], LIFTS) for limb in freed]
     for lifted in zip(*ways, strict=True):
-        q, solved = np.array(start.q), True
-        for limb, lift in zip(freed, lifted, strict=True):
-            pose = climber.contact_pose(start.q, limb)
-            pose = pin.SE3(pose.rotation, pose.translation + lift)
-            wanted = place(climber.body_pose(q).actInv(pose))[None]
-            angles, some = reach.postures(limb, wanted, climber.angles(q, limb)[None])
-            solved = solved and bool(some[0, 0])
-            q = climber.with_limb(q, limb, angles[0, 0])
+        poses = {limb: climber.contact_pose(start.q, limb) for limb in freed}
+        wanted = {
+            limb: pin.SE3(pose.rotation, pose.translation + lift)
+            for (limb, pose), lift in zip(poses.items(), lifted, strict=True)
+        }
+        # Limbs of few joints turn as they are lifted
+        q, left_over = closure.closed(start.q, wanted, 0.0, not closure.short.intersection(freed))
         raised = Stance(start.contacts, q)
-        if not solved or clearances.standing(raised.contacts, q) is not None:
+        if left_over > 10.0 * CLOSED or clearances.standing(raised.contacts, q) is not None:
             continue
         try:
             plan = carry_out(climber, left, StancePath((first, raised), np.zeros(1)), options)

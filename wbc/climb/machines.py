@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from math import pi
 
@@ -19,14 +20,22 @@ from wbc.robots.pairs import find_self_pairs
 from wbc.robots.walker_masses import hold_rating, with_masses
 from wbc.robots.walker_robot import Walker, walker
 
+log = logging.getLogger("wbc")
+
 #: Acceleration of the joints of robots whose description has none [rad/s^2]: full torque on a leg without load
 QUICK = 60.0
 #: The same for a humanoid, whose limbs are heavier [rad/s^2]
 HEAVY = 20.0
+#: Speed of the joints of robots whose description has none, as MJCF has not [rad/s, m/s]: that of geared motors
+RATE = 10.0
 #: Friction that feet count on [1]: rubber on concrete has some 0.8
 FRICTION = 0.6
 #: Half lengths of the soles of TALOS [m]
 SOLE = (0.1, 0.06)
+#: Most that a hand of TALOS bears [N; N m]: 6 kg, and about half of what the motors of its wrist give; assumed
+HAND = (60.0, 3.0)
+#: Where the fingers of TALOS close, in the frame of its gripper, whose z axis points back to the wrist [m]
+BETWEEN_FINGERS = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.12]))
 
 
 def climber(name: str) -> Climber:
@@ -91,14 +100,12 @@ def _three_pandas(name: str) -> Climber:
     return Climber(robot, hands, name=name)
 
 
-def _talos(hands: bool) -> Callable[[str], Climber]:
+def _talos(*hands: str) -> Callable[[str], Climber]:
     def make(name: str) -> Climber:
         robot = ready(load("talos", shapes="convex", acceleration=HEAVY))
-        sole = FlatFoot(SOLE, FRICTION)
+        sole, grip = FlatFoot(SOLE, FRICTION), GripHand(*HAND)
         limbs = [ClimbLimb(robot.frames[f"{side}_foot"], sole, name=f"{side}_foot") for side in ("left", "right")]
-        if hands:
-            grip = GripHand(200.0, 10.0)
-            limbs += [ClimbLimb(robot.frames[f"{side}_hand"], grip, FLIP, f"{side}_hand") for side in ("left", "right")]
+        limbs += [ClimbLimb(robot.frames[hand], grip, BETWEEN_FINGERS, hand) for hand in hands]
         return Climber(robot, limbs, name=name)
 
     return make
@@ -109,6 +116,21 @@ def ready(robot: Robot) -> Robot:
     if robot.self_pairs is not None or not robot.shapes:
         return robot
     return robot.with_self_pairs(find_self_pairs(robot, samples=300).kept)
+
+
+def with_rates(robot: Robot) -> Robot:
+    """The robot with largest speeds :data:`RATE` and accelerations :data:`QUICK` of joints that have none; which joints
+    have no speed of their own is a warning in the log.
+    """
+    rows = np.arange(robot.nv) >= robot.base_nv
+    slow, lazy = (rows & ~np.isfinite(part) for part in (robot.limits.velocity, robot.limits.acceleration))
+    if slow.any():
+        names = ", ".join(name for name, unknown in zip(robot.dof_names, slow, strict=True) if unknown)
+        log.warning("%s: joints without a limit of speed move at %g rad/s or m/s at most: %s", robot.name, RATE, names)
+    return robot.with_limits(
+        velocity=np.where(slow, RATE, robot.limits.velocity),
+        acceleration=np.where(lazy, QUICK, robot.limits.acceleration),
+    )
 
 
 _FEET = ("front_left_foot", "front_right_foot", "hind_left_foot", "hind_right_foot")
@@ -123,8 +145,9 @@ _MADE: dict[str, Callable[[str], Climber]] = {
     "solo12": _table(_FEET, "fit", QUICK, PointFoot(FRICTION)),
     "a1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
     "go1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
-    "talos": _talos(False),
-    "talos_hands": _talos(True),
+    "talos": _talos(),
+    "talos_hand": _talos("right_hand"),
+    "talos_hands": _talos("left_hand", "right_hand"),
     "wall_climber": _limbed(GripHand(300.0, 20.0, swivels=True)),
     "octopod": _limbed(PointFoot(FRICTION)),
 }

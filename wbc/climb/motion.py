@@ -35,6 +35,8 @@ from wbc.validation import Array
 AT = 1e-4
 #: Lifts on curves, one after the other: height as a multiple of the asked one, lean of :class:`SwingShape` [1]
 CURVES = ((1.0, 0.0), (1.0, 0.8), (2.0, 0.8))
+#: Poses of a body that differ by less are one [m, 1]
+ONE_PLACE = 1e-9
 #: Heights to which limbs are lifted along bands, one after the other, as multiples of the asked one
 HEIGHTS = (1.0, 2.0, 0.5)
 #: How much further than it has to a band goes round links that touch, one after the other
@@ -120,7 +122,7 @@ class MotionOptions:
         margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight; half of
             it where the body shifts and no limb lifts.
         inertia: share of the slack of equilibrium at rest that accelerations may use, where something weighs [1].
-        friction: share of the coefficients of friction on which equilibrium counts on the way [1].
+        friction: share of the coefficients of friction, and of soles, on which equilibrium counts on the way [1].
         speeds: see :class:`MotionSpeeds`.
         effort: share of the joints' efforts within which torques at rest stay on the way [1]; inf: they do not count.
 
@@ -236,12 +238,10 @@ class Mover:
     def _shapes(
         self, one: Stance, other: Stance, row: int, refusals: list[tuple[float, float, MoveError]]
     ) -> Iterator[SwingShape]:
-        """Straight, then along elastic bands while the time lasts; those that contacts cannot follow are refused."""
-        for height, lean in CURVES:
-            yield SwingShape(height * self.lift, lean)
-            if not self.closure.short:
-                yield SwingShape(height * self.lift, lean, yields=True)
-        weighs = bool(np.any(self.scene.gravity))
+        """Straight, then along elastic bands while the time lasts, at first with the body still where both stances have
+        it at one place; those that contacts cannot follow are refused.
+        """
+        weighs, short = bool(np.any(self.scene.gravity)), bool(self.closure.short)
         balance = self.balance.world if weighs and isinstance(self.balance, Equilibrium) else None
         band = ElasticBand(self._world, balance, self._needed(one, other))
         swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
@@ -249,19 +249,26 @@ class Mover:
         begins += [(SwingShape(self.lift, evenly=True), aside) for aside in ASIDES if swings]
         rng = np.random.default_rng(self.options.seed)
         for _ in range(self.options.tries if swings else 0):
-            via = {
-                k: rng.uniform(*self._range(k)) for k in (range(len(one.contacts)) if self.closure.short else swings)
-            }
+            via = {k: rng.uniform(*self._range(k)) for k in (range(len(one.contacts)) if short else swings)}
             begins.append((SwingShape(self.lift, evenly=True, via=via), ASIDES[0]))
-        for shape, aside in begins:
-            if self.watch.passed:
-                return
-            try:
-                guide = band_path(self.closure, one, other, shape, self._normals, replace(band, aside=aside))
-            except InfeasibleError as error:
-                refusals.append((0.0, 0.0, _passed_on(row, error)))
-            else:
-                yield replace(shape, guide=guide)
+        bodies = [self.climber.body_pose(stance.q) for stance in (one, other)]
+        stays = not short and bodies[0].isApprox(bodies[1], ONE_PLACE)
+        for still in (True, False) if stays else (False,):
+            for height, lean in CURVES:
+                if still or not stays:
+                    yield SwingShape(height * self.lift, lean)
+                if not still and not short:
+                    yield SwingShape(height * self.lift, lean, yields=True)
+            for first, aside in begins:
+                if self.watch.passed:
+                    return
+                shape, pulled = replace(first, still=still), replace(band, aside=aside, still=still)
+                try:
+                    guide = band_path(self.closure, one, other, shape, self._normals, pulled)
+                except InfeasibleError as error:
+                    refusals.append((0.0, 0.0, _passed_on(row, error)))
+                else:
+                    yield replace(shape, guide=guide)
 
     def _needed(self, one: Stance, other: Stance) -> float:
         """Slack at rest that contacts keep from stance to stance, where something weighs [weights]."""

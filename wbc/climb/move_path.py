@@ -47,6 +47,7 @@ class SwingShape:
         lean: how much of that goes towards where the limb's contact is at rest, at most this share of the height [1].
         yields: the body yields to limbs that hold, which go as evenly in their joints as they can; of paths without a
             guide, on which limbs in the air turn freely between lift and land where they cannot keep their turn.
+        still: the body stays where it is, as both stances have it.
         evenly: bands begin evenly in the joints; else limbs in the air are on their curves at first.
         via: limb -> angles through which it goes in the middle at first, of bands that begin evenly.
         guide: a path that body and limbs follow, but for what contacts need; None: the body goes straight and evenly,
@@ -56,6 +57,7 @@ class SwingShape:
     height: float
     lean: float = 0.0
     yields: bool = False
+    still: bool = False
     evenly: bool = False
     via: Mapping[int, Array] = field(default_factory=dict)
     guide: MovePath | None = None
@@ -281,7 +283,7 @@ class _Moving:
         up, down = s < ON_CURVE + 1e-9, s > 1.0 - ON_CURVE - 1e-9
         for part, curves in ((up, self.curves(s[up])), (~(up | down), {}), (down, self.curves(s[down]))):
             some = q[part]
-            self._close(s[part], some, curves | self._places(s[part]), LIGHT_BODY)
+            self._close(s[part], some, curves | self._places(s[part]), 0.0 if self.shape.still else LIGHT_BODY)
             q[part] = some
 
     def curves(self, s: Array) -> dict[int, Array]:

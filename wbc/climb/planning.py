@@ -99,7 +99,8 @@ def plan_climb(
         except NoStancesError as error:
             if last is None:
                 raise
-            before = f"{tries} ways over stances have a move without a motion, the last one {last}; no other was found"
+            told = f"{last.field}: {last.reason}"
+            before = f"{tries} ways over stances have a move without a motion, the last one {told}; no other was found"
             raise error.about(before) from last
         try:
             plan = carry_out(climber, scene, stances, mover=mover)
@@ -107,7 +108,8 @@ def plan_climb(
         except MoveError as error:
             last = error
             if watch.passed:
-                seen = f"{tries + 1} ways over stances were found, and none could be moved along; the last: {error}"
+                told = f"{error.field}: {error.reason}"
+                seen = f"{tries + 1} ways over stances were found, and none could be moved along; the last: {told}"
                 reason = f"the limit of {given.seconds:g} s ended planning, which proves nothing: {seen}"
                 raise no_stances("seconds", given.seconds, reason, "limit") from error
             contacts = [tuple(stance.contacts) for stance in stances.stances]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import cos, pi, sin
 
 import numpy as np
@@ -72,14 +73,16 @@ def families() -> tuple[str, ...]:
 def placed(climber: Climber, frame: pin.SE3) -> Array:
     """The climber at rest with the middle of its contacts at a frame on a surface: its normal along z, its x ahead.
 
-    The normal is the mean of the contact frames' z axes; of contacts that fix positions only, up where it stands.
+    The normal is the mean of the contact frames' z axes; of contacts that fix positions only, up where it stands. Of a
+    robot with feet and hands that pull the feet count.
     """
-    body = climber.body_pose(climber.rest)
-    contacts = [climber.contact_pose(climber.rest, limb) for limb in range(len(climber.limbs))]
-    points = [body.actInv(pose.translation) for pose in contacts]
+    body, every = climber.body_pose(climber.rest), list(range(len(climber.limbs)))
+    limbs = [limb for limb in every if not climber.limbs[limb].contact.pulls] or every
+    contacts = {limb: climber.contact_pose(climber.rest, limb) for limb in limbs}
+    points = [body.actInv(pose.translation) for pose in contacts.values()]
     up = [
         body.rotation.T @ (Z if climber.fixed(limb) == "position" else pose.rotation[:, 2])
-        for limb, pose in enumerate(contacts)
+        for limb, pose in contacts.items()
     ]
     normal = np.mean(up, axis=0)
     normal = normal / np.linalg.norm(normal)
@@ -155,6 +158,29 @@ def _stairs(rng: np.random.Generator, size: float, density: float) -> ClimbCours
         boxes.append((x, x + long, height))
         x += long
     return _platforms(boxes, size, width, x - 1.8 * size)
+
+
+def _rail(rng: np.random.Generator, size: float, density: float) -> ClimbCourse:
+    """Three stairs for feet with a rail beside them for the right hand, by the names of a humanoid's limbs."""
+    rise, tread, flat, steps = rng.uniform(0.14, 0.16) * size, rng.uniform(0.27, 0.3) * size, 1.2 * size, 3
+    heights = [rise * k for k in range(steps + 1)]
+    ends = np.cumsum([-flat, flat, *[tread] * (steps - 1), 1.5 * flat])
+    course = _platforms(list(zip(ends[:-1], ends[1:], heights, strict=True)), size, size, 0.0, 0.14 * size)
+    footholds = [replace(foothold, limbs=("left_foot", "right_foot")) for foothold in course.scene.footholds]
+    across, above, radius = -0.33 * size * Y, rng.uniform(0.72, 0.78) * size * Z, 0.02 * size
+    corners = [x * X + across + above + height * Z for x, height in ((-flat, 0.0), (-0.5 * tread, 0.0),
+               (ends[-2] - 0.5 * tread, heights[-1]), (ends[-1], heights[-1]))]  # fmt: skip
+    bodies = dict(course.scene.bodies)
+    for k, (a, b) in enumerate(pairwise(corners)):
+        name, along = f"rail {k + 1}", (b - a) / np.linalg.norm(b - a)
+        bodies[name] = bar(a, b, radius)
+        normal = pin.exp3(-0.4 * along) @ np.cross(along, Y)
+        turn = np.column_stack([along, np.cross(normal, along), normal])
+        for j, part in enumerate(np.arange(0.05 * size, np.linalg.norm(b - a), 0.15 * size)):
+            frame = pin.SE3(turn, a + part * along + radius * normal)
+            footholds.append(Foothold(f"{name},{j}", frame, name, limbs=("right_hand",), rolls=2))
+    end = frame_on([ends[-2] + 0.4 * size, 0.0, heights[-1]], Z)
+    return ClimbCourse(ClimbScene(footholds, bodies, EARTH), frame_on([-0.4 * size, 0.0, 0.0], Z), end)
 
 
 def _gap(rng: np.random.Generator, size: float, density: float) -> ClimbCourse:
@@ -263,6 +289,7 @@ _FAMILIES: dict[str, Callable[[np.random.Generator, float, float], ClimbCourse]]
     "wall": _wall,
     "stepping_stones": _stepping_stones,
     "stairs": _stairs,
+    "rail": _rail,
     "rubble": _rubble,
     "chimney": _chimney,
     "gap": _gap,
@@ -293,10 +320,12 @@ def _along(
     return ClimbCourse(ClimbScene(footholds, bodies, gravity), *ends)
 
 
-def _platforms(boxes: Sequence[tuple[float, float, float]], size: float, width: float, goal: float) -> ClimbCourse:
-    """Floors from x to x at a height, with footholds on top."""
+def _platforms(
+    boxes: Sequence[tuple[float, float, float]], size: float, width: float, goal: float, spacing: float = 0.0
+) -> ClimbCourse:
+    """Floors from x to x at a height, with footholds on top, a quarter of the size apart unless it is said."""
     bodies, footholds = dict[str, SceneBody](), list[Foothold]()
-    rules = FootholdRules(0.25 * size, 0.06 * size, max_slope=0.1)
+    rules = FootholdRules(spacing or 0.25 * size, 0.06 * size, max_slope=0.1)
     for k, (a, b, height) in enumerate(boxes):
         at = np.array([(a + b) / 2, 0.0, height - 0.5 * size])
         body = bodies[f"floor {k + 1}"] = SceneBody(Box((b - a, width, size)), pin.SE3(np.eye(3), at))

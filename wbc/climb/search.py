@@ -22,16 +22,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from wbc import validation
 from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import TOLERANCE
 from wbc.climb.climber import Climber
-from wbc.climb.foothold_graph import ways_over_footholds, within_spans
+from wbc.climb.foothold_graph import ways_over_footholds
 from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene
+from wbc.climb.separation import Crossing, Separation
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.watch import PlanWatch
 from wbc.climb.world import SPARE, ClimbWorld, PostureOutcome
@@ -54,6 +54,8 @@ NEAR = 1.0
 DEAR = 6.0
 #: Other beginnings from which postures of refused moves are sought, once nothing else is left
 ATTEMPTS = 3
+#: Moves that brought no stance nearer to the goal after which is asked whether any could
+STANDSTILL = 3000
 #: What a move costs more whose like could not be made, once [steps]
 LATE = 8.0
 #: What a limb in the air costs [steps]
@@ -120,7 +122,7 @@ class StanceOptions:
         gait: sets of limbs, by name, that go at once where that can be.
         forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
         effort: share of the joints' efforts within which torques at rest stay [1]; inf: efforts do not count.
-        friction: share of the coefficients of friction that counts [1].
+        friction: share of the coefficients of friction, and of soles, that counts [1].
     """
 
     margin: float = 0.02
@@ -283,6 +285,7 @@ class StanceSearch:
         self._sets = [tuple(climber.row(name) for name in names) for names in options.gait]
         counted = options.effort < np.inf and np.any(scene.gravity)
         self._balance = Equilibrium(climber, scene, options.friction) if counted else None
+        self._separation, self._stalled = Separation(self.world, self.goal), STANDSTILL
 
     def run(self, watch: PlanWatch) -> StancePath:
         """The way found, see :func:`find_stances`; called again, one without the moves that were forbidden since."""
@@ -292,9 +295,9 @@ class StanceSearch:
             if path := self._at_goal(first):
                 return path
             self.seen = 1
-            if self._cannot_be():
+            if self._separation.cannot_be():
                 raise self._refusal("goal")
-            if gap := self._gap():
+            if gap := self._separation.gap(first.contacts):
                 raise no_stances("goal", self._told_goal(), gap, "goal", self._distance(first))
             self._push(first, self._moves(first))
         until, most = time.monotonic() + self.options.seconds, self.options.moves + sum(self.tried.values())
@@ -310,8 +313,13 @@ class StanceSearch:
                 continue
             self._push(node, moves)
             watch.look(self._so_far)
-            if sum(self.tried.values()) >= most or time.monotonic() > until or watch.passed:
+            tried = sum(self.tried.values())
+            if tried >= most or time.monotonic() > until or watch.passed:
                 raise self._refusal("limit")
+            if tried >= self._stalled:
+                self._stalled = 2 * tried
+                if (crossing := self._crossing()).lacks:
+                    raise self._refusal("gap", crossing.told)
             if self._forbidden(node.contacts, after):
                 continue
             if attempt == 0 and self._comes_late(node, after):
@@ -331,7 +339,7 @@ class StanceSearch:
             self._known[after.tobytes()] = found
             self.seen = len(self._known)
             if self._distance(found) < self._distance(self._nearest):
-                self._nearest = found
+                self._nearest, self._stalled = found, sum(self.tried.values()) + STANDSTILL
             if path := self._at_goal(found):
                 return path
             self._push(found, self._moves(found))
@@ -601,17 +609,31 @@ class StanceSearch:
         stances = [Stance(self._rows(contacts), self.world.q_of(state)) for contacts, state in rows]
         return StancePath((self.given, *stances[1:]), np.array(margins))
 
-    def _refusal(self, cause: str) -> NoStancesError:
+    def _crossing(self) -> Crossing:
+        """The first step that no stance has made."""
+        borne = [node.contacts for node in self._known.values()]
+        if len(self._names) == 2:
+            lifts = [lift for node in self._known.values() for lift in node.lifts.items()]
+            borne = [
+                np.frombuffer(kept, dtype=np.int32) for kept, (lift, _) in lifts if lift[0] == PostureOutcome.STANDS
+            ]
+        rows = {row for contacts in borne for row in self._rows(contacts)} - {FREE_LIMB}
+        return self._separation.crossing(rows, self._far.min(axis=0), self.options.margin, self.first.state)
+
+    def _refusal(self, cause: str, why: str = "") -> NoStancesError:
         tried, best = sum(self.tried.values()), self._nearest
         nearest = self._distance(best)
         parts = counted(self.tried)
         saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
         which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"
         goal = self._told_goal()
+        if cause == "gap":
+            return no_stances("goal", goal, f"{why}; {saw}; {which}", "goal", nearest)
         if cause == "limit":
             reason = f"a limit of moves or time ended the search, which proves nothing: {saw}; {which}"
-            return no_stances("goal", goal, reason, cause, nearest)
-        if lacking := "; ".join(self._lacking().values()):
+            told = self._crossing().told
+            return no_stances("goal", goal, f"{reason}; {told}" if told else reason, cause, nearest)
+        if lacking := "; ".join(self._separation.lacking().values()):
             reason = f"no stance there is within reach: {lacking}; {saw}; {which}"
             return no_stances("goal", goal, reason, "goal", nearest)
         return no_stances("goal", goal, f"every stance that can be come to was seen: {saw}; {which}", cause, nearest)
@@ -626,47 +648,3 @@ class StanceSearch:
     def _told(self, node: _Node) -> str:
         held = zip(self._names, self._rows(node.contacts), strict=True)
         return ", ".join(f"{name} at {self.scene.footholds[row].id if row >= 0 else 'none'}" for name, row in held)
-
-    def _lacking(self) -> dict[int, str]:
-        """Limbs that have no foothold within their length of a body at the goal, and how far it is."""
-        out: dict[int, str] = {}
-        if not isinstance(self.goal, BodyPlace):
-            return out
-        for limb, name in enumerate(self._names):
-            row = self.world.limbs.numbers[limb]
-            reach = float(row.length + np.linalg.norm(self.world.limbs.root(limb)))
-            allowed = self.world.cone_of[limb] >= 0
-            near = np.linalg.norm(self.world.places[allowed, 9:] - self.goal.position, axis=1)
-            least = float(near.min()) if len(near) else np.inf
-            if least > reach + self.goal.within:
-                out[limb] = f"{name} reaches {reach:.3g} m and its nearest foothold is {least:.3g} m away"
-        return out
-
-    def _cannot_be(self) -> bool:
-        """Whether the limbs that have a foothold near the goal bear no wrench of every direction."""
-        able = [limb for limb in range(len(self._names)) if limb not in self._lacking()]
-        forces = [max(self.world.forces(limb), default=0) for limb in able]
-        return sum(forces) < 6
-
-    def _gap(self) -> str:
-        """Why no foothold near the goal can be come to, as limbs that hold are near each other; or nothing."""
-        roots = np.array([self.world.limbs.root(limb) for limb in range(len(self._names))])
-        lengths = np.array([row.length for row in self.world.limbs.numbers])
-        held = [self._hold(at) for at in self.first.contacts if at >= 0]
-        if len(lengths) < 2 or not held:
-            return ""
-        apart = np.linalg.norm(roots[:, None] - roots, axis=2) + lengths[:, None] + lengths
-        span, positions = float(apart[~np.eye(len(lengths), dtype=bool)].max()), self.scene.positions
-        if isinstance(self.goal, BodyPlace):
-            reach = float((lengths + np.linalg.norm(roots, axis=1)).max()) + self.goal.within
-            wanted = np.linalg.norm(positions - self.goal.position, axis=1) <= reach
-        else:
-            wanted = np.arange(len(positions)) == self.scene.row(self.goal.foothold)
-        reached = within_spans(positions, np.array(held), span)
-        if (reached & wanted).any() or not wanted.any():
-            return ""
-        wide = cKDTree(positions[reached]).query(positions[~reached])[0].min()
-        return (
-            f"its footholds are beyond a gap of {wide:.3g} m, and limbs that hold at once are at most {span:.3g} m"
-            f" apart: {int(reached.sum())} of {len(positions)} footholds can be come to"
-        )

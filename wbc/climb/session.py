@@ -143,8 +143,7 @@ def climber_of(request: ClimberRequest) -> Climber:
     if len(frames) < 2:
         raise ShapeError("limbs", request.limbs, "give the frames at the tips of two limbs or more, with commas")
     robot = robots.load(str(path), base="floating", shapes="fit")
-    if not np.isfinite(robot.limits.acceleration[robot.base_nv :]).all():
-        robot = robot.with_limits(acceleration=machines.QUICK)
+    robot = machines.with_rates(robot)
     kinds: dict[str, ContactKind] = {
         "point": PointFoot(request.friction), "flat": FlatFoot(friction=request.friction), "grip": GripHand(),
         "rolling-grip": GripHand(rolls=True), "suction": SuctionPad(friction=request.friction),

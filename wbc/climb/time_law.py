@@ -226,4 +226,7 @@ def _denser(times: Array, q: Array, v: Array, parts: Array) -> tuple[Array, Arra
     inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(times[:-1], times[1:], parts, strict=True)]
     more = np.concatenate([*inner, times[-1:]])
     curve = CubicHermiteSpline(times, q, v, axis=0)
-    return more, np.asarray(curve(more)), np.asarray(curve(more, 1))
+    values, rates = np.asarray(curve(more)), np.asarray(curve(more, 1))
+    # Rest is rest to the bit
+    values[-1], rates[-1] = q[-1], v[-1]
+    return more, values, rates

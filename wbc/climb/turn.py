@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.closure import CLOSED, Closure
-from wbc.climb.joint_values import beyond_limits
+from wbc.climb.joint_values import beyond_limits, joint_values
 from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene
@@ -86,7 +86,7 @@ class BodyTurn:
     def _along(
         self, state: MovingStance, timed: tuple[Array, Array], guide: Guide, pace: _Slower, moves: list[ContactMove]
     ) -> ContactPlan | None:
-        (times, twists), climber, model = timed, self.climber, self.climber.robot.model
+        (times, twists), climber = timed, self.climber
         limbs, lands = range(len(climber.limbs)), {move.limb: move.land for move in moves}
         aloft = [limb for limb in limbs if state.contacts[limb] == FREE_LIMB]
         wanted = {limb: place(climber.contact_pose(state.q, limb))[None] for limb in limbs}
@@ -104,11 +104,11 @@ class BodyTurn:
             if self._closure.bring(some, wanted, body=0.0)[0] > 10.0 * CLOSED:
                 return None
             q.append(some[0])
-        steps = np.diff(times)[:, None]
-        rates = np.array([pin.difference(model, a, b) for a, b in pairwise(q)]) / steps
-        v = np.vstack([state.v[None], 0.5 * (rates[1:] + rates[:-1]), np.zeros((1, climber.robot.nv))])
-        v[:, :6] = twists
-        path = np.array(q)
+        steps, path = np.diff(times)[:, None], np.array(q)
+        values, still = joint_values(climber.robot, path), np.zeros(climber.robot.nv - 6)
+        curve = CubicSpline(times, values, bc_type=((1, state.v[6:]), (1, still)))
+        v = np.hstack([twists, curve(times, 1)])
+        v[-1, 6:] = still
         if not (self._within(path, v, steps) and self._borne(state.contacts, path)):
             return None
         rows = [[row] for row in state.contacts]

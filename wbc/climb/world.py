@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import dataclasses
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -164,7 +163,7 @@ class ClimbWorld:
         margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies and from each other
             [m].
         spare: how much more they keep, also from what tips hold, than :class:`Clearances` says [m].
-        friction: share of the coefficients of friction that counts [1].
+        friction: share of the coefficients of friction, and of soles, that counts [1].
 
     Attributes:
         places: poses ``(places, 12)``. hold: the foothold of each. start: places of the start's contacts.
@@ -454,10 +453,10 @@ class ClimbWorld:
         self._slack_cones: list[SlackCone] = []
         for limb, one in enumerate(limbs):
             able = np.array([not hold.limbs or one.name in hold.limbs for hold in holds], dtype=bool)
-            own = share * np.minimum(float(getattr(one.contact, "friction", np.inf)), frictions)
-            for friction in dict.fromkeys(own[able].tolist()):
-                table[limb, able & (own == friction)] = len(self._slack_cones)
-                self._slack_cones.append(SlackCone.of(_slipping(one.contact, friction)))
+            lower = np.minimum(float(getattr(one.contact, "friction", np.inf)), frictions)
+            for friction in dict.fromkeys(lower[able].tolist()):
+                table[limb, able & (lower == friction)] = len(self._slack_cones)
+                self._slack_cones.append(SlackCone.of(one.contact.lower(friction, share)))
         numbers = (_ConeNumbers * max(1, len(self._slack_cones)))()
         self._cone_arrays = []
         for row, cone in zip(numbers, self._slack_cones, strict=False):
@@ -532,13 +531,6 @@ def _pieces_of(climber: Climber, margin: float) -> _Pieces:
     chosen = climber.robot.self_pairs or ()
     pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
     return found._replace(pairs=np.array(pairs, dtype=np.int32).ravel())
-
-
-def _slipping(kind: ContactKind, friction: float) -> ContactKind:
-    """The kind with a lower friction, if it has any."""
-    if not friction < getattr(kind, "friction", friction):
-        return kind
-    return dataclasses.replace(kind, friction=friction)  # type: ignore[call-arg]  # kinds that have it
 
 
 def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: Array) -> pin.SE3:

@@ -24,6 +24,10 @@ from wbc.validation import Array
 
 _Array = np.ndarray
 _FLOAT = np.dtype(np.float64)
+#: Of the numbers of a gate: a thread is within
+BUSY = 2
+#: Of the table of a stepper: the tick with values
+WITH_VALUES = 2
 
 
 class CompiledStack(Handles):
@@ -49,11 +53,13 @@ class CompiledStack(Handles):
         self._q = core.tick.q.data.cast("B")
         self._v_in, self._use_v = core.tick.v_in[: core.layout.nv], core.tick.use_v
         self._q_shape, self._v_shape = (core.layout.nq,), (core.layout.nv,)
-        self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.sensors)
-        self._plans, self._cycle = core.together.plans, core.together.none.cycle
-        #: of the targets of the last step that had any, in one call
-        self._cycle_with_targets = self._cycle
-        self._busy = False
+        self._snapshot, self._context, self._sensed = core.snapshot, core.context, bool(core.measured)
+        self._plans, self._gate = core.together.plans, core.gate
+        nothing = core.together.none.request
+        step, self._cycles = core.assembly.stepper(self._gate, nothing, self.step, self._finished)
+        if type(self).step is CompiledStack.step:
+            # The same, where that is one call of C, with the targets of the last step that had any
+            self.__dict__["step"] = step
 
     def step(self, q: Any, v: Any = None, dt: Any = None, **targets: Any) -> Step:
         """One control cycle: the command v for the next dt seconds.
@@ -74,42 +80,40 @@ class CompiledStack(Handles):
             ShapeError, NotFiniteError, RotationError, RangeError: bad input; the controller is unchanged.
             UnknownNameError: as of :meth:`set`. BusyError: another thread is within ``step`` of this controller.
         """
-        if self._busy:
+        if self._gate[BUSY]:
             raise BusyError("step", self.stack.robot.name, "this controller is in use by another thread; clone() it")
         core = self._core
         if v is None and dt is None and not core.waits and core.call is core.plain_call:
             # In one call, with the interpreter's lock, so that no other thread is within
-            done = (self._cycle_with_targets if targets else self._cycle)(q, targets)
-            if type(done) is Step:
-                return done
-            if done == REFUSED and targets and type(done := self._cycle_as_planned(q, targets)) is Step:
+            done = self._cycle_as_planned(q, targets)
+            if isinstance(done, Step):
                 return done
             if done >= 0:
                 return self._finished(done, q)
         if targets:
             self._set_first(q, v, dt, targets)
         try:
-            self._busy = True
+            self._gate[BUSY] = 1
             if waits := dt is not None or core.waits:
                 self._prepare(q, v, dt)
             if not (type(q) is _Array and q.dtype is _FLOAT and q.shape == self._q_shape):
                 q = validation.real_array("q", q, self._q_shape)
             if v is not None and not (type(v) is _Array and v.dtype is _FLOAT and v.shape == self._v_shape):
                 v = validation.real_array("v", v, self._v_shape)
-            if self._sensed:
-                core.sense(q)
             # What may raise is over
             if v is not None:
                 self._v_in[:] = v
                 self._use_v[0] = 1.0
             self._q[:] = q.tobytes()
+            if self._sensed:
+                core.assembly.sense()
             if waits:
                 core.advance(dt)
             if (flag := core.call()) and core.finish(flag) < 0:
                 core.refuse(q, v)
             return Step(self._snapshot(), self._context)
         finally:
-            self._busy = False
+            self._gate[BUSY] = 0
 
     def _cycle_as_planned(self, q: Any, targets: dict[str, Any]) -> Step | int:
         """The same of other targets than those of the last step, or of poses that are no arrays."""
@@ -119,19 +123,21 @@ class CompiledStack(Handles):
         done: Step | int = plan.cycle(q, {name: x.homogeneous if is_pose(x) else x for name, x in targets.items()})
         if isinstance(done, Step) or done >= 0:
             self._core.let_go(plan.slots)
-            self._cycle_with_targets = plan.cycle
+            self._cycles[WITH_VALUES] = plan.request
         return done
 
     def _finished(self, flag: int, q: Any) -> Step:
         """A step after its tick."""
         try:
-            self._busy = True
+            self._gate[BUSY] = 1
+            if (watch := self._core.watch) is not None:
+                flag = watch.settle(flag)
             if self._core.finish(flag) < 0:
                 self._core.refuse(q, None)
             self._core.finished()
             return Step(self._snapshot(), self._context)
         finally:
-            self._busy = False
+            self._gate[BUSY] = 0
 
     def _set_first(self, q: Any, v: Any, dt: Any, targets: dict[str, Any]) -> None:
         """Targets of a step whose other arguments are checked before."""
@@ -315,7 +321,7 @@ class CompiledStack(Handles):
             UnknownNameError: no such item.
         """
         validation.one_of("item", name, self._core.handles)
-        return next((sensor.pairs() for sensor, handle in self._core.sensors if handle.item_name == name), ())
+        return next((item.sensor.pairs() for item in self._core.measured if item.handle.item_name == name), ())
 
     def _prepare(self, q: Any, v: Any, dt: Any) -> None:
         """Check everything before anything is changed; the first configuration, where it is waited for."""

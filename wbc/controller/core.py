@@ -12,6 +12,7 @@ from wbc import validation
 from wbc.controller.handle import POSE, Directions, Handle
 from wbc.controller.policy import Fallback, Policy
 from wbc.controller.ramps import Ramps
+from wbc.controller.sensors import measured_items
 from wbc.controller.step import Step
 from wbc.controller.together import Plan, Together
 from wbc.errors import SolverError
@@ -20,7 +21,6 @@ from wbc.robot import Robot
 from wbc.stack.artifact import Artifact
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Slot
-from wbc.tasks.base import Constraint, Sensor
 from wbc.tick.buffers import BAD_V
 from wbc.tick.context import Context
 from wbc.tick.generic import GenericTick
@@ -29,6 +29,7 @@ from wbc.validation import Array
 
 if TYPE_CHECKING:
     from wbc.controller.escape import Escape
+    from wbc.controller.watch import Watch
     from wbc.tick.solved import SolvedTick
 
 
@@ -43,28 +44,6 @@ def assembly_of(stack: Declaration, artifact: Artifact) -> CompiledTick:
     if artifact.program is not None:
         return GenericTick(artifact.program, stack, artifact.layout, artifact.behind)
     raise SolverError("artifact", artifact, "has neither a library nor a program")
-
-
-class Carried:
-    """Pose and velocity in the world, flat as inputs are, of what stands in a moving frame; all are views.
-
-    Args:
-        frame, twist: of the frame in the world. local, drift: of what stands in it, in its axes.
-    """
-
-    def __init__(self, frame: Array, twist: Array, local: Array, drift: Array) -> None:
-        self._turn, self._origin, self._twist = frame[:9].reshape(3, 3, order="F"), frame[9:], twist
-        self._local, self._drift = local, drift
-        self.pose, self.velocity = np.zeros(12), np.zeros(6)
-
-    def place(self) -> None:
-        """Compute both anew: R R_o, p + R p_o; v + w x R p_o + R v_o, w + R w_o."""
-        turn, local, arm = self._turn, self._local, self._turn @ self._local[9:]
-        self.pose[:9] = (turn @ local[:9].reshape(3, 3, order="F")).ravel(order="F")
-        self.pose[9:] = self._origin + arm
-        linear, angular = self._twist[:3], self._twist[3:]
-        self.velocity[:3] = linear + np.cross(angular, arm) + turn @ self._drift[:3]
-        self.velocity[3:] = angular + turn @ self._drift[3:]
 
 
 def _nothing() -> None:
@@ -83,9 +62,12 @@ class Core:
         call: one tick on the buffers as they are, returns its flag; a recorder puts its own in place.
         resets: how many there were. recording: the file that ticks are recorded into, or None. finished: is told that
             ``finish`` has followed a tick with its values in one call; a recorder puts its own in place.
+        gate: not 0 where a step is more than a native tick with its values in one call: it ``waits``, ``call`` is not
+            ``plain_call``, a thread is within.
         waits: the next step has more to do than to copy q: defaults to take from it, ramps, dt to set back, or native
             code to change over to, which it may not where ``may_change`` is false.
-        plain_call: the native tick that is all of a step's work where it is ``call``; None where there is more.
+        plain_call: what a native tick with its values in one call does, where it is ``call``; None where there is more.
+        measured: items that sensors measure, and ``watch``, which follows their ticks; None without.
     """
 
     def __init__(
@@ -101,14 +83,13 @@ class Core:
 
             self.tick = SolvedTick(self.assembly, stack, layout, solver)
         self.fallback = Fallback(self.tick, self.assembly, stack, layout)
-        self.call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
-        self._tick_call = self.call
-        self.plain_call = self.call if isinstance(self.tick, CompiledTick) else None
+        self._tick_call: Callable[[], int] = self.tick.call if isinstance(self.tick, CompiledTick) else self.tick.step
+        self._plain_call: Callable[[], int] | None = None
         self.may_change, self.assembly.wake = True, self._wake
         self.context = Context(stack, layout, self.assembly)
         # of all ways to copy some hundred numbers into something immutable, the fastest
         self.snapshot = self.assembly.snapshot
-        self.resets, self.ramps = 0, Ramps()
+        self.resets, self.ramps, self.gate = 0, Ramps(), np.zeros(3, np.int64)
         self.recording: pathlib.Path | None = None
         self.finished: Callable[[], None] = _nothing
         #: inputs that follow the first configuration, with their items, and those of them that it still has to fill
@@ -119,10 +100,8 @@ class Core:
         #: where a pose waits to be taken, and what takes it
         self._poses: dict[Slot, tuple[memoryview, Callable[[], int]]] = {}
         self.directions = Directions(layout, self.tick, self.handles)
-        #: what sensors measure that stands in a moving frame, by the name of the item
-        self._carried: dict[str, Carried] = {}
-        #: sensors with the handles of their items
-        self.sensors = [(self._sensor(name), self.handles[name]) for name in layout.blocks if self._is_sensed(name)]
+        self.measured = measured_items(stack, layout, self.assembly, self.handles)
+        self.watch: Watch | None = None
         self._escape: Escape | None = None
         self.follow(self.fallback.policy)
         self.tick.dt[0] = stack.dt
@@ -159,12 +138,43 @@ class Core:
 
             self.call = self._escape = Escape(self.call, self.tick, self.fallback, self.context, self.snapshot)
         self._unwatched = self.call
-        if self.sensors:
-            from wbc.controller.watch import BrakingAuthority, Watch
+        self.watch = None
+        if self.measured:
+            from wbc.controller.watch import Watch
 
-            braking = BrakingAuthority(self.stack, self.layout)
-            drifts = [self.layout.blocks[h.item_name].slots["drift"].start for _, h in self.sensors]
-            self.call = Watch(self.call, self._forget, self.tick, self.fallback, self.sensors, drifts, braking=braking)
+            self.call = self.watch = Watch(
+                self.call, self._forget, self.tick, self.assembly, self.fallback, self.measured
+            )
+        self.plain_call = self.call if isinstance(self.tick, CompiledTick) and not policy.escape else None
+
+    @property
+    def waits(self) -> bool:
+        """See the class."""
+        return bool(self.gate[0])
+
+    @waits.setter
+    def waits(self, more: bool) -> None:
+        self.gate[0] = more
+
+    @property
+    def call(self) -> Callable[[], int]:
+        """See the class."""
+        return self._call
+
+    @call.setter
+    def call(self, call: Callable[[], int]) -> None:
+        self._call = call
+        self.gate[1] = call is not self._plain_call
+
+    @property
+    def plain_call(self) -> Callable[[], int] | None:
+        """See the class."""
+        return self._plain_call
+
+    @plain_call.setter
+    def plain_call(self, call: Callable[[], int] | None) -> None:
+        self._plain_call = call
+        self.gate[1] = self._call is not call
 
     def again(self) -> Step:
         """A tick on the buffers as they are, sensed inputs included."""
@@ -192,8 +202,8 @@ class Core:
         self.tick.reset()
         if self._escape is not None:
             self._escape.reset()
-        for sensor, _ in self.sensors:
-            sensor.reset()
+        for item in self.measured:
+            item.sensor.reset()
         self.resets += 1
         self.waits = True
 
@@ -319,30 +329,3 @@ class Core:
         """The robot as an item sees it."""
         robot = self.stack.robot
         return robot.seen_from(self.frame_pose(name)) if self.stack[name].frame else robot
-
-    # What is measured
-
-    def _is_sensed(self, name: str) -> bool:
-        item = self.stack[name].item
-        return isinstance(item, Constraint) and item.sensed_rows(self.stack.robot) > 0
-
-    def _sensor(self, name: str) -> Sensor:
-        item, slots = self.stack[name].item, self.layout.blocks[name].slots
-        assert isinstance(item, Constraint)
-        numbers = {key: self.tick.p[slot.span] for key, slot in slots.items()}
-        if frame := self.stack[name].frame:
-            own = {key: self.tick.p[slot.span] for key, slot in self.layout.blocks[frame].slots.items()}
-            carried = Carried(own["pose"], own["twist"], numbers["pose"], numbers["velocity"])
-            self._carried[name] = carried
-            numbers |= {"pose": carried.pose, "velocity": carried.velocity}
-        return item.sensor(self.stack.robot, numbers)
-
-    def sense(self, q: Array) -> None:
-        """Measure what enabled items sense; not at numbers that the tick will refuse."""
-        if not np.isfinite(q).all():
-            return
-        for sensor, handle in self.sensors:
-            if handle.enabled:
-                if carried := self._carried.get(handle.item_name):
-                    carried.place()
-                sensor.sense(q)

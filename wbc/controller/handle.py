@@ -86,6 +86,7 @@ class Handle:
         "_robot",
         "_row_weights",
         "_weight",
+        "switched",
     )
 
     _block: Block
@@ -101,6 +102,8 @@ class Handle:
     _robot: Robot
     _row_weights: Array
     _weight: float
+    #: 1 or 0, as ``enabled`` is, for native code
+    switched: Array
     # For type checkers; the methods below answer. Values of items: see handles.pyi
     enabled: bool
     mask: Any
@@ -123,6 +126,7 @@ class Handle:
         put("_plain", {name: (inputs.size(self._robot, i),) for name, i in plain.items() if inputs.is_plain(i)})
         put("_poses", frozenset(name for name, slot in block.slots.items() if slot.input.kind == "pose"))
         put("_enabled", True)
+        put("switched", np.ones(1))
         put("_weight", block.entry.weight)
         put("_mask", np.ones(len(block.rows)))
         put("_row_weights", np.asarray(block.entry.item.row_weights(self._robot), dtype=np.float64))
@@ -316,6 +320,7 @@ class Handle:
         for name in ("_enabled", "_weight"):
             super().__setattr__(name, getattr(other, name))
         super().__setattr__("_mask", other._mask.copy())
+        self.switched[0] = other._enabled
 
     def unit_weights(self) -> Array:
         """What a weight of 1 puts on each row of a task, its switches counted."""
@@ -325,6 +330,7 @@ class Handle:
         """Write weights or row switches to the buffers."""
         tick, block, form = self._owner.tick, self._block, self._block.form
         on = self._mask * float(self._enabled)
+        self.switched[0] = self._enabled
         if form == "task":
             tick.weight[block.span] = self._weight * on * self._row_weights * self._owner.row_costs[block.span]
         elif form == "bounds":

@@ -75,7 +75,7 @@ class Fallback:
     """The links of one controller. :meth:`prepare` makes them, else the first tick that needs one.
 
     Attributes:
-        prepared: no tick has to import or to make anything.
+        prepared: no tick has to import or to make anything. flag: where the flag is in a report.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Fallback:
     ) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
-        self._flag, self._v = Memory(layout).flag, Memory(layout)["v"]
+        self.flag, self._v = Memory(layout).flag, Memory(layout)["v"]
         self._links: dict[str, SolvedTick] = {}
 
     @property
@@ -129,7 +129,7 @@ class Fallback:
                 self._tick.reset()
                 if flag == BRAKED:
                     return flag  # it is proven that there is no answer
-                self._tick.report[self._flag] = RECOVERED + CHAIN.index(link)
+                self._tick.report[self.flag] = RECOVERED + CHAIN.index(link)
                 return flag
         return self._brake(CHAIN_BRAKED)
 
@@ -142,7 +142,7 @@ class Fallback:
         self._tick.reset()
         solver = self._link("daqp")
         solver.brake(solver.qp())
-        self._tick.report[self._flag] = flag
+        self._tick.report[self.flag] = flag
         return flag
 
     def lead(self, way: Array, speed: float) -> bool:
@@ -159,7 +159,7 @@ class Fallback:
         solved = solver.finish(replace(qp, H=qp.H + firm * np.outer(ahead, ahead), g=qp.g - firm * speed * ahead))
         self._tick.reset()
         if solved == SOLVED:
-            self._tick.report[self._flag] = ESCAPED
+            self._tick.report[self.flag] = ESCAPED
             return True
         self._tick.report[:] = before
         self._tick.v_last[:] = before[self._v]

@@ -23,7 +23,7 @@ class Plan:
     Attributes:
         places: where each value's bytes wait. shapes: of its array. slots: of the inputs.
         take: check them all and write them; 0, and nothing written, where one is refused.
-        cycle: the same by ``names``, and a tick, see :meth:`wbc.tick.native.CompiledTick.cycler`.
+        cycle, request: the same by ``names``, and a tick, see :meth:`wbc.tick.native.CompiledTick.cycler`.
     """
 
     def __init__(self, context: Context, slots: list[Slot], kinds: list[int], names: Sequence[str] = ()) -> None:
@@ -41,7 +41,7 @@ class Plan:
         assembly = context.assembly
         assert assembly is not None
         self.take = assembly.taker(staged, table)
-        self.cycle = assembly.cycler(staged, table, names, Step, context)
+        self.cycle, self.request = assembly.cycler(staged, table, names, Step, context)
 
 
 class Together:
@@ -52,7 +52,7 @@ class Together:
         #: of names that were given together and can be taken quickly
         self.plans: dict[tuple[str, ...], Plan] = {}
         #: of no names
-        self.none = Plan(context, [], [])
+        self.none = self.plans[()] = Plan(context, [], [])
 
     def plan(self, values: Mapping[str, Any]) -> Plan | None:
         """How the targets of these items are taken quickly, from now on; None where they cannot be.

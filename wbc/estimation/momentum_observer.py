@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc import validation
+from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
 
@@ -29,10 +30,15 @@ class MomentumObserver:
         residual: r ``[nv]`` [N m; N].
 
     Raises:
-        RangeError: a gain or a period that is not above 0, or K dt above 1.
+        RangeError: a gain or a period that is not above 0, K dt above 1, or a model with Pinocchio's own mimic joints,
+            whose Coriolis matrix Pinocchio gets wrong (4.1); those of a :class:`wbc.robot.Robot` are none of these.
     """
 
     def __init__(self, model: pin.Model, gain: float, dt: float) -> None:
+        for joint in model.mimicking_joints:
+            raise RangeError(
+                "model", model.names[joint], "is a mimic joint of Pinocchio, whose Coriolis matrix is wrong"
+            )
         self._model, self._data = model, model.createData()
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         self._gain = validation.scalar("gain", gain, low=0.0, high=1.0 / self._dt, open_low=True, unit="1/s")

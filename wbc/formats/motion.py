@@ -45,7 +45,7 @@ class RecordedMotion:
         q: positions [n x joints, rad or m]; a joint that a message does not name has its last one.
         v: velocities [n x joints, rad/s or m/s]; None where a message gives none, or NaN.
         frames: name -> the frame in its parent.
-        remarks: topics that are not read, and why.
+        remarks: topics that are not read, and why; times that go back, stand still, or are of several clocks.
     """
 
     joints: tuple[str, ...]

@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import math
 import os
 import pathlib
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -35,6 +37,27 @@ STAMPS = (("sec", "nsec"), ("sec", "nanosec"), ("seconds", "nanos"))
 State = dict[str, tuple[float, float | None]]
 #: A message of a file: its topic, type, time of recording [s], and fields by attribute
 FoundMessage = tuple[str, str, float, Any]
+
+
+class Clock:
+    """Times of the messages of a topic, or of one frame of it.
+
+    Attributes:
+        said: what they say [s], 0 where they say nothing. recorded: when they were recorded [s].
+    """
+
+    def __init__(self) -> None:
+        self.said, self.recorded = list[float](), list[float]()
+
+    @property
+    def times(self) -> list[float]:
+        """Their own [s]; those of the recording where none has one. A simulation's first message may say 0."""
+        return self.said if any(self.said) else self.recorded
+
+    @property
+    def goes_back(self) -> float:
+        """By how much a message is before the one that came before it, at most [s]."""
+        return float(max(0.0, -np.diff(self.times).min(initial=0.0)))
 
 
 def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> RecordedMotion:
@@ -79,7 +102,7 @@ def _mcap(path: pathlib.Path, topics: Sequence[str], others: dict[str, str]) -> 
 
     decoders = dict[int, Callable[[bytes], Any]]()
     # A file whose writer was killed gives its whole chunks
-    with path.open("rb") as file, contextlib.suppress(EndOfFile):
+    with path.open("rb") as file, contextlib.suppress(EndOfFile, struct.error):
         for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
             kind = schema.name.replace("/msg/", "/") if schema is not None else ""
             if channel.id not in decoders:
@@ -138,44 +161,79 @@ def _wanted(kind: str, topic: str, topics: Sequence[str]) -> bool:
 def _gathered(
     messages: Iterator[FoundMessage], path: pathlib.Path, others: dict[str, str], topics: Sequence[str]
 ) -> RecordedMotion:
-    states: list[tuple[float, State]] = []
-    poses: dict[str, tuple[str, list[tuple[float, list[float]]]]] = {}
+    clocks = dict[tuple[str, str], Clock]()
+    states: list[tuple[Clock, int, State]] = []
+    poses: dict[str, tuple[str, list[tuple[Clock, int, list[float]]]]] = {}
     seen = set[str]()
+
+    def stamped(topic: str, child: str, fields: Any, time: float) -> tuple[Clock, int]:
+        clock = clocks.setdefault((topic, child), Clock())
+        clock.said.append(_stamp(fields, kind))
+        clock.recorded.append(time)
+        return clock, len(clock.said) - 1
+
     for topic, kind, time, fields in messages:
         seen.add(topic)
-        if kind in JOINTS:
-            if state := _state(fields, topic, kind):
-                states.append((_stamp(fields, kind, time), state))
-            continue
-        for placed in [fields] if kind in SINGLE else fields.transforms:
-            # What Foxglove has flat, ROS has in parts
-            place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
-            child = str(placed.child_frame_id)
-            numbers = [float(getattr(place.translation, x)) for x in "xyz"]
-            numbers += [float(getattr(place.rotation, x)) for x in "xyzw"]
-            if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1.0) > UNIT:
-                raise FormatError(topic, numbers, f"the pose of {child!r} is none: a position and a unit quaternion")
-            parent = str(placed.header.frame_id if parent is None else parent)
-            known, moves = poses.setdefault(child, (parent, []))
-            if known != parent:
-                raise FormatError(topic, parent, f"is a second parent of {child!r}, which {known!r} has placed before")
-            moves.append((_stamp(placed, kind, time), numbers))
+        try:
+            if kind in JOINTS:
+                if state := _state(fields, topic, kind):
+                    states.append((*stamped(topic, "", fields, time), state))
+                continue
+            for placed in [fields] if kind in SINGLE else fields.transforms:
+                parent, child, numbers = _placed(placed, topic)
+                known, moves = poses.setdefault(child, (parent, []))
+                if known != parent:
+                    reason = f"is a second parent of {child!r}, which {known!r} has placed before"
+                    raise FormatError(topic, parent, reason)
+                moves.append((*stamped(topic, child, placed, time), numbers))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            if isinstance(error, WbcError):
+                raise
+            raise FormatError(topic, f"message at {time:.9g} s", f"is no {kind}: {error}") from error
     if missing := [topic for topic in topics if topic not in seen]:
         raise FormatError("topics", missing[0], "no messages of a type that is read", sorted(seen | others.keys()))
     if not states and not poses:
         said = "; ".join(f"{topic} ({kind})" for topic, kind in others.items()) or "no messages at all"
         raise FormatError("path", str(path), f"has neither joint states nor transforms, but {said}")
+    dated = [(clock.times[k], state) for clock, k, state in states]
+    moved = {child: [(clock.times[k], row) for clock, k, row in moves] for child, (_, moves) in poses.items()}
     # What stands may have been said long before the recording began
-    dated: list[Sequence[tuple[float, Any]]] = [states, *(moves for _, moves in poses.values())]
-    times = [[time for time, _ in each] for each in dated if each]
-    begin = min(min(each) for each in [each for each in times if len(each) > 1] or times)
+    times = [[time for time, _ in dated], *([time for time, _ in way] for way in moved.values())]
+    begin = min(min(each) for each in [each for each in times if len(each) > 1] or times if each)
+    remarks = [f"not read: {topic} ({kind})" for topic, kind in sorted(others.items())]
+    remarks += [
+        f"{topic}{f', {child}' if child else ''}: time goes back, by {back:.3g} s at most; messages are taken in the "
+        "order of their times"
+        for (topic, child), clock in clocks.items()
+        if (back := clock.goes_back)
+    ]
+    spans = {key: (min(clock.times), max(clock.times)) for key, clock in clocks.items() if len(clock.times) > 1}
+    if spans:
+        first, last = min(spans, key=lambda key: spans[key][1]), max(spans, key=lambda key: spans[key][0])
+        if (apart := spans[last][0] - spans[first][1]) > max(end - start for start, end in spans.values()):
+            ends, begins = (" ".join(key).strip() for key in (first, last))
+            remarks.append(f"{begins} begins {apart:.6g} s after {ends} ends: are they of one clock?")
     frames = {}
-    for child, (parent, moves) in poses.items():
-        t, rows = _by_time([time - begin for time, _ in moves], np.array([numbers for _, numbers in moves]))
+    for child, way in moved.items():
+        values = np.array([numbers for _, numbers in way])
+        t, rows = _by_time([time - begin for time, _ in way], values)
+        if len(t) < len(np.unique(np.column_stack([[time for time, _ in way], values]), axis=0)):
+            remarks.append(f"{child} has several poses at one time, of which the last is taken")
         rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
-        frames[child] = Path6(parent, t, rows)
-    remarks = tuple(f"not read: {topic} ({kind})" for topic, kind in sorted(others.items()))
-    return RecordedMotion(*_rows(states, begin), frames, remarks)
+        frames[child] = Path6(poses[child][0], t, rows)
+    return RecordedMotion(*_rows(dated, begin, remarks), frames, tuple(remarks))
+
+
+def _placed(placed: Any, topic: str) -> tuple[str, str, list[float]]:
+    """Parent, child, and x, y, z [m], quaternion x, y, z, w of a transform."""
+    # What Foxglove has flat, ROS has in parts
+    place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
+    child = str(placed.child_frame_id)
+    numbers = [float(getattr(place.translation, x)) for x in "xyz"]
+    numbers += [float(getattr(place.rotation, x)) for x in "xyzw"]
+    if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1.0) > UNIT:
+        raise FormatError(topic, numbers, f"the pose of {child!r} is none: a position and a unit quaternion")
+    return str(placed.header.frame_id if parent is None else parent), child, numbers
 
 
 def _state(fields: Any, topic: str, kind: str) -> State:
@@ -193,14 +251,13 @@ def _state(fields: Any, topic: str, kind: str) -> State:
             continue
         if not isinstance(name, str):
             raise FormatError(topic, name, "is no name of a joint")
-        if velocity is not None and np.isnan(velocity):
-            # As ros2_control writes what it does not measure
-            velocity = None
-        if not np.isfinite([position, velocity or 0.0]).all():
+        position, velocity = float(position), math.nan if velocity is None else float(velocity)
+        if not math.isfinite(position) or math.isinf(velocity):
             raise FormatError(topic, (position, velocity), f"the state of {name!r} is no finite number")
         if name in out:
             raise FormatError(topic, name, "has two states in one message")
-        out[name] = float(position), None if velocity is None else float(velocity)
+        # NaN is what ros2_control writes for what it does not measure
+        out[name] = position, None if math.isnan(velocity) else velocity
     return out
 
 
@@ -209,16 +266,24 @@ def _optional(fields: Any, name: str) -> Any:
     return None if hasattr(fields, "HasField") and not fields.HasField(name) else getattr(fields, name, None)
 
 
-def _rows(states: list[tuple[float, State]], begin: float) -> tuple[tuple[str, ...], Array, Array, Array | None]:
+def _rows(
+    states: list[tuple[float, State]], begin: float, remarks: list[str]
+) -> tuple[tuple[str, ...], Array, Array, Array | None]:
     """Joints, times, positions and velocities: a row a message, from the first on after which all joints are known."""
     joints = tuple(dict.fromkeys(name for _, state in states for name in state))
     last: State = {}
-    times, rows = list[float](), list[list[tuple[float, float | None]]]()
+    times, rows, twice = list[float](), list[list[tuple[float, float | None]]](), dict[str, None]()
+    at_once, since = State(), -np.inf
     for time, state in sorted(states, key=lambda pair: pair[0]):
+        at_once, since = at_once if time == since else {}, time
+        twice |= dict.fromkeys(name for name in state if at_once.get(name, state[name]) != state[name])
+        at_once |= state
         last |= state
         if len(last) == len(joints):
             times.append(time - begin)
             rows.append([last[name] for name in joints])
+    if twice:
+        remarks.append(f"several states at one time, of which the last is taken: {', '.join(twice)}")
     # A velocity that is not given is NaN here
     t, numbers = _by_time(times, np.array(rows, dtype=np.float64).reshape(len(rows), len(joints), 2))
     known = bool(rows) and not np.isnan(numbers[..., 1]).any()
@@ -233,14 +298,14 @@ def _by_time(times: Sequence[float], values: Array) -> tuple[Array, Array]:
     return t[last], values[last]
 
 
-def _stamp(fields: Any, kind: str, time: float) -> float:
-    """The message's own time [s], that of its recording where it has none."""
+def _stamp(fields: Any, kind: str) -> float:
+    """The message's own time [s]; 0 where it has none."""
     own = getattr(fields, "timestamp", None) if kind.startswith("foxglove") else fields.header.stamp
     if own is None:
-        return time
+        return 0.0
     names = next((names for names in STAMPS if all(hasattr(own, name) for name in names)), STAMPS[0])
     seconds, nanoseconds = (getattr(own, name) for name in names)
     value = float(seconds + nanoseconds / NANO)
     if not np.isfinite(value):
         raise FormatError("timestamp", value, "is no finite number")
-    return value or time
+    return value

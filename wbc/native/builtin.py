@@ -12,6 +12,8 @@ _NO_ARGUMENTS = 4
 _ONE_ARGUMENT = 8
 #: See _NO_ARGUMENTS
 _ARGUMENTS = 0x80
+#: ``METH_KEYWORDS`` besides
+_NAMED_ARGUMENTS = 0x82
 
 
 class _MethodDef(ctypes.Structure):
@@ -53,9 +55,21 @@ def builtin_of_some(function: Any, argument: int) -> Callable[..., Any]:
     return made
 
 
-def _made(function: Any, argument: int, flags: int) -> Any:
+def builtin_like(method: Any, signature: str, function: Any, argument: object) -> Callable[..., Any]:
+    """The same in place of a method, with its name and text; arguments may have names:
+    ``PyObject *function(PyObject *argument, PyObject *const *, Py_ssize_t count, PyObject *names)``. It keeps
+    ``argument``.
+    """
+    text = f"{method.__name__}($self, {signature})\n--\n\n{method.__doc__}"
+    made: Callable[..., Any] = _made(function, argument, _NAMED_ARGUMENTS, method.__name__, text)
+    return made
+
+
+def _made(function: Any, argument: object, flags: int, name: str = "call", text: str = "") -> Any:
     address = ctypes.cast(function, ctypes.c_void_p).value or 0
-    method = _methods.setdefault(address, _MethodDef(b"call", address, flags, None))
+    method = _methods.get(address)
+    if method is None:
+        method = _methods.setdefault(address, _MethodDef(name.encode(), address, flags, text.encode() or None))
     return _make(ctypes.byref(method), argument, None)
 
 

@@ -3,13 +3,15 @@
 An entry's name is :func:`wbc.stack.key.key`. Folders are private to the user; every file's hash is in the manifest and
 is checked before the file is loaded; an entry that fails the check is built again. An entry is written beside its
 place and renamed into it under a lock, so that of parallel builds of one entry the first does the work. A cache
-directory that cannot be used, or that others may write to, is replaced by a temporary one for this process.
+directory that cannot be used, that is full, or that others may write to, is replaced by a temporary one for this
+process.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import functools
 import hashlib
 import json
@@ -27,18 +29,28 @@ from wbc.native.file_lock import lock, unlock
 log = logging.getLogger("wbc")
 
 MANIFEST = "manifest.json"
+#: Errors of a disk that takes no more
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 #: Who waits longer for compiled code is told so [s]
 SLOW = 5.0
 
 
 def root() -> pathlib.Path:
-    """Cache directory: ``WBC_CACHE`` if set, else the platform's user cache."""
+    """Cache directory: ``WBC_CACHE`` if set, else the platform's user cache; of a user without a home, as in
+    containers, a folder of temporary files.
+    """
     chosen = os.environ.get("WBC_CACHE")
     if chosen:
         return pathlib.Path(chosen)
     import platformdirs
 
-    return pathlib.Path(platformdirs.user_cache_dir("wbc"))
+    # Versions of platformdirs leave "~" in the path, or raise
+    with contextlib.suppress(RuntimeError):
+        if (place := pathlib.Path(platformdirs.user_cache_dir("wbc"))).is_absolute():
+            return place
+    import tempfile
+
+    return pathlib.Path(tempfile.gettempdir(), f"wbc-{os.getuid()}")
 
 
 def find(name: str, library: bool) -> pathlib.Path | None:
@@ -73,6 +85,18 @@ def fetch(
         what, advice: what is built, and what spares the wait, for the log where it takes long.
     """
     base = base_of(name, library)
+    try:
+        return _fetched(base, name, build, what, advice)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        return _fetched(_instead(base, os.strerror(error.errno)), name, build, what, advice)
+
+
+def _fetched(
+    base: pathlib.Path, name: str, build: Callable[[pathlib.Path], None], what: str, advice: str
+) -> tuple[pathlib.Path, bool]:
+    """:func:`fetch` in a directory."""
     final = base / name
     if _valid(final):
         return final, True

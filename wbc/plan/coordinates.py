@@ -227,6 +227,15 @@ class PlanningCoordinates:
         for place, leader, ratio, offset in self.followers:
             yield place, ratio * column(leader) + offset
 
+    def uncoupled(self, q: Array) -> tuple[float, str]:
+        """How far the worst follower is from where its leader has it [rad or m], and what to say of it."""
+        robot, off = self.robot, q - self.configuration(self.of_configuration(q))
+        far = {float(off[robot.position_index[coupling.follower]]): coupling for coupling in robot.couplings}
+        worst = max(far, key=abs, default=0.0)
+        row, leader = (far[worst].follower, far[worst].leader) if far else (0, 0)
+        says = f"follows {robot.dof_names[leader]} and is {worst:.3g} {robot.dof_units[row]} from where it has to be"
+        return worst, f"{robot.dof_names[row]} {says}"
+
     def velocity(self, x: Array, rate: Array) -> Array:
         """The velocity [nv] of the configuration at x, where x changes at ``rate``; or of several."""
         v = np.zeros((*np.shape(rate)[:-1], self.robot.nv))
@@ -268,7 +277,7 @@ class PlanningCoordinates:
         for k in (*self.circles, *(k for ball in self.balls for k in range(3 + ball.number)[ball.span])):
             low[k], high[k] = -np.inf, np.inf
         dofs = {place: dof for dof, place in enumerate(self.robot.position_index)}
-        for place, leader, ratio, offset in self.followers:
+        for place, leader, ratio, offset in (follower for follower in self.followers if follower[2]):
             ends = sorted((side[dofs[place]] - offset) / ratio for side in (lower, upper))
             low[leader], high[leader] = max(low[leader], ends[0]), min(high[leader], ends[1])
         return low, high

@@ -62,12 +62,13 @@ class _PlanStruct(ctypes.Structure):
         ),
         *((name, ctypes.c_int) for name in ("n", "pairs", "capacity", "seeds")),
         ("count", ctypes.c_int * 2),
-        *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "longest")),
+        *((name, ctypes.c_double) for name in ("range", "step", "tolerance", "drift", "near_enough", "longest")),
         ("random", ctypes.c_ulonglong),
         ("path", _KeptRows),
         ("goal", _KeptRows),
         ("node", ctypes.c_void_p * 2),
         ("lanes", ctypes.c_void_p * 2),
+        ("domain", ctypes.c_void_p * 2),
         ("parent", ctypes.c_void_p * 2),
         ("work", ctypes.c_void_p),
         ("meet", ctypes.c_int * 2),
@@ -116,13 +117,14 @@ class NativePlanner:
         self._p, self._scale, self._weight = p, 1.0 / coordinates.scale, coordinates.scale**-2.0
         self._struct = it = _PlanStruct(n=n, capacity=NODES, range=1.0, step=0.1, tolerance=1e-8, drift=1e-3)
         self._nodes, self._lanes = ([np.empty((NODES, n)) for _ in range(2)] for _ in range(2))
+        self._domains = [np.empty(NODES) for _ in range(2)]
         self._parents = [np.empty(NODES, dtype=np.int32) for _ in range(2)]
         self._points, self._others = np.empty((POINTS, n)), np.empty((POINTS, n))
         for name in ("low", "high", "sample_low", "sample_high", "_weight", "_scale"):
             setattr(it, name.strip("_"), getattr(self, name).ctypes.data)
         for k in range(2):
             it.node[k], it.parent[k] = self._nodes[k].ctypes.data, self._parents[k].ctypes.data
-            it.lanes[k] = self._lanes[k].ctypes.data
+            it.lanes[k], it.domain[k] = self._lanes[k].ctypes.data, self._domains[k].ctypes.data
         self._kept: dict[str, list[Array]] = {}
         self._compiled: dict[PlanningRows, tuple[int, int, int]] = {}
         self.use("path", rows)
@@ -176,7 +178,7 @@ class NativePlanner:
         self._call.wbc_plan_prepare(self.at)
 
     def set(self, **numbers: float) -> None:
-        """Numbers of ``native/plan.h``: range, step, tolerance, drift, longest."""
+        """Numbers of ``native/plan.h``: range, step, tolerance, drift, near_enough, longest."""
         for name, value in numbers.items():
             setattr(self._struct, name, value)
 

@@ -275,21 +275,19 @@ class _Search:
         self.native.pad(LEAST_PAD)
         self.native.begin(options.seed)
         self.native.set(step=options.step)
-        self.start = planner.coordinates.of_configuration(q)
-        self.goals: list[Array] = []
+        self.q0, self.start, self.goals = q, planner.coordinates.of_configuration(q), list[Array]()
         #: near start and goals, with room on all sides
         self.first, self.last = self.start, list[Array]()
-        self.nodes = (0, 0)
-        self.pad, self.shortening = PAD, 0.0
+        self.nodes, self.pad, self.shortening = (0, 0), PAD, 0.0
 
     def check_start(self) -> None:
         """Refuse a start that breaks a constraint."""
-        if reason := self.fault(self.start):
+        if reason := self.fault(self.start, self.q0):
             raise InfeasibleError("q0", *reason)
         self.first = self.native.away(self.start, 2.0 * PAD)
 
-    def fault(self, x: Array) -> tuple[float, str] | None:
-        """(by how much, which constraint) x breaks most; None: none."""
+    def fault(self, x: Array, q: Array | None = None) -> tuple[float, str] | None:
+        """(by how much, which constraint) x breaks most, or q, of which it was made; None: none."""
         native, coordinates = self.native, self.planner.coordinates
         beyond = np.maximum(native.low - x, x - native.high)
         worst = int(np.argmax(beyond))
@@ -298,17 +296,16 @@ class _Search:
             what = f"{coordinates.names[worst]} is beyond its limit of {limit:.4g} {coordinates.units[worst]}"
             return float(x[worst]), what
         x[:] = np.clip(x, native.low, native.high)
-        rows = self.rows
-        if rows.count:
+        if q is not None and abs((coupled := coordinates.uncoupled(q))[0]) > MET:
+            return coupled
+        if (rows := self.rows).count:
             values = np.asarray(rows.function(x, self.planner._core.tick.p)[0]).ravel()
             off = np.concatenate([np.abs(values[: rows.equalities]), -values[rows.equalities :]])
             worst = int(np.argmax(off))
             if not off[worst] <= MET:
                 return float(values[worst]), f"{rows.labels[worst]} does not hold, off by {off[worst]:.3g}"
-            if native.broken(x) > 1e-8:
-                fixed = native.projected(x)
-                if fixed is not None:
-                    x[:] = fixed
+            if native.broken(x) > 1e-8 and (fixed := native.projected(x)) is not None:
+                x[:] = fixed
         if native.margin(x) < -OPEN and (nearest := native.scene.nearest(x)) is not None:
             where = f"{nearest.first} and {nearest.second} are {1e3 * nearest.distance:.2f} mm apart"
             return nearest.distance, f"{where}, {1e3 * nearest.required:.2f} mm required"
@@ -325,7 +322,7 @@ class _Search:
             if isinstance(goal, ConfigurationGoal):
                 x = self.planner.coordinates.of_configuration(goal.q, self.start)
                 self._widen(x)
-                if reason := self.fault(x):
+                if reason := self.fault(x, goal.q):
                     faults.append(reason)
                 else:
                     self.goals.append(x)
@@ -430,7 +427,9 @@ class _Search:
         native.begin(options.seed + 7919 * attempt)
         span = float(np.linalg.norm((native.sample_high - native.sample_low) / self.planner.coordinates.scale))
         reach = RANGE * span if options.range is None else options.range
-        native.set(longest=shortest, range=reach * RANGES[attempt % len(RANGES)])
+        # Of uniform samples about the same share is so near at any number of coordinates
+        domain = max(0.5, 2.0 - 2.7 / np.sqrt(len(native.low))) * RANGE * span
+        native.set(longest=shortest, range=reach * RANGES[attempt % len(RANGES)], near_enough=domain)
         native.root(0, self.first)
         roots = [k for k, x in enumerate(self.last) if native.free(x)]
         for k in roots:

@@ -13,7 +13,6 @@ from wbc.multibody import pin
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
 from wbc.proximity.corners import NEAR
-from wbc.proximity.missing import Screws
 from wbc.proximity.rows import PairRows
 from wbc.proximity.scene import PairScene
 from wbc.shapes import FAR
@@ -33,7 +32,7 @@ OFF = 1e-12
 _INTEGERS = ("joints", "steps", "bodies", "pairs", "rows", "corners", "width", "nv", "has_pose", "has_velocity")
 _LENGTHS = ("keep_share", "keep_length", "off", "near")
 _ARRAYS = (
-    *("q", "joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
+    *("joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
     *("body_joint", "body_place", "body_pose", "shape", "corner", "corner_count"),
     *("first", "second", "outward", "pair_side", "most", "answer", "doubtful", "has_row", "is_measured", "urgent"),
     *("score", "least", "row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side"),
@@ -62,10 +61,11 @@ def library() -> ctypes.PyDLL:
         CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
     found = checked(load_library(kernel(SOURCES / "sensor.c", HEADERS)), wbc_scene_size=_SceneStruct)
+    at = ctypes.c_void_p
     for name in ("wbc_sense", "wbc_measure"):
-        getattr(found, name).argtypes = [ctypes.c_void_p]
+        getattr(found, name).argtypes = [at, at]
         getattr(found, name).restype = None
-    found.wbc_missing.argtypes, found.wbc_missing.restype = [ctypes.c_void_p, ctypes.c_double], ctypes.c_int
+    found.wbc_missing.argtypes, found.wbc_missing.restype = [at, at, at, ctypes.c_double, at], ctypes.c_int
     return found
 
 
@@ -76,6 +76,7 @@ class Sensing:
         pairs: number of the pair of each row, -1 without.
         distances, normals, points, doubtful: of every pair at its last measurement.
         urgent: which pairs come before others, see :mod:`wbc.proximity.missing`.
+        addresses: of ``wbc_sense``, of ``wbc_missing``, and of what they work on.
     """
 
     def __init__(self, scene: PairScene, rows: PairRows | None = None) -> None:
@@ -87,15 +88,12 @@ class Sensing:
         self.pairs = np.full(count, -1, dtype=np.int32)
         self._near, self._has_row = np.zeros(count, dtype=np.int8), np.zeros(pairs, dtype=np.int8)
         self.urgent = np.zeros(pairs, dtype=np.int8)
-        self._v, self._braking = np.zeros(scene.robot.nv), np.zeros(scene.robot.nv)
-        self._screws = Screws(scene.robot.model)
         arrays = _kinematics(scene) | _bodies(scene) | {
-            "q": self._q, "answer": self._answer, "doubtful": self._doubtful, "row_pair": self.pairs,
+            "answer": self._answer, "doubtful": self._doubtful, "row_pair": self.pairs,
             "first": scene.first.astype(np.int32), "second": scene.second.astype(np.int32), "outward": scene.outward,
             "has_row": self._has_row, "is_measured": np.zeros(pairs, dtype=np.int8), "urgent": self.urgent,
             "score": np.zeros(pairs), "least": np.zeros(pairs), "heap": np.zeros(max(count, 1), dtype=np.int32),
             "row_near": self._near, "row_fresh": np.zeros(count, dtype=np.int8), "pose": self._pose,
-            "screws": self._screws.rows, "v": self._v, "braking": self._braking,
         }  # fmt: skip
         if rows is not None:
             names = ("distance", "drift", "line", "side", "pair_side", "most", "margin", "rate", "pose", "velocity")
@@ -114,6 +112,8 @@ class Sensing:
         )  # fmt: skip
         self._at = ctypes.c_void_p(ctypes.addressof(self._scene))
         self._sense, self._measure, self._missing = functions.wbc_sense, functions.wbc_measure, functions.wbc_missing
+        in_c = (ctypes.cast(function, ctypes.c_void_p).value or 0 for function in (self._sense, self._missing))
+        self.addresses = (*in_c, ctypes.addressof(self._scene))
         self.distances, self.normals, self.points = self._answer[:, 0], self._answer[:, 1:4], self._answer[:, 4:]
 
     @property
@@ -134,19 +134,19 @@ class Sensing:
     def sense(self, q: Array) -> None:
         """Measure and write the rows."""
         self._q[:] = q
-        self._sense(self._at)
+        self._sense(self._at, self._q.ctypes.data)
 
-    def missing(self, v: Array, dt: float, braking: Array) -> int:
-        """See :meth:`wbc.proximity.sensor.PairSensor.missing`; at the configuration of the last :meth:`sense`."""
-        self._screws.place(self._q)
-        self._v[:], self._braking[:] = v, braking
-        return int(self._missing(self._at, dt))
+    def missing(self, screws: Array, v: Array, dt: float, braking: Array) -> int:
+        """See :meth:`wbc.proximity.sensor.PairSensor.missing`."""
+        given = [np.ascontiguousarray(x, dtype=np.float64) for x in (screws, v, braking)]
+        twists, command, brakes = (x.ctypes.data for x in given)
+        return int(self._missing(self._at, twists, command, dt, brakes))
 
     def measure(self, q: Array, pose: pin.SE3) -> None:
         """All pairs."""
         self._q[:] = q
         self._pose[:] = np.concatenate([np.asarray(pose.rotation).ravel("F"), pose.translation])
-        self._measure(self._at)
+        self._measure(self._at, self._q.ctypes.data)
 
 
 def _kinematics(scene: PairScene) -> dict[str, Array]:

@@ -93,16 +93,24 @@ class PairSensor:
             q = self._robot.configuration("q", q)
         self._sensing.sense(q)
 
-    def missing(self, v: Array, dt: float, braking: Array) -> int:
+    @property
+    def addresses(self) -> tuple[int, ...]:
+        """Of ``wbc_sense`` and ``wbc_missing`` in C, which do what :meth:`sense` and :meth:`missing` do, and of what
+        they work on.
+        """
+        return self._sensing.addresses
+
+    def missing(self, screws: Array, v: Array, dt: float, braking: Array) -> int:
         """The most that a pair without a row uses of what its row would allow, where the last :meth:`sense` was, at the
         command v [nv]: :data:`wbc.proximity.missing.LITTLE` to ``INWARD``. From ``TOO_MUCH`` on the next :meth:`sense`
         has rows for such pairs, and the command is to be found again.
 
         Args:
+            screws: there, the twist (linear; angular) at the world's origin of each degree of freedom [nv, 6].
             dt: until the next command [s]. braking: deceleration of each degree of freedom that is counted on in front
                 of a margin [nv]; infinite where any will do.
         """
-        return self._sensing.missing(v, dt, braking)
+        return self._sensing.missing(screws, v, dt, braking)
 
     def pairs(self) -> tuple[tuple[str, str, float], ...]:
         """(name of A, name of B, distance [m]) of the rows that have a pair, in the last call."""

@@ -101,7 +101,7 @@ class Recorder:
         self._call, self._plain_call, self._finished = core.call, core.plain_call, core.finished
         core.call = functools.partial(_recorded, self)
         if self._call is self._plain_call:
-            core.plain_call, core.finished = core.call, self._tell
+            core.plain_call, core.finished = core.call, self._finish
             core.assembly.recording[0] = ctypes.addressof(self._writing)
         core.recording = self.path
         atexit.register(self._leave)
@@ -180,7 +180,19 @@ class Recorder:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
-    def _tell(self, warm: bool = True) -> None:
+    def _finish(self) -> None:
+        """Record what came of a tick that C has begun to record: with nothing new, after the last one."""
+        self._complete(True, self._seen)
+
+    def _complete(self, ready: bool, resets: int) -> None:
+        """Record what came of a tick that began ``ready`` and after so many ``resets`` of the controller."""
+        if self._core.resets != resets:
+            # found again from other rows, which are sensed inputs, and from no active set
+            first, last, numbers = self._values
+            self._memory[self._writing.end + first : self._writing.end + last] = numbers
+        self._tell(ready and self._core.resets == self._seen)
+
+    def _tell(self, warm: bool) -> None:
         """Record what came of a tick; ``warm``: the solver remembered what it was recorded with."""
         memory, writing = self._memory, self._writing
         begin = writing.end
@@ -215,11 +227,7 @@ def _recorded(recorder: Recorder) -> int:
     if flag < 0:
         writing.ready = ready
         return flag
-    if core.resets != resets:
-        # found again from other rows, which are sensed inputs, and from no active set
-        first, last, numbers = recorder._values
-        memory[begin + first : begin + last] = numbers
-    recorder._tell(bool(ready) and core.resets == recorder._seen)
+    recorder._complete(bool(ready), resets)
     return flag
 
 

@@ -12,7 +12,7 @@ import shutil
 import signal
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -54,13 +54,11 @@ class ClipJob:
     @property
     def asked(self) -> dict[str, Any]:
         """What a finished clip must have been asked for to be left as it is: plain data."""
-        plain: dict[str, Any] = {"robot": self.robot, "loading": dict(self.loading), "options": dict(self.options)}
+        plain: dict[str, Any] = {name: getattr(self, name) for name in ("robot", "loading", "options", "formats")}
+        plain |= {"support": True} if self.support else {}
         if self.correspondence is not None:
             plain["correspondence"] = self.correspondence.read_text(encoding="utf-8")
-        if self.support:
-            plain["support"] = True
-        text = json.dumps({**plain, "formats": list(self.formats)}, default=str, sort_keys=True)
-        return dict(json.loads(text))
+        return dict(json.loads(json.dumps(plain, default=str, sort_keys=True)))
 
     @property
     def is_done(self) -> bool:
@@ -129,13 +127,17 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
         return
     # Forks of a process with threads may hang
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=_deaf) as pool:
+    # Ctrl-C goes to all processes of a terminal; the first one ends the others
+    deaf = signal.SIGINT, signal.SIG_IGN
+    with ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=signal.signal, initargs=deaf) as pool:
         waiting = {pool.submit(retarget_job, job): job for job in jobs}
         try:
             while waiting:
                 ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in ended:
-                    yield _answer(future, waiting.pop(future))
+                    job, error = waiting.pop(future), future.exception()
+                    # A process that was killed is a reason too
+                    yield future.result() if error is None else ClipDone(job, {}, f"{type(error).__name__}: {error}")
         except BaseException:
             # Those that are busy would be waited for, and are forgotten by a pool that was shut down
             busy = list((getattr(pool, "_processes", None) or {}).values())
@@ -143,17 +145,6 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
             for process in busy:
                 process.terminate()
             raise
-
-
-def _answer(future: Future[ClipDone], job: ClipJob) -> ClipDone:
-    """What came of a clip, also where its process was killed."""
-    error = future.exception()
-    return future.result() if error is None else ClipDone(job, {}, f"{type(error).__name__}: {error}")
-
-
-def _deaf() -> None:
-    """Ctrl-C goes to all processes of a terminal; the first one ends the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def retarget_job(job: ClipJob) -> ClipDone:

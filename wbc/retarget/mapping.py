@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -47,15 +48,10 @@ class Places:
     head: Array | None
     limbs: Mapping[str, LimbPlaces]
 
-
-@dataclass(frozen=True)
-class _Trunk:
-    """Place of the pelvis [frames, 3] [m], turns of pelvis and chest, and the heading of the pelvis [frames, 3, 3]."""
-
-    place: Array
-    pelvis: Array
-    chest: Array
-    heading: Array
+    @cached_property
+    def heading(self) -> Array:
+        """Turns of the pelvis about the vertical alone [frames, 3, 3]."""
+        return _headings(self.turn)
 
 
 def normalised(vectors: Array, fallback: Array) -> Array:
@@ -163,12 +159,11 @@ class Mapper:
             lift = np.array([0.0, 0.0, self._heights.get("left_leg", 0.0)])
             place = match.scale * (hips - np.array([0.0, 0.0, ground])) + lift
         head = turns[:, match.head] @ axes if turns is not None and match.head >= 0 and body.head else None
-        trunk = _Trunk(place, pelvis, chest, _headings(pelvis))
-        limbs = {name: self._limb(name, points, turns, trunk, ankle) for name in match.limbs}
-        return Places(place, pelvis, chest, head, limbs)
+        trunk = Places(place, pelvis, chest, head, {})
+        return replace(trunk, limbs={name: self._limb(name, points, turns, trunk, ankle) for name in match.limbs})
 
     def _limb(
-        self, name: str, points: Array, turns: Array | None, trunk: _Trunk, ankle: dict[str, float]
+        self, name: str, points: Array, turns: Array | None, trunk: Places, ankle: dict[str, float]
     ) -> LimbPlaces:
         """Targets of a limb."""
         match, limb = self.match.limbs[name], self.match.body.limbs[name]
@@ -176,9 +171,9 @@ class Mapper:
         bones = normalised(chain[:, 1:] - chain[:, :-1], self._still[name])
         if match.tip == match.end:
             bones[:, 2] = bones[:, 1]
-        base = trunk.place + trunk.pelvis @ self._bases[name]
+        base = trunk.pelvis + trunk.turn @ self._bases[name]
         if self._from_chest(name):
-            base = trunk.place + trunk.pelvis @ self._waist + trunk.chest @ self._bases[name]
+            base = trunk.pelvis + trunk.turn @ self._waist + trunk.chest @ self._bases[name]
         upper, lower, hand = self._lengths[name]
         middle = base + upper * bones[:, 0]
         rotation = self._rotation(match, points, turns, trunk, limb.contact == "flat")
@@ -193,7 +188,7 @@ class Mapper:
         return LimbPlaces(middle, wrist, wrist + (-height if rotation is None else rotation @ -height), rotation)
 
     def _rotation(
-        self, match: LimbMatch, points: Array, turns: Array | None, trunk: _Trunk, foot: bool
+        self, match: LimbMatch, points: Array, turns: Array | None, trunk: Places, foot: bool
     ) -> Array | None:
         """Of the foot or hand, in the body's axes at rest."""
         axes, rest = self.match.axes, self.match.rest
@@ -206,7 +201,7 @@ class Mapper:
         # Along the foot, as far as its rest is turned from there; the hips say where its side is
         forward = rest[match.tip] - rest[match.end]
         before = frames_of(axes[:, 1][None], np.cross(forward, axes[:, 1])[None])[0]
-        ahead, left = points[:, match.tip] - points[:, match.end], trunk.pelvis[:, :, 1]
+        ahead, left = points[:, match.tip] - points[:, match.end], trunk.turn[:, :, 1]
         side = left - ahead * (np.sum(left * ahead, axis=1) / np.maximum(np.sum(ahead**2, axis=1), 1e-12))[:, None]
         return np.asarray(frames_of(side, np.cross(ahead, side)) @ before.T @ axes)
 

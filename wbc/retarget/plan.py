@@ -28,6 +28,8 @@ CLEAR = 0.006
 NEARLY_TURNED = -0.99
 #: A foot stands flat where its sole is tilted by less than the angle of this cosine
 SOLE_LEVEL = 0.8
+#: A foot on its toes or heel stands so far from where its ankle's limit would hold it [rad]
+ANKLE_SPARE = 0.05
 #: Most of a leg's length that a standing leg has between hip and ankle
 STRETCH = 0.985
 #: Standard deviation of the Gaussian that the lowering of the pelvis is smoothed with [s]
@@ -204,25 +206,35 @@ def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[
     the mean.
     """
     ends, rotation = limb.end[a:b], limb.rotation[a:b] if limb.rotation is not None else None
-    place = np.median(ends, axis=0)
+    place = _median(ends)
     if robot.contact != "flat" or rotation is None:
         level = float(place[2]) - robot.radius
         place[2] = robot.radius + (0.0 if level < GROUND else level)
         return place, None
-    if float(np.median(rotation[:, 2, 2])) > SOLE_LEVEL:
+    if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL:
         forward = rotation[:, :, 0].mean(axis=0)
         yaw = float(np.arctan2(forward[1], forward[0]))
         standing = exponential(np.array([[0.0, 0.0, yaw]]))[0]
-        level = float(np.median(limb.wrist[a:b, 2])) - float(np.linalg.norm(robot.places[2] - robot.places[3]))
+        level = float(_median(limb.wrist[a:b, 2])) - float(np.linalg.norm(robot.places[2] - robot.places[3]))
         lowest = np.zeros(3)
     else:
         standing = np.asarray(Rotation.from_matrix(rotation).mean().as_matrix())
+        # No farther from the shank than the ankle can turn it
+        shank = (limb.middle[a:b] - limb.wrist[a:b]) @ standing
+        leans = np.arctan2(shank[:, 0], shank[:, 2])
+        turn = np.clip(0.0, robot.pitch[0] + ANKLE_SPARE + leans.max(), robot.pitch[1] - ANKLE_SPARE + leans.min())
+        standing = standing @ exponential(np.array([[0.0, turn, 0.0]]))[0]
         lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
-        level = float(np.median(_lowest(robot, ends, rotation)))
+        level = float(_median(_lowest(robot, ends, rotation)))
     # The lowest point of the sole stands where it is in the mean
-    place = np.median(ends + rotation @ lowest, axis=0) - standing @ lowest
+    place = _median(ends + rotation @ lowest) - standing @ lowest
     place[2] = (0.0 if level < GROUND else level) - float(standing[2] @ lowest)
     return place, standing
+
+
+def _median(values: Array) -> Array:
+    """Over the ticks; of a single one, as live, its own."""
+    return values[0].copy() if len(values) == 1 else np.asarray(np.median(values, axis=0))
 
 
 def balanced(plan: MotionPlan) -> Array:

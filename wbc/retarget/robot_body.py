@@ -72,6 +72,8 @@ class RobotLimb:
         contact: flat or point. radius: of the ball; 0 of a flat foot [m].
         corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
         surface: corners of the hull of what the end is made of, in the contact frame [corners, 3] [m].
+        pitch: least and most turn of the end against its last bone, from the bone along the end's z axis, about the
+            axis to the left, that joints behind the middle hinge allow [2] [rad].
         guessed: the description says nothing of the foot's or hand's size.
     """
 
@@ -85,6 +87,7 @@ class RobotLimb:
     radius: float
     corners: Array
     surface: Array
+    pitch: tuple[float, float]
     guessed: bool
 
     @property
@@ -284,12 +287,26 @@ def _limb(
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
     limb = RobotLimb(
         joints, base, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, contact, radius, corners,
-        surface, guessed,
+        surface, _pitch(robot, data, joints[joints.index(middle) + 1 :], places, plan.axes), guessed,
     )  # fmt: skip
     placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
     if wrist:
         placed[limb.wrist] = (wrist, pin.SE3.Identity())
     return limb, placed
+
+
+def _pitch(robot: Robot, data: pin.Data, joints: tuple[int, ...], places: Array, axes: Array) -> tuple[float, float]:
+    """Least and most turn of an end against its last bone about the axis to the left [rad]."""
+    forward, _, up = (places[1] - places[2]) @ axes
+    least = most = -float(np.arctan2(forward, up))
+    for joint in joints:
+        along = float(_axis(robot, data, joint) @ axes[:, 1])
+        if abs(along) > ACROSS:
+            number = int(robot.model.idx_vs[joint])
+            low, high = robot.limits.position_lower[number], robot.limits.position_upper[number]
+            ends = np.sign(along) * (np.array([low, high]) - robot.neutral[int(robot.model.idx_qs[joint])])
+            least, most = least + float(ends.min()), most + float(ends.max())
+    return least, most
 
 
 def _middle_hinge(robot: Robot, data: pin.Data, joints: tuple[int, ...], tip: Array) -> int:

@@ -22,23 +22,8 @@ ARM_WORDS = {"arm", "hand", "wrist", "elbow", "shoulder", "forearm", "gripper"}
 LEG_WORDS = {"leg", "hip", "knee", "ankle", "foot", "toe", "thigh", "shin"}
 #: What markers of optical motion capture are called without their side
 MARKERS = {
-    "ank",
-    "toe",
-    "hee",
-    "asi",
-    "psi",
-    "kne",
-    "tib",
-    "thi",
-    "sho",
-    "elb",
-    "wra",
-    "wrb",
-    "fin",
-    "fhd",
-    "bhd",
-    "mt",
-}
+    "ank", "toe", "hee", "asi", "psi", "kne", "tib", "thi", "sho", "elb", "wra", "wrb", "fin", "fhd", "bhd", "mt",
+}  # fmt: skip
 #: What a first letter l or r says the side of
 SIDED = MARKERS | LEG_WORDS | (ARM_WORDS - {"forearm", "gripper"})
 #: Words of parts of a body, by part

@@ -55,6 +55,11 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
             path = _as_read(path, recipe)
         _, tree = read_xml(path)
         if tree.tag == "robot":
+            if unexpanded := [
+                element.tag.rpartition("}")[2] for element in tree.iter() if "/xacro}" in str(element.tag)
+            ]:
+                reason = f"it has <xacro:{unexpanded[0]}>: call it {path.stem}{XACRO}, and it is expanded"
+                raise RobotFileError("robot", str(path), reason)
             return read_urdf(path, tree, base, recipe.mimic_leaders)
         if tree.tag == "mujoco":
             from wbc.robot.sources.mjmodel import compiled, read_mjmodel

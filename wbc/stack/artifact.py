@@ -102,7 +102,8 @@ def _virtual(stack: Declaration, layout: Layout, name: str) -> tuple[Artifact, p
     def fill(folder: pathlib.Path) -> None:
         made.append(build(stack, layout))
         for name, function in made[0].functions.items():
-            function.save(str(folder / f"{name}{FUNCTION}"))
+            # CasADi does not say that a disk is full, and opens no path that has other letters than the locale's
+            (folder / f"{name}{FUNCTION}").write_text(function.serialize())
         for name, text in codegen.tables(stack, layout, made[0]).items():
             (folder / name).write_text(text)
 

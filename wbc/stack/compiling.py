@@ -21,7 +21,7 @@ FUNCTION = ".casadi"
 
 def functions_in(folder: Path) -> dict[str, ca.Function]:
     """The functions of a stack that is in the cache, by name."""
-    return {path.stem: ca.Function.load(str(path)) for path in sorted(folder.glob(f"*{FUNCTION}"))}
+    return {path.stem: ca.Function.deserialize(path.read_text()) for path in sorted(folder.glob(f"*{FUNCTION}"))}
 
 
 def compile_behind(folder: Path) -> str:

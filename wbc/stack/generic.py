@@ -71,8 +71,9 @@ WRITTEN = (
 #: What the tick compiled for the stack does in place of what is here, once there is one
 FORWARDED = (
     "wbc_tick_arrive", "wbc_tick_assemble", "wbc_tick_certify", "wbc_tick_check", "wbc_tick_curvature",
-    "wbc_tick_find_lost", "wbc_tick_look_ahead", "wbc_tick_reset", "wbc_tick_resume", "wbc_tick_safe_step",
-    "wbc_tick_solve", "wbc_tick_step", "wbc_tick_suspend", "wbc_tick_take", "wbc_tick_task_rows", "wbc_tick_torques",
+    "wbc_tick_find_lost", "wbc_tick_look_ahead", "wbc_tick_missed", "wbc_tick_reset", "wbc_tick_resume",
+    "wbc_tick_safe_step", "wbc_tick_solve", "wbc_tick_step", "wbc_tick_suspend", "wbc_tick_take",
+    "wbc_tick_task_rows", "wbc_tick_torques",
 )  # fmt: skip
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")
@@ -307,7 +308,7 @@ def _context(variant: Variant) -> str:
         "#include <string.h>",
         f"#define COMMAND {COMMANDS.index(variant.command)}",
         f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
-        *(f"#define {name} 0" for name in ("HANDED", "HANDED_TO_LOST", "WORK_W", "WORK_IW")),
+        *(f"#define {name} 0" for name in ("HANDED", "HANDED_TO_LOST", "HANDED_TO_TORQUE", "WORK_W", "WORK_IW")),
         *(f"#define HAS_{name} {int(there)}" for name, there in chosen.items()),
         *(f"#define HAS_{name} 1" for name in _ALWAYS),
         "/* Of eight bytes each, in the order that Python writes them in */",

@@ -311,7 +311,8 @@ class _ProgramBuilder:
         sensed = item.sensed_rows(robot)
         matrix = tracer.slope(margin[: count - sensed, :])
         margin, drift, factor, matrix = tracer.expanded(margin, self.drift(block, margin), factor, matrix)
-        matrix, drift[: count - sensed] = self.midway(block, matrix, drift[: count - sensed])
+        own = slice(count - sensed), slice(None)  # of one row alone, drift[:0] would lie down
+        matrix, drift[own] = self.midway(block, matrix, drift[own])
         if sensed:
             empty = ca.SX(sensed, self.layout.nv)
             matrix = ca.vertcat(matrix, empty if self.loops else self.sensed_matrix(block, sensed))

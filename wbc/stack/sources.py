@@ -25,9 +25,13 @@ def completed(functions: Mapping[str, ca.Function], tables: Mapping[str, str]) -
     written = {file.name: file.read_text() for file in native.iterdir() if file.name.endswith((".c", ".h"))}
     compiled = {name: _shared(function) for name, function in functions.items()}
     place = sum(name not in _LAST for name in compiled["rows"].name_out())
-    sizes = {"HANDED": 0, "HANDED_TO_LOST": -1}
+    sizes = {"HANDED": 0, "HANDED_TO_LOST": -1, "HANDED_TO_TORQUE": -1}
     # In the order of the outputs; of what is lost, v is a command and not the last one
-    for name, output, others in (("lost", "handed_to_lost", ("v",)), ("curvature", "handed", ())):
+    for name, output, others in (
+        ("torque", "handed_to_torque", ()),
+        ("lost", "handed_to_lost", ("v",)),
+        ("curvature", "handed", ()),
+    ):
         if name in compiled:
             compiled["rows"], compiled[name] = hand_over(compiled["rows"], compiled[name], place, output, others)
             sizes[output.upper()] = compiled["rows"].numel_out(output)

@@ -14,7 +14,7 @@ import numpy as np
 
 from wbc.errors import SolverError
 from wbc.native.arrays import ARRAY_MAKERS, PLAIN_ARRAYS
-from wbc.native.builtin import builtin, builtin_of_one, builtin_of_some, places_of
+from wbc.native.builtin import builtin, builtin_like, builtin_of_one, builtin_of_some, places_of
 from wbc.native.library import load_library
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -80,6 +80,9 @@ class CompiledTick(Buffers, ABC):
         self._kept: list[Any] = []
         #: address of a ``wbc_recording`` of ``native/builtins.h``, into which ticks with values in one call go; 0: none
         self.recording = np.zeros(1, np.int64)
+        #: a ``wbc_watch`` of ``native/watch.h``: the sensors that measure before such ticks, none at first
+        self.watch = np.zeros(2, np.int64)
+        self._watch_at = ctypes.c_void_p(self.watch.ctypes.data)
         #: a copy of :attr:`state`, and where the layout has ``moves`` of q (+) v dt after it
         self.snapshot: Callable[[], bytes] = builtin(
             self._library.wbc_python_kept, self._cycle(np.zeros(0), np.zeros((0, 3)), [], [])
@@ -102,10 +105,10 @@ class CompiledTick(Buffers, ABC):
 
     def cycler(
         self, staged: Array, plan: np.ndarray, names: Sequence[str], step: Callable[[bytes, Any], Any], context: object
-    ) -> Callable[[Any, dict[str, Any]], Any]:
+    ) -> tuple[Callable[[Any, dict[str, Any]], Any], int]:
         """What ticks at a configuration with these values in one call: of (q, values by name), arrays of doubles.
         Returns a step where the tick is solved, else its flag; a negative one, and nothing is changed, where an
-        argument is refused or names are others or in another order.
+        argument is refused or names are others or in another order. And what :meth:`stepper` knows it by.
 
         Args:
             staged, plan: as of :meth:`taker`. names: of the values.
@@ -116,7 +119,20 @@ class CompiledTick(Buffers, ABC):
         places = places_of(step(data, context), (context, data))
         request = self._cycle(staged, plan, known, [id(step), id(context), *places])
         self._kept += [step, context]
-        return builtin_of_some(self._library.wbc_python_cycle, request)
+        return builtin_of_some(self._library.wbc_python_cycle, request), request
+
+    def stepper(self, gate: np.ndarray, cycle: int, method: Any, finish: Any) -> tuple[Callable[..., Any], np.ndarray]:
+        """What stands for a controller's ``step``: ticks of what :meth:`cycler` made, without Python between them, and
+        the table of these: the second number is of steps without values, the third of those with.
+
+        Args:
+            gate: three numbers; where one is not 0 ``method`` does the step. cycle: of no values.
+            finish: ends a step whose tick has a flag (flag, q).
+        """
+        table = np.array([gate.ctypes.data, cycle, cycle], np.int64)
+        self._kept += [gate, table]
+        about = (table.ctypes.data, method, finish)
+        return builtin_like(method, "q, v=None, dt=None, **targets", self._library.wbc_python_steps, about), table
 
     def part(self, first: int, count: int) -> Callable[[bytes], Array]:
         """What makes an array of ``count`` numbers of :attr:`snapshot` from number ``first`` on, read-only, without a
@@ -133,9 +149,9 @@ class CompiledTick(Buffers, ABC):
         objects = np.array([id(name) for name in names], np.int64)
         request = np.array(
             [
-                self.pointer.value, self.recording.ctypes.data, self.q.ctypes.data, staged.ctypes.data,
-                table.ctypes.data, len(table), self._layout.nq, self.state.nbytes, self.state.ctypes.data,
-                moves.ctypes.data, len(moves), self._layout.nq if len(moves) else 0,
+                self.pointer.value, self.recording.ctypes.data, self.watch.ctypes.data, self.q.ctypes.data,
+                staged.ctypes.data, table.ctypes.data, len(table), self._layout.nq, self.state.nbytes,
+                self.state.ctypes.data, moves.ctypes.data, len(moves), self._layout.nq if len(moves) else 0,
                 objects.ctypes.data, *PLAIN_ARRAYS, *step,
             ],
             np.int64,
@@ -145,6 +161,25 @@ class CompiledTick(Buffers, ABC):
 
     def reset(self) -> None:
         self._library.wbc_tick_reset(self.pointer)
+
+    def watch_sensors(self, sensors: np.ndarray) -> None:
+        """Sensors measure from now on before each tick with its values in one call, which then looks at its command.
+
+        Args:
+            sensors: a ``wbc_sensor`` of ``native/watch.h`` each [count, 10].
+        """
+        self._kept.append(sensors)
+        self.watch[:] = sensors.ctypes.data, len(sensors)
+
+    def sense(self) -> None:
+        """Measure at q what enabled items sense."""
+        self._library.wbc_tick_sense(self.pointer, self._watch_at)
+
+    def missed(self) -> int:
+        """The most that a pair without a row uses, at the reported command, of what its row would allow:
+        :data:`wbc.proximity.missing.LITTLE` to ``INWARD``.
+        """
+        return int(self._library.wbc_tick_missed(self.pointer, self._watch_at))
 
     def assemble(self) -> None:
         """Rows and QP only; no reported number is NaN."""

@@ -26,6 +26,7 @@ from wbc.climb.time_law import cubics_need, fastest
 from wbc.climb.world import ClimbWorld
 from wbc.errors import RangeError
 from wbc.multibody import pin
+from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
 #: How many times slower than asked a way is planned, and how many standings the search keeps of each number of swings,
@@ -232,15 +233,12 @@ class _TimedWay:
             ends = [0, *itertools.chain.from_iterable(swings), len(x) - 1]
             holds = [CubicSpline(x[i : j + 1], values[i : j + 1]) if i < j else None for i, j in _pairs(ends)]
             for k, (lift, land) in enumerate(swings):
-                # As fast at first and at last as while it holds; one that lifts at once is at rest
-                rates = [
-                    None if held is None else (1, held(x[at], 1))
+                # As fast at first and at last as while it holds
+                rates = tuple(
+                    (1, self._held_rates(limb, at, values[at]) if held is None else held(x[at], 1))
                     for held, at in zip(holds[k:], (lift, land), strict=False)
-                ]
-                free = "not-a-knot"
-                swung = CubicSpline(
-                    x[lift : land + 1], values[lift : land + 1], bc_type=tuple(r or free for r in rates)
                 )
+                swung = CubicSpline(x[lift : land + 1], values[lift : land + 1], bc_type=rates)
                 terms[:, lift:land, climber.joints(limb) - 6] = swung.c
             for held, (i, j) in zip(holds, _pairs(ends), strict=True):
                 if held is not None:
@@ -249,6 +247,16 @@ class _TimedWay:
             terms[:, :, coupling.follower - 6] = coupling.ratio * terms[:, :, coupling.leader - 6]
             terms[3, :, coupling.follower - 6] += coupling.offset
         return PPoly(terms, x)
+
+    def _held_rates(self, limb: int, instant: int, angles: Array) -> Array:
+        """Rates of a limb's joints with which its contact stays where it is, at the way's full speed [rad/s, m/s]."""
+        climber, track, model = self.climber, self.search.track, self.climber.robot.model
+        about, rows = climber.limbs[limb], 3 if climber.fixed(limb) == "position" else 6
+        q = climber.with_limb(climber.with_body(climber.rest, track.sampled[instant]), limb, angles)
+        J = pin.computeFrameJacobian(model, model.createData(), q, frame_index(model, about.frame), pin.LOCAL)
+        J = (about.placement.inverse().toActionMatrix() @ J)[:rows]
+        moved = np.linalg.lstsq(J[:, climber.joints(limb)], J[:, :6] @ track.twists[instant], rcond=None)[0]
+        return -np.asarray(moved)
 
     def _body(self, at: Array) -> tuple[Array, Array]:
         """Configurations with the body at places of the way, and its twists at full speed: cubic between instants."""

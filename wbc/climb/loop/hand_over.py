@@ -28,13 +28,15 @@ class HandOvers:
         moves: of the plan. reference: its motion. unload: time in which a limb hands over its load [s].
 
     Attributes:
-        moving: lifts at which the plan is not at rest [s].
+        moving: lifts at which the plan is not at rest [s]. resting: landings at which it is [s].
     """
 
     def __init__(self, moves: Sequence[ContactMove], reference: PlanReference, unload: float) -> None:
         time, lands = HANDED * unload, sorted(move.land for move in moves)
         lifts = sorted({move.lift for move in moves})
-        self.moving = {lift for lift in lifts if np.abs(reference.derivatives(lift)[0]).max() > RESTS}
+        moves_at = {t: np.abs(reference.derivatives(t)[0]).max() > RESTS for t in {*lifts, *lands}}
+        self.moving = {lift for lift in lifts if moves_at[lift]}
+        self.resting = {land for land in lands if not moves_at[land]}
         #: (landing, lift, rate between) [s, s, 1]
         self._slow = list[tuple[float, float, float]]()
         for lift in lifts:

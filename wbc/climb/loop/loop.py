@@ -553,6 +553,10 @@ class ClimbLoop:
                 # A plan that is given up comes to rest behind that, as soon as joints can, the limb still held
                 if not self._needs and not (ready and self._may_lift(move) and self._borne(limb, move)):
                     ahead = max(min(ahead, move.lift), self._path_time)
+            # What comes after a landing counts on its load, which by torques takes a time
+            landing = self._torques and limb.state in (LimbState.REACHING, LimbState.LATCHING)
+            if landing and move is not None and move.land < ahead and move.land in self._hand_overs.resting:
+                ahead = max(min(ahead, move.land), self._path_time)
         self._late = False
         for limb in self._limbs:
             for _ in range(CHANGES):

@@ -22,7 +22,7 @@ class LoopOptions:
         patience: how long the plan waits for a limb that is late [s].
         unload: time in which a limb hands over its load before it lifts, and takes it after it lands, of torques [s].
         bandwidth: omega of a = a_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q), of torques [1/s].
-        friction: share of the coefficients of friction on which torques count [1].
+        friction: share of the coefficients of friction, and of soles, on which torques count [1].
         delay: of the torques, which the loop knows [s].
         log: whether ticks are logged; without, the log has the start alone.
         press: speed at which a foot that is late goes on against its foothold's normal, of torques [m/s].

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -110,10 +110,8 @@ class FootholdContact(Contact):
         return Cone(matrix, -ca.SX.inf(len(self._pattern)), inputs["bounds"])
 
     def numbers(self, friction: float, share: float = 1.0) -> tuple[Array, Array]:
-        """``slopes`` and ``bounds`` on a surface with this coefficient of friction: a share of the lower one counts."""
-        own: float | None = getattr(self.kind, "friction", None)
-        lower: dict[str, Any] = {} if own is None else {"friction": share * min(own, friction)}
-        a, b = replace(self.kind, **lower).cone()
+        """``slopes`` and ``bounds`` on a surface of a friction, and with a share as of ``ContactKind.lower``."""
+        a, b = self.kind.lower(friction, share).cone()
         return a[self._borne][:, list(self.axes)][self._pattern], b[self._borne]
 
     @cached_property

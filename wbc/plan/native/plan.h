@@ -65,11 +65,13 @@ typedef struct {
     double step;      /* of edges with rows: between two projections */
     double tolerance; /* of equalities at a configuration */
     double drift;     /* of equalities between two of them */
+    double near_enough; /* samples draw a node from which an edge was not free no farther */
     double longest;   /* paths through samples are shorter */
     unsigned long long random;
     kept_rows_t path, goal; /* rows of all configurations; with those of the goal's tasks */
     double *node[2];        /* capacity x n: trees from the start and from the goals */
     double *lanes[2];       /* of these, blocks of n x LANES, times `scale`; infinite behind the last */
+    double *domain[2];      /* samples farther from a node do not draw it */
     int *parent[2];         /* -1: a root */
     double *work;           /* for one projection: see project.h */
     int meet[2];            /* nodes at which the trees met */

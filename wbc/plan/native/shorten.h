@@ -5,11 +5,11 @@
 #include "trees.h"
 
 /* What is gained must be more than this share */
-#define GAIN 1e-4
+#define GAIN 1e-3
 /* Cuts end after so many that gained nothing */
 #define IDLE 15
 /* Corners are pulled in by no less than this share */
-#define PULLED 0.05
+#define PULLED 0.2
 
 static double length_of(const plan_t *p, const double *x, int count) {
     double sum = 0.0;
@@ -97,12 +97,30 @@ static int bevel(plan_t *p, double *x, int points, int room, int k) {
         along_x(p, x + k * n, x + (k - 1) * n, t, two);
         along_x(p, x + k * n, x + (k + 1) * n, t, two + n);
         const double was = metric(p, two, x + k * n) + metric(p, x + k * n, two + n);
-        if (metric(p, two, two + n) > (1.0 - 50.0 * GAIN) * was) return points;
+        if (metric(p, two, two + n) > (1.0 - 5.0 * GAIN) * was) return points;
         if (!edge(p, two, two + n)) continue;
         const int now = splice(p, x, points, room, k - 1, k + 1, two, 2);
         return now < 0 ? points : now;
     }
     return points;
+}
+
+/* One coordinate of points i + 1 to j - 1 goes evenly, over the length of the path, from where it is at i to where it is at j; 1: it is so
+ * free, and shorter */
+static int level(plan_t *p, double *x, int i, int j, int k, double *others) {
+    const int n = p->n, count = j - i + 1;
+    double *from = x + i * n, gone = 0.0;
+    const double length = length_of(p, from, count), first = from[k], last = x[j * n + k];
+    memcpy(others, from, count * n * sizeof *x);
+    for (int m = 1; m < count - 1; m++) {
+        gone += metric(p, from + (m - 1) * n, from + m * n);
+        others[m * n + k] = first + gone / length * (last - first);
+    }
+    if (length_of(p, others, count) > (1.0 - 3.0 * GAIN) * length) return 0;
+    for (int m = 1; m < count; m++)
+        if (!edge(p, others + (m - 1) * n, others + m * n)) return 0;
+    memcpy(from, others, count * n * sizeof *x);
+    return 1;
 }
 
 /* A path with `cuts` tries, then with corners pulled in and cut off `rounds` times; the number of points */
@@ -120,13 +138,16 @@ static int shorten(plan_t *p, double *x, int points, int room, int cuts, int rou
             if (now < points) k--;
             points = now;
         }
+        for (int k = 0; !has_rows(p) && round == 0 && k < p->n && points > 2; k++)
+            if (!level(p, x, 0, points - 1, k, others))
+                for (int i = 0; i + 2 < points; i++) level(p, x, i, i + 2, k, others);
         if (!has_rows(p) && round % 2 == 0)
             for (int k = 1; k < points - 1; k++) {
                 const int now = bevel(p, x, points, room, k);
                 if (now > points) k++;
                 points = now;
             }
-        if (length_of(p, x, points) > (1.0 - 10.0 * GAIN) * before) break;
+        if (length_of(p, x, points) > (1.0 - 5.0 * GAIN) * before) break;
     }
     return points;
 }

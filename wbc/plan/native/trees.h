@@ -10,6 +10,8 @@
 #define SLIGHT 0.1
 /* Samples are drawn so often until one lies on no longer path */
 #define INFORMED 20
+/* and these so often until one is near enough to a node */
+#define DRAWN 10
 
 /* A node; beside its row in `node` it stands in `lanes`, where coordinates of LANES nodes are together, weighted */
 static int add(plan_t *p, int tree, const double *x, int parent) {
@@ -20,6 +22,7 @@ static int add(plan_t *p, int tree, const double *x, int parent) {
     for (int m = 0; at % LANES == 0 && m < LANES * n; m++) lane[m] = INFINITY;
     for (int k = 0; k < n; k++) lane[LANES * k] = p->scale[k] * x[k];
     p->parent[tree][at] = parent;
+    p->domain[tree][at] = INFINITY;
     return p->count[tree]++;
 }
 
@@ -80,16 +83,21 @@ static void draw(plan_t *p, double *x) {
     }
 }
 
-/* `samples` more, or until the trees meet: 1 */
+/* `samples` more, or until the trees meet: 1. A node from which an edge was not free is drawn by near samples only (Yershova, Jaillet,
+ * Simeon and LaValle, Dynamic-domain RRTs, 2005) */
 static int grow(plan_t *p, int samples) {
     double x[p->n];
     for (int k = 0; k < samples; k++) {
-        int reached;
-        draw(p, x);
         const int tree = p->count[0] > p->count[1];
-        const int from = nearest_node(p, tree, x);
+        int reached, from = 0, again = 0;
+        do {
+            draw(p, x);
+            from = nearest_node(p, tree, x);
+        } while (metric(p, p->node[tree] + p->n * from, x) > p->domain[tree][from] && ++again < DRAWN);
+        if (again == DRAWN) continue;
         const int node = extend(p, tree, from, x, p->range, &reached);
         if (p->count[tree] == p->capacity) return -1;
+        if (reached != 1 && (node < 0 || reached < 0)) p->domain[tree][from] = p->near_enough;
         if (node < 0) continue;
         const double *target = p->node[tree] + p->n * node;
         int other = nearest_node(p, !tree, target);

@@ -12,7 +12,6 @@ typedef struct {
     tolerance_t how;
     double keep_share, keep_length, off, near;
     /* kinematics */
-    const double *q;
     const int *joint_parent, *joint_steps; /* steps of joint k: joint_steps[k] to joint_steps[k + 1] */
     const double *joint_place;             /* 12 each */
     const int *step_kind, *step_q;
@@ -38,8 +37,9 @@ typedef struct {
     signed char *row_near, *row_fresh;
     double *distance, *drift, *line, *side;
     const double *pose, *velocity, *margin, *rate;
-    /* a command: screws 6 a velocity, v, what each brakes with; velocities of a joint: the first, and how many */
+    /* a command, while it is looked at: screws 6 a velocity, v, what each brakes with */
     const double *screws, *v, *braking;
+    /* velocities of a joint: the first, and how many */
     const int *joint_v;
     double *joint_twist; /* 6 each; 0 for what moves from outside */
     double *speed;       /* of the fastest point of a body, at most */

@@ -8,17 +8,17 @@
 
 long long wbc_scene_size(void) { return (long long)sizeof(scene_t); }
 
-/* All pairs at the present configuration, into `answer` and `doubtful` */
-void wbc_measure(scene_t *s) {
-    place_bodies(s);
+/* All pairs, into `answer` and `doubtful` */
+void wbc_measure(scene_t *s, const double *q) {
+    place_bodies(s, q);
     s->measured = 0;
     for (int k = 0; k < s->pairs; k++) measure(s, k);
 }
 
 /* Measure what can be among the closest, and write the rows */
-void wbc_sense(scene_t *s) {
+void wbc_sense(scene_t *s, const double *q) {
     double twist[6];
-    place_bodies(s);
+    place_bodies(s, q);
     s->measured = 0;
     choose(s);
     const int moves = outside_twist(s, twist);
@@ -46,5 +46,10 @@ void wbc_sense(scene_t *s) {
     }
 }
 
-/* The most that a pair without a row uses of what its row would allow, at the command; such pairs are urgent from now on */
-int wbc_missing(scene_t *s, double dt) { return s->pairs > s->rows ? missing(s, dt) : LITTLE; }
+/* The most that a pair without a row uses of what its row would allow, at the command v where the last `wbc_sense` was;
+ * such pairs are urgent from now on. Where there are as many rows as pairs `choose` gives each pair one. */
+int wbc_missing(scene_t *s, const double *screws, const double *v, double dt, const double *braking) {
+    if (s->pairs <= s->rows) return LITTLE;
+    s->screws = screws, s->v = v, s->braking = braking;
+    return missing(s, dt);
+}

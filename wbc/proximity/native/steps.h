@@ -40,8 +40,8 @@ static void take_step(int kind, const double *number, const double *q, double *p
     memcpy(pose, next, sizeof R);
 }
 
-/* All joints and bodies at the present q and pose */
-static void place_bodies(scene_t *s) {
+/* All joints and bodies at a configuration and the present pose */
+static void place_bodies(scene_t *s, const double *q) {
     if (s->has_pose) {
         double *outside = s->joint_pose + 12 * s->joints;
         for (int i = 0; i < 3; i++)
@@ -53,7 +53,7 @@ static void place_bodies(scene_t *s) {
         double *pose = s->joint_pose + 12 * j;
         compose(s->joint_pose + 12 * s->joint_parent[j], s->joint_place + 12 * j, pose);
         for (int k = s->joint_steps[j]; k < s->joint_steps[j + 1]; k++)
-            take_step(s->step_kind[k], s->step_number + 12 * k, s->q + s->step_q[k], pose);
+            take_step(s->step_kind[k], s->step_number + 12 * k, q + s->step_q[k], pose);
     }
     for (int b = 0; b < s->bodies; b++)
         compose(s->joint_pose + 12 * s->body_joint[b], s->body_place + 12 * b, s->body_pose + 12 * b);

@@ -14,7 +14,7 @@ from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.retarget.clip import Array, listed
 from wbc.retarget.sources.layouts import LAYOUTS, best_layout, parents_by_name, parents_of
-from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in, text_of
+from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in, text_of, unlike
 
 #: Keys of an npz with points
 POINTS = (
@@ -78,7 +78,9 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
     for number, title in enumerate(header):
         match = COLUMN.match(title)
         if match and match[1].strip():
-            columns.setdefault(match[1].strip(), {})[match[2].lower()] = number
+            axes = columns.setdefault(match[1].strip(), {})
+            if axes.setdefault(match[2].lower(), number) != number:
+                raise no_clip(path, f"two columns {title}")
             unit = COLUMN_UNITS.get(match[3] or "", unit)
         elif title.lower() not in (*TIMES, *COUNTERS):
             other.append(title)
@@ -151,4 +153,5 @@ def of_points(path: pathlib.Path, points: Array, names: Names) -> Recorded:
     given = list(validation.strings("names", names))
     if len(given) != points.shape[1]:
         raise ShapeError("names", given, f"expected {points.shape[1]} names, one a joint, not {len(given)}")
+    given = unlike(given, notes)
     return Recorded(given, parents_by_name(given), points, 0.0, notes=notes)

@@ -24,10 +24,8 @@ CLIP_SUFFIXES = (".bvh", ".c3d", ".npz", ".npy", ".csv", ".pkl", ".pt")
 CONVERTED = {
     ".fbx": "FBX is not read: convert it to BVH, in Blender by File > Import > FBX, then Export > Motion Capture",
     ".trc": "TRC is not read: save it as C3D or as csv with a header of names",
-    ".glb": "glTF is not read: convert it to BVH in Blender",
-    ".gltf": "glTF is not read: convert it to BVH in Blender",
-    ".asf": "ASF and AMC are not read: convert them to BVH",
-    ".amc": "ASF and AMC are not read: convert them to BVH",
+    **dict.fromkeys((".glb", ".gltf"), "glTF is not read: convert it to BVH in Blender"),
+    **dict.fromkeys((".asf", ".amc"), "ASF and AMC are not read: convert them to BVH"),
 }
 #: Least frames a second [Hz]
 SLOWEST = 10.0

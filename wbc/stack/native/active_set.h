@@ -312,7 +312,8 @@ static int from_last(wbc_tick *t, double angle) {
 /* The distance problem of the factor at hand */
 static void see_rows(wbc_tick *t) {
     if (!t->factored) {
-        invert(t);
+        invert_factor(t);
+        find_scaling(t);
         pack(t);
         image(t);
         for (int i = 0; i < WIDE; i++) t->ldp_v[i] = -t->y[i];

@@ -101,13 +101,16 @@ static void form_bounds(wbc_tick *t) {
 /* `screen`: without rows that no velocity within the bounds could violate */
 static void assemble(wbc_tick *t, int screen) {
     const double *arg[4] = {t->q, t->v_last, t->p, &t->dt};
-    double *res[15] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
+    double *res[16] = {t->report.error, t->desired, t->report.factor, t->jt, t->at, t->free_low, t->free_high,
                        t->report.margin, t->bound_low, t->bound_high, t->report.margin_factor,
 #if NNZK > 0
                        t->handed,
 #endif
 #if HANDED_TO_LOST >= 0
                        t->handed_to_lost,
+#endif
+#if HANDED_TO_TORQUE >= 0
+                       t->handed_to_torque,
 #endif
                        t->segment, t->screw};
     rows(arg, res, t->work_iw, t->work_w, 0);
@@ -171,7 +174,7 @@ static void assemble(wbc_tick *t, int screen) {
     memcpy(t->straight, t->H, sizeof t->H);
 #endif
     if ((CALM || (BENDING > 0 && t->curving != 0.0)) && t->plain == 0.0 && LEADING > 0 && t->unusable == 0.0) reach(t);
-    for (int i = 0; BENDING > 0 && t->shortened != 0.0 && i < NV; i++) {
+    for (int i = 0; (BENDING > 0 || CLOSING > 0) && t->shortened != 0.0 && i < NV; i++) {
         t->H[i * WIDE + i] += t->shortened / (dof_scale[i] * dof_scale[i]);
         t->prepared = 0;
     }

@@ -99,6 +99,16 @@ static void unbend(wbc_tick *t) {
     t->curving = t->shortened = 0.0;
 }
 
+#if BENDING > 0 || (COMMAND != VELOCITY && CLOSING > 0)
+/* The problem again, with a shorter step, or smaller accelerations */
+static void shorten(wbc_tick *t) {
+    memset(t->bend, 0, sizeof t->bend);
+    if (t->reduced) find_stiffness(t);
+    t->shortened = t->shortened == 0.0 ? t->stiffness : STEEPER * t->shortened;
+    assemble(t, 1);
+}
+#endif
+
 #if BENDING > 0
 
 /* Both sides of an equality row to where `bend` wants them */
@@ -224,14 +234,6 @@ static int curve_rows(wbc_tick *t) {
     t->curving = 1.0;
     if (changed) assemble(t, 1);
     return changed;
-}
-
-/* The problem again, with a shorter step */
-static void shorten(wbc_tick *t) {
-    memset(t->bend, 0, sizeof t->bend);
-    if (t->reduced) find_stiffness(t);
-    t->shortened = t->shortened == 0.0 ? t->stiffness : STEEPER * t->shortened;
-    assemble(t, 1);
 }
 
 static int turns_round(const wbc_tick *t) {

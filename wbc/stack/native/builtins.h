@@ -4,6 +4,7 @@
 #define WBC_BUILTINS_H
 
 #include "values.h"
+#include "watch.h"
 
 typedef struct _object PyObject;
 typedef struct {
@@ -25,6 +26,14 @@ void PyBuffer_Release(Py_buffer *);
 void PyErr_Clear(void);
 ptrdiff_t PyDict_Size(PyObject *);
 int PyDict_Next(PyObject *, ptrdiff_t *, PyObject **, PyObject **);
+PyObject *PyDict_New(void);
+int PyDict_SetItem(PyObject *, PyObject *, PyObject *);
+ptrdiff_t PyTuple_Size(PyObject *);
+PyObject *PyTuple_GetItem(PyObject *, ptrdiff_t);
+PyObject *PyTuple_New(ptrdiff_t);
+int PyTuple_SetItem(PyObject *, ptrdiff_t, PyObject *);
+PyObject *PyObject_Call(PyObject *, PyObject *, PyObject *);
+PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
 int PyUnicode_Compare(PyObject *, PyObject *);
 PyObject *PyType_GenericAlloc(PyObject *, ptrdiff_t);
 void Py_DecRef(PyObject *);
@@ -112,6 +121,7 @@ typedef struct {
 typedef struct {
     wbc_tick *tick;
     wbc_recording *const *recording; /* where the address of one is, or 0 */
+    const wbc_watch *watch;
     double *q, *staged;      /* the tick's configuration, and where values wait */
     const int *plan;
     long long count, coordinates, bytes; /* values, coordinates of q, and of what a step keeps of `report` */
@@ -180,16 +190,22 @@ static PyObject *step_of(const wbc_cycle *c) {
     return out;
 }
 
-/* Values by name, in the order of `names`, to where they wait; 0 where one is refused */
-static int values_of(const wbc_cycle *c, PyObject *values) {
+/* Value k by its name, where it belongs in the order of `names`, to where it waits; 0 where it is refused */
+static int value_of(const wbc_cycle *c, long long k, PyObject *name, PyObject *value, double *at) {
+    if (name != c->names[k] && PyUnicode_Compare(name, c->names[k])) return 0;
+    return numbers_of(c, value, c->plan[3 * k] == VALUE_POSE, c->plan[3 * k + 2], at);
+}
+
+/* All values, of a dictionary or, where there is none, of a call with their names; 0 where one is refused */
+static int values_of(const wbc_cycle *c, PyObject *values, PyObject *names, PyObject *const *given) {
     PyObject *name, *value;
     double *at = c->staged;
     ptrdiff_t next = 0;
-    if (PyDict_Size(values) != c->count) return 0;
+    if ((values ? PyDict_Size(values) : names ? PyTuple_Size(names) : 0) != c->count) return 0;
     for (long long k = 0; k < c->count; at += c->plan[3 * k++ + 2]) {
-        if (!PyDict_Next(values, &next, &name, &value)) return 0;
-        if (name != c->names[k] && PyUnicode_Compare(name, c->names[k])) return 0;
-        if (!numbers_of(c, value, c->plan[3 * k] == VALUE_POSE, c->plan[3 * k + 2], at)) return 0;
+        if (!values) name = PyTuple_GetItem(names, (ptrdiff_t)k), value = given[k];
+        else if (!PyDict_Next(values, &next, &name, &value)) return 0;
+        if (!value_of(c, k, name, value, at)) return 0;
     }
     return 1;
 }
@@ -199,31 +215,79 @@ static void copy_row(const wbc_recording *r, const char *memory, long long first
         memcpy(r->chunk + r->end + p[0], memory + p[1], (size_t)p[2]);
 }
 
-/* The step of a tick that is solved, else its flag; WBC_NOT_TAKEN, and nothing is changed, where an argument is refused.
- * `given`: a configuration, and a dictionary of values by name */
+/* 1 for a tick that is solved and misses no pair, else 0 with its flag: WBC_NOT_TAKEN, and nothing is changed, where an argument is
+ * refused. `values`, `names`, `given`: as of `values_of` */
 #define WBC_NOT_TAKEN (-100)
-EXPORT PyObject *wbc_python_cycle(PyObject *request, PyObject *const *given, ptrdiff_t count) {
-    const wbc_cycle *c = PyLong_AsVoidPtr(request);
+static int tick_with(const wbc_cycle *c, PyObject *q, PyObject *values, PyObject *names, PyObject *const *given, int *flag) {
     const size_t size = (size_t)c->coordinates * sizeof(double);
     double before[c->coordinates + 1];
     wbc_recording *const r = *c->recording;
-    if (r && (!r->ready || r->end + 2 * r->row > r->size)) return PyLong_FromLong(WBC_NOT_TAKEN);
-    if (count != 2 || !values_of(c, given[1])) return PyLong_FromLong(WBC_NOT_TAKEN);
+    *flag = WBC_NOT_TAKEN;
+    if (r && (!r->ready || r->end + 2 * r->row > r->size)) return 0;
+    if (!values_of(c, values, names, given)) return 0;
     memcpy(before, c->q, size);
-    if (!numbers_of(c, given[0], 0, c->coordinates, c->q)) return PyLong_FromLong(WBC_NOT_TAKEN);
+    if (!numbers_of(c, q, 0, c->coordinates, c->q)) return 0;
     if (c->count && (wbc_tick_check(c->tick) || !wbc_tick_take(c->tick, c->staged, c->plan, (int)c->count))) {
         memcpy(c->q, before, size);
         wbc_tick_check(c->tick);
-        return PyLong_FromLong(WBC_NOT_TAKEN);
+        return 0;
     }
+    if (c->watch->count) wbc_tick_sense(c->tick, c->watch);
     if (r) copy_row(r, c->report, 0, r->given);
-    const int flag = wbc_tick_step(c->tick);
-    if (r && !flag) {
+    *flag = wbc_tick_step(c->tick);
+    const int done = !*flag && !(c->watch->count && wbc_tick_missed(c->tick, c->watch) >= MISSED);
+    if (r && done) {
         copy_row(r, c->report, r->given, r->told);
         memset(r->chunk + r->end + r->reset, 0, sizeof(double));
         r->end += r->row, r->count++;
-    } else if (r && flag > 0) r->ready = 0;
-    return flag ? PyLong_FromLong(flag) : step_of(c);
+    } else if (r && *flag >= 0) r->ready = 0;
+    return done;
+}
+
+/* The step of such a tick, else its flag. `given`: a configuration, and a dictionary of values by name */
+EXPORT PyObject *wbc_python_cycle(PyObject *request, PyObject *const *given, ptrdiff_t count) {
+    const wbc_cycle *c = PyLong_AsVoidPtr(request);
+    int flag = WBC_NOT_TAKEN;
+    return count == 2 && tick_with(c, given[0], given[1], 0, 0, &flag) ? step_of(c) : PyLong_FromLong(flag);
+}
+
+/* Steps of a controller: ticks of no values, and of those of the last step that had any */
+typedef struct {
+    const long long *gate; /* of GATE numbers one is not 0: a step has more to do than a tick */
+    const wbc_cycle *plain, *with_values;
+} wbc_steps;
+#define GATE 3
+
+/* The call of a function with arguments as they were given */
+static PyObject *call_with(PyObject *function, PyObject *const *given, ptrdiff_t count, PyObject *names) {
+    const ptrdiff_t named = names ? PyTuple_Size(names) : 0;
+    PyObject *plain = PyTuple_New(count), *by_name = PyDict_New(), *out = 0;
+    int ok = plain && by_name;
+    for (ptrdiff_t k = 0; ok && k < count; k++) {
+        Py_IncRef(given[k]);
+        ok = !PyTuple_SetItem(plain, k, given[k]);
+    }
+    for (ptrdiff_t k = 0; ok && k < named; k++) ok = !PyDict_SetItem(by_name, PyTuple_GetItem(names, k), given[count + k]);
+    if (ok) out = PyObject_Call(function, plain, by_name);
+    if (plain) Py_DecRef(plain);
+    if (by_name) Py_DecRef(by_name);
+    return out;
+}
+
+/* `step` of a controller. `about`: the address of a wbc_steps, as an integer; what does a step that is more than a tick; what ends one
+ * whose tick has a flag (flag, q) */
+EXPORT PyObject *wbc_python_steps(PyObject *about, PyObject *const *given, ptrdiff_t count, PyObject *names) {
+    const wbc_steps *s = PyLong_AsVoidPtr(PyTuple_GetItem(about, 0));
+    const wbc_cycle *c = names && PyTuple_Size(names) ? s->with_values : s->plain;
+    long long more = count != 1;
+    int flag = WBC_NOT_TAKEN;
+    for (int k = 0; k < GATE; k++) more |= s->gate[k];
+    if (!more && tick_with(c, given[0], 0, names, given + 1, &flag)) return step_of(c);
+    if (flag < 0) return call_with(PyTuple_GetItem(about, 1), given, count, names);
+    PyObject *number = PyLong_FromLong(flag);
+    PyObject *out = number ? PyObject_CallFunctionObjArgs(PyTuple_GetItem(about, 2), number, given[0], (PyObject *)0) : 0;
+    if (number) Py_DecRef(number);
+    return out;
 }
 
 /* What a step keeps of the tick before; `request`: the address of a wbc_cycle, as an integer */

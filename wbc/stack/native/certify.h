@@ -24,7 +24,7 @@ static double quick_bound(wbc_tick *t, const double *size) {
  * between the two, |R^-1| |R^-T| size entry by entry */
 static double sharp_bound(wbc_tick *t, const double *size) {
     double longest = 0.0, worst = 0.0, image_of_size[WIDE] = {0};
-    if (!t->factored) invert(t);
+    if (!t->factored) invert_factor(t);
     for (int i = 0; i < NV; i += 4)
         for (int at = i & ~7; at < WIDE; at += 4) {
             four sum = GIVEN_FOUR(image_of_size + at);
@@ -32,6 +32,7 @@ static double sharp_bound(wbc_tick *t, const double *size) {
             FOUR(image_of_size + at) = sum;
         }
     if (t->daqp.n_active > 0) {
+        if (!t->factored) find_scaling(t);
         for (int i = 0; i < DOFS; i++) longest = larger(1.0 / t->scaling[i], longest);
         return longest * (sqrt(dot(image_of_size, image_of_size, 0)) + active_residual(t));
     }
@@ -178,7 +179,9 @@ static void refine(wbc_tick *t) {
 /* The same with the bound in wide arithmetic where it is not good enough */
 static void examine_closely(wbc_tick *t) {
     examine(t);
-    if (t->report.error_bound > GOOD_BOUND && !t->reduced) t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
+    if (!(t->report.error_bound > GOOD_BOUND) || t->reduced) return;
+    if (!t->factored) find_scaling(t);
+    t->report.error_bound = smaller(wide_bound(t), t->report.error_bound);
 }
 
 /* No refinement is worth its while */

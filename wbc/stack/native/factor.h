@@ -155,8 +155,10 @@ INLINE int finish_row(wbc_tick *t, int k, int n, double *plain, double *shares, 
         }
         FOUR(row + at) = p, FOUR(row + at + 4) = q;
     }
-    if (chosen) row[k + n] = chosen_pivot(chosen, row, k + n);
-    const double pivot = row[k + n], reciprocal = 1.0 / pivot, scale = t->inverse_diagonal[k + n] = 1.0 / sqrt(pivot);
+    const double pivot = chosen ? chosen_pivot(chosen, row, k + n) : row[k + n];
+    /* Not where it is the same: what reads the row next would have to wait for it */
+    if (chosen && chosen->more[k + n] != 0.0) row[k + n] = pivot;
+    const double reciprocal = 1.0 / pivot, scale = t->inverse_diagonal[k + n] = 1.0 / sqrt(pivot);
     for (int c = n + 1; c < 4; c++) shares[4 * n + c] = -row[k + c] * reciprocal;
     for (int at = from; at < WIDE; at += 8) {
         FOUR(out + at) = GIVEN_FOUR(row + at) * EACH(scale);
@@ -355,7 +357,7 @@ static void solve_upper(const wbc_tick *t, const double *y, double *x) {
         const double x2 = MADD(-x3, s2[i + 3], y[i + 2] - SUM_OF_FOUR(p2)) * d[2];
         const double x1 = MADD(-x2, s1[i + 2], MADD(-x3, s1[i + 3], y[i + 1] - SUM_OF_FOUR(p1))) * d[1];
         const double x0 = MADD(-x1, s0[i + 1], MADD(-x2, s0[i + 2], MADD(-x3, s0[i + 3], y[i] - SUM_OF_FOUR(p0)))) * d[0];
-        x[i] = x0, x[i + 1] = x1, x[i + 2] = x2, x[i + 3] = x3;
+        FOUR(x + i) = (four){x0, x1, x2, x3};
     }
 }
 
@@ -387,10 +389,14 @@ INLINE void invert_rows(wbc_tick *t, int i, int at) {
     FOUR(out + 2 * WIDE) = p2, FOUR(out + 2 * WIDE + 4) = q2, FOUR(out + 3 * WIDE) = p3, FOUR(out + 3 * WIDE + 4) = q3;
 }
 
-/* R^-1 by rows, which are full, and 1 / length of each in `scaling` */
-static void invert(wbc_tick *t) {
+/* R^-1 by rows, which are full */
+static void invert_factor(wbc_tick *t) {
     for (int i = TALL - 4; i >= 0; i -= 4)
         for (int at = i & ~7; at < WIDE; at += 8) invert_rows(t, i, at);
+}
+
+/* 1 / length of each row of R^-1 */
+static void find_scaling(wbc_tick *t) {
     for (int i = 0; i < NV; i++) {
         const double *row = t->inverse + i * WIDE;
         t->scaling[i] = dot(row, row, i);

@@ -14,16 +14,22 @@ INLINE double stopping(double h, double a, double closing, double dt) {
     return 2.0 * h / (lag + sqrt(lag * lag + 2.0 * h / a));
 }
 
-/* A margin h > 0 may fall by rate h, as the row says, or as fast as the joints can stop with a part of their
- * acceleration, whichever is less. Joints at rest always satisfy the second. docs/reach.md */
-static void brake_for_margins(wbc_tick *t) {
-    double limit[NV];
+/* What each velocity counts on to brake in front of margins, WBC_INF without a limit; whether any has one */
+static int find_braking(const wbc_tick *t, double *limit) {
     int limited = 0;
     for (int i = 0; i < NV; i++) {
         const int on = brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
         limit[i] = on ? BRAKING_MARGIN * brake_limit[i] : WBC_INF;
         limited |= on;
     }
+    return limited;
+}
+
+/* A margin h > 0 may fall by rate h, as the row says, or as fast as the joints can stop with a part of their
+ * acceleration, whichever is less. Joints at rest always satisfy the second. docs/reach.md */
+static void brake_for_margins(wbc_tick *t) {
+    double limit[NV];
+    const int limited = find_braking(t, limit);
     for (int k = 0; limited && k < MC; k++) {
         if (margin_at[k] < 0 || t->free_low[k] <= -WBC_INF) continue;
         const double h = t->report.margin[margin_at[k]], plain = t->p[rate_at[k]] * h;

@@ -79,7 +79,7 @@ static void report_soft_rows(wbc_tick *t) {
 #if COMMAND == TORQUE
 /* Torques of the joints for the command, within their limits */
 EXPORT void wbc_tick_torques(wbc_tick *t) {
-    const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, t->report.v, t->enabled};
+    const double *arg[7] = {t->q, t->v_last, t->p, &t->dt, t->report.v, t->enabled, t->handed_to_torque};
     double *res[1] = {t->report.torque};
     torque(arg, res, t->work_iw, t->work_w, 0);
     for (int i = 0; i < DOFS; i++) {
@@ -193,26 +193,28 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
 }
 
 /* The velocity that accelerations lead to keeps loops closed, and within the bounds: where corrections of it would pass them, the
- * accelerations are others, as far as there are any */
+ * accelerations are others, as far as there are any, and where none lead to closed loops, as next to a dead point, smaller ones */
 static int arriving_answer(wbc_tick *t, int flag, int *nameless) {
 #if COMMAND != VELOCITY && CLOSING > 0
-    double low[MC + 1], high[MC + 1];
+    int open = 0;
     if (CLOSING == 0 || flag != WBC_SOLVED || (t->arrived = arrives_within(t))) return flag;
-    memcpy(low, t->free_low, sizeof t->free_low);
-    memcpy(high, t->free_high, sizeof t->free_high);
     for (int n = 0; n < ARRIVALS && flag == WBC_SOLVED; n++) {
         if (!bend_arrival(t)) {
-            if (n == 0) return report_open(t, flag);
+            open = n == 0;
             break;
         }
         flag = answer(t, nameless);
         if (flag == WBC_SOLVED && !unsound(t, flag) && (t->arrived = arrives_within(t))) return flag;
     }
-    memcpy(t->free_low, low, sizeof t->free_low);
-    memcpy(t->free_high, high, sizeof t->free_high);
-    t->prepared = 0;
-    own_sides(t);
-    return answer(t, nameless);
+    for (int n = 0; n < SHORTER; n++) {
+        shorten(t);
+        flag = answer(t, nameless);
+        if (flag == WBC_SOLVED && !unsound(t, flag) && (t->arrived = arrives_within(t))) return flag;
+    }
+    t->shortened = 0.0;
+    assemble(t, 1);
+    flag = answer(t, nameless);
+    return open && flag == WBC_SOLVED ? report_open(t, flag) : flag;
 #else
     (void)t, (void)nameless;
     return flag;

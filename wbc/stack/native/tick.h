@@ -12,8 +12,8 @@
  *   COMMAND     0: velocities, 1: accelerations, 2: torques; of the last two the variables are accelerations and the
  *               wrenches of contacts
  *   NNZK k_row k_col   entries of the curvature's upper triangle
- *   HANDED HANDED_TO_LOST   numbers that the rows hand to the curvature, and to what bends; without curvature, and with -1, the rows
- *               have no such output
+ *   HANDED HANDED_TO_LOST HANDED_TO_TORQUE   numbers that the rows hand to the curvature, to what bends, and to torques; without
+ *               curvature, and with -1, the rows have no such output
  *   REDUCED     rows of loops, and of torques that nothing gives, which are taken out of the QP, see reduced.h; 0 without loops
  *   REDUCED_NV  NV with such rows, else 0
  *   FORCES FORCED_NV FORCE_FIRST row_torque   forces in loops, one a row of them, NV with such, else 0, and the first among the
@@ -127,8 +127,8 @@ typedef struct {
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
     double segment[6 * SEGMENTS + 1], screw[6 * NV], segment_ahead[6 * SEGMENTS + 1];
     double q_good[NQ + 1];       /* q of the last tick that was not refused, put back by one that is */
-    /* outputs of the generated rows; `handed` is for the curvature, the other for what bends */
-    double handed[HANDED + 1], handed_to_lost[HANDED_TO_LOST + 2];
+    /* outputs of the generated rows; `handed` is for the curvature, the others for what bends, and torques */
+    double handed[HANDED + 1], handed_to_lost[HANDED_TO_LOST + 2], handed_to_torque[HANDED_TO_TORQUE + 2];
     double jt[NNZJ + 1], at[NNZA + 1], bound_low[NB * NV + 1], bound_high[NB * NV + 1];
     /* factorisation */
     double R[TALL * WIDE], inverse[TALL * WIDE], inverse_diagonal[TALL], y[WIDE];

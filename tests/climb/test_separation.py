@@ -1,0 +1,59 @@
+"""What keeps a climber from its goal is said early: the step that lacks least, and by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tests.climb.by_hand import climber
+from wbc.climb import BodyPlace, ClimbScene, first_stance, plan_climb
+from wbc.climb.contacts import FlatFoot, GripHand, PointFoot, SuctionPad
+from wbc.climb.scene import Foothold, SceneBody, size_of
+from wbc.climb.scenes import placed
+from wbc.climb.search import NoStancesError
+from wbc.climb.surfaces import FootholdRules, footholds_on, frame_on
+from wbc.shapes import Box
+
+
+def floors(size: float, wide: float) -> ClimbScene:
+    """Two floors with a gap between them."""
+    bodies, footholds = dict[str, SceneBody](), list[Foothold]()
+    for name, begin, end in (("near", -size, 0.5 * size), ("far", 0.5 * size + wide, 2.0 * size + wide)):
+        at = np.array([(begin + end) / 2, 0.0, -0.25 * size])
+        body = bodies[name] = SceneBody(Box((end - begin, size, 0.5 * size)), pin.SE3(np.eye(3), at))
+        footholds += footholds_on(
+            name, body.shape, body.placement, FootholdRules(0.25 * size, 0.05 * size, max_slope=0.1)
+        )
+    return ClimbScene(footholds, bodies)
+
+
+@pytest.mark.parametrize("name", ["talos"])
+def test_a_gap_that_no_step_crosses_is_named_early(name: str) -> None:
+    robot = climber(name)
+    size = size_of(robot)
+    scene = floors(size, 0.9 * size)
+    start = first_stance(robot, scene, placed(robot, frame_on([-0.3 * size, 0.0, 0.0], [0.0, 0.0, 1.0])))
+    goal = robot.body_pose(start.q).translation + [2.2 * size, 0.0, 0.0]
+    with pytest.raises(
+        NoStancesError, match=r"the step from near \d+ to far \d+, .* m away .* (reach|lacks)"
+    ) as refused:
+        plan_climb(robot, scene, start, BodyPlace(goal))
+    assert refused.value.cause == "goal"
+    looked = int(str(refused.value).split(" moves looked at")[0].split()[-1])
+    assert looked < 10_000
+
+
+@pytest.mark.parametrize(
+    ("kind", "other"),
+    [
+        (PointFoot(0.6), PointFoot(0.4)),
+        (FlatFoot((0.1, 0.05), 0.6), FlatFoot((0.08, 0.04), 0.4)),
+        (SuctionPad(100.0, 0.05, 0.6), SuctionPad(100.0, 0.04, 0.4)),
+        (GripHand(), GripHand()),
+    ],
+)
+def test_a_share_counts_of_friction_and_of_soles(kind: object, other: object) -> None:
+    lower = kind.lower(0.5, 0.8)  # type: ignore[attr-defined]
+    assert all(np.allclose(a, b) for a, b in zip(lower.cone(), other.cone(), strict=True))  # type: ignore[attr-defined]
+    assert kind.lower(np.inf) == kind  # type: ignore[attr-defined]
