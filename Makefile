@@ -24,7 +24,7 @@ PUBLIC := build/public
 SOURCES := wbc tasks robots tests bench examples
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check without slow lint format types docs site site-setup check-export wheel figures bench bench-ik bench-time-laws soak lock platforms clean
+.PHONY: help setup demo test check without slow lint format types docs site site-setup check-export cross wheel figures bench bench-ik bench-time-laws soak lock platforms clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -73,13 +73,17 @@ site: $(SITE_READY)  ## the pages as a site with a reference of all public names
 	@ln -sf $(CURDIR)/wbc/* $(CURDIR)/tasks $(CURDIR)/robots $(PUBLIC)/wbc/
 	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build
 
+cross: $(READY)  ## the code that ticks share compiled by zig for Linux aarch64, macOS arm64 and Windows, and looked at
+	$(BIN)/python -m bench.ahead_machines
+
 check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 states under qemu; says what is not installed
 	$(BIN)/python -m bench.export_machines
 
-wheel: $(READY)  ## a wheel for this platform, with the code that ticks need where there is no compiler, into dist/
+# PLATFORM is linux-aarch64, macos-arm64 or windows-x86-64, for which ziglang compiles
+wheel: $(READY)  ## a wheel with the code that ticks need where there is no compiler, into dist/; PLATFORM=linux-aarch64
 	@rm -rf build/lib
 	$(BIN)/python -m wbc.stack.ahead
-	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	WBC_WHEEL_PLATFORM=$(PLATFORM) $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@rm -rf build/lib
 
 figures: $(READY)  ## measure again what pages say, where it takes at most 5 minutes and is older than its code

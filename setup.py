@@ -1,5 +1,10 @@
-"""What pyproject.toml cannot say: hand-written C is compiled ahead, into the clone or the wheel; wbc/stack/ahead.py."""
+"""What pyproject.toml cannot say: hand-written C is compiled ahead, into the clone or the wheel; wbc/stack/ahead.py.
 
+With WBC_WHEEL_PLATFORM, a name of wbc.native.targets.OTHERS, the wheel is for that kind of machine.
+"""
+
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -8,6 +13,7 @@ from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 
 HERE = Path(__file__).parent
+PLATFORM = os.environ.get("WBC_WHEEL_PLATFORM")
 
 
 def compile_ahead() -> None:
@@ -29,7 +35,7 @@ class WithLibraries(Distribution):
     """A package of one platform where the libraries are there."""
 
     def has_ext_modules(self) -> bool:
-        return any(HERE.glob("wbc/native/ahead/*.so"))
+        return bool(PLATFORM) or any(HERE.glob("wbc/native/ahead/*"))
 
 
 class Compiled(build_py):
@@ -38,6 +44,16 @@ class Compiled(build_py):
     def finalize_options(self) -> None:
         compile_ahead()
         super().finalize_options()
+
+    def run(self) -> None:
+        super().run()
+        if PLATFORM:
+            from wbc.native import targets
+            from wbc.stack import ahead
+
+            folder = Path(self.build_lib).resolve() / "wbc" / "native" / "ahead"
+            shutil.rmtree(folder, ignore_errors=True)
+            ahead.build(targets.with_solver(PLATFORM, HERE / "build" / "solver"), folder)
 
 
 class AnyPython(bdist_wheel):
@@ -49,7 +65,11 @@ class AnyPython(bdist_wheel):
         super().finalize_options()
 
     def get_tag(self) -> tuple[str, str, str]:
-        return "py3", "none", super().get_tag()[2]
+        if not PLATFORM:
+            return "py3", "none", super().get_tag()[2]
+        from wbc.native import targets
+
+        return "py3", "none", targets.OTHERS[PLATFORM].tag
 
 
 setup(distclass=WithLibraries, cmdclass={"bdist_wheel": AnyPython, "build_py": Compiled})

@@ -1,6 +1,6 @@
 """Prints for which platforms and Pythons everything that ``pip install wbc`` needs is to be had as wheels.
 
-Exit status: 0 where that is so for all of them, 1 where not, 3 without a package index.
+Exit status: 0 where that is so for all of them, 1 where not, 3 where the package index could not be asked.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ PLATFORMS = {
     "macOS arm64": ("darwin", "arm64"),
     "Windows x86-64": ("win32", "AMD64"),
 }
+#: What pip says first where there is no wheel
+NONE = "ERROR: No matching"
 
 
 def tags(system: str, machine: str) -> list[str]:
@@ -45,7 +47,7 @@ def missing(platform: str, python: str) -> str:
         command = [sys.executable, "-m", "pip", "install", "--dry-run", "--quiet", "--ignore-installed"]
         command += ["--only-binary=:all:", f"--target={folder}", f"--python-version={python}", *asked, *wanted]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
-    said = [line for line in done.stderr.splitlines() if line.startswith("ERROR: No matching")]
+    said = [line for line in done.stderr.splitlines() if line.startswith(NONE)]
     return "" if done.returncode == 0 else (said or done.stderr.splitlines() or ["pip failed"])[-1]
 
 
@@ -58,12 +60,15 @@ def main() -> int:
         print("no package index: ", found[cells[0]])
         return 3
     for platform in PLATFORMS:
-        had = [f"{python} {'no ' if found[platform, python] else 'yes'}" for python in PYTHONS]
-        print(f"{platform:16}", *had, sep="  ")
+        said = [found[platform, python] for python in PYTHONS]
+        words = ["yes" if not reason else "no " if reason.startswith(NONE) else "?  " for reason in said]
+        print(f"{platform:16}", *(f"{python} {word}" for python, word in zip(PYTHONS, words, strict=True)), sep="  ")
     for reason in sorted({reason for reason in found.values() if reason}):
         print(reason)
     print(f"{sum(not reason for reason in found.values())} of {len(cells)}")
-    return int(any(found.values()))
+    if any(reason.startswith(NONE) for reason in found.values()):
+        return 1
+    return 3 if any(found.values()) else 0
 
 
 if __name__ == "__main__":

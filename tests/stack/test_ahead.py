@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from wbc.errors import CompileError
-from wbc.native import kernel, toolchain
+from bench.ahead_machines import KINDS, shown
+from wbc.errors import CompileError, UnknownNameError
+from wbc.native import kernel, targets, toolchain
 from wbc.stack import ahead, generic
 
 WBC = Path(kernel.__file__).parents[1]
@@ -57,7 +58,7 @@ def test_texts_are_a_file_and_what_it_includes(tmp_path: Path) -> None:
 def test_what_was_compiled_ahead_is_taken(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At once where any code will do; else only for want of a compiler; and only if it is of these texts."""
     kernel.AHEAD.mkdir()
-    toolchain.compile_kernel(TEXTS, kernel.ahead(TEXTS), portable=True)
+    toolchain.compile_kernel(TEXTS, kernel.ahead(TEXTS), target=targets.HERE)
     own = kernel.library(TEXTS, toolchain.compile_kernel, at_once=False)
     assert own.parents[1] == folder / "cache"
     assert kernel.library(TEXTS, toolchain.compile_kernel, at_once=True) == kernel.ahead(TEXTS)
@@ -72,8 +73,8 @@ def test_what_was_compiled_ahead_is_taken(folder: Path, monkeypatch: pytest.Monk
 def test_a_build_makes_what_is_missing_and_removes_what_is_old(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Path] = []
 
-    def compile_to(texts: Mapping[str, str], output: Path, portable: bool = False) -> None:
-        assert portable
+    def compile_to(texts: Mapping[str, str], output: Path, target: targets.Target) -> None:
+        assert target == targets.HERE
         made.append(output)
         output.touch()
 
@@ -89,3 +90,31 @@ def test_a_build_makes_what_is_missing_and_removes_what_is_old(folder: Path, mon
     monkeypatch.setattr(toolchain, "missing", lambda: ("no C compiler",))
     with pytest.raises(CompileError, match="no C compiler"):
         ahead.build()
+
+
+@pytest.mark.parametrize(
+    ("name", "suffix"), [("linux-aarch64", "so"), ("macos-arm64", "dylib"), ("windows-x86-64", "dll")]
+)
+def test_libraries_of_other_machines_have_other_names_and_need_zig(
+    name: str, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = targets.OTHERS[name]
+    assert kernel.ahead(TEXTS, target).suffix == f".{suffix}"
+    assert kernel.ahead(TEXTS, target).stem != kernel.ahead(TEXTS).stem
+    monkeypatch.setattr(toolchain, "_wheel", lambda: None)
+    monkeypatch.setattr(toolchain, "_on_path", lambda program: None if program == "zig" else f"/usr/bin/{program}")
+    with pytest.raises(CompileError, match=f"no zig for {target.triple}"):
+        ahead.build(target)
+
+
+def test_a_platform_that_is_not_known_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="linux-aarch64"):
+        targets.with_solver("linux-arm64", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_library_shows_its_names(tmp_path: Path) -> None:
+    toolchain.compile_kernel(TEXTS, tmp_path / "answer.so", target=targets.HERE)
+    kind, names = shown((tmp_path / "answer.so").read_bytes())
+    assert kind == KINDS[targets.HERE.system, targets.HERE.machine]
+    assert {name for name in names if not name.startswith("_")} == {"answer"}

@@ -5,13 +5,12 @@ wheel, else once on a machine, into the cache.
 from __future__ import annotations
 
 import hashlib
-import platform
 import re
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wbc.native import cache, toolchain
+from wbc.native.targets import HERE, TargetMachine
 
 #: Libraries that were compiled ahead, see :mod:`wbc.stack.ahead`
 AHEAD = Path(__file__).parent / "ahead"
@@ -64,12 +63,12 @@ def library(
     return folder / "code.so"
 
 
-def ahead(texts: Texts) -> Path:
+def ahead(texts: Texts, target: TargetMachine = HERE) -> Path:
     """Where the library of some texts, for any processor of this kind, is if it was compiled ahead: its name says what
     it was made of.
     """
-    name = _hash(*texts.values(), sys.platform, platform.machine(), toolchain.solver_version())
-    return AHEAD / f"{name[:32]}.so"
+    name = _hash(*texts.values(), target.system, target.machine, toolchain.solver_version())
+    return AHEAD / f"{name[:32]}{target.suffix}"
 
 
 def _hash(*texts: str) -> str:

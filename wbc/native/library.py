@@ -23,7 +23,7 @@ def load_library(path: pathlib.Path) -> ctypes.PyDLL:
 
     What is loaded is a copy that loses its name at once: pages of a library come from its file when they are first
     used, and one that is truncated or written over in place would take the process with it. Where no copy can be
-    made, the file itself is loaded.
+    made, the file itself is loaded, as on Windows, which lets nobody change or remove the file of what is loaded.
 
     Raises:
         OSError: it cannot be read, or it is no library.
@@ -37,11 +37,11 @@ def load_library(path: pathlib.Path) -> ctypes.PyDLL:
 
 
 def _load_copy(content: bytes, path: pathlib.Path) -> ctypes.PyDLL:
-    for folder in _folders(path):
+    for folder in _folders(path) if sys.platform != "win32" else ():
         with contextlib.suppress(OSError):
             # A name of its own: the loader takes two files of one name for the same
             name = os.path.join(folder, f".loading-{os.getpid()}-{len(_loaded)}.so")
-            file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600)
+            file = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             try:
                 with open(file, "wb") as copy:
                     copy.write(content)

@@ -7,14 +7,15 @@ import importlib.util
 import logging
 import os
 import pathlib
+import re
 import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import casadi as ca
 
 from wbc.errors import CompileError
+from wbc.native.targets import HERE, TargetMachine
 
 log = logging.getLogger("wbc")
 
@@ -39,9 +40,6 @@ COMMON_FLAGS = (
     "-w",
 )
 
-#: What makes a shared library; names of the interpreter that loads it are found when it is loaded, which the linker of
-#: macOS has to be told
-_SHARED = ("-shared", "-Wl,-undefined,dynamic_lookup") if sys.platform == "darwin" else ("-shared",)
 #: What needs no compiler
 WITHOUT = "a wheel of `make wheel`, or an installation made where a compiler is, brings compiled code"
 
@@ -80,9 +78,10 @@ def _is_zig(cc: str) -> bool:
     return pathlib.Path(cc).stem == "zig"
 
 
-def _command(cc: str) -> list[str]:
+def _command(cc: str, target: TargetMachine | None = None) -> list[str]:
     """What a command line of the compiler begins with; zig would trap undefined behaviour at -O0."""
-    return [cc, "cc", "-fno-sanitize=undefined"] if _is_zig(cc) else [cc]
+    kind = ["-target", target.triple] if target and target.triple else []
+    return [cc, "cc", "-fno-sanitize=undefined", *kind] if _is_zig(cc) else [cc]
 
 
 @functools.cache
@@ -114,13 +113,15 @@ def reason(error: CompileError) -> str:
     return " and ".join(missing()) or str(error)
 
 
-def require() -> None:
+def require(target: TargetMachine = HERE) -> None:
     """Nothing that native ticks need is missing.
 
     Raises:
         CompileError: something is.
     """
-    if missing():
+    if target.triple:
+        _compiler_for(target)
+    elif missing():
         raise CompileError("compiler", compiler(), f"cannot compile: {', '.join(missing())}; {WITHOUT}")
 
 
@@ -133,14 +134,14 @@ def fall_back(reason: str) -> None:
     )
 
 
-def headers() -> pathlib.Path:
+def headers(target: TargetMachine = HERE) -> pathlib.Path:
     """Include folder of the casadi wheel."""
-    return pathlib.Path(ca.__file__).parent / "include"
+    return target.casadi / "include"
 
 
-def library() -> pathlib.Path:
+def library(target: TargetMachine = HERE) -> pathlib.Path:
     """Static DAQP library of the casadi wheel."""
-    return pathlib.Path(ca.__file__).parent / "libdaqpstat.a"
+    return target.casadi / "libdaqpstat.a"
 
 
 @functools.cache
@@ -194,7 +195,7 @@ def compile_tick(files: dict[str, str], output: pathlib.Path, search: bool = Fal
         )
         with ThreadPoolExecutor(len(parts)) as pool:
             list(pool.map(lambda part: _run(part, place), parts))
-        _run([*_command(cc), "rows.o", "tick.o", *_with_solver(cc, output)], place)
+        _run([*_command(cc), "rows.o", "tick.o", *_with_solver(cc, output, files, place)], place)
 
 
 def compile_rows(text: str, output: pathlib.Path) -> None:
@@ -204,56 +205,58 @@ def compile_rows(text: str, output: pathlib.Path) -> None:
         CompileError: as of :func:`compile_tick`.
     """
     flags = ROWS_FLAGS if len(text) <= LONG_ROWS else ("-O0",)
-    _compile_visible({"rows.c": text}, output, flags, COMMON_FLAGS)
+    _compile_visible({"rows.c": text}, output, flags, None)
 
 
-def compile_kernel(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
+def compile_kernel(files: Mapping[str, str], output: pathlib.Path, target: TargetMachine | None = None) -> None:
     """Compile hand-written files, of which the first includes the others, to a shared library at ``output``.
 
-    ``portable``: for any processor of this kind, not only for this machine's.
+    ``target``: for any processor of its kind; default: for this machine's only.
 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
-    _compile_visible(files, output, ("-O3",), _common(portable))
+    _compile_visible(files, output, ("-O3",), target)
 
 
 def _compile_visible(
-    files: Mapping[str, str], output: pathlib.Path, optimisation: tuple[str, ...], common: tuple[str, ...]
+    files: Mapping[str, str], output: pathlib.Path, optimisation: tuple[str, ...], target: TargetMachine | None
 ) -> None:
-    with _written(files) as (cc, place):
+    with _written(files, target) as (cc, place):
         # What it exports must be seen by who loads the library
-        flags = [f for f in common if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
-        command = [*_command(cc), *flags, *optimisation, *_SHARED, next(iter(files)), "-lm", "-o", str(output)]
-        _run(command, place)
+        flags = [f for f in _common(target) if not f.startswith(("-fvisibility", "-DCASADI_SYMBOL_EXPORT"))]
+        made = _shared(cc, output, files, place, target)
+        _run([*_command(cc, target), *flags, *optimisation, next(iter(files)), *made], place)
 
 
-def compile_generic(files: Mapping[str, str], output: pathlib.Path, portable: bool = False) -> None:
+def compile_generic(files: Mapping[str, str], output: pathlib.Path, target: TargetMachine | None = None) -> None:
     """Compile the files of :func:`wbc.stack.generic.sources`, with DAQP, to a shared library at ``output``.
 
-    ``portable``: as of :func:`compile_kernel`.
+    ``target``: as of :func:`compile_kernel`.
 
     Raises:
         CompileError: as of :func:`compile_tick`.
     """
-    require()
-    with _written(files) as (cc, place):
-        command = [*_command(cc), *_common(portable), "-O1", f"-I{headers()}", "generic.c"]
-        _run([*command, *_with_solver(cc, output)], place)
+    require(target or HERE)
+    with _written(files, target) as (cc, place):
+        command = [*_command(cc, target), *_common(target), "-O1", f"-I{headers(target or HERE)}", "generic.c"]
+        _run([*command, *_with_solver(cc, output, files, place, target)], place)
 
 
-def _common(portable: bool) -> tuple[str, ...]:
-    return tuple(flag for flag in COMMON_FLAGS if not (portable and flag == "-march=native"))
+def _common(target: TargetMachine | None) -> tuple[str, ...]:
+    """Flags of all code for a target. Windows can move any code, and shows of a library what is declared so."""
+    windows = (target or HERE).system == "win32"
+    left_out = ("-march=native",) * (target is not None) + ("-fPIC",) * windows
+    shown = ("-DEXPORT=__declspec(dllexport)",) * windows
+    return (*(flag for flag in COMMON_FLAGS if flag not in left_out), *shown)
 
 
 @contextmanager
-def _written(files: Mapping[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
+def _written(files: Mapping[str, str], target: TargetMachine | None = None) -> Iterator[tuple[str, pathlib.Path]]:
     """The compiler, and a folder that has the files while it is used."""
     import tempfile
 
-    cc = compiler()
-    if cc is None:
-        raise CompileError("compiler", None, f"no C compiler found; install gcc or wbc[compiler]; {WITHOUT}")
+    cc = _compiler_for(target or HERE)
     with tempfile.TemporaryDirectory(prefix="wbc-") as folder:
         place = pathlib.Path(folder)
         for name, text in files.items():
@@ -261,12 +264,48 @@ def _written(files: Mapping[str, str]) -> Iterator[tuple[str, pathlib.Path]]:
         yield cc, place
 
 
-def _with_solver(cc: str, output: pathlib.Path) -> tuple[str, ...]:
+def _compiler_for(target: TargetMachine) -> str:
+    """The compiler; for other machines zig, which brings headers and linkers for them."""
+    cc = compiler()
+    if target.triple and not (cc and _is_zig(cc)):
+        cc = _on_path("zig") or _wheel()
+        if cc is None:
+            raise CompileError("compiler", None, f"there is no zig for {target.triple}; pip install wbc[compiler]")
+    if cc is None:
+        raise CompileError("compiler", None, f"no C compiler found; install gcc or wbc[compiler]; {WITHOUT}")
+    return cc
+
+
+def _with_solver(
+    cc: str, output: pathlib.Path, files: Mapping[str, str], place: pathlib.Path, target: TargetMachine | None = None
+) -> tuple[str, ...]:
     """What links a shared library with DAQP, of which nothing is seen from outside."""
     # zig's linker knows no such option, and -Bsymbolic is enough; a library of macOS finds its own names without both
     hidden = () if _is_zig(cc) else ("-Wl,--exclude-libs,ALL",)
-    inside = (*hidden, "-Wl,-Bsymbolic") if sys.platform == "linux" else ()
-    return (*_SHARED, *inside, str(library()), "-lm", "-o", str(output))
+    inside = (*hidden, "-Wl,-Bsymbolic") if (target or HERE).system == "linux" else ()
+    return (*inside, str(library(target or HERE)), *_shared(cc, output, files, place, target))
+
+
+def _shared(
+    cc: str, output: pathlib.Path, files: Mapping[str, str], place: pathlib.Path, target: TargetMachine | None
+) -> tuple[str, ...]:
+    """What makes a shared library at ``output``. Names of the interpreter that loads it are found then: the linker of
+    macOS has to be told so, and that of Windows who has them, in a file in ``place``.
+    """
+    system = (target or HERE).system
+    found: tuple[str, ...] = ()
+    if system == "darwin":
+        found = ("-Wl,-undefined,dynamic_lookup",)
+    names = sorted(
+        set(re.findall(r"\b(Py[A-Z]?[A-Za-z]*_\w+)\(|(?:extern PyObject \*)(PyExc_\w+)", "".join(files.values())))
+    )
+    if system == "win32" and names:
+        listed = "".join(f"    {name or f'{data} DATA'}\n" for name, data in names)
+        (place / "python3.def").write_text(f"LIBRARY python3.dll\nEXPORTS\n{listed}")
+        tool = [cc, "dlltool"] if _is_zig(cc) else ["dlltool"]
+        _run([*tool, "-m", "i386:x86-64", "-D", "python3.dll", "-d", "python3.def", "-l", "python3.a"], place)
+        found = ("python3.a",)
+    return ("-shared", *found, "-lm", "-o", str(output))
 
 
 def _output(command: list[str]) -> str:

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import field
 
 from wbc.native import kernel, toolchain
+from wbc.native.targets import TargetMachine
 from wbc.quick_dataclasses import dataclass
 from wbc.stack.commands import COMMANDS
 from wbc.stack.memory import (
@@ -149,9 +150,9 @@ def library(variant: Variant) -> pathlib.Path:
     return kernel.library(origins(variant), compiling(variant), "the tick, once for all stacks", at_once=True)
 
 
-def compiling(variant: Variant, portable: bool = False) -> Callable[[kernel.Texts, pathlib.Path], None]:
+def compiling(variant: Variant, target: TargetMachine | None = None) -> Callable[[kernel.Texts, pathlib.Path], None]:
     """What compiles a variant: (its origins, output)."""
-    return lambda _, output: toolchain.compile_generic(sources(variant), output, portable)
+    return lambda _, output: toolchain.compile_generic(sources(variant), output, target)
 
 
 def origins(variant: Variant) -> dict[str, str]:

@@ -28,6 +28,8 @@ from wbc.validation import Array
 
 #: What the structure of the stack's own code may have besides, as it has no pointers and other gaps [numbers]
 _SPARE = 512
+#: A library that is loaded already; Windows never loads one of the same path again
+_LOADED = getattr(os, "RTLD_NOLOAD", ctypes.DEFAULT_MODE)
 #: No two contexts of a process have the same
 _serials = itertools.count(1)
 _capsule = ctypes.pythonapi.PyCapsule_GetPointer
@@ -46,7 +48,7 @@ def _evaluate() -> int:
     # The one that is loaded: the wheel has the same library by several names, and another would be a second copy of it
     for path in sorted(pathlib.Path(ca.__file__).parent.glob("libcasadi.*")):
         try:
-            found: Any = ctypes.PyDLL(str(path), mode=os.RTLD_NOLOAD)._ZN6casadi21_function_buffer_evalEPv
+            found: Any = ctypes.PyDLL(str(path), mode=_LOADED)._ZN6casadi21_function_buffer_evalEPv
         except (OSError, AttributeError):
             continue
         return ctypes.cast(found, ctypes.c_void_p).value or 0

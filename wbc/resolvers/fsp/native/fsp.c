@@ -1,6 +1,7 @@
 /* Spaces of solutions and the best of them, by Householder reflections. Arrays of Python come as buffers, in any layout.
  * A matrix in here is one vector after another, each of `length` numbers. */
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,10 +10,10 @@ typedef struct _object PyObject;
 typedef struct {
     void *buf;
     PyObject *obj;
-    long len, itemsize;
+    ptrdiff_t len, itemsize;
     int readonly, ndim;
     char *format;
-    long *shape, *strides, *suboffsets;
+    ptrdiff_t *shape, *strides, *suboffsets;
     void *internal;
 } Py_buffer;
 int PyObject_GetBuffer(PyObject *, Py_buffer *, int);
@@ -45,12 +46,12 @@ static double inner(const double *x, const double *y, int count) {
 static int load(PyObject *array, int count, double *out) {
     Py_buffer b;
     if (PyObject_GetBuffer(array, &b, READ)) return -1;
-    const int fits = strcmp(b.format, "d") == 0 && b.len == 8l * count && (b.ndim == 1 || b.ndim == 2);
+    const int fits = strcmp(b.format, "d") == 0 && b.len == (ptrdiff_t)8 * count && (b.ndim == 1 || b.ndim == 2);
     if (fits) {
-        const long rows = b.ndim > 1 ? b.shape[0] : 1, length = b.shape[b.ndim - 1];
-        const long down = b.ndim > 1 ? b.strides[0] : 0, along = b.strides[b.ndim - 1];
-        for (long i = 0; i < rows; i++)
-            for (long j = 0; j < length; j++) *out++ = *(double *)((char *)b.buf + i * down + j * along);
+        const ptrdiff_t rows = b.ndim > 1 ? b.shape[0] : 1, length = b.shape[b.ndim - 1];
+        const ptrdiff_t down = b.ndim > 1 ? b.strides[0] : 0, along = b.strides[b.ndim - 1];
+        for (ptrdiff_t i = 0; i < rows; i++)
+            for (ptrdiff_t j = 0; j < length; j++) *out++ = *(double *)((char *)b.buf + i * down + j * along);
     } else {
         PyErr_SetString(PyExc_TypeError, "expected matrices and vectors of float64 that fit each other");
     }
