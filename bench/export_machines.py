@@ -8,17 +8,17 @@ aarch64 comes from casadi's wheel for that machine, which pip downloads (55 MB) 
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import shutil
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 from bench.pool import ROOT
 from tests.export.cases import CASES
+from wbc.errors import CompileError
+from wbc.native import targets, toolchain
 
-TARGET, PLATFORM = "aarch64-linux-musl", "manylinux2014_aarch64"
+TARGET = "aarch64-linux-musl"
 EMULATORS = ("qemu-aarch64", "qemu-aarch64-static")
 #: Exit code where something that the check needs is not installed
 MISSING = 3
@@ -41,13 +41,10 @@ def run(*command: str | Path, folder: Path) -> str:
 
 def solver(folder: Path) -> Path:
     """DAQP for the other machine, of the version of casadi that is installed here."""
-    version = importlib.metadata.version("casadi")
-    options = ("--no-deps", "--only-binary=:all:", "--platform", PLATFORM, "--python-version", "3.11")
-    words = (sys.executable, "-m", "pip", "download", "-q", *options, f"casadi=={version}", "-d", folder)
-    if subprocess.run([*map(str, words)], cwd=ROOT, capture_output=True, check=False).returncode:
-        raise missing(f"pip cannot download casadi {version} for {PLATFORM}, which has DAQP; --daqp names its archive")
-    with zipfile.ZipFile(next(folder.glob(f"casadi-{version}-*.whl"))) as wheel:
-        return Path(wheel.extract("casadi/libdaqpstat.a", folder))
+    try:
+        return toolchain.library(targets.with_solver("linux-aarch64", folder))
+    except CompileError as error:
+        raise missing(f"{error}; --daqp names the archive") from error
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from wbc.climb.climber import Climber
 from wbc.climb.goal import BodyPlace, LimbAt
 from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop import ClimbLoop
-from wbc.climb.motion import MoveError
+from wbc.climb.motion import MotionOptions, MoveError
 from wbc.climb.plan import ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.scene import ClimbScene
@@ -138,7 +138,9 @@ class ClimbDrive:
                     self.stands = self.stands or str(error)
         # Stances with other places of the body may lead on where none do along the way itself
         end = self._track(stance, OTHERWISE).poses[-1]
-        options = self._freely(ahead, turned)
+        motion = self.options.motion
+        speeds = replace(motion.speeds, speed=max(ahead, SLOWEST), turn_rate=max(turned, SLOWEST))
+        options = self._freely(replace(motion, speeds=speeds))
         try:
             plan = plan_climb(self.climber, scene, stance, BodyPlace(end.translation, end.rotation), options)
         except (NoStancesError, MoveError) as error:
@@ -187,18 +189,16 @@ class ClimbDrive:
         for limb, foothold in near:
             with contextlib.suppress(InfeasibleError, RangeError):
                 return plan_limb_work(self.climber, scene, stance, limb, [foothold], self.options.motion)
-        freely = replace(self._freely(0.0, 0.0), motion=self.options.motion)
+        options = self._freely(self.options.motion)
         for limb, foothold in near if self._ends else []:
             with contextlib.suppress(NoStancesError, MoveError):
-                return plan_climb(self.climber, scene, stance, LimbAt(limb, foothold), freely)
+                return plan_climb(self.climber, scene, stance, LimbAt(limb, foothold), options)
         self._aloft = tuple(stance.contacts), place
         return None
 
-    def _freely(self, ahead: float, turned: float) -> ClimbOptions:
-        motion = self.options.motion
-        speeds = replace(motion.speeds, speed=max(ahead, SLOWEST), turn_rate=max(turned, SLOWEST))
+    def _freely(self, motion: MotionOptions) -> ClimbOptions:
         stances = StanceOptions(self.options.margin, self.options.limits, moves=FEW_MOVES)
-        return ClimbOptions(stances, replace(motion, speeds=speeds), again=2)
+        return ClimbOptions(stances, motion, again=2)
 
     def _track(self, stance: Stance, seconds: float) -> BodyTrack:
         pose = self.climber.body_pose(stance.q)
