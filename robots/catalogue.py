@@ -16,13 +16,14 @@ from wbc.robot.loading import build, finish, looks_like_path, unknown
 from wbc.robot.loops import AnyLoop
 from wbc.robot.recipe import Recipe, lock_mapping
 from wbc.robot.robot import Robot
-from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder
 from wbc.robot.sources.kinds import is_mjmodel, is_text
 from wbc.robot.sources.table import read_robot, read_table
 
 if TYPE_CHECKING:
     from mujoco import MjModel
+
+    from wbc.robot.sources.dh import DHRow
 
 _FOLDER = pathlib.Path(__file__).parent
 
@@ -164,6 +165,8 @@ def from_dh(
     validation.instance("name", name, str, "a string")
     for key in limits:
         validation.one_of("limit", key, ("position_lower", "position_upper", "velocity", "acceleration", "effort"))
+    from wbc.robot.sources.dh import read_dh
+
     return finish(read_dh(rows, base, tool), Recipe(name, frames={"tip": "tip"}), "none", (), limits)
 
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 #: Part of its limit of acceleration by which a joint of a linkage counts on braking before a limit of position: the
 #: rest is for what the linkage asks of it on the way, and for the other joints that it takes along
 LINKAGE_BRAKING = 0.25
-#: Of a coordinate that goes on without end, or none
-FREE = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -168,7 +166,7 @@ class JointLimits(Constraint):
     ) -> Bounds:
         """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
         interval = partial(allowed_accelerations, dt=dt, longest=longest)
-        return self._intervals(robot, kin, inputs, interval, motor=motors or {})
+        return self._intervals(robot, kin, inputs, interval, together=False, motor=motors or {})
 
     def _intervals(
         self,
@@ -176,24 +174,39 @@ class JointLimits(Constraint):
         kin: Tracer,
         inputs: Values,
         interval: Callable[..., tuple[ca.SX, ca.SX]],
+        together: bool = True,
         **own: Mapping[int, ca.SX],
     ) -> Bounds:
-        """What ``interval`` allows each chosen degree of freedom, of which ``own`` has more arguments."""
+        """What ``interval`` allows each chosen degree of freedom, of which ``own`` has more arguments; ``together``: it
+        takes columns of degrees of freedom that have the same kinds of limits.
+        """
         limits, count, shares = self.limits(robot), robot.nv, np.ones(robot.nv)
         shares[[dof for linkage in robot.loops.linkages for dof in linkage.dofs]] = LINKAGE_BRAKING
+        free = robot.position_index < 0
+        columns = (
+            np.where(free, -np.inf, limits.position_lower), np.where(free, np.inf, limits.position_upper),
+            limits.velocity, limits.acceleration, limits.acceleration * shares,
+        )  # fmt: skip
+        alike: dict[object, list[int]] = {}
+        for i, values in enumerate(zip(*columns, strict=True)):
+            kind = tuple([float(value) if value in (0.0, np.inf, -np.inf) else None for value in values])
+            alike.setdefault(kind if together else i, []).append(i)
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
-        for i in range(count):
-            k = int(robot.position_index[i])
-            lower[i], upper[i] = interval(
-                kin.q[k] if k >= 0 else ca.SX(0),
-                kin.v[i],
-                position=(float(limits.position_lower[i]), float(limits.position_upper[i])) if k >= 0 else FREE,
-                velocity=float(limits.velocity[i]),
-                acceleration=float(limits.acceleration[i]),
-                braking=float(limits.acceleration[i] * shares[i]),
+        for dofs in alike.values():
+            low, high, velocity, acceleration, braking = (
+                float(column[dofs[0]]) if len(dofs) == 1 or np.all(column[dofs] == column[dofs[0]]) else
+                ca.SX(column[dofs]) for column in columns
+            )  # fmt: skip
+            lower[dofs], upper[dofs] = interval(
+                ca.vertcat(*[ca.SX(0) if free[i] else kin.q[int(robot.position_index[i])] for i in dofs]),
+                kin.v[dofs],
+                position=(low, high),
+                velocity=velocity,
+                acceleration=acceleration,
+                braking=braking,
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
-                **{name: values[i] for name, values in own.items() if i in values},
+                **{name: values[i] for name, values in own.items() for i in dofs if i in values},
             )
         return Bounds(lower, upper)
 
@@ -203,46 +216,51 @@ def allowed_interval(
     v: ca.SX,
     dt: ca.SX,
     *,
-    position: tuple[float, float],
-    velocity: float,
-    acceleration: float,
+    position: tuple[float | ca.SX, float | ca.SX],
+    velocity: float | ca.SX,
+    acceleration: float | ca.SX,
     velocity_scale: ca.SX,
     return_rate: ca.SX,
     shortest_dt: float | None = None,
-    braking: float = math.inf,
+    braking: float | ca.SX | None = None,
 ) -> tuple[ca.SX, ca.SX]:
-    """The interval of :class:`JointLimits` for one coordinate, lower <= upper always.
+    """The interval of :class:`JointLimits` for one coordinate, or a column of them, lower <= upper always.
 
-    Limits are numbers, infinite where there is none, and cost no operation there. ``braking``, before a limit of
-    position, is no more than ``acceleration``.
+    Limits are numbers, infinite where there is none, and cost no operation there, or columns of finite ones.
+    ``braking``, before a limit of position, is no more than ``acceleration``; None: the same.
     """
-    braking = min(braking, acceleration)
+    braking = acceleration if braking is None else braking
     low, high = -ca.SX.inf(1), ca.SX.inf(1)
-    bounded = math.isfinite(velocity) or math.isfinite(acceleration)
-    if math.isfinite(velocity):
+    bounded = _finite(velocity) or _finite(acceleration)
+    if _finite(velocity):
         high = velocity_scale * velocity
         low = -high
-    if math.isfinite(acceleration):
+    if _finite(acceleration):
         step = acceleration * dt
         # Clipping both ends gives the intersection, or where it is empty the acceleration end nearest to it
         low, high = (
-            clip(end, v - step, v + step) if math.isfinite(velocity) else v + s * step
-            for end, s in ((low, -1), (high, 1))
+            clip(end, v - step, v + step) if _finite(velocity) else v + s * step for end, s in ((low, -1), (high, 1))
         )
     lower, upper = low, high
-    if math.isfinite(position[1]):
+    if _finite(position[1]):
         upper = _approach(position[1] - q, braking, dt, return_rate, shortest_dt)
         upper = clip(upper, low, high) if bounded else upper
-    if math.isfinite(position[0]):
+    if _finite(position[0]):
         lower = -_approach(q - position[0], braking, dt, return_rate, shortest_dt)
         lower = clip(lower, low, high) if bounded else lower
-        if math.isfinite(position[1]):
+        if _finite(position[1]):
             # Equal in exact arithmetic at worst (a range of width 0 seen from outside)
             lower = ca.fmin(lower, upper)
     return lower, upper
 
 
-def _approach(distance: ca.SX, acceleration: float, dt: ca.SX, return_rate: ca.SX, shortest_dt: float | None) -> ca.SX:
+def _finite(limit: float | ca.SX) -> bool:
+    return isinstance(limit, ca.SX) or math.isfinite(limit)
+
+
+def _approach(
+    distance: ca.SX, acceleration: float | ca.SX, dt: ca.SX, return_rate: ca.SX, shortest_dt: float | None
+) -> ca.SX:
     """Largest velocity towards a limit ``distance`` away; negative outside (distance < 0): the slowest return.
 
     The return is no faster than a speed from which the joint stops on the limit, so that it never conflicts with

@@ -40,6 +40,19 @@ def placement(robot: Robot, frame: str, q: np.ndarray) -> pin.SE3:
     return pin.SE3.Identity() if frame == "world" else data.oMf[robot.model.getFrameId(frame)].copy()
 
 
+def frame_jacobian(
+    robot: Robot, frame: str, q: np.ndarray, axes: pin.ReferenceFrame = pin.LOCAL_WORLD_ALIGNED
+) -> np.ndarray:
+    """Jacobian of a frame at its origin, by Pinocchio [6, nv]."""
+    data, number = robot.model.createData(), robot.model.getFrameId(frame)
+    return np.array(pin.computeFrameJacobian(robot.model, data, q, number, axes))
+
+
+def free_direction(robot: Robot, frame: str, q: np.ndarray) -> np.ndarray:
+    """The unit velocity of an arm of seven joints that keeps a frame's pose."""
+    return np.asarray(np.linalg.svd(frame_jacobian(robot, frame, q))[2][-1])
+
+
 def robot(name: str, model: pin.Model) -> Robot:
     """A robot without limits."""
     none = np.full(model.nv, np.inf)

@@ -13,6 +13,7 @@ import pytest
 import wbc.robots
 from tests.backends import IN_PYTHON, way
 from tests.calm import held
+from tests.models import frame_jacobian, placement
 from tests.repeats import repeats
 from wbc.api import Stack
 from wbc.tasks import (
@@ -59,19 +60,16 @@ def test_the_residual_at_the_end_of_the_tick_is_the_one_that_rows_ask_for(dt: fl
     foot = "left_sole_link"
     stack = Stack(robot, dt).add(Hold(foot, gain=4.0), name="foot").add(Posture(gain=20.0), name="posture")
     controller = stack.add(JointLimits()).compile(backend="vm")
-    data = robot.model.createData()
     for _ in range(20):
         q, goal = (
             robot.integrate(robot.neutral, np.r_[np.zeros(6), 0.3 * rng.normal(size=robot.nv - 6)], 1.0) for _ in "ab"
         )
-        pin.framesForwardKinematics(robot.model, data, q)
-        pose = data.oMf[robot.model.getFrameId(foot)].copy()
+        pose = placement(robot, foot, q)
         target = pin.SE3(pin.exp3(rng.normal(0, 0.05, 3)) @ pose.rotation, pose.translation + rng.normal(0, 0.02, 3))
         controller.reset(q)
         controller["foot"].target, controller["posture"].target = target, goal
         step = controller.step(q)
-        pin.framesForwardKinematics(robot.model, data, robot.integrate(q, step.v, dt))
-        later = data.oMf[robot.model.getFrameId(foot)]
+        later = placement(robot, foot, robot.integrate(q, step.v, dt))
         off = [
             np.r_[p.translation - target.translation, pin.log3(p.rotation @ target.rotation.T)] for p in (pose, later)
         ]
@@ -99,9 +97,7 @@ def test_every_item_that_holds_makes_up_for_what_it_loses(item: object) -> None:
     stack = Stack(robot, dt).add(item, name="held").add(EndEffector("pelvis"), name="pelvis")
     controller = stack.add(Posture(), weight=1e-3).add(JointLimits()).compile(backend="vm")
     q = np.array(robot.neutral)
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    home = data.oMf[robot.model.getFrameId("pelvis")].copy()
+    home = placement(robot, "pelvis", q)
     for k in range(60):
         controller["pelvis"].target = pin.SE3(home.rotation, home.translation + k * dt * np.array([0.6, 0.2, 0.3]))
         step = controller.step(q)
@@ -109,8 +105,7 @@ def test_every_item_that_holds_makes_up_for_what_it_loses(item: object) -> None:
         assert np.abs(step.lost["held"]).max() <= 1e-3 * dt * max(1.0, stack.length)
         q = robot.integrate(q, step.v, dt)
     free = [] if isinstance(item, SlidingContact) else [0, 1]
-    pin.framesForwardKinematics(robot.model, data, q)
-    foot = data.oMf[robot.model.getFrameId(FOOT)].translation - controller["held"].target.translation
+    foot = placement(robot, FOOT, q).translation - controller["held"].target.translation
     assert np.abs(foot[[*free, 2]]).max() < 3e-4
 
 
@@ -122,9 +117,7 @@ def test_what_cannot_be_made_up_for_is_said() -> None:
     controller = stack.compile(backend="vm")
     v = np.zeros(robot.nv)
     v[6:12] = 10.0
-    jacobian = pin.computeFrameJacobian(
-        robot.model, robot.model.createData(), robot.neutral, robot.model.getFrameId(FOOT), pin.LOCAL_WORLD_ALIGNED
-    )
+    jacobian = frame_jacobian(robot, FOOT, robot.neutral)
     v[:6] = -np.linalg.solve(jacobian[:, :6], jacobian[:, 6:] @ v[6:])
     step = controller.step(robot.neutral, v)
     assert step.status == "relaxed"

@@ -14,6 +14,7 @@ import pytest
 from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactPlan, Stance, first_stance, machines, plan_climb
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along, planning
+from wbc.climb.balance import Equilibrium
 from wbc.climb.checker import check
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
@@ -21,10 +22,12 @@ from wbc.climb.drive import ClimbDrive, standing_plan
 from wbc.climb.grids import INCH, cylinder_grid, remove_rows
 from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.loop import Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState
+from wbc.climb.loop.reference import PlanReference
 from wbc.climb.resume import stance_in
 from wbc.climb.scene import size_of
 from wbc.climb.scenes import draw, placed
 from wbc.climb.search import NoStancesError
+from wbc.climb.stance import FREE_LIMB
 from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
 
 
@@ -268,3 +271,18 @@ def test_a_way_on_which_joints_would_have_to_stop_is_none(walker: Climber, scene
     monkeypatch.setattr(planning, "fastest", stops)
     with pytest.raises(NoStancesError, match="have to stop"):
         plan_along(walker, scene, BodyTrack((over(13, 12), over(13, 12.5)), 4 * INCH))
+
+
+def test_a_limb_in_the_air_weighs_where_it_comes_down() -> None:
+    climber = machines.climber("anymal_c")
+    course = draw("stairs", size_of(climber), 0)
+    start = first_stance(climber, course.scene, placed(climber, course.start))
+    begin, way = climber.body_pose(start.q), 0.4 * size_of(climber) * np.array([0.5, np.sqrt(0.75), 0.0])
+    track = BodyTrack((begin, pin.SE3(begin.rotation, begin.translation + way)), 0.08 * size_of(climber))
+    plan, options = plan_along(climber, course.scene, track, start), AlongOptions()
+    bears, motion, contacts = Equilibrium(climber, course.scene), PlanReference(plan, climber.robot), list(plan.start)
+    assert plan.moves
+    for move in sorted(plan.moves, key=lambda move: move.lift):
+        contacts[move.limb] = FREE_LIMB
+        assert min(bears.margin(contacts, motion.q(time)) for time in (move.lift, move.land)) > 0.99 * options.margin
+        contacts[move.limb] = move.lands

@@ -180,10 +180,19 @@ def test_logs_of_others_are_refused() -> None:
         check(run.log, plan.climber, few)
 
 
-def test_distances_are_known_where_coal_has_no_answer() -> None:
+@pytest.mark.parametrize(
+    ("rotation", "height"),
+    [
+        ([[0.95428, 0.29893, 0.0], [0.29893, -0.95427, 1e-5], [0.0, 0.0, -1.0]], 0.1262),
+        # 2.4 m deep by Coal 3.0.3
+        ([[0.6145672, -0.7888644, -2e-7], [-0.7888644, -0.6145672, -3e-7], [1e-7, 3e-7, -1.0]], 0.1262008),
+    ],
+)
+def test_distances_are_known_where_coal_has_no_answer_or_a_wrong_one(
+    rotation: list[list[float]], height: float
+) -> None:
     capsule, box = coal.Capsule(0.0508, 0.1524), coal.Box(4.7, 0.24415, 0.1)
-    rotation = np.array([[0.95428, 0.29893, 0.0], [0.29893, -0.95427, 1e-5], [0.0, 0.0, -1.0]])
-    at = pin.SE3(rotation, np.array([0.0, 0.0, 0.1262]))
+    at = pin.SE3(np.array(rotation), np.array([-8e-7, 4e-7, height]))
     assert coal_distance(capsule, at, box, pin.SE3.Identity()) == pytest.approx(-0.0508, abs=4e-5)
 
 

@@ -71,6 +71,21 @@ def test_a_plan_waits_for_limbs_that_are_late(lag: float) -> None:
     assert (np.diff(run.log["path_time"]) >= 0.0).all()
 
 
+def test_a_robot_at_rest_keeps_to_a_plan_that_begins_in_motion() -> None:
+    plan = gait(TRIPODS)
+    first = int(np.abs(plan.v[plan.times < plan.moves[0].land]).max(axis=1).argmax())
+    now, aloft = plan.times[first], {move.limb for move in plan.moves if move.lift < plan.times[first]}
+    moves = [dataclasses.replace(move, lift=max(move.lift - now, 0.0), land=move.land - now) for move in plan.moves]
+    start = tuple(FREE_LIMB if limb in aloft else row for limb, row in enumerate(plan.start))
+    parts = {"times": plan.times[first:] - now, "q": plan.q[first:], "v": plan.v[first:]}
+    plan = dataclasses.replace(plan, start=start, moves=moves, **parts)
+    run = ClimbLoop(plan).run()
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    reference = PlanReference(plan, plan.climber.robot)
+    for time, q in zip(run.log["path_time"], run.log.array("q"), strict=True):
+        assert np.abs(pin.difference(plan.climber.robot.model, q, reference.q(time))).max() < 1e-3
+
+
 def test_a_limb_that_never_comes_is_named_with_its_distance() -> None:
     plan = gait(TRIPODS)
     row = plan.moves[0].lands

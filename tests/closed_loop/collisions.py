@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from tests.closed_loop.constraints import bend
+from tests.closed_loop.constraints import bend, beyond
 from tests.closed_loop.eyes import Array, Gaps, Standing, length
 from tests.closed_loop.loop import Loop, Run
 from tests.closed_loop.machines import FEWER, STARTS, anywhere, machine
-from tests.random_robots import unit
 from tests.repeats import repeats
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
@@ -131,7 +130,7 @@ def pressed(loop: Loop, name: str, seed: int = 31) -> Figures:
     loop["caps"].velocity_scale, loop["reach"].gain = SPEED, 3.0
     figures = {"deepest": np.inf, "excess": -np.inf, "touching": 0.0, "unsolved": 0.0}
     for start in range(starts):
-        q, pose, inward = beyond(loop, thing, gaps, rng)
+        q, pose, inward = beyond(loop, thing.size, gaps, rng, lambda _: pin.exp3(rng.uniform(-2, 2, 3)))
         twist = np.zeros(6)
         if start % 2:
             twist = np.concatenate([-0.1 * inward, rng.uniform(-0.3, 0.3, 3)])
@@ -148,19 +147,6 @@ def pressed(loop: Loop, name: str, seed: int = 31) -> Figures:
         d = np.array([gaps(x, p) for x, p in zip(run.q, poses, strict=True)]) - MARGIN
         judge(figures, loop, run, d, length(twist[3:]))
     return accept(figures, starts, 0.5)
-
-
-def beyond(loop: Loop, thing: Thing, gaps: Gaps, rng: np.random.Generator) -> tuple[Array, pin.SE3, Array]:
-    """A configuration, a thing beyond the hand that touches nothing, and the direction into it."""
-    for _ in range(1000):
-        q = anywhere(loop.robot, rng)
-        shoulder, tip = (p.translation for p in loop.eyes.poses(q, loop.frames.plane[0], loop.frames.tip))
-        inward = (tip - shoulder) / length(tip - shoulder) + 0.3 * unit(rng)
-        inward /= length(inward)
-        pose = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), tip + (0.2 + thing.size) * inward)
-        if gaps(q, pose).min() > MARGIN + 0.01:
-            return q, pose, inward
-    raise AssertionError("the obstacle is always in the way")
 
 
 def folded(loop: Loop, name: str, starts: int = FOLDED, seed: int = 32) -> Figures:

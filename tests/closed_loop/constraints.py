@@ -9,7 +9,7 @@ for a point within rho of the axes of joints that turn at w = sum |v_i| in all, 
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,7 @@ import pinocchio as pin
 from tests.closed_loop.eyes import Array, Gaps, length, wrap
 from tests.closed_loop.loop import Loop
 from tests.closed_loop.machines import STARTS, anywhere, machine, near
+from tests.models import frame_jacobian
 from tests.random_robots import unit
 from tests.tasks.robots import FRAMES, Frames
 from wbc.robot import Robot
@@ -98,7 +99,7 @@ def obstacle(loop: Loop, name: str, moving: bool, seed: int = 11) -> Figures:
     loop["caps"].velocity_scale, loop["reach"].gain = 0.5, 3.0
     figures = {"deepest": np.inf, "excess": -np.inf, "touching": 0.0, "unsolved": 0.0}
     for _ in range(STARTS):
-        q, pose, inward = outside(loop, shape, gaps, rng)
+        q, pose, inward = beyond(loop, BALL.radius * (name == "ball"), gaps, rng, against)
         tip = eyes.pose(q, f.tip).translation
         twist = np.zeros(6)
         if moving:
@@ -128,18 +129,28 @@ def obstacle(loop: Loop, name: str, moving: bool, seed: int = 11) -> Figures:
     return figures
 
 
-def outside(loop: Loop, shape: Any, gaps: Gaps, rng: np.random.Generator) -> tuple[Array, pin.SE3, Array]:
-    """A configuration, an obstacle beyond the hand that touches nothing, and the direction into it."""
+def beyond(
+    loop: Loop, size: float, gaps: Gaps, rng: np.random.Generator, turn: Callable[[Array], Array]
+) -> tuple[Array, pin.SE3, Array]:
+    """A configuration, an obstacle beyond the hand that touches nothing, and the direction into it.
+
+    ``size``: nothing of the obstacle on the hand's side is farther from its origin [m]; ``turn``: its rotation, from
+    that direction.
+    """
     for _ in range(1000):
         q = anywhere(loop.robot, rng)
         shoulder, tip = (p.translation for p in loop.eyes.poses(q, loop.frames.plane[0], loop.frames.tip))
         inward = (tip - shoulder) / length(tip - shoulder) + 0.3 * unit(rng)
         inward /= length(inward)
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), -inward).matrix()
-        pose = pin.SE3(turn, tip + (0.2 + BALL.radius * isinstance(shape, Sphere)) * inward)
+        pose = pin.SE3(turn(inward), tip + (0.2 + size) * inward)
         if gaps(q, pose).min() > MARGIN + 0.01:
             return q, pose, inward
     raise AssertionError("the obstacle is always in the way")
+
+
+def against(inward: Array) -> Array:
+    """A rotation whose z axis looks back at the hand."""
+    return np.array(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), -inward).matrix())
 
 
 def frame_speed(loop: Loop, name: str, seed: int = 12) -> Figures:
@@ -200,7 +211,7 @@ def hold(loop: Loop, name: str = "hold", seed: int = 13) -> Figures:
     found = 0
     while found < STARTS:
         q = anywhere(loop.robot, rng)
-        jacobian = frame_jacobian(loop, q, frame)[: 6 if kind == "pose" else 3]
+        jacobian = frame_jacobian(loop.robot, frame, q)[: 6 if kind == "pose" else 3]
         if np.linalg.svd(jacobian, compute_uv=False)[-1] < 0.1:
             continue
         found += 1
@@ -226,11 +237,6 @@ def hold(loop: Loop, name: str = "hold", seed: int = 13) -> Figures:
         assert figures["unsolved"] == 0, figures
     assert figures["pulled"] > 5e-3, figures
     return figures
-
-
-def frame_jacobian(loop: Loop, q: Array, frame: str) -> Array:
-    number = loop.robot.model.getFrameId(frame)
-    return np.array(pin.computeFrameJacobian(loop.robot.model, loop.eyes.data, q, number, pin.LOCAL_WORLD_ALIGNED))
 
 
 def fixed(loop: Loop, name: str = "fixed", seed: int = 14) -> Figures:

@@ -170,9 +170,8 @@ def test_an_overlap_at_the_start_is_left_at_the_rate(method: str) -> None:
 def overlapping() -> tuple[Robot, np.ndarray]:
     """A ball of the hand 3 cm into one of the base."""
     bot = robot("panda")
-    data, q = bot.model.createData(), bot.neutral
-    pin.framesForwardKinematics(bot.model, data, q)
-    base, hand = (data.oMf[bot.model.getFrameId(link)] for link in ("panda_link0", "panda_hand"))
+    q = bot.neutral
+    base, hand = (placement(bot, link, q) for link in ("panda_link0", "panda_hand"))
     towards = base.actInv(hand.translation) + np.array([0.06, 0.0, -0.0671])
     place = pin.SE3(np.eye(3), towards)
     assert np.linalg.norm(towards - base.actInv(hand.translation)) == pytest.approx(0.09, abs=1e-3)

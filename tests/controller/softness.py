@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from tests.models import frame_jacobian, placement
 from wbc.robot import Robot
 
 Array = NDArray[np.float64]
@@ -26,12 +26,7 @@ DAMPING = 1e-8
 
 def jacobian(robot: Robot, q: Array, frame: str) -> tuple[Array, Array]:
     """Place of a frame's origin, and its derivative along v."""
-    data = robot.model.createData()
-    pin.computeJointJacobians(robot.model, data, q)
-    pin.updateFramePlacements(robot.model, data)
-    number = robot.model.getFrameId(frame)
-    J = pin.getFrameJacobian(robot.model, data, number, pin.LOCAL_WORLD_ALIGNED)
-    return data.oMf[number].translation.copy(), J[:3].copy()
+    return placement(robot, frame, q).translation, frame_jacobian(robot, frame, q)[:3]
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.models import placement
 from tests.repeats import repeats
 from wbc.api import Stack
 from wbc.shapes import Sphere
@@ -63,19 +64,17 @@ def test_no_tick_brakes(seed: int) -> None:
     name = list(FRAMES)[seed % len(FRAMES)]
     stack = drawn(rng, name)
     robot, controller = stack.robot, stack.compile(backend="vm")
-    data, found = robot.model.createData(), collections.Counter[str]()
+    found = collections.Counter[str]()
     for k in range(30):
         if k % 10 == 0:
             away = np.r_[np.zeros(robot.base_nv), rng.normal(0, 0.4, robot.nv - robot.base_nv)]
             q = robot.integrate(robot.neutral, away)
             controller.reset(q)
-            pin.framesForwardKinematics(robot.model, data, q)
-            hand = data.oMf[robot.model.getFrameId(FRAMES[name][0])].copy()
+            hand = placement(robot, FRAMES[name][0], q)
             controller["tip"].target = hand * pin.SE3(pin.exp3(rng.normal(0, 0.5, 3)), rng.normal(0, 0.3, 3))
             for held in [item for item in ("hold", "grip") if item in stack and rng.random() < 0.5]:
-                there = data.oMf[robot.model.getFrameId(stack[held].item.frame)].copy()
                 off = pin.SE3(pin.exp3(rng.normal(0, 0.2, 3)), rng.normal(0, 0.05, 3))
-                controller[held].target = there * off
+                controller[held].target = placement(robot, stack[held].item.frame, q) * off
             if "ball" in stack:
                 controller["ball"].pose = pin.SE3(np.eye(3), hand.translation + rng.normal(0, 0.2, 3))
         step = controller.step(q)

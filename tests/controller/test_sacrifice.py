@@ -12,6 +12,7 @@ import pytest
 
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, controller, inside, near_limits, quarrel, robot
+from tests.models import frame_jacobian
 from wbc.api import Controller, Stack
 from wbc.controller import Status, Step, core_of
 from wbc.shapes import HalfSpace
@@ -80,10 +81,7 @@ def test_a_collision_margin_gives_way_to_a_hold(both: Controller) -> None:
     assert step.status is Status.RELAXED
     assert {s.item for s in step.relaxed} == {"floor"}
     assert all(s.unit == "m/s" and s.amount > 0.1 for s in step.relaxed)
-    data = both.stack.robot.model.createData()
-    frame = both.stack.robot.model.getFrameId(TIP)
-    J = pin.computeFrameJacobian(both.stack.robot.model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
-    assert np.abs(J @ step.v).max() < 1e-8
+    assert np.abs(frame_jacobian(both.stack.robot, TIP, q) @ step.v).max() < 1e-8
     # the amount is the violation of dh/dt >= -rate h, here with dh/dt = 0
     asked = -both["floor"].rate * step.margins["floor"]
     rows = core_of(both).layout.blocks["floor"].rows

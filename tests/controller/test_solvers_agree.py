@@ -10,7 +10,7 @@ import pytest
 from tests.backends import IN_PYTHON
 from tests.controller.stacks import aim, controller, inside
 from tests.judges.exact_qp import reference
-from tests.qp.problems import quadprog_solution
+from tests.judges.quadprog_qp import referee
 from tests.repeats import covering
 from wbc.api import Controller
 from wbc.controller import Status, core_of
@@ -59,7 +59,7 @@ def test_solvers_agree_and_know_their_error(name: str, weight: float) -> None:
             assert error <= step.certificate.error_bound + 1e-16, label
             assert step.certificate.error_bound < 1e-6, label
         if weight >= 1e-4:  # what quadprog itself can do: it has no refinement
-            assert np.abs(quadprog_solution(qp) - exact).max() < 1e-6
+            assert np.abs(referee(qp) - exact).max() < 1e-6
     assert solved > count // 2
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from tests.backends import IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, robot
-from tests.models import placement
+from tests.models import frame_jacobian, placement
 from tests.torque.problems import controller
 from wbc.api import Controller, Stack
 from wbc.controller import Status, core_of
@@ -154,9 +154,7 @@ def test_losses_are_those_of_the_command(tick: Controller) -> None:
     q = bot.neutral
     tick["hand"].target = moved([0.0, 0.05, 0.0])
     step = tick.step(q, np.zeros(7))
-    data = bot.model.createData()
-    J = pin.computeFrameJacobian(bot.model, data, q, bot.model.getFrameId(TIP), pin.LOCAL_WORLD_ALIGNED)
-    missing = J[:3] @ step.v - [0.0, 0.1, 0.0]
+    missing = frame_jacobian(bot, TIP, q)[:3] @ step.v - [0.0, 0.1, 0.0]
     loss = next(loss for loss in step.explain().losses if (loss.task, loss.unit) == ("hand", "m/s"))
     assert loss.lost == pytest.approx(np.linalg.norm(missing), rel=1e-9)
 

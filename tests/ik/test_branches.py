@@ -10,7 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.ik.test_inverse_kinematics import TIPS, arm, outside, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, outside, solver, stack
+from tests.models import free_direction, placement
 from tests.repeats import repeats
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.ik import InverseKinematics
@@ -81,14 +82,14 @@ def turned(way: Array) -> Array:
 def flange(q: Array) -> Array:
     """The pose of tool0 in the base frame of the closed form, which is turned half-way round."""
     half = np.diag([-1.0, -1.0, 1.0, 1.0])
-    return half @ np.asarray(tip(arm("ur5"), q, "tool0").homogeneous)
+    return half @ np.asarray(placement(arm("ur5"), "tool0", q).homogeneous)
 
 
 def test_all_branches_of_the_ur5_are_found() -> None:
     robot, rng, ik, counts = arm("ur5"), np.random.default_rng(1), solver("ur5"), []
     for _ in range(repeats(5)):
         q = rng.uniform(-np.pi, np.pi, 6)
-        ik["hand"].target = tip(robot, q, "tool0")
+        ik["hand"].target = placement(robot, "tool0", q)
         found = ik.branches(robot.neutral, budget=None)
         wanted = closed_form(flange(q))
         counts.append(len(wanted))
@@ -97,7 +98,7 @@ def test_all_branches_of_the_ur5_are_found() -> None:
             assert min(np.abs(turned(x - exact)).max() for x in found.q) < 1e-4
         for solution in found.solutions:
             assert solution.solved
-            assert tip(robot, solution.q, "tool0").isApprox(tip(robot, q, "tool0"), 1e-4)
+            assert placement(robot, "tool0", solution.q).isApprox(placement(robot, "tool0", q), 1e-4)
             assert solution.error <= 1e-5
             # Of the full turns of a joint that its range leaves, the nearest
             for sign in (-1.0, 1.0):
@@ -112,7 +113,7 @@ def test_all_branches_of_the_ur5_are_found() -> None:
 
 def test_answers_are_sorted_and_of_one_seed() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(1)), "tool0")
+    ik["hand"].target = placement(robot, "tool0", robot.random(1))
     one, again = (ik.branches(robot.neutral, budget=None, seed=3, restarts=200) for _ in range(2))
     np.testing.assert_array_equal(one.q, again.q)
     np.testing.assert_array_equal(one.hits, again.hits)
@@ -142,7 +143,7 @@ def test_on_a_redundant_arm_they_are_where_the_wishes_rest() -> None:
     ik, low, high = decided(), robot.limits.position_lower, robot.limits.position_upper
     ik["posture"].target = robot.neutral
     for seed in range(repeats(2)):
-        goal = tip(robot, random_q(robot, np.random.default_rng(seed)), name)
+        goal = placement(robot, name, robot.random(seed))
         ik["hand"].target = goal
         found = ik.branches(robot.neutral, budget=None)
         assert len(found.solutions) > 1
@@ -150,9 +151,8 @@ def test_on_a_redundant_arm_they_are_where_the_wishes_rest() -> None:
             assert np.abs(one - other).max() > 0.01
         for q in found.q:
             assert outside(robot, q) <= 0.0
-            assert goal.isApprox(tip(robot, q, name), 1e-4)
-            data, frame = robot.model.createData(), robot.model.getFrameId(name)
-            free = np.linalg.svd(pin.computeFrameJacobian(robot.model, data, q, frame))[2][-1]
+            assert goal.isApprox(placement(robot, name, q), 1e-4)
+            free = free_direction(robot, name, q)
             pull = float(free @ (q - robot.neutral))
             # At rest, or the way down ends at a limit
             ahead = q - np.sign(pull) * 1e-3 * free
@@ -166,10 +166,9 @@ def test_the_row_that_holds_an_answer_is_named() -> None:
     ik["posture"].target = robot.neutral
     at_limit = 0
     for seed in range(4):
-        ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(seed)), TIPS["panda"])
+        ik["hand"].target = placement(robot, TIPS["panda"], robot.random(seed))
         for solution in ik.branches(robot.neutral, budget=None).solutions:
-            data, frame = robot.model.createData(), robot.model.getFrameId(TIPS["panda"])
-            free = np.linalg.svd(pin.computeFrameJacobian(robot.model, data, solution.q, frame))[2][-1]
+            free = free_direction(robot, TIPS["panda"], solution.q)
             if abs(float(free @ (solution.q - robot.neutral))) > 0.05:
                 at_limit += 1
                 assert any(b.item == "limits" for b in solution.binding)
@@ -181,7 +180,7 @@ def test_free_directions_are_refused() -> None:
     with pytest.raises(RangeError, match="leave 1 of 7 directions free") as caught:
         solver().branches(robot.neutral)
     assert caught.value.field == "goals"
-    ik["hand"].target = tip(robot, robot.neutral, TIPS["panda"])
+    ik["hand"].target = placement(robot, TIPS["panda"], robot.neutral)
     for name, value, refused in (("weight", 0.0, True), ("enabled", False, True), ("mask", np.eye(7)[1], False)):
         before = getattr(ik["posture"], name)
         setattr(ik["posture"], name, value)
@@ -204,7 +203,7 @@ def test_out_of_reach_is_an_error_that_says_how_far() -> None:
 
 def test_the_time_is_kept() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(1)), "tool0")
+    ik["hand"].target = placement(robot, "tool0", robot.random(1))
     ik.branches(robot.neutral, restarts=3)
     # so many restarts would take minutes
     found = ik.branches(robot.neutral, budget=0.01, restarts=100_000)

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, solver, stack
+from tests.models import free_direction, placement
 from wbc.api import Stack
 from wbc.errors import (
     ContinuityError,
@@ -37,11 +38,11 @@ def circle(home: pin.SE3, radius: float = 0.1) -> Any:
 
 def test_configurations_are_on_the_path_and_on_one_branch() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    pose = circle(tip(robot, HOME, "tool0"))
+    pose = circle(placement(robot, "tool0", HOME))
     s = np.linspace(0.0, 2.0 * np.pi, 50)
     found = ik.along({"hand": pose}, s, HOME)
     for place, q in zip(s, found.q, strict=True):
-        off = pose(place).actInv(tip(robot, q, "tool0"))
+        off = pose(place).actInv(placement(robot, "tool0", q))
         assert np.abs(pin.log6(off).vector).max() < 1e-7
     np.testing.assert_allclose(found.q[[0, -1]], [HOME, HOME], atol=1e-6)
     assert found.moved <= 0.02
@@ -51,7 +52,7 @@ def test_configurations_are_on_the_path_and_on_one_branch() -> None:
 
 def test_the_branch_does_not_depend_on_where_it_is_asked_for() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    pose = circle(tip(robot, HOME, "tool0"))
+    pose = circle(placement(robot, "tool0", HOME))
     coarse = ik.along({"hand": pose}, [0.0, 3.0, 6.0], HOME)
     fine = ik.along({"hand": pose}, np.linspace(0.0, 6.0, 601), HOME)
     np.testing.assert_allclose(coarse.q, fine.q[[0, 300, 600]], atol=1e-6)
@@ -65,17 +66,14 @@ def test_what_the_goals_leave_open_is_at_rest() -> None:
     """A redundant arm with a posture: the distance to it cannot fall along the goals' null space."""
     robot = arm("panda")
     ik = stack().add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
-    pose = circle(tip(robot, robot.neutral, TIPS["panda"]))
+    pose = circle(placement(robot, TIPS["panda"], robot.neutral))
     s = np.linspace(0.0, 2.0 * np.pi, 40)
     ik["posture"].target = robot.neutral
     found = ik.along({"hand": pose}, s, robot.neutral)
     np.testing.assert_allclose(found.q[-1], robot.neutral, atol=1e-6)
     assert np.abs(found.q - robot.neutral).max() > 0.2
     for q in found.q:
-        jacobian = pin.computeFrameJacobian(
-            robot.model, robot.model.createData(), q, robot.model.getFrameId(TIPS["panda"])
-        )
-        free = np.linalg.svd(jacobian)[2][-1]
+        free = free_direction(robot, TIPS["panda"], q)
         assert abs(free @ (q - robot.neutral)) < 1e-4
 
 
@@ -83,7 +81,7 @@ def test_a_closed_path_is_gone_all_the_way_round() -> None:
     """A whole turn about the base: the pose at its end is the first one, the configuration is not."""
     robot, ik = arm("ur5"), solver("ur5")
     start = HOME - np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    home = tip(robot, start, "tool0")
+    home = placement(robot, "tool0", start)
 
     def turned(s: float) -> pin.SE3:
         return pin.SE3(pin.exp3(np.array([0.0, 0.0, s])), np.zeros(3)) * home
@@ -98,8 +96,8 @@ def test_a_closed_path_is_gone_all_the_way_round() -> None:
 
 def test_targets_are_also_sequences() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    goal = tip(robot, HOME + 0.4, "tool0")
-    first = tip(robot, HOME, "tool0")
+    goal = placement(robot, "tool0", HOME + 0.4)
+    first = placement(robot, "tool0", HOME)
     s = [0.0, 2.0, 3.0]
     listed = ik.along({"hand": [first, goal, first]}, s, HOME)
 
@@ -115,7 +113,7 @@ def test_targets_are_also_sequences() -> None:
 def test_sequences_of_positions_and_of_rotations(kind: str) -> None:
     robot = arm("ur5")
     ik = stack("ur5", kind).add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
-    first, last = tip(robot, HOME, "tool0"), tip(robot, HOME + 0.3, "tool0")
+    first, last = placement(robot, "tool0", HOME), placement(robot, "tool0", HOME + 0.3)
     part = "translation" if kind == "position" else "rotation"
     ends = [getattr(first, part), getattr(last, part)]
     s = np.linspace(0.0, 1.0, 5)
@@ -127,14 +125,14 @@ def test_sequences_of_positions_and_of_rotations(kind: str) -> None:
     thick = ik.along({"hand": between}, s, HOME)
     np.testing.assert_allclose(thin.q[-1], thick.q[-1], atol=1e-5)
     for x, q in zip(between, thick.q, strict=True):
-        np.testing.assert_allclose(getattr(tip(robot, q, "tool0"), part), x, atol=1e-7)
+        np.testing.assert_allclose(getattr(placement(robot, "tool0", q), part), x, atol=1e-7)
 
 
 def test_the_end_of_reach_is_named() -> None:
     """Straight away from the base; searches with restarts succeed just before the end and fail just behind it."""
     robot, ik = arm("ur5"), solver("ur5", "auto", "position")
     start = np.array([0.0, -1.0, 1.2, -0.3, 0.3, 0.0])
-    here = tip(robot, start, "tool0").translation
+    here = placement(robot, "tool0", start).translation
     away = np.array([here[0], here[1], 0.0]) / np.hypot(here[0], here[1])
     with pytest.raises(InfeasibleError, match=r"not reached: hand off by .*; no row binds") as caught:
         ik.along({"hand": lambda s: here + s * away}, [0.0, 2.0], start)
@@ -153,7 +151,7 @@ def test_the_limit_that_binds_is_named() -> None:
     upper[0] = 1.0
     bounded = Stack(robot.with_limits(position_upper=upper), 0.01).add(EndEffector("tool0"), name="hand")
     ik = bounded.add(JointLimits(), name="limits").inverse_kinematics()
-    home = tip(robot, HOME, "tool0")
+    home = placement(robot, "tool0", HOME)
 
     def turned(s: float) -> pin.SE3:
         return pin.SE3(pin.exp3(np.array([0.0, 0.0, s])), np.zeros(3)) * home
@@ -172,7 +170,7 @@ def test_a_jump_is_named() -> None:
     for _ in range(7):
         start = robot.neutral + rng.uniform(-0.8, 0.8, 7)
         start = np.clip(start, robot.limits.position_lower + 0.1, robot.limits.position_upper - 0.1)
-        home, move = tip(robot, start, TIPS["panda"]), rng.uniform(-0.4, 0.4, 3)
+        home, move = placement(robot, TIPS["panda"], start), rng.uniform(-0.4, 0.4, 3)
 
     def line(s: float) -> pin.SE3:
         return pin.SE3(home.rotation, home.translation + s * move)
@@ -187,9 +185,9 @@ def test_a_jump_is_named() -> None:
 
 def test_targets_are_as_before() -> None:
     robot, ik = arm("ur5"), solver("ur5")
-    goal = tip(robot, random_q(robot, np.random.default_rng(3)), "tool0")
+    goal = placement(robot, "tool0", robot.random(3))
     ik["hand"].target = goal
-    ik.along({"hand": circle(tip(robot, HOME, "tool0"))}, [0.0, 0.1], HOME)
+    ik.along({"hand": circle(placement(robot, "tool0", HOME))}, [0.0, 0.1], HOME)
     assert ik["hand"].target.isApprox(goal, 1e-12)
     with pytest.raises(InfeasibleError):
         ik.along({"hand": [pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0]))]}, [0.0], HOME)
@@ -197,7 +195,7 @@ def test_targets_are_as_before() -> None:
 
 
 def home() -> pin.SE3:
-    return tip(arm("ur5"), HOME, "tool0")
+    return placement(arm("ur5"), "tool0", HOME)
 
 
 @pytest.mark.parametrize(
@@ -232,8 +230,8 @@ def test_joints_of_several_coordinates() -> None:
     robot, ik = arm("kinova"), solver("kinova")
     assert robot.nq > robot.nv
     start = np.array(pin.integrate(robot.model, robot.neutral, np.full(robot.nv, 0.2)))
-    pose = circle(tip(robot, start, TIPS["kinova"]), 0.05)
+    pose = circle(placement(robot, TIPS["kinova"], start), 0.05)
     found = ik.along({"hand": pose}, [0.0, 1.0, 2.0 * np.pi], start)
-    assert pose(1.0).isApprox(tip(robot, found.q[1], TIPS["kinova"]), 1e-7)
+    assert pose(1.0).isApprox(placement(robot, TIPS["kinova"], found.q[1]), 1e-7)
     np.testing.assert_allclose(found.q[2], start, atol=1e-6)
     assert all(pin.isNormalized(robot.model, q, 1e-9) for q in found.q)

@@ -42,19 +42,6 @@ def solver(name: str = "panda", backend: str = "auto", kind: str = "pose") -> In
     return stack(name, kind).inverse_kinematics(backend=backend)
 
 
-def tip(robot: Robot, q: Array, frame: str) -> pin.SE3:
-    return placement(robot, frame, q)
-
-
-def random_q(robot: Robot, rng: np.random.Generator) -> Array:
-    """Within the limits; unbounded joints at any angle."""
-    v = rng.uniform(-np.pi, np.pi, robot.nv)
-    q = np.array(pin.integrate(robot.model, pin.neutral(robot.model), v))
-    for i in np.flatnonzero(robot.position_index >= 0):
-        q[robot.position_index[i]] = rng.uniform(robot.limits.position_lower[i], robot.limits.position_upper[i])
-    return q
-
-
 def outside(robot: Robot, q: Array) -> float:
     """By how much q passes its limits."""
     dofs = np.flatnonzero(robot.position_index >= 0)
@@ -67,11 +54,11 @@ def outside(robot: Robot, q: Array) -> float:
 def test_reachable_poses_are_reached_within_the_limits(name: str) -> None:
     robot, rng, ik = arm(name), np.random.default_rng(5), solver(name)
     for _ in range(100):
-        goal = tip(robot, random_q(robot, rng), TIPS[name])
+        goal = placement(robot, TIPS[name], robot.random(rng))
         ik["hand"].target = goal
         solution = ik.solve(robot.neutral, budget=None)
         assert solution.status == "solved", solution
-        off = goal.actInv(tip(robot, solution.q, TIPS[name]))
+        off = goal.actInv(placement(robot, TIPS[name], solution.q))
         assert np.abs(off.translation).max() < 1.8e-5
         assert np.abs(pin.log3(off.rotation)).max() < 1.8e-5
         assert solution.error <= 1e-5
@@ -81,7 +68,7 @@ def test_reachable_poses_are_reached_within_the_limits(name: str) -> None:
 
 def test_the_tolerance_is_kept() -> None:
     robot, ik = arm("panda"), solver()
-    goal = tip(robot, random_q(robot, np.random.default_rng(2)), TIPS["panda"])
+    goal = placement(robot, TIPS["panda"], robot.random(2))
     ik["hand"].target = goal
     for tolerance in (1e-2, 1e-5, 1e-9):
         assert ik.solve(robot.neutral, budget=None, tolerance=tolerance).error <= tolerance
@@ -91,7 +78,7 @@ def test_one_seed_gives_one_answer() -> None:
     robot, ik = arm("panda"), solver()
     found = {}
     for k in range(30):
-        ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(k)), TIPS["panda"])
+        ik["hand"].target = placement(robot, TIPS["panda"], robot.random(k))
         first = ik.solve(robot.neutral, budget=None, seed=3)
         again = ik.solve(robot.neutral, budget=None, seed=3, restarts=50)
         np.testing.assert_array_equal(first.q, again.q)
@@ -123,7 +110,7 @@ def test_out_of_reach_the_nearest_configuration_is_found(kind: str) -> None:
     best = min(minimize(cost, s, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-15}).fun for s in starts)
     length = robot.characteristic_length
     assert length * np.sqrt(cost(solution.q)) < length * np.sqrt(best) + 1e-3
-    here = tip(robot, solution.q, TIPS["panda"]).translation
+    here = placement(robot, TIPS["panda"], solution.q).translation
     assert solution.residuals["hand"].norm("m") == pytest.approx(np.linalg.norm(here - goal.translation), abs=1e-9)
     assert outside(robot, solution.q) <= 0.0
     assert "unreachable" in solution.explain()
@@ -134,11 +121,11 @@ def test_goals_that_contradict_each_other_are_told_from_those_out_of_reach() -> 
     robot = arm("panda")
     both = stack(kind="position").add(EndEffector("panda_link7", kind="position"), name="wrist")
     ik = both.inverse_kinematics()
-    q = random_q(robot, np.random.default_rng(4))
-    ik["hand"].target = tip(robot, q, TIPS["panda"]).translation
-    ik["wrist"].target = tip(robot, q, "panda_link7").translation
+    q = robot.random(4)
+    ik["hand"].target = placement(robot, TIPS["panda"], q).translation
+    ik["wrist"].target = placement(robot, "panda_link7", q).translation
     assert ik.solve(robot.neutral, budget=None).status == "solved"
-    ik["wrist"].target = tip(robot, robot.neutral, "panda_link7").translation
+    ik["wrist"].target = placement(robot, "panda_link7", robot.neutral).translation
     assert ik.solve(robot.neutral, budget=None, restarts=10).status == "contradictory"
     ik["wrist"].target = (3.0, 0.0, 0.0)
     assert ik.solve(robot.neutral, budget=None, restarts=10).status == "unreachable"
@@ -161,14 +148,14 @@ def test_wishes_are_followed_where_they_cost_nothing() -> None:
     ik = stack().add(Posture(), name="posture", weight=1e-3).inverse_kinematics()
     assert ik.goals == ("hand",)
     for seed in range(6):
-        goal = tip(robot, random_q(robot, np.random.default_rng(seed)), name)
+        goal = placement(robot, name, robot.random(seed))
         ik["hand"].target, ik["posture"].target = goal, robot.neutral
         solution = ik.solve(robot.neutral, budget=None)
         assert solution.solved
         assert solution.error <= 1e-5
 
         def pose(q: Array, goal: pin.SE3 = goal) -> Array:
-            off = goal.actInv(tip(robot, q, name))
+            off = goal.actInv(placement(robot, name, q))
             return np.concatenate([off.translation, pin.log3(off.rotation)])
 
         better = minimize(
@@ -189,8 +176,8 @@ def test_obstacles_are_respected() -> None:
     ik, plain, rng = ball.inverse_kinematics(), solver(), np.random.default_rng(9)
     hit = 0
     for _ in range(25):
-        q = random_q(robot, rng)
-        goal = tip(robot, q, TIPS["panda"])
+        q = robot.random(rng)
+        goal = placement(robot, TIPS["panda"], q)
         place = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.5]) + 0.1 * rng.standard_normal(3))
         ik["hand"].target = plain["hand"].target = goal
         ik["ball"].pose = place

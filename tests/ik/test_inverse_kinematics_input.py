@@ -12,7 +12,8 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.ik.test_inverse_kinematics import TIPS, arm, random_q, solver, stack, tip
+from tests.ik.test_inverse_kinematics import TIPS, arm, solver, stack
+from tests.models import placement
 from wbc.api import Stack
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.ik import InverseKinematics
@@ -39,7 +40,7 @@ NAN = np.full(7, np.nan)
 )
 def test_bad_input_is_refused_and_changes_nothing(options: dict[str, Any], error: type[WbcError], field: str) -> None:
     robot, ik = arm("panda"), solver()
-    ik["hand"].target = tip(robot, random_q(robot, np.random.default_rng(1)), TIPS["panda"])
+    ik["hand"].target = placement(robot, TIPS["panda"], robot.random(1))
     before = ik.solve(robot.neutral, budget=None)
     with pytest.raises(error) as raised:
         ik.solve(**{"q0": robot.neutral, **options})
@@ -102,7 +103,7 @@ def test_a_budget_is_overrun_by_one_iteration_at_most(backend: str, budget: floa
     robot, ik = arm("panda"), crowded(backend)
     overrun = []
     for k in range(12):
-        ik["hand"].target = tip(robot, robot.neutral, TIPS["panda"]).translation
+        ik["hand"].target = placement(robot, TIPS["panda"], robot.neutral).translation
         ik["wrist"].target = np.array([0.1 * k, 0.0, 2.0])
         found = ik.solve(robot.neutral, budget=budget, restarts=100_000)
         assert found.status != "solved"
@@ -122,7 +123,7 @@ def test_no_restarts_is_one_descent() -> None:
 
 def test_a_start_outside_the_limits_is_moved_to_them() -> None:
     robot, ik = arm("panda"), solver()
-    goal = tip(robot, random_q(robot, np.random.default_rng(6)), TIPS["panda"])
+    goal = placement(robot, TIPS["panda"], robot.random(6))
     ik["hand"].target = goal
     solution = ik.solve(robot.neutral + 9.0, budget=None)
     assert solution.solved
@@ -133,7 +134,7 @@ def test_a_start_outside_the_limits_is_moved_to_them() -> None:
 
 def test_one_call_is_enough() -> None:
     robot = arm("panda")
-    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    goal = placement(robot, TIPS["panda"], robot.random(7))
     solution = stack().solve(robot.neutral, {"hand": goal}, budget=None)
     assert solution.solved
     assert solution.error <= 1e-5
@@ -146,7 +147,7 @@ def test_one_call_is_enough() -> None:
 def test_a_compiled_one_takes_the_same_arguments_for_one_search() -> None:
     """Targets of a search are forgotten after it, also those of one that is refused."""
     robot, kinematics = arm("panda"), stack().inverse_kinematics()
-    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    goal = placement(robot, TIPS["panda"], robot.random(7))
     ours, theirs = (inspect.signature(owner.solve).parameters for owner in (Stack, InverseKinematics))
     assert [name for name in ours if name not in ("goals", "backend")] == list(theirs)
     assert all((ours[name].kind, ours[name].default) == (theirs[name].kind, theirs[name].default) for name in theirs)
@@ -162,7 +163,7 @@ def test_a_compiled_one_takes_the_same_arguments_for_one_search() -> None:
 def test_limits_of_speed_do_not_count() -> None:
     robot = arm("panda")
     slow = stack().add(FrameVelocityLimit(TIPS["panda"], linear=1e-3, angular=1e-3), name="slow")
-    goal = tip(robot, random_q(robot, np.random.default_rng(7)), TIPS["panda"])
+    goal = placement(robot, TIPS["panda"], robot.random(7))
     assert slow.solve(robot.neutral, {"hand": goal}, budget=None).solved
 
 
@@ -182,8 +183,8 @@ def test_joints_that_no_goal_moves_stay() -> None:
         q = robot.neutral.copy()
         for i in arms:
             q[index[i]] = rng.uniform(robot.limits.position_lower[i], robot.limits.position_upper[i])
-        torso = tip(robot, q, "torso_2_link")
-        ik["hand"].target = torso.actInv(tip(robot, q, "gripper_left_base_link"))
+        torso = placement(robot, "torso_2_link", q)
+        ik["hand"].target = torso.actInv(placement(robot, "gripper_left_base_link", q))
         solution = ik.solve(robot.neutral, budget=None)
         solved, restarted = solved + solution.solved, restarted + (solution.descents > 1)
         others = np.setdiff1d(np.arange(robot.nq), index[arms])
@@ -197,7 +198,7 @@ def test_measured_pairs_are_respected() -> None:
     ik = stack().add(SelfCollision(margin=0.01), name="self").inverse_kinematics()
     rng = np.random.default_rng(0)
     for _ in range(3):
-        ik["hand"].target = tip(robot, random_q(robot, rng), TIPS["panda"])
+        ik["hand"].target = placement(robot, TIPS["panda"], robot.random(rng))
         solution = ik.solve(robot.neutral, budget=None, restarts=5)
         assert solution.status in ("solved", "unreachable", "contradictory")
         assert solution.status == "contradictory" or min(solution.margins["self"]) > -1e-8
@@ -205,7 +206,7 @@ def test_measured_pairs_are_respected() -> None:
 
 def test_a_batch_gives_what_single_searches_give() -> None:
     robot, rng, ik = arm("panda"), np.random.default_rng(12), solver()
-    goals = [tip(robot, random_q(robot, rng), TIPS["panda"]) for _ in range(40)]
+    goals = [placement(robot, TIPS["panda"], robot.random(rng)) for _ in range(40)]
     batch = ik.solve_batch(robot.neutral, {"hand": goals}, budget=None, workers=3)
     alone = ik.solve_batch(robot.neutral, {"hand": goals}, budget=None, workers=1)
     np.testing.assert_array_equal(batch.q, alone.q)

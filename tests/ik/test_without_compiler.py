@@ -7,10 +7,10 @@ import subprocess
 import sys
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wbc
+from tests.models import placement
 from tests.repeats import repeats
 from wbc.tasks import EndEffector, JointLimits, Posture
 
@@ -29,12 +29,10 @@ def test_the_same_searches(name: str) -> None:
     """Of random poses, of which every third is out of reach."""
     robot, rng = wbc.robots.load(name), np.random.default_rng(7)
     both = [kinematics(robot, ROBOTS[name], backend) for backend in ("native", "vm")]
-    data, frame = robot.model.createData(), robot.model.getFrameId(ROBOTS[name])
     solved = 0
     for k in range(repeats(6)):
         q = rng.uniform(np.maximum(robot.limits.position_lower, -3.0), np.minimum(robot.limits.position_upper, 3.0))
-        pin.framesForwardKinematics(robot.model, data, q)
-        pose = data.oMf[frame].copy()
+        pose = placement(robot, ROBOTS[name], q)
         far = k % 3 == 2
         pose.translation = (3.0 if far else 1.0) * pose.translation
         answers = []

@@ -32,8 +32,9 @@ def distance(qp: QP, x: Array) -> float | None:
 
 
 def referee(qp: QP) -> Array | None:
-    """The minimiser by quadprog; None where that gives up."""
-    C = np.vstack((np.eye(qp.n), qp.A))
+    """The minimiser by quadprog, in units of rows and columns for its tolerances; None where that gives up."""
+    column = 1.0 / np.sqrt(np.diag(qp.H))
+    C = np.vstack((np.eye(qp.n), qp.A)) * column
     norms = np.linalg.norm(C, axis=1)
     on = norms > 0.0
     C, lower, upper = C[on] / norms[on, None], qp.lower[on] / norms[on], qp.upper[on] / norms[on]
@@ -45,7 +46,7 @@ def referee(qp: QP) -> Array | None:
     normals = np.vstack((V[:rank], C[low], -C[high]))
     sides = np.concatenate(((U.T @ lower[equal])[:rank] / S[:rank], lower[low], -upper[high]))
     try:
-        found = quadprog.solve_qp(qp.H, -qp.g, normals.T, sides, rank)
+        found = quadprog.solve_qp(qp.H * np.outer(column, column), -qp.g * column, normals.T, sides, rank)
     except ValueError:
         return None
-    return np.asarray(found[0])
+    return np.asarray(found[0]) * column

@@ -7,13 +7,13 @@ import pickle
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wbc
 from tests.backends import IN_PYTHON
 from tests.levels import arms
 from tests.levels.reference import Goal, hierarchy
+from tests.models import frame_jacobian
 from wbc.api import Controller
 from wbc.controller import Status, core_of
 from wbc.errors import LevelError
@@ -94,15 +94,14 @@ def test_later_levels_never_disturb_earlier_ones(native: Controller) -> None:
     rng = np.random.default_rng(6)
     stack = wbc.Stack(arms.arm(), arms.DT, calm=False)
     stack.add(EndEffector("tip", kind="position"), name="tip").add(JointLimits())
-    upper, model = stack.compile(solver=IN_PYTHON), stack.robot.model
-    data = model.createData()
+    upper = stack.compile(solver=IN_PYTHON)
     for _ in range(40):
         q, v = arms.put(native, rng)
         step = native.step(q, v)
         upper.reset(q)
         upper["tip"].target = native["tip"].target
         reference = upper.step(q, v)
-        J = pin.computeFrameJacobian(model, data, q, model.getFrameId("tip"), pin.LOCAL_WORLD_ALIGNED)[:3]
+        J = frame_jacobian(stack.robot, "tip", q)[:3]
         if step.status == Status.SOLVED and not any(b.item == "ball" for b in step.binding):
             assert np.abs(J @ (step.v - reference.v)).max() <= 2e-6
         assert max((x.disturbance for x in step.levels), default=0.0) <= 1e-6

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import four_bar, numbers
+from tests.loops.mechanisms import body, four_bar, hinge, mjcf, numbers
 from tests.loops.test_loops import OPEN, opened
 from wbc.errors import RobotFileError, UnknownNameError
 from wbc.robot import LoopError
@@ -176,6 +176,29 @@ def test_an_equality_of_mjcf_is_what_mujoco_compiles(equality: str) -> None:
 def test_an_equality_that_is_not_active_closes_nothing(caplog: pytest.LogCaptureFixture) -> None:
     robot = wbc.robots.load(CHAINS.format('<weld body1="a" body2="c" active="false"/>'), shapes="none")
     assert not robot.loops
+
+
+@pytest.mark.parametrize("motors", ["", '<actuator><motor joint="turn"/></actuator>'])
+def test_a_free_body_that_loops_hold_is_part_of_the_robot(motors: str) -> None:
+    arm = body("arm", np.zeros(3), hinge("turn", np.array([0.0, 1.0, 0.0])))
+    bodies = arm + body("between", np.ones(3), "<freejoint/>") + body("load", np.ones(3), '<freejoint name="load"/>')
+    # The load hangs on what hangs on the arm
+    ties = '<weld body1="between" body2="load"/><weld body1="arm" body2="between"/>'
+    text = mjcf("carried", bodies, ties).replace("</mujoco>", motors + "</mujoco>")
+    robot = wbc.robots.load(text, shapes="none")
+    assert len(robot.loops.loops) == 2
+    assert robot.motors == tuple(range(robot.nv)[robot.dofs("turn")])
+    assert not robot.locked_dofs
+    assert len(wbc.robots.load(text, shapes="none", loops=False).locked_dofs) == 12
+    controller = wbc.Stack(robot, 0.005).add(wbc.tasks.Posture(("turn",)), name="posture").compile()
+    target = robot.neutral.copy()
+    target[robot.position_index[robot.dofs("turn")]] = 0.3
+    controller["posture"].target = target
+    step = controller.step(robot.neutral)
+    later = robot.integrate(robot.neutral, step.v, 0.005)
+    assert step.status == "solved"
+    assert max(robot.loop_gaps(later).values()) < OPEN
+    assert np.linalg.norm(robot.pose(later, "load").translation - robot.pose(robot.neutral, "load").translation) > 1e-3
 
 
 def test_a_loop_that_closes_only_beyond_limits_says_whose(caplog: pytest.LogCaptureFixture) -> None:

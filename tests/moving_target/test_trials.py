@@ -8,12 +8,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
 import wbc
+from tests.models import frame_jacobian
 from wbc.cli.app import app
 from wbc.moving_target import pictures
 from wbc.moving_target.knowledge import Knowledge, Measurement
@@ -106,10 +106,7 @@ def test_walls_of_a_hole() -> None:
 def test_an_arm_starts_where_it_can_turn_about_every_axis_within_its_rates() -> None:
     """The Space Station's arm: each of some hundred random axes takes less than 0.9 of the rate limits at first."""
     robot = wbc.robots.load("ssrms")
-    start, data = station_arm().scenario.start, robot.model.createData()
-    jacobian = pin.computeFrameJacobian(
-        robot.model, data, start, robot.model.getFrameId("tip"), pin.LOCAL_WORLD_ALIGNED
-    )
+    jacobian = frame_jacobian(robot, "tip", station_arm().scenario.start)
     axes = np.random.default_rng(0).normal(size=(100, 3))
     spins = np.radians(3.0) * axes / np.linalg.norm(axes, axis=1)[:, None]
     needed = np.abs(np.linalg.pinv(jacobian)[:, 3:] @ spins.T) / robot.limits.velocity[:, None]

@@ -111,6 +111,16 @@ def test_rows_of_velocities_alone_are_refused() -> None:
         stack.plan(robot.neutral, robot.neutral)
 
 
+def test_a_joint_that_is_fixed_no_longer_moves_again() -> None:
+    planner = behind_a_wall(("still", wbc.tasks.Fixed(["panda_joint1"]))).planner()
+    start = planner.stack.robot.neutral
+    goal = start + np.eye(len(start))[0] * 0.3
+    with pytest.raises(InfeasibleError, match="panda_joint1 is beyond its limit"):
+        planner.plan(start, goal)
+    planner["still"].enabled = False
+    assert np.allclose(planner.plan(start, goal).q[-1], goal)
+
+
 def test_fingers_that_mimic_follow() -> None:
     robot = wbc.robots.load("panda", lock=())
     stack = wbc.Stack(robot, dt=0.01)

@@ -61,10 +61,6 @@ def level() -> dict[int | None, LevelHand]:
     return {order: LevelHand(order, published=True) for order in (0, 1, 2, None)}
 
 
-def pose(robot: Any, q: np.ndarray, frame: str = "tip") -> pin.SE3:
-    return placement(robot, frame, q)
-
-
 def rms(values: np.ndarray) -> np.ndarray:
     return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
 
@@ -74,7 +70,7 @@ def inches(q: np.ndarray, from_q: np.ndarray) -> np.ndarray:
 
 
 def test_1_home() -> None:
-    place = pose(manipulator(), HOME)
+    place = placement(manipulator(), "tip", HOME)
     np.testing.assert_allclose(place.translation / INCH, [0, 19.39, -40], atol=1e-12)
     np.testing.assert_allclose(place.rotation, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(hand(HOME)[0], place.translation, atol=1e-15)
@@ -88,13 +84,13 @@ def test_1_printed_formulas() -> None:
         x = 1.39 * (s2 * s3 * c4 - c2 * s4) - 40 * s2 * c3
         y = 1.39 * (c1 * c3 * c4 - s1 * c2 * s3 * c4 - s1 * s2 * s4) + 40 * (s1 * c2 * c3 + c1 * s3) + 18 * c1
         z = 1.39 * (s1 * c3 * c4 + c1 * c2 * s3 * c4 + c1 * s2 * s4) + 40 * (-c1 * c2 * c3 + s1 * s3) + 18 * s1
-        np.testing.assert_allclose(pose(manipulator(), q).translation / INCH, [x, y, z], atol=1e-12)
+        np.testing.assert_allclose(placement(manipulator(), "tip", q).translation / INCH, [x, y, z], atol=1e-12)
 
 
 def test_2_level_wrist_and_yaw(level: dict[int | None, LevelHand]) -> None:
     free = LevelHand()
     for q in (GENERIC, *RNG.uniform(-3, 3, (40, 6))):
-        rotation = pose(manipulator(), levelled(q)).rotation
+        rotation = placement(manipulator(), "tip", levelled(q)).rotation
         np.testing.assert_allclose(rotation[2, :2], 0.0, atol=1e-12)
         assert rotation[2, 2] > 0.0
         alpha = math.atan2(rotation[0, 1], rotation[1, 1])
@@ -270,7 +266,7 @@ def test_8_smaller_steps(level: dict[int | None, LevelHand]) -> None:
     path = straight_line(level[None], HOME, line, solves=100)
     assert (np.abs(deviation(path, line)[0] / INCH) <= [2e-4, 1e-4, 2.1e-3]).all()
     for q in path:
-        np.testing.assert_allclose(pose(manipulator(), q).rotation[2, :2], 0.0, atol=1e-9)
+        np.testing.assert_allclose(placement(manipulator(), "tip", q).rotation[2, :2], 0.0, atol=1e-9)
     # About the origin a bias stays at the first order, and everything at order 0
     affine = deviation(straight_line(level[1], HOME, line, solves=100, latched=HOME), line)[0] / INCH
     np.testing.assert_allclose(affine, [-0.00693, 0.00219, 0.00174], atol=1e-5)
@@ -315,7 +311,7 @@ def test_8_the_stack_stays_within_a_thousandth() -> None:
     stack.add(wbc.tasks.EndEffector("tip", gain=100.0), name="hand")
     controller = stack.compile(backend="vm")
     for q0, axis in itertools.product((HOME, start("4.6")), np.eye(3)):
-        home, q, worst = pose(manipulator(), q0), q0, 0.0
+        home, q, worst = placement(manipulator(), "tip", q0), q0, 0.0
         for k in range(1, 42):
             # Where the hand is to be at the tick's end; the last two ticks stay there
             goal = home.translation + 0.1 * INCH * min(k, 40) * axis
@@ -323,7 +319,7 @@ def test_8_the_stack_stays_within_a_thousandth() -> None:
             q = q + 0.01 * controller.step(q).v
             worst = max(worst, float(np.abs(hand(q)[0] - goal).max()))
         assert worst / INCH < 1e-3
-        end = pose(manipulator(), q)
+        end = placement(manipulator(), "tip", q)
         assert np.abs(end.translation - home.translation - 4.0 * INCH * axis).max() / INCH < 1e-3
         np.testing.assert_allclose(end.rotation[2, :2], 0.0, atol=1e-6)
 
@@ -347,7 +343,7 @@ def test_9_measuring_arm() -> None:
 def test_9_the_chain_agrees() -> None:
     robot = measuring_arm()
     for angles in RNG.uniform(-1.2, 1.2, (50, 4)):
-        place, at = pose(robot, hanging(angles)), measured(angles)
+        place, at = placement(robot, "tip", hanging(angles)), measured(angles)
         np.testing.assert_allclose(place.translation, at[:3], atol=1e-9)
         heading = place.rotation[:, 2]
         np.testing.assert_allclose(heading, [math.sin(at[3]), math.cos(at[3]), 0.0], atol=1e-9)
@@ -371,7 +367,7 @@ def test_10_degenerate_readings() -> None:
             function(np.zeros(4))
     for q2 in np.radians([20.0, -20.0]):
         q = hanging(np.array([0.0, q2, 0.4, 0.2]))
-        link = pose(measuring_arm(), q, "F4").translation
+        link = placement(measuring_arm(), "F4", q).translation
         assert math.degrees(math.asin(link[2] / np.linalg.norm(link))) == pytest.approx(70.0)
         near = [measured(np.array([step, q2, 0.4, 0.2])) for step in (-1e-6, 1e-6)]
         np.testing.assert_allclose(near[0], near[1], atol=1e-5)
@@ -436,7 +432,7 @@ def test_13_compensation() -> None:
         off = (held.relative - held.commanded)[:, :3] / INCH
         assert low < np.linalg.norm(off, axis=1).max() < high
         for q in held.q[::5]:
-            np.testing.assert_allclose(pose(manipulator(), q).rotation[2, :2], 0.0, atol=1e-6)
+            np.testing.assert_allclose(placement(manipulator(), "tip", q).rotation[2, :2], 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.models import placement
 from tests.published.arm_machine import STATE, rates
 from wbc.coordinates import (
     BodyRows,
@@ -130,9 +131,7 @@ def test_a7_three_points_make_over_determined_answers_free_of_units(unit: float)
     )
     command = np.array((0.01, 0.02, 0.0, 0.01, 0.0, 0.02))
     v = rates(control, control.active, STATE, command)
-    matrices, data = control.rates(STATE), control.robot.model.createData()
-    pin.framesForwardKinematics(control.robot.model, data, STATE)
-    turn = data.oMf[control.robot.model.getFrameId("tip")].rotation
+    matrices, turn = control.rates(STATE), placement(control.robot, "tip", STATE).rotation
     spread = np.vstack([np.hstack((np.eye(3), -pin.skew(turn[:, k]))) for k in range(3)])
     one = np.ones(3)
     own = np.block([[3 * np.eye(3), -pin.skew(one)], [pin.skew(one), 2 * np.eye(3)]])
@@ -190,16 +189,13 @@ def test_a25_a_held_pose_does_not_drift(station: PairController) -> None:
     station.switch("alpha | xi", 0.0)
     station.reset(STATE)
     station.command([0.01])
-    data, model = station.robot.model.createData(), station.robot.model
-    tip = model.getFrameId("tip")
-    pin.framesForwardKinematics(model, data, STATE)
-    held, q, farthest = data.oMf[tip].copy(), STATE, 0.0
+    held, q, farthest = placement(station.robot, "tip", STATE), STATE, 0.0
     for k in range(5000):
         step = station.step(q)
         assert step.certificate.violation < 1e-10
         q = q + 0.02 * step.v
         if k % 50 == 0:
-            pin.framesForwardKinematics(model, data, q)
-            farthest = max(farthest, float(np.linalg.norm(data.oMf[tip].translation - held.translation)))
+            off = placement(station.robot, "tip", q).translation - held.translation
+            farthest = max(farthest, float(np.linalg.norm(off)))
     assert farthest < 1e-6
     assert np.abs(q - STATE).max() > 0.5

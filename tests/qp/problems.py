@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-import quadprog
 
+from tests.judges.quadprog_qp import referee
 from wbc.qp import QP
 
 DT = 0.005
@@ -28,18 +28,6 @@ def braking_bounds(q, lower, upper, speed, v_last, acceleration=10.0):
     reach = acceleration * DT
     low, high = np.maximum(low, v_last - reach), np.minimum(high, v_last + reach)
     return np.minimum(low, high), np.maximum(low, high)
-
-
-def quadprog_solution(qp: QP) -> np.ndarray:
-    """The referee's minimiser."""
-    n = qp.n
-    C = np.vstack((np.eye(n), qp.A))
-    equal = qp.lower == qp.upper
-    low = ~equal & np.isfinite(qp.lower)
-    high = ~equal & np.isfinite(qp.upper)
-    normals = np.vstack((C[equal], C[low], -C[high]))
-    bounds = np.concatenate((qp.lower[equal], qp.lower[low], -qp.upper[high]))
-    return quadprog.solve_qp(qp.H, -qp.g, normals.T, bounds, int(equal.sum()))[0]
 
 
 def panda(weight: float, ticks: int) -> list[QP]:
@@ -67,7 +55,7 @@ def panda(weight: float, ticks: int) -> list[QP]:
         floor = -20.0 * (data.oMf[hand].translation[2] - 0.3)
         qp = QP((H + H.T) / 2, g, np.append(low, floor), np.append(high, np.inf), A)
         out.append(qp)
-        v = np.clip(quadprog_solution(qp), low, high)
+        v = np.clip(referee(qp), low, high)
         for _ in range(10):  # ten ticks a sample, so that a short record sees the whole path
             q = np.clip(q + v * DT, model.lowerPositionLimit, model.upperPositionLimit)
         pin.framesForwardKinematics(model, data, q)
@@ -109,7 +97,7 @@ def talos(weight: float, ticks: int) -> list[QP]:
         )
         qp = QP((H + H.T) / 2, g, np.concatenate((low, np.zeros(12))), np.concatenate((high, np.zeros(12))), A)
         out.append(qp)
-        v = np.clip(quadprog_solution(qp), low, high)
+        v = np.clip(referee(qp), low, high)
         q = pin.integrate(model, q, v * 10 * DT)
         q[7:] = np.clip(q[7:], model.lowerPositionLimit[7:], model.upperPositionLimit[7:])
     return out

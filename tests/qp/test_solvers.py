@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bench.qp.survey import survey, table
-from tests.qp.problems import RECORDS, quadprog_solution
+from tests.judges.quadprog_qp import referee as by_quadprog
+from tests.qp.problems import RECORDS
 from tests.qp.samples import SIZES, WEIGHTS, whole_body
 from tests.repeats import covering
 from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, SolverError, UnknownNameError
@@ -28,7 +29,7 @@ def test_solvers_agree_on_recorded_ticks(robot, weight):
     solvers = [make_solver(name, ticks[0].n, ticks[0].m) for name in SUPPORTED]
     active = 0
     for qp in ticks:
-        referee = quadprog_solution(qp)
+        referee = by_quadprog(qp)
         for solver in solvers:
             answer = solver.solve(qp)
             assert answer.solved, solver.name
@@ -48,7 +49,7 @@ def test_solvers_agree_on_samples(shape, weight):
         assert all(answer.solved for answer in answers)
         assert max(np.abs(answers[0].x - answer.x).max() for answer in answers) < 1e-6
         assert max(certify(qp, answer).error_bound for answer in answers) < 1e-6
-        assert np.abs(answers[0].x - quadprog_solution(qp)).max() < 1e-6
+        assert np.abs(answers[0].x - by_quadprog(qp)).max() < 1e-6
 
 
 def test_every_reset_is_as_new(name):

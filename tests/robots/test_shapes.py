@@ -118,7 +118,9 @@ def test_single_point_and_bad_clouds() -> None:
     assert_refused(lambda: fit_capsule(np.array([[0, 0, np.nan]])), NotFiniteError, "")
 
 
-@pytest.mark.parametrize(("radius", "half"), [(0.1, 0.5), (0.2, 0.2), (0.3, 0.02), (0.05, 0.05)])
+@pytest.mark.parametrize(
+    ("radius", "half"), [(0.1, 0.5), (0.2, 0.2), (0.3, 0.02), (0.05, 0.05), (0.2666643374642336, 5.976195030713273e-07)]
+)
 def test_capsule_around_cylinder(radius: float, half: float) -> None:
     r, h, gap = around_cylinder(radius, half)
     turn = np.linspace(0, 2 * math.pi, 400, endpoint=False)

@@ -73,8 +73,7 @@ class Servos:
                  form: str) -> None:  # fmt: skip
         self.kind, self.form, nv = kind, "bodies" if kind == "torque" else form, robot.nv
         model, self.fastest = robot.model.copy(), robot.limits.velocity
-        upper = np.triu(pin.crba(model, model.createData(), q))
-        inertia = float(np.diag(upper).max())
+        inertia = float(np.diag(pin.crba(model, model.createData(), q)).max())
         self.armature = np.full(nv, rng.uniform(0.02, 0.15) * inertia)
         weight = max(np.abs(pin.computeGeneralizedGravity(model, model.createData(), q)).max(), 0.5 * inertia)
         self.delay = int(min(rng.integers(0, 9), 0.045 // dt))
@@ -134,8 +133,8 @@ class Servos:
 
     def _bodies(self, u: np.ndarray, h: float) -> None:
         bias = pin.nonLinearEffects(self._model, self._data, self.q, self.v).copy()
-        upper = np.triu(pin.crba(self._model, self._data, self.q))
-        M, damping, force = upper + np.triu(upper, 1).T, self.viscous + self.coulomb / np.hypot(self.v, 0.01), u
+        M = pin.crba(self._model, self._data, self.q)
+        damping, force = self.viscous + self.coulomb / np.hypot(self.v, 0.01), u
         if self.kind == "position":
             damping, force = damping + self.stiffness * (self.lag + h), self.stiffness * (u - self.q)
         elif self.kind == "velocity":

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.models import frame_jacobian
 from tests.refusals import assert_refused
 from tests.simulation.machines import HANDS, heavy, random_torque
 from wbc.errors import RangeError, ShapeError, UnknownNameError
@@ -61,9 +62,8 @@ def test_wrenches_are_in_the_axes_of_a_frame_that_rolls_on_its_hold(plant: Gripp
     model, before = ROBOT.model, plant.state
     q, v = before.q.copy(), before.v.copy()
     plant.advance(0.001)
-    data, wrench = model.createData(), plant.wrenches[HANDS[0]]
-    push = pin.computeFrameJacobian(model, data, q, model.getFrameId(HANDS[0]), pin.LOCAL).T @ wrench
-    a = pin.aba(model, data, q, v, tau + push)
+    push = frame_jacobian(ROBOT, HANDS[0], q, pin.LOCAL).T @ plant.wrenches[HANDS[0]]
+    a = pin.aba(model, model.createData(), q, v, tau + push)
     theirs = np.array(plant.data.qacc)
     theirs[:3] = pin.Quaternion(q[3:7]).matrix().T @ theirs[:3] - np.cross(v[3:6], v[:3])
     assert a == pytest.approx(theirs, abs=1e-6 * np.abs(theirs).max() + 1e-6)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.judges.quadprog_qp import SAME, distance
+from tests.models import frame_jacobian, placement
 from tests.soak.episodes import label
 from tests.soak.machines import configuration, machine
 from tests.soak.stacks import DT, pose, weight
@@ -49,12 +50,9 @@ def pose_problem(controller: Controller, rng: np.random.Generator) -> tuple[Arra
     bounds = controller.qp()
     low, high = np.maximum(bounds.lower[: robot.nv], -1.0), np.minimum(bounds.upper[: robot.nv], 1.0)
     v: Array = low + (high - low) * rng.uniform(0.25, 0.75, robot.nv)
-    data = robot.model.createData()
-    frame = robot.model.getFrameId(f"f{last // 2}")
-    J = pin.computeFrameJacobian(robot.model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
-    pin.framesForwardKinematics(robot.model, data, q)
-    held = data.oMf[frame].copy()
-    held.translation[:] += J[:3] @ v / GAIN
+    frame = f"f{last // 2}"
+    held = placement(robot, frame, q)
+    held.translation[:] += frame_jacobian(robot, frame, q)[:3] @ v / GAIN
     controller["hold"].target, controller["hold"].enabled = held, True
     return q, v
 

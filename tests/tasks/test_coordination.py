@@ -12,7 +12,7 @@ import pytest
 
 import wbc
 from tests.evaluation import numbers, sample, slope
-from tests.models import X, Z, arm, placement, robot as bare
+from tests.models import X, Z, arm, frame_jacobian, placement, robot as bare
 from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
@@ -97,9 +97,7 @@ def test_coupling_starts_where_it_is_told() -> None:
 
 def plain(machine: Robot, frame: str, q: np.ndarray, rows: slice, length: float) -> float:
     """Yoshikawa's measure from Pinocchio's Jacobian, without a floor."""
-    data = machine.model.createData()
-    number = machine.model.getFrameId(frame)
-    jacobian = pin.computeFrameJacobian(machine.model, data, q, number, pin.LOCAL_WORLD_ALIGNED).copy()
+    jacobian = frame_jacobian(machine, frame, q)
     jacobian[:3] /= length
     return float(np.sqrt(np.linalg.det(jacobian[rows] @ jacobian[rows].T)))
 

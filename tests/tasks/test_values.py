@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.evaluation import numbers, slope
 from tests.models import placement
+from tests.random_robots import random_pose
 from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
 from wbc.robot import Robot
 from wbc.symbolic import Kinematics, Tracer
@@ -28,12 +29,6 @@ def states(name: str) -> tuple[Robot, list[np.ndarray], np.random.Generator]:
 def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     """Scipy's logarithm: a third implementation, reliable up to pi."""
     return Rotation.from_matrix(rotation).as_rotvec()
-
-
-def random_pose(rng: np.random.Generator, angle: float | None = None) -> pin.SE3:
-    axis = rng.normal(size=3)
-    turn = rng.uniform(0.1, 3.0) if angle is None else angle
-    return pin.SE3(pin.exp3(turn * axis / np.linalg.norm(axis)), rng.uniform(-1, 1, 3))
 
 
 def axes_of(machine: Robot, axes: str, frame: str, base: str, q: np.ndarray) -> np.ndarray:

@@ -12,10 +12,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.models import placement
+from tests.models import frame_jacobian, placement
 from wbc.coordinates import BodyRows, CoordinatePair, JointRows, MissingPartError, expressions
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
-from wbc.robot import Robot
 from wbc.robots import load, operator_arm
 from wbc.teleop import Keyboard, Order, RateFile, RateFileError, SessionLog, Teleoperation, run_session
 from wbc.teleop.keyboard import HELD
@@ -243,13 +242,13 @@ def test_what_is_lost_is_told_with_the_reason_and_a_better_pair(station: Teleope
     """Beside the locus of the yaw joint's lock most of a command is lost, and told; another pair loses nothing."""
     robot, q = station.robot, BESIDE
     scale = np.array([1.0 / robot.characteristic_length] * 3 + [1.0] * 3)
-    J = jacobian(robot, BESIDE)
+    J = frame_jacobian(robot, "tip", BESIDE)
     worst = np.linalg.svd(np.vstack([scale[:, None] * J, np.eye(7)[1]]))[0][:6, -1] / scale
     rates = tuple(0.02 * worst / np.abs(worst[:3]).max())
     station.reset(q)
     for k in range(60):
         seen = station.step(q, Order(rates, pair="xi | joint2" if k == 0 else None))
-        np.testing.assert_allclose(seen.met, jacobian(robot, q) @ seen.step.v, atol=1e-12)
+        np.testing.assert_allclose(seen.met, frame_jacobian(robot, "tip", q) @ seen.step.v, atol=1e-12)
         np.testing.assert_array_equal(seen.asked, rates)
         lost = np.linalg.norm(scale * (seen.asked - seen.met)) / np.linalg.norm(scale * seen.asked)
         assert seen.lost == pytest.approx(lost, abs=1e-12)
@@ -300,13 +299,6 @@ def test_what_is_late_is_told_apart_from_what_limits_take(kind: str, limits: dic
 
 def test_the_nearest_locus_is_named(station: Teleoperation) -> None:
     assert station.nearest_locus(BESIDE, "xi | joint2") == "0.012 rad from joint2 = 1.571, where the pair loses rank"
-
-
-def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Of the tip, by Pinocchio."""
-    model = robot.model
-    index = model.getFrameId("tip")
-    return pin.computeFrameJacobian(model, model.createData(), q, index, pin.LOCAL_WORLD_ALIGNED)
 
 
 def test_over_determined_motion_has_its_cue(station: Teleoperation) -> None:

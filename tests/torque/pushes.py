@@ -8,12 +8,14 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-import quadprog
 from scipy.spatial import ConvexHull
 
 import wbc
 from tests.backends import way
+from tests.judges.quadprog_qp import referee
+from tests.pinocchio_state import PinocchioState
 from wbc.api import Controller
+from wbc.qp import QP
 from wbc.robot import Robot
 from wbc.shapes import Box, PlacedShape
 from wbc.simulation import Command, CommandKind, MujocoPlant, mujoco_model
@@ -90,67 +92,48 @@ class Peer:
 
     def __init__(self, one: Stand) -> None:
         self.one, self.model = one, one.robot.model
-        self.data, q = self.model.createData(), one.robot.neutral
-        pin.framesForwardKinematics(self.model, self.data, q)
-        self.center = pin.centerOfMass(self.model, self.data, q).copy()
+        self.start = PinocchioState(self.model, one.robot.neutral, np.zeros(self.model.nv))
         self.weight = G * pin.computeTotalMass(self.model)
-        self.start = {f: self.data.oMf[self.model.getFrameId(f)].copy() for f in (one.chest, one.hand, *one.soles)}
         self.last = np.zeros(self.model.nv)
-
-    def _frame(self, name: str, gain: float) -> tuple[np.ndarray, np.ndarray]:
-        """J of a frame and the acceleration that it is asked for, along the world's axes."""
-        index, axes = self.model.getFrameId(name), pin.LOCAL_WORLD_ALIGNED
-        J = pin.getFrameJacobian(self.model, self.data, index, axes)
-        bias = pin.getFrameClassicalAcceleration(self.model, self.data, index, axes).vector
-        rate = pin.getFrameVelocity(self.model, self.data, index, axes).vector
-        at, start = self.data.oMf[index], self.start[name]
-        off = np.concatenate([at.translation - start.translation, pin.log3(at.rotation @ start.rotation.T)])
-        return np.array(J), -bias - 4.0 * gain * rate - 4.0 * gain**2 * off
 
     def torque(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Of all degrees of freedom; the last ones where quadprog finds none."""
-        one, model, data, nv = self.one, self.model, self.data, self.model.nv
-        M = pin.crba(model, data, q)
-        M, h = np.triu(M) + np.triu(M, 1).T, pin.nonLinearEffects(model, data, q, v).copy()
-        pin.centerOfMass(model, data, q, v, np.zeros(nv))
-        fall = -data.acom[0] - 16.0 * data.vcom[0] - 64.0 * (data.com[0] - self.center)
-        parts = [(pin.jacobianCenterOfMass(model, data, q).copy(), fall.copy(), 10.0)]
-        pin.computeJointJacobians(model, data, q)
-        pin.forwardKinematics(model, data, q, v, np.zeros(nv))
-        pin.updateFramePlacements(model, data)
-        (chest, turn), (hand, move) = self._frame(one.chest, 5.0), self._frame(one.hand, 5.0)
-        posture = -20.0 * v - 100.0 * pin.difference(model, one.robot.neutral, q)
-        parts += [(chest[3:], turn[3:], 1.0), (hand[:3], move[:3], 1.0), (np.eye(nv)[6:], posture[6:], 1e-4)]
+        one, nv, state = self.one, self.model.nv, PinocchioState(self.model, q, v)
+
+        def asked(name: str, gain: float) -> np.ndarray:
+            """The acceleration that a frame is asked for."""
+            frame, start = state.frame(name), self.start.frame(name).pose
+            off = np.r_[frame.pose.translation - start.translation, pin.log3(frame.pose.rotation @ start.rotation.T)]
+            return -frame.bias - 4.0 * gain * frame.twist - 4.0 * gain**2 * off
+
+        fall = -state.center_bias - 16.0 * state.center_J @ v - 64.0 * (state.center - self.start.center)
+        posture = -20.0 * v - 100.0 * pin.difference(self.model, one.robot.neutral, q)
+        parts = [
+            (state.center_J, fall, 10.0),
+            (state.frame(one.chest).J[3:], asked(one.chest, 5.0)[3:], 1.0),
+            (state.frame(one.hand).J[:3], asked(one.hand, 5.0)[:3], 1.0),
+            (np.eye(nv)[6:], posture[6:], 1e-4),
+        ]
         forces = []
         for sole in one.soles:
-            J, asked = self._frame(sole, 5.0)
-            parts.append((J, asked, 1e3))
-            turned = data.oMf[model.getFrameId(sole)].rotation
-            forces += [J[:3] - pin.skew(turned @ corner) @ J[3:] for corner in one.corners]
+            frame = state.frame(sole)
+            parts.append((frame.J, asked(sole, 5.0), 1e3))
+            forces += [frame.J[:3] - pin.skew(frame.pose.rotation @ corner) @ frame.J[3:] for corner in one.corners]
         down, count = np.vstack(forces).T, 3 * len(forces)
         H = np.diag(np.concatenate([np.full(nv, 1e-6), np.full(count, 1e-4 / self.weight**2)]))
         g = np.zeros(nv + count)
-        for J, asked, weight in parts:
+        for J, wanted, weight in parts:
             H[:nv, :nv] += weight * J.T @ J
-            g[:nv] += weight * J.T @ asked
-        moved, most = np.hstack([M, -down]), one.robot.limits.effort[6:]
+            g[:nv] -= weight * J.T @ wanted
+        moved, most = np.hstack([state.M, -down]), np.r_[np.zeros(6), one.robot.limits.effort[6:]]
         mu = FRICTION / np.sqrt(2.0)
         pyramid = np.array([[0, 0, 1], [1, 0, mu], [-1, 0, mu], [0, 1, mu], [0, -1, mu]])
         cones = np.hstack([np.zeros((5 * len(forces), nv)), np.kron(np.eye(len(forces)), pyramid)])
-        rows = np.vstack([moved, -moved[6:], cones])
-        ends = np.concatenate([-h[:6], -most - h[6:], -most + h[6:], np.zeros(len(cones))])
-        size = 1.0 / np.sqrt(np.diag(H))
-        length = np.linalg.norm(rows * size, axis=1)
-        try:
-            x = (
-                size
-                * quadprog.solve_qp(
-                    H * np.outer(size, size), g * size, (rows * size / length[:, None]).T, ends / length, 6
-                )[0]
-            )
-        except ValueError:
-            return self.last
-        self.last = np.concatenate([np.zeros(6), np.clip((moved @ x + h)[6:], -most, most)])
+        free, none = np.full(nv + count, np.inf), np.zeros(len(cones))
+        lower, upper = np.r_[-free, -most - state.h, none], np.r_[free, most - state.h, none + np.inf]
+        x = referee(QP(H, g, lower, upper, np.vstack([moved, cones])))
+        if x is not None:
+            self.last = np.clip(moved @ x + state.h, -most, most)
         return self.last
 
 

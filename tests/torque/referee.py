@@ -1,20 +1,31 @@
-"""The QP of a torque tick by numpy and Pinocchio alone, and its solution by quadprog."""
+"""The QP of a torque tick from what Pinocchio says of the state, and its solution by quadprog."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
-import quadprog
 
+from tests.judges.quadprog_qp import referee
+from tests.pinocchio_state import PinocchioState
 from wbc.api import Controller
+from wbc.qp import QP
 from wbc.robot import Robot
-from wbc.symbolic.kinematics import frame_index
 from wbc.tasks import CenterOfMass, EndEffector, PointContact, Posture, RigidGrasp, SurfaceContact
 
 G = 9.81
 FORCE_WEIGHT, REST, REST_WEIGHT = 1e-4, 5.0, 1e-8
+Wrenched = PointContact | SurfaceContact | RigidGrasp
+
+
+def cone(item: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows on a wrench and their sides, which tests/torque/test_contacts.py holds to sums of forces."""
+    rows = item.cone({declared.name: ca.SX(declared.default) for declared in item.limits()})
+    outputs = ca.Function("cone", [], [ca.densify(ca.SX(part)) for part in (rows.matrix, rows.lower, rows.upper)])()
+    matrix, lower, upper = (np.array(outputs[f"o{k}"]) for k in range(3))
+    return matrix, lower[:, 0], upper[:, 0]
 
 
 class Referee:
@@ -22,144 +33,76 @@ class Referee:
 
     def __init__(self, controller: Controller, q: np.ndarray, v: np.ndarray, dt: float) -> None:
         self.controller, self.stack, self.robot = controller, controller.stack, controller.stack.robot
-        self.q, self.v, self.dt = q, v, dt
-        self.model, self.data = self.robot.model, self.robot.model.createData()
-        pin.forwardKinematics(self.model, self.data, q, v, np.zeros(self.model.nv))
-        pin.updateFramePlacements(self.model, self.data)
-        pin.computeJointJacobians(self.model, self.data, q)
-        self.M = pin.crba(self.model, self.model.createData(), q)
-        self.M = np.triu(self.M) + np.triu(self.M, 1).T
-        self.h = pin.nonLinearEffects(self.model, self.model.createData(), q, v)
-        self.contacts = {
-            e.name: e.item for e in self.stack.entries if isinstance(e.item, (PointContact, SurfaceContact, RigidGrasp))
-        }
-        self.places, n = {}, self.model.nv
+        self.state, self.dt, self.base = PinocchioState(self.robot.model, q, v), dt, self.robot.base_nv
+        self.contacts = {e.name: e.item for e in self.stack.entries if isinstance(e.item, Wrenched)}
+        self.places, n = {}, self.robot.nv
         for name, item in self.contacts.items():
             self.places[name] = slice(n, n := n + item.components)
         self.n = n
 
-    def frame(self, name: str) -> tuple[pin.SE3, np.ndarray, np.ndarray, np.ndarray]:
-        """Pose, Jacobian, and its rate times v at the frame's origin in world axes; Jacobian in the frame's axes."""
-        f = frame_index(self.model, name)
-        J = pin.getFrameJacobian(self.model, self.data, f, pin.LOCAL_WORLD_ALIGNED)
-        local = pin.getFrameJacobian(self.model, self.data, f, pin.LOCAL)
-        bias = pin.getFrameClassicalAcceleration(self.model, self.data, f, pin.LOCAL_WORLD_ALIGNED).vector
-        return self.data.oMf[f].copy(), np.array(J), np.array(bias), np.array(local)
-
     def task(self, item: Any, target: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """error, J, (dJ/dt) v."""
-        nv = self.model.nv
+        state, nv = self.state, self.robot.nv
         if isinstance(item, EndEffector):
-            pose, J, bias, _ = self.frame(item.frame)
-            return pose.translation - target, J[:3], bias[:3]
+            frame = state.frame(item.frame)
+            return frame.pose.translation - target, frame.J[:3], frame.bias[:3]
         if isinstance(item, CenterOfMass):
-            data = self.model.createData()
-            com = pin.centerOfMass(self.model, data, self.q, self.v, np.zeros(nv))
-            error, bias = com - target, data.acom[0].copy()
-            return error, pin.jacobianCenterOfMass(self.model, self.model.createData(), self.q), bias
+            return state.center - target, state.center_J, state.center_bias
         assert isinstance(item, Posture)
-        base = 6 if self.robot.base == "floating" else 0
-        error = pin.difference(self.model, target, self.q)[base:]
-        return error, np.eye(nv)[base:], np.zeros(nv - base)
+        error = pin.difference(self.robot.model, target, state.q)[self.base :]
+        return error, np.eye(nv)[self.base :], np.zeros(nv - self.base)
 
-    def cone(self, item: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows on a wrench."""
-        if isinstance(item, RigidGrasp):
-            most = np.concatenate([np.broadcast_to(item.force, 3), np.broadcast_to(item.torque, 3)]).astype(float)
-            return np.eye(6), -most, most
-        if isinstance(item, PointContact):
-            angles = 2 * np.pi * np.arange(item.edges) / item.edges
-            slope = np.cos(np.pi / item.edges) * item.friction
-            faces = np.column_stack([-np.cos(angles), -np.sin(angles), np.full(item.edges, slope)])
-        else:
-            # every wrench of the corners' pyramids is allowed, and each row touches them: tests/torque/test_contacts.py
-            X, Y = item.half_lengths
-            mu = item.friction / np.sqrt(2)
-            faces = []
-            for s in (1, -1):
-                faces += [[s, 0, mu, 0, 0, 0], [0, s, mu, 0, 0, 0], [0, 0, Y, s, 0, 0], [0, 0, X, 0, s, 0]]
-                for a in (1, -1):
-                    for b in (1, -1):
-                        faces.append([a * Y, b * X, mu * (X + Y), s * a * mu, s * b * mu, -s])
-        rows = np.vstack([np.eye(len(faces[0]))[2], faces])
-        return rows, np.zeros(len(rows)), np.full(len(rows), np.inf)
+    def wide(self, matrix: np.ndarray, first: int = 0) -> np.ndarray:
+        """Columns of the variables from the ``first`` on, as columns of all."""
+        return np.pad(matrix, ((0, 0), (first, self.n - first - matrix.shape[1])))
 
-    def qp(self) -> tuple[np.ndarray, ...]:
-        """H, g, equality rows and sides, inequality rows and lower sides."""
-        stack, nv, n = self.stack, self.model.nv, self.n
+    def qp(self) -> QP:
+        """Of accelerations and wrenches."""
+        stack, state, nv, n = self.stack, self.state, self.robot.nv, self.n
         metre = np.where(np.array(self.robot.dof_units) == "m", stack.length, 1.0)
-        weight = pin.computeTotalMass(self.model) * G
-        sizes = [metre]
-        for item in self.contacts.values():
-            sizes.append(np.repeat([weight, weight * self.robot.characteristic_length], 3)[: item.components])
-        size = np.concatenate(sizes)
-        # damping of all variables, and joints that come to rest
-        H = np.diag(stack.damping / size**2)
-        rest = np.zeros(n)
-        rest[:nv] = REST_WEIGHT / metre**2
-        H += np.diag(rest)
-        g = rest * np.concatenate([4 * REST * self.v, np.zeros(n - nv)])
-        for place in self.places.values():
-            H[place, place] += np.diag(FORCE_WEIGHT / size[place] ** 2)
+        weight = pin.computeTotalMass(self.robot.model) * G
+        units = np.repeat([weight, weight * self.robot.characteristic_length], 3)
+        size = np.concatenate([metre, *[units[: item.components] for item in self.contacts.values()]])
+        # damping of all variables, joints that come to rest, and small wrenches
+        rest = np.r_[REST_WEIGHT / metre**2, np.zeros(n - nv)]
+        H = np.diag(stack.damping / size**2 + rest + np.r_[np.zeros(nv), np.full(n - nv, FORCE_WEIGHT)] / size**2)
+        g = rest * np.r_[4 * REST * state.v, np.zeros(n - nv)]
         for entry in stack.tasks:
             if not isinstance(entry.item, (EndEffector, CenterOfMass, Posture)):
                 continue
             gain = 2.0
             e, J, bias = self.task(entry.item, self.controller[entry.name].get("target"))
             length = stack.length if not isinstance(entry.item, Posture) else 1.0
-            wide = np.hstack([J, np.zeros((len(J), n - nv))])
-            wanted = -4 * gain**2 * e - 4 * gain * J @ self.v - bias
-            H += entry.weight / length**2 * wide.T @ wide
-            g -= entry.weight / length**2 * wide.T @ wanted
-        equal, sides, rows, lower = [], [], [], []
-        dynamics, base = np.hstack([self.M, np.zeros((nv, n - nv))]), 6 if self.robot.base == "floating" else 0
+            wanted = -4 * gain**2 * e - 4 * gain * J @ state.v - bias
+            H[:nv, :nv] += entry.weight / length**2 * J.T @ J
+            g[:nv] -= entry.weight / length**2 * J.T @ wanted
+        dynamics, most = self.wide(state.M), self.robot.limits.effort[self.base :]
+        rows, lower, upper = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
         for name, item in self.contacts.items():
-            pose, J, bias, local = self.frame(item.frame)
-            k, target = item.components, self.controller[name].get("target")
-            turn = pose.rotation @ target.rotation.T
-            phi = pin.log3(turn)
-            e = np.concatenate([pose.translation - target.translation, phi])[:k]
-            speed = J @ self.v
-            de = np.concatenate([speed[:3], pin.Jlog3(turn).T @ speed[3:]])[:k]
-            equal.append(np.hstack([J[:k], np.zeros((k, n - nv))]))
-            sides.append(-10.0 * de - bias[:k] - 20.0 * (speed[:k] + 10.0 * e))
-            dynamics[:, self.places[name]] = -local[:k].T
-            F, low, high = self.cone(item)
-            wide = np.zeros((len(F), n))
-            wide[:, self.places[name]] = F
-            rows += [wide, -wide[np.isfinite(high)]]
-            lower += [low, -high[np.isfinite(high)]]
-        equal.append(dynamics[:base])
-        sides.append(-self.h[:base])
-        most = self.robot.limits.effort[base:]
-        rows += [dynamics[base:], -dynamics[base:]]
-        lower += [-most - self.h[base:], -most + self.h[base:]]
-        ends = [acceleration_interval(self.robot, i, self.q, self.v, self.dt, stack.dt_range[1]) for i in range(nv)]
-        for sign, end in ((1.0, 0), (-1.0, 1)):
-            bound = sign * np.array([pair[end] for pair in ends])
-            on = np.flatnonzero(np.isfinite(bound))
-            rows.append(sign * np.eye(n)[on])
-            lower.append(bound[on])
-        return H, g, np.vstack(equal), np.concatenate(sides), np.vstack(rows), np.concatenate(lower)
+            frame, target, k = state.frame(item.frame), self.controller[name].get("target"), item.components
+            turn = frame.pose.rotation @ target.rotation.T
+            e = np.r_[frame.pose.translation - target.translation, pin.log3(turn)]
+            de = np.r_[frame.twist[:3], pin.Jlog3(turn).T @ frame.twist[3:]]
+            wanted = (-10.0 * de - frame.bias - 20.0 * (frame.twist + 10.0 * e))[:k]
+            F, low, high = cone(item)
+            rows += [self.wide(frame.J[:k]), self.wide(F, self.places[name].start)]
+            lower, upper = [*lower, wanted, low], [*upper, wanted, high]
+            dynamics[:, self.places[name]] = -frame.local[:k].T
+        none = np.zeros(self.base)
+        ends = [acceleration_interval(self.robot, i, state.q, state.v, self.dt, stack.dt_range[1]) for i in range(nv)]
+        free = np.full(n - nv, np.inf)
+        least = np.concatenate([[low for low, _ in ends], -free, *lower, np.r_[none, -most] - state.h])
+        greatest = np.concatenate([[high for _, high in ends], free, *upper, np.r_[none, most] - state.h])
+        return QP(H, g, least, greatest, np.vstack([*rows, dynamics]))
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:
         """(a and wrenches, torques)."""
-        H, g, E, e, A, b = self.qp()
-        nv, base = self.model.nv, 6 if self.robot.base == "floating" else 0
-        C = np.vstack([E, A])
-        # in units of rows and columns, for the solver's tolerances
-        column = 1.0 / np.sqrt(np.diag(H))
-        row = 1.0 / np.linalg.norm(C * column, axis=1)
-        scaled = (C * column) * row[:, None]
-        x = (
-            quadprog.solve_qp(H * np.outer(column, column), -g * column, scaled.T, np.r_[e, b] * row, len(E))[0]
-            * column
-        )
-        tau = self.M @ x[:nv] + self.h
+        x, state = referee(self.qp()), self.state
+        assert x is not None
+        tau = pin.rnea(self.robot.model, state.data, state.q, state.v, x[: self.robot.nv])
         for name, item in self.contacts.items():
-            local = self.frame(item.frame)[3]
-            tau -= local[: item.components].T @ x[self.places[name]]
-        tau[:base] = 0.0
+            tau -= state.frame(item.frame).local[: item.components].T @ x[self.places[name]]
+        tau[: self.base] = 0.0
         return x, tau
 
 

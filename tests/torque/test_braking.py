@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wbc.robots
+from tests.pinocchio_state import PinocchioState
 from tests.torque.problems import controller, robot
 from wbc.api import Controller, Stack
 from wbc.errors import CommandError, RangeError
@@ -45,11 +46,8 @@ def test_limits_hold_at_accelerations_that_the_motors_have_and_not_at_others() -
     assert 0.005 < found.scale < 0.9
     assert found.acceleration == pytest.approx(found.scale * asked.limits.acceleration)
     # the state that decides: with all torque on one side nothing is left
-    M = pin.crba(asked.model, asked.model.createData(), found.q)
-    M = np.triu(M) + np.triu(M, 1).T
-    h = pin.nonLinearEffects(asked.model, asked.model.createData(), found.q, found.v)
-    k = asked.dof_names.index(found.decides)
-    assert np.abs(h[k]) + np.abs(M[k]) @ found.acceleration == pytest.approx(0.95 * asked.limits.effort[k])
+    state, k = PinocchioState(asked.model, found.q, found.v), asked.dof_names.index(found.decides)
+    assert np.abs(state.h[k]) + np.abs(state.M[k]) @ found.acceleration == pytest.approx(0.95 * asked.limits.effort[k])
     worst, braked = thrown(asked)
     assert max(worst, braked) > 0, "the adversary breaks nothing, which is no test"
     worst, braked = thrown(asked.with_limits(acceleration=found.acceleration))

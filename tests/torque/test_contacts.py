@@ -4,44 +4,43 @@ from __future__ import annotations
 
 import itertools
 
-import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
 
+from tests.pinocchio_state import PinocchioState
 from tests.torque.problems import DT, controller, robot
-from tests.torque.referee import Referee
+from tests.torque.referee import cone
 from wbc.api import Stack
 from wbc.errors import CommandError
-from wbc.tasks import EndEffector, PointContact, RigidGrasp, SurfaceContact
+from wbc.tasks import EndEffector, LineContact, PointContact, RigidGrasp, SurfaceContact
 
 
-def cone(item: SurfaceContact | PointContact) -> tuple[np.ndarray, np.ndarray]:
-    """Rows F w >= low of a contact's declaration, by CasADi."""
-    declared = {i.name: ca.SX(i.default) for i in item.limits()}
-    found = item.cone(declared)
-    function = ca.Function("cone", [], [ca.densify(found.matrix), found.lower])
-    matrix, low = function()["o0"], function()["o1"]
-    return np.array(matrix), np.array(low)[:, 0]
-
-
-def test_surface_wrenches_are_exactly_those_of_four_corners() -> None:
-    """Sums of forces within pyramids at the corners are allowed; others, found by linear programming, are not."""
-    X, Y, friction = 0.12, 0.05, 0.7
-    F, low = cone(SurfaceContact("any", half_lengths=(X, Y), friction=friction))
-    mu = friction / np.sqrt(2)
-    corners = [np.array([a * X, b * Y, 0.0]) for a, b in itertools.product((1, -1), repeat=2)]
+@pytest.mark.parametrize(
+    ("item", "ends"),
+    [
+        (SurfaceContact("any", half_lengths=(0.12, 0.05), friction=0.7), [(a, b) for a in (1, -1) for b in (1, -1)]),
+        (LineContact("any", half_length=0.12, friction=0.7), [(1, 0), (-1, 0)]),
+    ],
+)
+def test_wrenches_are_exactly_those_of_forces_at_the_ends(
+    item: SurfaceContact | LineContact, ends: list[tuple[int, int]]
+) -> None:
+    """Sums of forces within pyramids at corners or ends are allowed; others, found by linear programming, are not."""
+    F, low, _ = cone(item)
+    mu = item.friction / np.sqrt(2)
     rays = [np.array([a * mu, b * mu, 1.0]) for a, b in itertools.product((1, -1), repeat=2)]
-    generators = np.column_stack([np.r_[f, np.cross(p, f)] for p in corners for f in rays])
-    rng = np.random.default_rng(0)
-    inside = generators @ rng.exponential(1.0, (16, 200)) ** 3
+    places = [np.array([0.12 * a, 0.05 * b, 0.0]) for a, b in ends]
+    whole, axes = np.column_stack([np.r_[f, np.cross(p, f)] for p in places for f in rays]), list(item.axes)
+    assert not np.delete(whole, axes, axis=0).any()
+    generators, rng, outside = whole[axes], np.random.default_rng(0), 0
+    inside = generators @ rng.exponential(1.0, (generators.shape[1], 200)) ** 3
     assert (F @ inside >= low[:, None] - 1e-9).all()
-    scale = np.array([0.6, 0.6, 1.0, 0.06, 0.13, 0.08])
-    outside = 0
-    for w in rng.normal(size=(300, 6)) * scale + np.array([0, 0, 1.0, 0, 0, 0]):
+    scale = np.array([0.6, 0.6, 1.0, 0.06, 0.13, 0.08])[axes]
+    for w in rng.normal(size=(300, len(axes))) * scale + np.eye(6)[2, axes]:
         allowed = bool((F @ w >= low - 1e-9).all())
-        possible = linprog(np.zeros(16), A_eq=generators, b_eq=w).status == 0
+        possible = linprog(np.zeros(generators.shape[1]), A_eq=generators, b_eq=w).status == 0
         assert allowed == possible, w
         outside += not possible
     assert 30 < outside < 270
@@ -50,7 +49,7 @@ def test_surface_wrenches_are_exactly_those_of_four_corners() -> None:
 @pytest.mark.parametrize("edges", [4, 5, 8])
 def test_a_pyramid_is_within_coulombs_cone_and_touches_it(edges: int) -> None:
     friction = 0.6
-    F, low = cone(PointContact("any", friction=friction, edges=edges))
+    F, low, _ = cone(PointContact("any", friction=friction, edges=edges))
     angles, sizes = np.linspace(0.0, 2 * np.pi, 720, endpoint=False), np.linspace(0, 1, 401)
     around = np.array([np.cos(angles), np.sin(angles)])
     # rows x angles x sizes
@@ -59,6 +58,13 @@ def test_a_pyramid_is_within_coulombs_cone_and_touches_it(edges: int) -> None:
     assert radius.max() <= friction + 1e-9
     assert radius.max() >= friction - 0.003
     assert radius.min() >= np.cos(np.pi / edges) * friction - 0.003
+
+
+def test_a_grip_bears_what_it_is_rated_for_along_each_axis() -> None:
+    F, low, high = cone(RigidGrasp("any", force=300.0, torque=(80.0, 90.0, 100.0)))
+    assert np.array_equal(F, np.eye(6))
+    assert np.array_equal(high, [300.0, 300.0, 300.0, 80.0, 90.0, 100.0])
+    assert np.array_equal(low, -high)
 
 
 def standing() -> tuple[object, np.ndarray, np.ndarray]:
@@ -201,7 +207,7 @@ def test_velocity_and_acceleration_level_hold_the_frame() -> None:
         tick.reset(bot.neutral)
         tick["hand"].target = tick["hand"].target + 0.3
         step = tick.step(bot.neutral, np.zeros(bot.nv))
-        J = Referee(tick, bot.neutral, np.zeros(bot.nv), DT).frame("arm1_hand")[1]
+        J = PinocchioState(bot.model, bot.neutral, np.zeros(bot.nv)).frame("arm1_hand").J
         assert np.abs(J @ step.command).max() < 1e-9
         assert np.abs(step.command).max() > 0.01
         for name in ("torque", "forces"):

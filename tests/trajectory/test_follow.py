@@ -10,11 +10,11 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.models import placement
+from tests.models import free_direction, placement
 from wbc.errors import ContinuityError, InfeasibleError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
-from wbc.trajectory import follow
+from wbc.trajectory import follow, geodesic_path
 from wbc.trajectory.paths.path import Path, PolynomialPath
 
 TIP = "panda_hand_tcp"
@@ -38,20 +38,9 @@ class Circle(Path):
         return out
 
 
-class Line(Path):
+def line(home: pin.SE3, move: np.ndarray) -> Path:
     """A straight line from a pose; the orientation stays."""
-
-    space, dof, degree = "poses", 6, None
-
-    def __init__(self, home: pin.SE3, move: np.ndarray) -> None:
-        self.home, self.knots = home, np.array([0.0, np.linalg.norm(move)])
-        self.direction = move / self.knots[1]
-
-    def evaluate(self, s: np.ndarray, order: int = 0, piece: Any = None) -> np.ndarray:
-        assert order == 0
-        out = np.tile(self.home.homogeneous, (len(s), 1, 1))
-        out[:, :3, 3] += s[:, None] * self.direction
-        return out
+    return geodesic_path(home, pin.SE3(home.rotation, home.translation + move))
 
 
 def tip(q: np.ndarray) -> pin.SE3:
@@ -90,9 +79,7 @@ def test_what_the_pose_leaves_open_is_the_stack_s() -> None:
     ends = followed.path.evaluate(followed.path.knots[[0, -1]])
     assert np.abs(ends - ROBOT.neutral).max() < 1e-7
     q = followed.path.evaluate(np.array([0.3]))[0]
-    data = ROBOT.model.createData()
-    jacobian = pin.computeFrameJacobian(ROBOT.model, data, q, ROBOT.model.getFrameId(TIP))
-    free = np.linalg.svd(jacobian)[2][-1]
+    free = free_direction(ROBOT, TIP, q)
     assert np.abs(q - ROBOT.neutral).max() > 0.1
     assert abs(free @ (q - ROBOT.neutral)) < 1e-4
 
@@ -130,10 +117,10 @@ def test_a_path_out_of_reach_names_the_place() -> None:
     home = tip(ROBOT.neutral)
     move = np.array([0.8, 0.0, 0.0])
     with pytest.raises(InfeasibleError, match="not reached") as caught:
-        follow(stack(), Line(home, move), ROBOT.neutral, "hand")
+        follow(stack(), line(home, move), ROBOT.neutral, "hand")
     reach = caught.value.value
     assert 0.05 < reach < 0.6
-    shorter = Line(home, move * (reach - 1e-3) / 0.8)
+    shorter = line(home, move * (reach - 1e-3) / 0.8)
     assert off(follow(stack(), shorter, ROBOT.neutral, "hand").path, shorter) < 2e-5
 
 
@@ -147,10 +134,10 @@ def test_a_jump_names_the_place_and_the_joint() -> None:
         if k < 6:
             continue
         with pytest.raises(ContinuityError, match=r"panda_joint\d jumps by 0\.\d+") as caught:
-            follow(stack(), Line(home, move), q, "hand")
+            follow(stack(), line(home, move), q, "hand")
         found.append(caught.value.value)
         length = np.linalg.norm(move)
-        before = Line(home, move * (found[0] - 1e-3) / length)
+        before = line(home, move * (found[0] - 1e-3) / length)
         assert off(follow(stack(), before, q, "hand").path, before) < 2e-5
     assert found
 

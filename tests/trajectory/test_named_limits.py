@@ -83,7 +83,7 @@ def test_shortest_durations_and_largest_speeds_along_paths() -> None:
                 refused += 1
                 (most,) = named(error, " is #")
                 with pytest.raises(InfeasibleError):
-                    time_optimal(path, *limits, **{**asked, error.field: 1.01 * most})
+                    time_optimal(path, *limits, **{**asked, error.field: 1.0001 * most})
                 asked[error.field] = most
         else:
             pytest.fail(f"no speeds were found for {asked}")

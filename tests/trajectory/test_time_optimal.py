@@ -8,7 +8,7 @@ import toppra
 import toppra.algorithm
 import toppra.constraint
 
-from wbc.trajectory import Law, PolynomialPath, Timing, blend_path, spline_path, time_optimal
+from wbc.trajectory import Law, PolynomialPath, Timing, blend_path, time_optimal
 
 CLAIM = 1.0 + 1e-6
 
@@ -118,12 +118,6 @@ def test_limits_of_very_different_sizes(velocity, acceleration):
     law = time_optimal(waypoints, velocity, per_joint)
     assert max(ratios(law)) <= CLAIM
     assert max(ratios(law)) > 1.0 - 1e-6
-
-
-def test_a_path_and_its_waypoints_are_alike():
-    waypoints, velocity, acceleration = random_problem(np.random.default_rng(12), 5)
-    given = time_optimal(spline_path(waypoints), velocity, acceleration)
-    assert given.duration == time_optimal(waypoints, velocity, acceleration).duration
 
 
 def test_finer_grids_are_never_much_slower():

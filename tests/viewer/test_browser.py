@@ -58,6 +58,10 @@ def loop() -> Iterator[Loop]:
     running.over.set()
     running.join()
     running.viewer.close()
+    # A way round that was begun is compiled to its end, which may take longer than all that is looked at here
+    for thread in threading.enumerate():
+        if thread.name == "way round":
+            thread.join()
 
 
 @functools.cache

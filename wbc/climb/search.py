@@ -31,7 +31,7 @@ from wbc.climb.foothold_graph import ways_over_footholds
 from wbc.climb.goal import BodyPlace, Goal, LimbAt, Route
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene
-from wbc.climb.separation import Crossing, Separation
+from wbc.climb.separation import Separation
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.watch import PlanWatch
 from wbc.climb.world import SPARE, ClimbWorld, PostureOutcome
@@ -54,8 +54,6 @@ NEAR = 1.0
 DEAR = 6.0
 #: Other beginnings from which postures of refused moves are sought, once nothing else is left
 ATTEMPTS = 3
-#: Moves that brought no stance nearer to the goal after which is asked whether any could
-STANDSTILL = 3000
 #: What a move costs more whose like could not be made, once [steps]
 LATE = 8.0
 #: What a limb in the air costs [steps]
@@ -285,7 +283,7 @@ class StanceSearch:
         self._sets = [tuple(climber.row(name) for name in names) for names in options.gait]
         counted = options.effort < np.inf and np.any(scene.gravity)
         self._balance = Equilibrium(climber, scene, options.friction) if counted else None
-        self._separation, self._stalled = Separation(self.world, self.goal), STANDSTILL
+        self._separation = Separation(self.world, self.goal)
 
     def run(self, watch: PlanWatch) -> StancePath:
         """The way found, see :func:`find_stances`; called again, one without the moves that were forbidden since."""
@@ -316,10 +314,6 @@ class StanceSearch:
             tried = sum(self.tried.values())
             if tried >= most or time.monotonic() > until or watch.passed:
                 raise self._refusal("limit")
-            if tried >= self._stalled:
-                self._stalled = 2 * tried
-                if (crossing := self._crossing()).lacks:
-                    raise self._refusal("gap", crossing.told)
             if self._forbidden(node.contacts, after):
                 continue
             if attempt == 0 and self._comes_late(node, after):
@@ -339,7 +333,7 @@ class StanceSearch:
             self._known[after.tobytes()] = found
             self.seen = len(self._known)
             if self._distance(found) < self._distance(self._nearest):
-                self._nearest, self._stalled = found, sum(self.tried.values()) + STANDSTILL
+                self._nearest = found
             if path := self._at_goal(found):
                 return path
             self._push(found, self._moves(found))
@@ -609,7 +603,7 @@ class StanceSearch:
         stances = [Stance(self._rows(contacts), self.world.q_of(state)) for contacts, state in rows]
         return StancePath((self.given, *stances[1:]), np.array(margins))
 
-    def _crossing(self) -> Crossing:
+    def _crossing(self) -> str:
         """The first step that no stance has made."""
         borne = [node.contacts for node in self._known.values()]
         if len(self._names) == 2:
@@ -620,18 +614,16 @@ class StanceSearch:
         rows = {row for contacts in borne for row in self._rows(contacts)} - {FREE_LIMB}
         return self._separation.crossing(rows, self._far.min(axis=0), self.options.margin, self.first.state)
 
-    def _refusal(self, cause: str, why: str = "") -> NoStancesError:
+    def _refusal(self, cause: str) -> NoStancesError:
         tried, best = sum(self.tried.values()), self._nearest
         nearest = self._distance(best)
         parts = counted(self.tried)
         saw = f"{self.seen} stances were reached and {tried} moves looked at" + (f" ({parts})" if parts else "")
         which = f"the nearest is {nearest:.3g} m from the goal, on {self._told(best)}"
         goal = self._told_goal()
-        if cause == "gap":
-            return no_stances("goal", goal, f"{why}; {saw}; {which}", "goal", nearest)
         if cause == "limit":
             reason = f"a limit of moves or time ended the search, which proves nothing: {saw}; {which}"
-            told = self._crossing().told
+            told = self._crossing()
             return no_stances("goal", goal, f"{reason}; {told}" if told else reason, cause, nearest)
         if lacking := "; ".join(self._separation.lacking().values()):
             reason = f"no stance there is within reach: {lacking}; {saw}; {which}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,18 +21,6 @@ from wbc.validation import Array
 NEARLY_CLOSED = 1e-3
 #: Steps that are tried, those on the shortest ways to the goal first
 SHORTEST_STEPS = 60
-
-
-class Crossing(NamedTuple):
-    """A step from a foothold that was held to one that was not.
-
-    Attributes:
-        told: which one, and what it lacks, in words; "" where there is none.
-        lacks: whether no step of those that were tried can be made.
-    """
-
-    told: str
-    lacks: bool
 
 
 class Separation:
@@ -91,9 +78,10 @@ class Separation:
             f" apart: {int(reached.sum())} of {len(positions)} footholds can be come to"
         )
 
-    def crossing(self, held: set[int], left: Array, margin: float, state: Array) -> Crossing:
-        """Whether two limbs can hold a foothold that was held and one that was not, on the shortest ways to the goal; a
-        robot of two limbs with its weight on the one, then on the other.
+    def crossing(self, held: set[int], left: Array, margin: float, state: Array) -> str:
+        """Which step from a foothold that was held to one that was not was not found, on the shortest ways to the goal,
+        and what it lacks where none of those that were tried can be made; a robot of two limbs with its weight on the
+        one, then on the other. Nothing where all were found.
 
         Args:
             held: rows of footholds, of two limbs those on which one has borne the robot alone.
@@ -114,9 +102,9 @@ class Separation:
                     break
                 best = min([best, *((off, f"{self._told(a, b)} {text}") for off, text in filter(None, lacks))])
             else:
-                said = f"none of the {len(steps)} shortest steps to footholds that cannot be come to can be made"
-                return Crossing(f"{said}: {best[1]}", True) if best[1] else Crossing(made, False)
-        return Crossing(made, False)
+                said = f"none of the {len(steps)} shortest steps to footholds that were not come to was found"
+                return f"{said}: {best[1]}" if best[1] else made
+        return made
 
     def _lacks(self, contacts: NDArray[np.int32], begun: Array, margin: float) -> tuple[float, str] | None:
         """How far two limbs are from holding, with the weight on either where there is no third one, also in words;

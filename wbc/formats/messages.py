@@ -88,9 +88,8 @@ def of_scene(run: Run) -> Iterator[Message]:
 def of_seen(seen: SeenTick) -> Iterator[Message]:
     """The messages of what is seen of a tick."""
     time = int(nanoseconds(np.array([seen.t]))[0])
-    placed = {**seen.frames}
-    placed |= {f"target/{name}": pose for name, pose in seen.targets.items()}
-    placed |= {f"obstacle/{name}": pose for name, pose in seen.obstacles.items()}
+    prefixed = {"": seen.frames, "target/": seen.targets, "obstacle/": seen.obstacles}
+    placed = {f"{prefix}{name}": pose for prefix, poses in prefixed.items() for name, pose in poses.items()}
     if placed:
         place = {"timestamp": stamp(time), "parent_frame_id": WORLD}
         transforms = [

@@ -12,6 +12,7 @@ import numpy as np
 from wbc.formats.messages import AXIS
 from wbc.formats.run import Run, SeenTick
 from wbc.formats.sink import Sink
+from wbc.formats.tick_tree import by_first
 from wbc.log import Log
 
 #: Ticks that are sent together
@@ -103,7 +104,4 @@ def _layout(groups: Iterable[str]) -> Any:
 
 def _groups(names: Iterable[str]) -> dict[str, list[str]]:
     """What columns ``group.member`` begin with -> these columns."""
-    out: dict[str, list[str]] = {}
-    for name in names:
-        out.setdefault(name.partition(".")[0], []).append(name)
-    return out
+    return {group: list(members.values()) for group, members in by_first({name: name for name in names}).items()}

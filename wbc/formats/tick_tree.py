@@ -35,7 +35,7 @@ class TickTree:
     def __init__(self, units: Mapping[str, str], apart: Collection[str] = ()) -> None:
         self.names, self._units, self._shapes = list[str](), units, dict[str, Any]()
         self.schema = schema_of({"status": ""}, "wbc.Tick")
-        for key, members in _by_first({name: name for name in units if name not in apart}).items():
+        for key, members in by_first({name: name for name in units if name not in apart}).items():
             self.schema["properties"][key], self._shapes[key] = self._laid_out(members)
 
     def _laid_out(self, members: dict[str, str]) -> tuple[dict[str, Any], Any]:
@@ -45,7 +45,7 @@ class TickTree:
             self.names.append(members[""])
             unit = self._units[members[""]]
             return schema_of(0.0) | ({"description": f"[{unit}]"} if unit else {}), begin
-        parts = _by_first(members)
+        parts = by_first(members)
         if len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
             columns = {key: below[""] for key, below in parts.items()}
             self.names += columns.values()
@@ -60,7 +60,7 @@ class TickTree:
         return {key: _filled(shape, numbers) for key, shape in self._shapes.items()}
 
 
-def _by_first(members: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def by_first(members: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """First part of a name -> rest of the name -> column. A column may be called as what others begin with."""
     out: dict[str, dict[str, str]] = {}
     for name, column in members.items():

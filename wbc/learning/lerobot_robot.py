@@ -39,8 +39,7 @@ class LeRobotDevice:
     def calibrate(self) -> None:
         """Nothing to do."""
 
-    def configure(self) -> None:
-        """Nothing to do."""
+    configure = calibrate
 
     def disconnect(self) -> None:
         """End it."""

@@ -229,10 +229,12 @@ class PlanningCoordinates:
 
     def uncoupled(self, q: Array) -> tuple[float, str]:
         """How far the worst follower is from where its leader has it [rad or m], and what to say of it."""
+        if not self.robot.couplings:
+            return 0.0, ""
         robot, off = self.robot, q - self.configuration(self.of_configuration(q))
         far = {float(off[robot.position_index[coupling.follower]]): coupling for coupling in robot.couplings}
-        worst = max(far, key=abs, default=0.0)
-        row, leader = (far[worst].follower, far[worst].leader) if far else (0, 0)
+        worst = max(far, key=abs)
+        row, leader = far[worst].follower, far[worst].leader
         says = f"follows {robot.dof_names[leader]} and is {worst:.3g} {robot.dof_units[row]} from where it has to be"
         return worst, f"{robot.dof_names[row]} {says}"
 

@@ -72,7 +72,6 @@ class _PlanStruct(ctypes.Structure):
         ("parent", ctypes.c_void_p * 2),
         ("work", ctypes.c_void_p),
         ("meet", ctypes.c_int * 2),
-        *((name, ctypes.c_int) for name in ("edges", "projections", "measured")),
         *((name, ctypes.c_int) for name in ("struck", "partial", "alive", "ended", "lane_node", "lane")),
     ]
 
@@ -91,12 +90,12 @@ def library() -> ctypes.CDLL:
     kinds: dict[str, Sequence[object]] = {
         "prepare": (), "free": (place,), "margin": (place,), "edge": (place, place), "project": (place,),
         "broken": (place,), "reach": (place,), "draw": (place,), "root": (number, place),
-        "away": (place, ctypes.c_double), "grow": (number,), "path": (place, number),
+        "away": (place, ctypes.c_double, ctypes.c_double), "grow": (number,), "path": (place, number),
         "shorten": (place, number, number, number, number, place, number), "length": (place, number),
     }  # fmt: skip
     for name, arguments in kinds.items():
         getattr(found, f"wbc_plan_{name}").argtypes = [place, *arguments]
-    for name in ("broken", "length", "margin"):
+    for name in ("away", "broken", "length", "margin"):
         getattr(found, f"wbc_plan_{name}").restype = ctypes.c_double
     return found
 
@@ -112,8 +111,8 @@ class NativePlanner:
         coordinates = scene.coordinates
         n = coordinates.count
         self.scene, self._call, self._rows = scene, library(), {"path": rows}
-        self.low, self.high = (np.ascontiguousarray(side) for side in limits)
-        self.sample_low, self.sample_high = self.low.copy(), self.high.copy()
+        self.low, self.high, self.sample_low, self.sample_high = (side.copy() for side in (*limits, *limits))
+        self.bounded = bool(np.isfinite(limits).all())
         self._p, self._scale, self._weight = p, 1.0 / coordinates.scale, coordinates.scale**-2.0
         self._struct = it = _PlanStruct(n=n, capacity=NODES, range=1.0, step=0.1, tolerance=1e-8, drift=1e-3)
         self._nodes, self._lanes = ([np.empty((NODES, n)) for _ in range(2)] for _ in range(2))
@@ -149,7 +148,15 @@ class NativePlanner:
         for name, array in self._arrays.items():
             setattr(it, name, array.ctypes.data)
         self.at = ctypes.c_void_p(ctypes.addressof(it))
+        self._margins = dict[bytes, float]()
+        self._call.wbc_plan_prepare(self.at)
         self.pad(0.0)
+
+    def limit(self, low: Array, high: Array) -> None:
+        """Other limits of x, within the first ones."""
+        self.low[:] = self.sample_low[:] = low
+        self.high[:] = self.sample_high[:] = high
+        self._call.wbc_plan_prepare(self.at)
 
     def prepare(self, rows: PlanningRows) -> tuple[int, int, int]:
         """Compile rows that were not compiled before: see :meth:`PlanningRows.compiled`."""
@@ -175,7 +182,7 @@ class NativePlanner:
         self._sweep.require(self._required + pad)
         # Proven is what is required without the pad
         self._struct.open = pad
-        self._call.wbc_plan_prepare(self.at)
+        self._margins.clear()
 
     def set(self, **numbers: float) -> None:
         """Numbers of ``native/plan.h``: range, step, tolerance, drift, near_enough, longest."""
@@ -202,15 +209,20 @@ class NativePlanner:
 
     def margin(self, x: Array) -> float:
         """The least distance of a pair at x, less what it keeps [m]; infinite where there is no pair."""
-        own = self._call.wbc_plan_margin(self.at, np.ascontiguousarray(x).ctypes.data)
-        return float(own + self._struct.open - OPEN)
+        key = x.tobytes()
+        if key not in self._margins:
+            self._margins[key] = float(self._call.wbc_plan_margin(self.at, np.ascontiguousarray(x).ctypes.data))
+        return self._margins[key] + float(self._struct.open) - OPEN
 
     def away(self, x: Array, room: float) -> Array:
         """A configuration near x that has ``room`` [m] on all sides, and is reached from it straight; x where it has
         that room, or where there is none.
         """
         out = np.array(x, dtype=np.float64)
-        self._call.wbc_plan_away(self.at, out.ctypes.data, room - self._struct.open)
+        self.margin(x)
+        before = self._margins[x.tobytes()]
+        margin = self._call.wbc_plan_away(self.at, out.ctypes.data, room - self._struct.open, before)
+        self._margins[out.tobytes()] = margin
         return x if (out == x).all() else out
 
     def edge(self, x: Array, y: Array) -> bool:
@@ -278,8 +290,3 @@ class NativePlanner:
     def node(self, tree: int) -> Array:
         """All nodes of a tree."""
         return self._nodes[tree][: self._struct.count[tree]]
-
-    @property
-    def looked(self) -> tuple[int, int]:
-        """Edges and projections so far."""
-        return int(self._struct.edges), int(self._struct.projections)

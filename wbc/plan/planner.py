@@ -139,9 +139,9 @@ class MotionPlanner(Handles):
         self._controller = CompiledStack(light, compile_stack(light, "vm", __version__), "daqp")
         self._core = core_of(self._controller)
         super().__init__(self._core.handles, light)
+        self._idle = frozenset(names) - set(self.kept)
         self._stops = stops(declared, self._core.layout)[1:]
         self._use(PlanningCoordinates.of(declared.robot, declared.length))
-        self._switches: tuple[bool, ...] = ()
         self._places = PlanningScene.places_of(self._core)
 
     def plan(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> PlannedPath:
@@ -193,6 +193,11 @@ class MotionPlanner(Handles):
         self._builder = RowsBuilder(self._core, coordinates, self.kept)
         self._rows: dict[tuple[Any, ...], PlanningRows] = {}
         self._native: NativePlanner | None = None
+        robot, self._fixed = self.stack.robot, dict[str, list[int]]()
+        for entry in self.stack.constraints:
+            if isinstance(entry.item, Fixed):
+                dofs = {dof for name in entry.item.joints for dof in range(robot.nv)[robot.dofs(name)]}
+                self._fixed[entry.name] = [k for k, dof in enumerate(coordinates.dofs) if dof in dofs]
 
     def _search(
         self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]
@@ -204,7 +209,7 @@ class MotionPlanner(Handles):
             self._use(PlanningCoordinates.of(self.stack.robot, self.stack.length, q))
         # Of tasks that count for nothing no value is taken
         named = {name for target in goals if isinstance(target, TargetGoal) for name in target.names}
-        idle = {entry.name for entry in self.stack.tasks} - named - set(self.kept)
+        idle = self._idle - named
         self._core.initialise({slot: name for slot, name in self._core.first.items() if name not in idle}, q)
         self._core.waiting = {}
         # What is compiled once for many queries is no part of the time of one
@@ -237,32 +242,23 @@ class MotionPlanner(Handles):
 
     def native(self, q: Array) -> NativePlanner:
         """What is kept of the scene and the rows; made again where their run-time values have changed."""
-        switches = tuple(handle.enabled for handle in self._core.handles.values())
         key = PlanningScene.key_of(self._core, self._places)
-        if self._native is None or self._native.scene.key != key or switches != self._switches:
+        if self._native is None or self._native.scene.key != key:
             scene = PlanningScene.of(self._core, self.coordinates, key)
             self._native = NativePlanner(scene, self.rows(), self._core.tick.p, self._limits)
-            self._switches = switches
-        self._native.low[:], self._native.high[:] = self._limits
-        x = self.coordinates.of_configuration(q)
-        for entry in self.stack.constraints:
-            if isinstance(entry.item, Fixed) and self._core.handles[entry.name].enabled:
-                dofs = {d for name in entry.item.joints for d in range(*self.stack.robot.dofs(name).indices(10**6))}
-                fixed = [k for k, dof in enumerate(self.coordinates.dofs) if dof in dofs]
-                self._native.low[fixed] = self._native.high[fixed] = x[fixed]
+        if self._fixed:
+            low, high = (side.copy() for side in self._limits)
+            fixed = [k for name, numbers in self._fixed.items() if self._core.handles[name].enabled for k in numbers]
+            low[fixed] = high[fixed] = self.coordinates.of_configuration(q)[fixed]
+            self._native.limit(low, high)
         return self._native
 
-    def write(self, goal: TargetGoal) -> list[Array]:
-        """Write the targets of a goal; what was there before."""
-        before = [self._core.tick.p[slot.span].copy() for slot, _ in goal.numbers]
+    def write(self, goal: TargetGoal) -> TargetGoal:
+        """Write the targets of a goal; those that were there before."""
+        before = tuple((slot, self._core.tick.p[slot.span].copy()) for slot, _ in goal.numbers)
         for slot, numbers in goal.numbers:
             self._core.tick.p[slot.span] = numbers
-        return before
-
-    def restore(self, goal: TargetGoal, before: list[Array]) -> None:
-        """Write back what was there before."""
-        for (slot, _), numbers in zip(goal.numbers, before, strict=True):
-            self._core.tick.p[slot.span] = numbers
+        return TargetGoal(goal.names, before)
 
 
 class _Search:
@@ -338,6 +334,8 @@ class _Search:
     def _widen(self, x: Array) -> None:
         """Samples of coordinates without limits are drawn about start and goals."""
         native = self.native
+        if native.bounded:
+            return
         reach = BEYOND * self.planner.coordinates.scale
         low, high = np.minimum(self.start, x) - reach, np.maximum(self.start, x) + reach
         native.sample_low[:] = np.where(np.isfinite(native.low), native.low, low)
@@ -367,7 +365,7 @@ class _Search:
                         values = np.asarray(rows.function(x, planner._core.tick.p)[0]).ravel()
                         least = min(least, float(np.abs(values[: rows.equalities]).max()))
         finally:
-            planner.restore(goal, before)
+            planner.write(before)
         self.goals += sorted(free, key=lambda x: self._distance(x, self.start))[:BRANCHES]
         if free:
             return []

@@ -26,7 +26,7 @@ class PlanningScene:
     Attributes:
         coordinates: that move the robot.
         bodies, pairs: of :mod:`wbc.clearance`.
-        key: the run-time values that it was made of.
+        key: the run-time values that it was made of, and what was enabled.
     """
 
     coordinates: PlanningCoordinates
@@ -73,8 +73,8 @@ class PlanningScene:
 
     @staticmethod
     def key_of(core: Core, places: Array) -> bytes:
-        """The run-time values at ``places`` that a scene is made of."""
-        return bytes(core.tick.p[places].tobytes())
+        """The run-time values at ``places`` that a scene is made of, and what is enabled."""
+        return bytes(core.tick.p[places].tobytes()) + bytes(handle.enabled for handle in core.handles.values())
 
     @staticmethod
     def places_of(core: Core) -> Array:

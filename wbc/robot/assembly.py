@@ -84,9 +84,6 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     limits = read_limits(model, description.base, notes)
     undriven = {name: model.getJointId(name) for name in description.undriven if model.existJointName(name)}
     locked_dofs = tuple(int(model.idx_vs[j]) + k for j in undriven.values() for k in range(int(model.nvs[j])))
-    if undriven:
-        notes["undriven"] = f"nothing drives {', '.join(undriven)}, which is no base: its velocity must stay 0"
-        log.warning("%s: %s", description.source or model.name, notes["undriven"])
     if description.base == "differential":
         locked_dofs = (1, *locked_dofs)
         notes["base"] = "differential drive: the sideways velocity of the base (index 1 of v) must stay 0"
@@ -110,6 +107,10 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
         log.warning("%s: loops that are not kept closed, as load(loops=False) asked: %s", robot.name, names)
     elif description.loops:
         robot = robot.with_loops(*(_unlocked(loop, locked) for loop in description.loops))
+    if still := [name for name, j in undriven.items() if int(model.idx_vs[j]) in robot.locked_dofs]:
+        said = f"nothing drives {', '.join(still)}, which is no base: its velocity must stay 0"
+        log.warning("%s: %s", description.source or model.name, said)
+        robot = changed(robot, notes={**robot.notes, "undriven": said})
     return _with_accelerations(robot, {**description.acceleration, **recipe.acceleration}, recipe.source)
 
 

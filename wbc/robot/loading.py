@@ -18,7 +18,6 @@ from wbc.robot.assembly import assemble, override_limits
 from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Robot, changed
 from wbc.robot.sources.description import Description, with_base
-from wbc.robot.sources.dh import DHRow, read_dh
 from wbc.robot.sources.files import example_data_folder, read_xml
 from wbc.robot.sources.kinds import USD, XACRO, is_mjmodel
 from wbc.robot.sources.urdf import read_urdf
@@ -36,7 +35,7 @@ _FITTED = {"fit": "capsule", "spheres": "spheres", "convex": "convex"}
 
 def read(source: Any, base: str | None, recipe: Recipe) -> Description:
     """The description in a URDF, xacro, SDF, MJCF or USD file, a ``pin.Model``, a ``mujoco.MjModel`` or rows of
-    :class:`DHRow`.
+    :class:`~wbc.robots.DHRow`.
 
     Raises:
         RobotFileError: a file that is missing, unreadable or neither; ShapeError: something else altogether.
@@ -70,8 +69,11 @@ def read(source: Any, base: str | None, recipe: Recipe) -> Description:
 
             return read_sdf(path, tree, base)
         raise RobotFileError("robot", str(path), f"neither URDF, SDF nor MJCF: the root element is <{tree.tag}>")
-    if isinstance(source, Sequence) and source and all(isinstance(row, DHRow) for row in source):
-        return read_dh(source, base)
+    if isinstance(source, Sequence) and source:
+        from wbc.robot.sources.dh import DHRow, read_dh
+
+        if all(isinstance(row, DHRow) for row in source):
+            return read_dh(source, base)
     expected = "expected a name, a path, a pin.Model, a mujoco.MjModel or a sequence of DHRow"
     raise ShapeError("robot", source, expected)
 

@@ -196,17 +196,10 @@ class Robot:
     @cached_property
     def dof_units(self) -> tuple[str, ...]:
         """``"rad"`` or ``"m"`` for each degree of freedom."""
-        units: list[str] = []
-        tree, library = self.tree, algebra(self.tree)
-        data = tree.createData()
-        library.computeJointJacobians(tree, data, self.neutral)
-        for j in range(1, self.tree.njoints):
-            # Pinocchio gives a single column without its second dimension
-            jacobian = library.getJointJacobian(tree, data, j, library.LOCAL).reshape(6, self.nv)
-            start, nv = int(self.tree.idx_vs[j]), int(self.tree.nvs[j])
-            for column in jacobian[:, start : start + nv].T:
-                units.append("rad" if np.abs(column[3:]).max() > 1e-9 else "m")
-        return tuple(units)
+        # A column's angular part is as long in every frame; Pinocchio gives a single one without its second dimension
+        jacobian = algebra(self.tree).computeJointJacobians(self.tree, self.tree.createData(), self.neutral)
+        turning = np.linalg.norm(jacobian.reshape(6, self.nv)[3:], axis=0)
+        return tuple("rad" if length > 1e-9 else "m" for length in turning)
 
     @cached_property
     def position_index(self) -> Array:
@@ -531,7 +524,8 @@ class Robot:
             robot.with_frame("pin", "coupler", offset).with_loops(Loop("four-bar", "pin", "rocker_end"))
 
         ``neutral`` becomes the nearest configuration that closes them. Rows that others imply are left out: those out
-        of the plane of a planar mechanism, and loops that add nothing. Every stack keeps them closed.
+        of the plane of a planar mechanism, and loops that add nothing. Every stack keeps them closed. Joints that
+        nothing drives, whose velocity had to stay 0, are passive where loops move them.
 
         Args:
             loops: see above. actuated: joints with motors, as of :meth:`with_actuated`; None: as before.
@@ -563,7 +557,16 @@ class Robot:
             if part.held == len(part.dofs):
                 said = "its loops hold as many motions as it has joints; lengths of the file may be rounded"
                 log.warning("%s: the linkage of %s cannot move: %s", self.name, part.name, said)
-        return replace(bare, neutral=neutral, loops=rows)
+        moved = {dof for part in rows.linkages for dof in part.dofs if dof in self.locked_dofs and dof >= self.base_nv}
+        still = tuple(dof for dof in self.locked_dofs if dof not in moved)
+        return replace(
+            bare,
+            neutral=neutral,
+            loops=rows,
+            notes={key: said for key, said in bare.notes.items() if key != "undriven" or still},
+            locked_dofs=still,
+            passive=tuple(sorted({*bare.passive, *moved})),
+        )
 
     def require_tree(self, what: str) -> None:
         """Refuse a mechanism with closed loops.

@@ -36,8 +36,8 @@ def around_cylinder(radius: float, half: float, inner: float | None = None) -> t
     where ``inner`` is how far the body reaches sideways where it reaches least (default: the radius itself;
     less for a box, whose corners lie on the cylinder).
     """
-    r = np.sqrt(np.linspace(0.0, half**2, 2001) + radius**2)
-    h = half - np.sqrt(r**2 - radius**2)
+    cut = np.sqrt(np.linspace(0.0, half**2, 2001))  # half - h; not of R^2 - r^2, which may round to less than 0
+    r, h = np.hypot(radius, cut), half - cut
     best = int(np.argmin(2 * h * r**2 + 4 / 3 * r**3))
     side = radius if inner is None else inner
     return float(r[best]), float(h[best]), float(r[best] - min(side, half - h[best]))

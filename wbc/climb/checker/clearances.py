@@ -55,6 +55,8 @@ POINT = 1e-6
 LARGEST = 1e6
 #: How far beside a pose it is asked again then [m]
 BESIDE = 1e-5
+#: Answers there that are no farther apart are the same: no depth changes by more than the way [m]
+SAME = 2e-5
 #: Length of a cylinder without end, for Coal [m]
 ENDLESS = 200.0
 #: Shortest part of the way between two ticks that is looked at
@@ -289,8 +291,8 @@ def _core(shape: Capsule | Sphere) -> coal.CollisionGeometry:
 
 
 def coal_distance(a: coal.CollisionGeometry, at: pin.SE3, b: coal.CollisionGeometry, there: pin.SE3) -> float:
-    """Distance of two solids at poses, below 0 where they meet [m]; where Coal has no answer, as where the core of a
-    round one touches a face, the middle one of those a hair beside it.
+    """Distance of two solids at poses, below 0 where they meet [m]; where Coal has no answer, or one that is another a
+    hair beside, as where the core of a round one touches a face, the middle one of those beside it.
     """
     request, answers = coal.DistanceRequest(), list[float]()
     request.enable_signed_distance = True
@@ -300,7 +302,8 @@ def coal_distance(a: coal.CollisionGeometry, at: pin.SE3, b: coal.CollisionGeome
             coal.Transform3s(there.rotation, there.translation),
         )
         answers.append(float(coal.distance(a, poses[0], b, poses[1], request, coal.DistanceResult())))
-        if abs(answers[0]) < LARGEST:
+        alike = len(answers) == 2 and abs(answers[1] - answers[0]) <= SAME
+        if abs(answers[0]) < LARGEST and (answers[0] > 0.0 or alike):
             return answers[0]
     return float(np.median(answers[1:])) - BESIDE
 

@@ -303,7 +303,7 @@ class ClimbLoop:
         off = float(np.abs(pin.difference(self.robot.model, self._q, np.asarray(plan.q[0], dtype=float))).max())
         if not self.steady or off > CONTINUES or tuple(plan.start) != tuple(self._held):
             raise RangeError("plan", off, "expected one that begins where the steady loop is, with its contacts")
-        self._begin(plan)
+        self._begin(plan, goes_on=True)
 
     def stop(self, reason: str) -> None:
         """The robot comes to rest along its plan and stays there until :meth:`carry_on`; limbs in the air rest where
@@ -639,8 +639,8 @@ class ClimbLoop:
 
     # ------------------------------------------------------------------ plans
 
-    def _begin(self, plan: ContactPlan) -> None:
-        """A plan, from where the robot is."""
+    def _begin(self, plan: ContactPlan, goes_on: bool = False) -> None:
+        """A plan, from where the robot is, which is as fast as the plan at once where it goes on from another one."""
         self._plans.append(plan)
         for foothold in plan.scene.footholds:
             self._footholds.setdefault(foothold.id, foothold)
@@ -655,7 +655,7 @@ class ClimbLoop:
         self.waiting, self._other, self._aside = None, "", False
         self._granted = set()
         self._path_time = 0.0
-        self._pace.begin(reference, 1.0)
+        self._pace.begin(reference, 1.0 if goes_on else _rate_along(plan.v[0], self._state.v))
         self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._look()
 
@@ -745,6 +745,13 @@ class ClimbLoop:
 
     def _end(self, outcome: ClimbOutcome, reason: str) -> None:
         self._outcome, self._reason = outcome, reason
+
+
+def _rate_along(planned: Array, v: Array) -> float:
+    """The rate of a plan at which a robot begins it, r = v . v_p / v_p . v_p within 0 and 1; 1 of a plan at rest."""
+    if float(np.abs(planned).max()) <= STILL:
+        return 1.0
+    return min(max(float(v @ planned) / float(planned @ planned), 0.0), 1.0)
 
 
 def _place_by(climber: Climber) -> Placed:

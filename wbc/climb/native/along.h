@@ -289,7 +289,7 @@ static int until(along_t *a, const int *row, int now, int without) {
     return last >= now ? last : -1;
 }
 
-/* Whether limbs but one that swings bear the robot */
+/* Whether limbs but one that swings bear the robot; that one is where it would hold its own span */
 static int bear(along_t *a, const int *row, int swinging, int instant) {
     climb_t *c = a->climb;
     int contact[MOST_LIMBS];
@@ -389,7 +389,7 @@ static int can_be(along_t *a, int level, standing_t *s) {
     const int others = until(a, b->row, b->now, s->limb), end = lasts(a, onto), latest = (others < end ? others : end) - 1;
     if (s->now < begins(a, onto)) s->now = begins(a, onto);
     if (s->now > latest || s->lift > lasts(a, from)) return a->why[TOO_SLOW]++, 0;
-    if (!bear(a, b->row, s->limb, s->lift) || !bear(a, b->row, s->limb, s->now)) return a->why[NOT_BORNE_THERE]++, 0;
+    if (!bear(a, b->row, s->limb, s->lift) || !bear(a, s->row, s->limb, s->now)) return a->why[NOT_BORNE_THERE]++, 0;
     int why = -1;
     const int land = s->now;
     for (s->shape = 0; s->shape < 2; s->shape++) {
@@ -405,12 +405,12 @@ static int can_be(along_t *a, int level, standing_t *s) {
             s->now = s->lift + (int)ceil(takes * fmin(used, LONGEST));
             if (s->now > latest) break;
         }
-        if (used > SHORT) {
-            if (why < 0) why = used == INFINITY ? NO_SWING : TOO_SLOW;
-            continue;
-        }
-        if (swing_clear(a, b->row, from, onto, parts + 1, at, angle)) return holds(a, s);
-        if (why < 0) why = LINKS_TOUCH;
+        /* The body has gone on by the time of a later landing */
+        int how = used == INFINITY ? NO_SWING : used > SHORT ? TOO_SLOW : -1;
+        if (how < 0 && s->now > land && !bear(a, s->row, s->limb, s->now)) how = NOT_BORNE_THERE;
+        if (how < 0 && !swing_clear(a, b->row, from, onto, parts + 1, at, angle)) how = LINKS_TOUCH;
+        if (how < 0) return holds(a, s);
+        if (why < 0) why = how;
     }
     a->why[why]++;
     return 0;
@@ -629,7 +629,7 @@ static int settle_swing(along_t *a, standing_t **chain, int d, long by, const do
             s->late = needs < after ? needs : after;
             s->early = needs - s->late < before ? needs - s->late : before;
             if (s->early < 0) s->early = 0;
-            if (!bear(a, row, l, s->lift - s->early) || !bear(a, row, l, s->now + s->late)) s->early = s->late = 0;
+            if (!bear(a, row, l, s->lift - s->early) || !bear(a, s->row, l, s->now + s->late)) s->early = s->late = 0;
         }
         s->shape = shape;
         if (k == SHAPES) return 1;

@@ -123,7 +123,7 @@ static void near_pair(plan_t *p, int k) {
     const double off = p->offs[pair->ball_off] + p->offs[pair->other_off];
     unsigned near = p->alive;
     if (pair->form != UNSEEN && off < INFINITY) {
-        const lanes_t *ball = (const lanes_t *)p->lane_centre + 3 * pair->ball, reached = pair->least + *(const lanes_t *)p->share * off;
+        const lanes_t *ball = (const lanes_t *)p->lane_centre + 3 * pair->ball, reached = p->sweep->required[k] + pair->radii + *(const lanes_t *)p->share * off;
         lanes_t square = {0};
         if (pair->form == BALLS) {
             const lanes_t *other = (const lanes_t *)p->lane_centre + 3 * pair->other;

@@ -52,7 +52,7 @@ static void prepare(plan_t *p) {
         const int moves = s->body_frame[other] >= 0, seen = p->radius[i] < INFINITY && p->radius[j] < INFINITY;
         const double about = moves ? p->radius[other] : s->shape[other].size[4];
         const shape_t *shape = s->shape + other;
-        p->outlines[k] = (outline_t){s->required[k] + p->radius[ball] + about, s->line[8 * ball + 6] + (moves ? s->line[8 * other + 6] : shape->size[4]),
+        p->outlines[k] = (outline_t){p->radius[ball] + about, s->line[8 * ball + 6] + (moves ? s->line[8 * other + 6] : shape->size[4]),
                                      !seen ? UNSEEN : moves ? BALLS : BALL_BOX, ball, other, swap ? two : one, swap ? one : two,
                                      seen && is_round(s->shape + ball) && (moves ? is_round(shape) : convex(shape)), moves || is_box(shape)};
     }

@@ -3,7 +3,7 @@
 
 long long wbc_plan_size(void) { return (long long)sizeof(plan_t); }
 
-/* After the bodies or what they keep have changed */
+/* After bodies or limits have changed */
 void wbc_plan_prepare(plan_t *p) { prepare(p); }
 
 /* 1: free; 0: not */
@@ -28,9 +28,7 @@ int wbc_plan_reach(plan_t *p, double *x) {
     return is_free(p, x) ? 2 : 1;
 }
 
-void wbc_plan_draw(plan_t *p, double *x) {
-    for (int k = 0; k < p->n; k++) x[k] = p->sample_low[k] + uniform(p) * (p->sample_high[k] - p->sample_low[k]);
-}
+void wbc_plan_draw(plan_t *p, double *x) { draw(p, x); }
 
 /* A root of a tree; its number, or -1 */
 int wbc_plan_root(plan_t *p, int tree, const double *x) {
@@ -39,10 +37,10 @@ int wbc_plan_root(plan_t *p, int tree, const double *x) {
 }
 
 /* From x to a configuration near it with `room` on all sides, which is reached from it straight: how far it may be [rad, m], and
- * how often it is tried; x where it has that room, or where there is none */
-void wbc_plan_away(plan_t *p, double *x, double room) {
+ * how often it is tried; x, of which `most` is the margin, where it has that room, or where there is none. Its margin */
+double wbc_plan_away(plan_t *p, double *x, double room, double most) {
     const int n = p->n;
-    double best[n], y[n], most = least_margin(p, x, -INFINITY);
+    double best[n], y[n];
     copy_x(p, x, best);
     for (double radius = 0.02; radius < 0.5 && most < room; radius *= 2.0)
         for (int again = 0; again < 20; again++) {
@@ -55,6 +53,7 @@ void wbc_plan_away(plan_t *p, double *x, double room) {
             if (margin > most && is_free(p, y) && edge(p, x, y)) copy_x(p, y, best), most = margin;
         }
     copy_x(p, best, x);
+    return most;
 }
 
 int wbc_plan_grow(plan_t *p, int samples) { return grow(p, samples); }

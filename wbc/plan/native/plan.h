@@ -29,10 +29,10 @@ typedef struct {
 /* How a pair is seen to be far apart: by the balls about both, by a ball and a box in the world, or not so */
 enum { BALLS, BALL_BOX, UNSEEN };
 
-/* `ball` moves; `least`: what is required, with the radii; `core`: the radii of both about their cores; where in `offs` it stands how far
+/* `ball` moves; `radii`: of the balls about both; `core`: of both about their cores; where in `offs` it stands how far
  * both may be off; `round`: places are looked at together; `exact`: what stands is no less than the box about it */
 typedef struct {
-    double least, core;
+    double radii, core;
     int form, ball, other, ball_off, other_off, round, exact;
 } outline_t;
 
@@ -75,7 +75,6 @@ typedef struct {
     int *parent[2];         /* -1: a root */
     double *work;           /* for one projection: see project.h */
     int meet[2];            /* nodes at which the trees met */
-    int edges, projections, measured; /* since it was begun */
     int struck;       /* the pair that was too near last */
     int partial;      /* whether of an edge that is not free what is free of it counts */
     unsigned alive;   /* places that are looked at together and still count */

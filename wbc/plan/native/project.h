@@ -83,7 +83,6 @@ static int project(plan_t *p, kept_rows_t *rows, double *x) {
     const int n = p->n, all = rows->equalities + rows->margins;
     double *A = p->work, *G = A + all * n, *r = G + all * all, *y = r + all, *dx = y + all;
     char *movable = (char *)(dx + n);
-    p->projections++;
     for (int step = 0; step < NEWTON_STEPS; step++) {
         int m = 0, holds = 1;
         evaluate(p, rows, x, 1);

@@ -74,7 +74,6 @@ static int examine(plan_t *p, int k, int last) {
     if (dot3(n, n) > 0.0 && parted_any(p, k) >= required) return 0;
     answer_t found;
     distance_of(s, i, j, &found);
-    p->measured++;
     copy3(found.normal, n);
     if (found.gap < required) {
         s->stopped = k;

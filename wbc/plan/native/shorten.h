@@ -17,10 +17,10 @@ static double length_of(const plan_t *p, const double *x, int count) {
     return sum;
 }
 
-/* Points i + 1 to j - 1 are replaced by `count` others; the number of points, or -1 where there is no room */
+/* Points i + 1 to j - 1 are replaced by `count` others where there is room; the number of points */
 static int splice(const plan_t *p, double *x, int points, int room, int i, int j, const double *others, int count) {
     const int now = points - (j - i - 1) + count, n = p->n;
-    if (now > room) return -1;
+    if (now > room) return points;
     memmove(x + (i + 1 + count) * n, x + j * n, (points - j) * n * sizeof *x);
     memcpy(x + (i + 1) * n, others, count * n * sizeof *x);
     return now;
@@ -56,9 +56,7 @@ static int cut(plan_t *p, double *x, int points, int room, double *others, int m
     if (metric(p, from, to) > (1.0 - GAIN) * (other - one)) return points;
     const int count = walk(p, from, to, 4.0 * (other - one), way, most - 2, &reached);
     if (!reached || metric(p, from, way) + length_of(p, way, count) > (1.0 - GAIN) * (other - one)) return points;
-    const int now = has_rows(p) ? splice(p, x, points, room, i, j, way, count - 1)
-                                : splice(p, x, points, room, i, j + 1, others, 2);
-    return now < 0 ? points : now;
+    return has_rows(p) ? splice(p, x, points, room, i, j, way, count - 1) : splice(p, x, points, room, i, j + 1, others, 2);
 }
 
 /* Point k towards the line between its neighbours, as far as that is free; it goes where it may go there */
@@ -99,8 +97,7 @@ static int bevel(plan_t *p, double *x, int points, int room, int k) {
         const double was = metric(p, two, x + k * n) + metric(p, x + k * n, two + n);
         if (metric(p, two, two + n) > (1.0 - 5.0 * GAIN) * was) return points;
         if (!edge(p, two, two + n)) continue;
-        const int now = splice(p, x, points, room, k - 1, k + 1, two, 2);
-        return now < 0 ? points : now;
+        return splice(p, x, points, room, k - 1, k + 1, two, 2);
     }
     return points;
 }

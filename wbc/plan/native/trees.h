@@ -57,7 +57,6 @@ static int extend(plan_t *p, int tree, int from, const double *target, double ra
         const double whole = metric(p, x, target), share = fmin(1.0, range / whole);
         if (whole == 0.0) return *reached = 1, from;
         along_x(p, x, target, share, out);
-        p->edges++;
         const double part = proven(p, x, out, 1);
         *reached = part < 1.0 ? -1 : share == 1.0;
         if (part < SLIGHT) return -1;

@@ -89,7 +89,7 @@ class MjTrees:
 def trees_of(model: mujoco.MjModel) -> MjTrees:
     """The robot's bodies. No part of it are, as trees of bodies on the world: those that a program moves (mocap)
     and that have no joint, those of flexes, where anything else moves those that only have a free joint, and beside a
-    driven robot that moves freely all that nothing drives.
+    driven robot that moves freely all that nothing drives. What a loop holds to the robot is part of it.
     """
     import mujoco
 
@@ -112,6 +112,9 @@ def trees_of(model: mujoco.MjModel) -> MjTrees:
     loose = still if len(floating) == 1 else [r for r in alone if r in still]
     if len(loose) == len(joints.keys() - set(bent)) == 1:  # one body that moves freely is a robot
         loose = []
+    ties = _ties(model)
+    while taken := {r for pair in ties for r in pair if r in loose and {*pair} - {r, *loose}}:
+        loose = [r for r in loose if r not in taken]
     left_out = {
         "moved by a program (mocap)": [r for r in roots if model.body_mocapid[r] >= 0 and r not in joints],
         "deformable": sorted(bent),
@@ -120,6 +123,21 @@ def trees_of(model: mujoco.MjModel) -> MjTrees:
     gone = {root for group in left_out.values() for root in group}
     kept = tuple(b for b in range(1, model.nbody) if int(model.body_rootid[b]) not in gone)
     return MjTrees(kept, {reason: group for reason, group in left_out.items() if group})
+
+
+def _ties(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """Roots of each two trees with joints that an active connect or weld holds together."""
+    import mujoco
+
+    moving, out = {int(model.body_rootid[b]) for b in model.jnt_bodyid}, []
+    for k in range(model.neq):
+        if model.eq_active0[k] and int(model.eq_type[k]) in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+            at_sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
+            ends = [int(end[k]) for end in (model.eq_obj1id, model.eq_obj2id)]
+            one, other = (int(model.body_rootid[model.site_bodyid[end] if at_sites else end]) for end in ends)
+            if one != other and {one, other} <= moving:
+                out.append((one, other))
+    return out
 
 
 def _is_pushed(model: mujoco.MjModel, root: int) -> bool:

@@ -97,7 +97,7 @@ def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks)
     Raises:
         RobotFileError: a negative mass.
     """
-    moments: dict[str, Array] = {}
+    names, tensors = list[str](), list[list[list[float]]]()
     for link in tree.findall("link"):
         name, mass, inertia = str(link.get("name")), link.find("inertial/mass"), link.find("inertial/inertia")
         if mass is None or inertia is None:
@@ -105,10 +105,12 @@ def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks)
         if number(mass, "value") < 0.0:
             raise RobotFileError("robot", str(path), f"link {name!r} has a mass of {mass.get('value')} kg")
         xx, xy, xz, yy, yz, zz = (number(inertia, key) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-        moments[name] = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    largest = max((float(np.abs(m).max()) for m in moments.values()), default=0.0)
+        names.append(name)
+        tensors.append([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = np.linalg.eigvalsh(np.array(tensors).reshape(-1, 3, 3))
+    largest = float(np.abs(moments).max(initial=0.0))
     wrong, slightly = list[str](), list[str]()
-    for name, m in moments.items():
+    for name, m in zip(names, moments, strict=True):
         excess = max(-m[0], m[2] - m[0] - m[1])
         if excess > MOMENT_DIGITS * np.abs(m).max():
             (wrong if excess > FELT * largest else slightly).append(f"link {name!r} {_shown(m)}")
