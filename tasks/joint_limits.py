@@ -166,7 +166,7 @@ class JointLimits(Constraint):
     ) -> Bounds:
         """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
         interval = partial(allowed_accelerations, dt=dt, longest=longest)
-        return self._intervals(robot, kin, inputs, interval, together=False, motor=motors or {})
+        return self._intervals(robot, kin, inputs, interval, motor=motors or {})
 
     def _intervals(
         self,
@@ -174,11 +174,10 @@ class JointLimits(Constraint):
         kin: Tracer,
         inputs: Values,
         interval: Callable[..., tuple[ca.SX, ca.SX]],
-        together: bool = True,
         **own: Mapping[int, ca.SX],
     ) -> Bounds:
-        """What ``interval`` allows each chosen degree of freedom, of which ``own`` has more arguments; ``together``: it
-        takes columns of degrees of freedom that have the same kinds of limits.
+        """What ``interval`` allows each chosen degree of freedom: one at a time where ``own`` has arguments of theirs,
+        else columns of those that have the same kinds of limits.
         """
         limits, count, shares = self.limits(robot), robot.nv, np.ones(robot.nv)
         shares[[dof for linkage in robot.loops.linkages for dof in linkage.dofs]] = LINKAGE_BRAKING
@@ -190,7 +189,7 @@ class JointLimits(Constraint):
         alike: dict[object, list[int]] = {}
         for i, values in enumerate(zip(*columns, strict=True)):
             kind = tuple([float(value) if value in (0.0, np.inf, -np.inf) else None for value in values])
-            alike.setdefault(kind if together else i, []).append(i)
+            alike.setdefault(i if own else kind, []).append(i)
         lower, upper = -ca.SX.inf(count), ca.SX.inf(count)
         for dofs in alike.values():
             low, high, velocity, acceleration, braking = (
@@ -206,7 +205,7 @@ class JointLimits(Constraint):
                 braking=braking,
                 velocity_scale=inputs["velocity_scale"],
                 return_rate=inputs["return_rate"],
-                **{name: values[i] for name, values in own.items() for i in dofs if i in values},
+                **{name: values[dofs[0]] for name, values in own.items() if dofs[0] in values},
             )
         return Bounds(lower, upper)
 

@@ -13,7 +13,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class FrameMotion:
+class FrameState:
     """A frame's pose; its Jacobian, twist and (dJ/dt) v at its origin along the world's axes, and its Jacobian along
     its own axes.
     """
@@ -40,9 +40,9 @@ class PinocchioState:
         pin.forwardKinematics(model, self.data, q, v, np.zeros(model.nv))
         pin.updateFramePlacements(model, self.data)
 
-    def frame(self, name: str) -> FrameMotion:
+    def frame(self, name: str) -> FrameState:
         """The motion of a frame by name."""
         index, along = frame_index(self.model, name), pin.LOCAL_WORLD_ALIGNED
         J, local = (np.array(pin.getFrameJacobian(self.model, self.data, index, axes)) for axes in (along, pin.LOCAL))
         bias = pin.getFrameClassicalAcceleration(self.model, self.data, index, along).vector.copy()
-        return FrameMotion(self.data.oMf[index].copy(), J, J @ self.v, bias, local)
+        return FrameState(self.data.oMf[index].copy(), J, J @ self.v, bias, local)

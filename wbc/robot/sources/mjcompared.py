@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wbc.multibody import own
-from wbc.robot.sources.mjnames import FREE, HINGE, SIZES, MjNames, coordinates
+from wbc.robot.sources.mjnames import FREE, HINGE, SIZES, MjNames, coordinates, held_bodies
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
 
@@ -174,8 +174,7 @@ class MjCompared:
             kind, ends = int(model.eq_type[k]), (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
             word = mujoco.mjtEq(kind).name.removeprefix("mjEQ_").lower()
             if word in ("connect", "weld"):
-                sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
-                ours = bodies & {int(model.site_bodyid[end]) if sites else end for end in ends}
+                ours = bodies & {*held_bodies(model, k)}
             elif word in ("joint", "tendon"):
                 ours = set(ends) & set(self._order) if word == "joint" else {0}
             else:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc.multibody import own
 from wbc.robot.loops import AnyLoop, JointCurve, Loop
-from wbc.robot.sources.mjnames import MjNames, pose_of
+from wbc.robot.sources.mjnames import MjNames, held_bodies, pose_of
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -42,11 +42,10 @@ def loops_of(
         if kind == int(mujoco.mjtEq.mjEQ_JOINT) and {j for j in ends if j >= 0} <= joints:
             loops.append(_curve(model, name, ends, data[:5].tolist(), names))
             continue
-        sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
-        ours = [int(model.site_bodyid[end]) if sites else end for end in ends]
-        if kind not in kinds or not {*ours, 0} <= {*bodies, 0} or ours == [0, 0]:
+        if kind not in kinds or not {*(ours := held_bodies(model, k)), 0} <= {*bodies, 0} or ours == (0, 0):
             lost.append(k)
             continue
+        sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
         if sites:
             places = [pose_of(model.site_pos[s], model.site_quat[s]) for s in ends]
         elif kinds[kind] == "connect":

@@ -24,7 +24,18 @@ from wbc.robot.sources.files import captured_stderr
 from wbc.robot.sources.mjactuators import driven_joints, elsewhere, force_range, of_actuators
 from wbc.robot.sources.mjcompared import MjCompared, sentence
 from wbc.robot.sources.mjloops import loops_of
-from wbc.robot.sources.mjnames import BALL, FREE, HINGE, SIZES, SLIDE, MjNames, coordinates, names_of, pose_of
+from wbc.robot.sources.mjnames import (
+    BALL,
+    FREE,
+    HINGE,
+    SIZES,
+    SLIDE,
+    MjNames,
+    coordinates,
+    held_bodies,
+    names_of,
+    pose_of,
+)
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -132,11 +143,9 @@ def _ties(model: mujoco.MjModel) -> list[tuple[int, int]]:
     moving, out = {int(model.body_rootid[b]) for b in model.jnt_bodyid}, []
     for k in range(model.neq):
         if model.eq_active0[k] and int(model.eq_type[k]) in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
-            at_sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
-            ends = [int(end[k]) for end in (model.eq_obj1id, model.eq_obj2id)]
-            one, other = (int(model.body_rootid[model.site_bodyid[end] if at_sites else end]) for end in ends)
-            if one != other and {one, other} <= moving:
-                out.append((one, other))
+            first, second = (int(model.body_rootid[body]) for body in held_bodies(model, k))
+            if first != second and {first, second} <= moving:
+                out.append((first, second))
     return out
 
 

@@ -72,6 +72,16 @@ def coordinates(model: mujoco.MjModel, joint: int, qpos: Array) -> Array:
     return out
 
 
+def held_bodies(model: mujoco.MjModel, equality: int) -> tuple[int, int]:
+    """Both bodies that a connect or weld holds together, given by themselves or by their sites; 0 is the world."""
+    import mujoco
+
+    first, second = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
+    if int(model.eq_objtype[equality]) == int(mujoco.mjtObj.mjOBJ_SITE):
+        return int(model.site_bodyid[first]), int(model.site_bodyid[second])
+    return first, second
+
+
 def _unique(given: Sequence[str], made: Sequence[str], reserved: Collection[str], suffix: str) -> list[str]:
     """The given names, with the suffix where they are reserved; the made ones where there is none. Underscores until
     it is no other's.
