@@ -74,10 +74,10 @@ site: $(SITE_READY)  ## the pages as a site with a reference of all public names
 	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build
 
 cross: $(READY)  ## the code that ticks share compiled by zig for Linux aarch64, macOS arm64 and Windows, and looked at
-	$(BIN)/python -m bench.ahead_machines
+	$(BIN)/python -m tests.stack.machines
 
 check-export: $(READY)  ## exported C built for aarch64 by zig and run at 1000 states under qemu; says what is not installed
-	$(BIN)/python -m bench.export_machines
+	$(BIN)/python -m tests.export.machines
 
 # PLATFORM is linux-aarch64, macos-arm64 or windows-x86-64, for which ziglang compiles
 wheel: $(READY)  ## a wheel with the code that ticks need where there is no compiler, into dist/; PLATFORM=linux-aarch64
@@ -93,7 +93,6 @@ bench: $(READY) $(PEERS_READY)  ## compare with pink, mink and placo on the same
 	$(BIN)/python -m bench --peers-python $(PEERS_VENV)/bin/python
 	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python
 	$(BIN)/python -m bench.time_laws
-	$(BIN)/python -m bench.figures --only plant_steps
 
 bench-ik: $(READY) $(PEERS_READY)  ## inverse kinematics on TRAC-IK's protocol, 10 000 poses a chain; Ctrl-C keeps what it has
 	$(BIN)/python -m bench.ik --full --peers-python $(PEERS_VENV)/bin/python

@@ -57,12 +57,6 @@ class Contender(ABC):
         self.call()
         self.settle()
 
-    def reference_error(self) -> float | None:
-        """Largest difference [rad/s or m/s] between the package's answer to the QP of this tick and an exact
-        solution of the same QP; None where the package does not show its QP.
-        """
-        return None
-
 
 def exact_solution(hessian: Array, linear: Array, rows: Array, upper: Array) -> Array:
     """Minimise 1/2 x'Hx + g'x subject to rows x <= upper by quadprog, then solve its active set once more.

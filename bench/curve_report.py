@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from bench.harness import OURS
 from bench.sheet import Sheet, line, us
 
-OURS = "wbc"
 TITLES = {
     "joints": "Tick against joints: two poses, posture, limits; medians [us]",
     "tasks": "Tick against tasks: pose tasks on Talos, posture, limits; medians [us]",
@@ -28,9 +28,9 @@ PANELS = {
 COLOURS = {"wbc": "#0b6e4f", "pink + daqp": "#c2185b", "mink + daqp": "#1565c0", "placo": "#ef6c00"}
 
 NOTES = """\
-Growing problems: targets are those of a path of the joints, all within reach; velocity limits, position limits and a \
-posture task as above. Degrees of freedom count the base's six where it floats. Switched off for wbc in all of them, \
-as in the problems above, because the peers have no such limit: `JointLimits(acceleration=False)`; all else is at its \
+Targets are those of a path of the joints, all within reach; velocity limits, position limits and a \
+posture task. Degrees of freedom count the base's six where it floats. Switched off for wbc in all of them, \
+because the peers have no such limit: `JointLimits(acceleration=False)`; all else is at its \
 default (look-ahead and certificate on, `calm=True`, whose curvature and damping the QPs of the peers do not have). \
 Three rounds of up to one pass or a quarter of a second; a dash in place of an end error: too slow for a whole pass in \
 that time.

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +12,12 @@ import numpy as np
 import pinocchio as pin
 
 from bench.curves import Point, points, prepare_curves
-from bench.pool import Worker, cores
+from bench.harness import OURS, PEERS
+from bench.pool import Worker, cores, turns
 from bench.problems import Case, load
 from bench.reference import Referee
 from bench.scenery import distances
 
-OURS = "wbc"
-PEERS = ("pink + daqp", "mink + daqp", "placo")
 #: On the humanoid only: mink with its own default for which pairs have rows
 DEFAULTS = "mink + daqp, rows within 1 cm"
 #: Rounds of a problem, and seconds that a contender has in each
@@ -35,7 +32,6 @@ def measure_curves(peers_python: str | None, folder: Path, rounds: int | None, s
     say("curves: preparing")
     prepare_curves(folder)
     found = points()
-    compiled = compile_all([folder / point.folder for point in found], say)
     core, _ = cores()
     with contextlib.ExitStack() as stack:
         first = folder / found[0].folder
@@ -47,26 +43,8 @@ def measure_curves(peers_python: str | None, folder: Path, rounds: int | None, s
             some = dict(workers)
             if point.curve == "g1" and peers_python is not None:
                 some[DEFAULTS] = stack.enter_context(Worker(peers_python, DEFAULTS, folder / point.folder, core))
-            measured = measure_point(point, folder / point.folder, some, rounds or ROUNDS)
-            out.append(measured | {"compile": compiled[point.folder]})
+            out.append(measure_point(point, folder / point.folder, some, rounds or ROUNDS))
     return out
-
-
-def compile_all(folders: Sequence[Path], say: Say) -> dict[str, float]:
-    """Compile this package's stacks into its cache before anything is timed, two at a time; seconds of each."""
-    done = 0
-
-    def compile_one(folder: Path) -> tuple[str, float]:
-        nonlocal done
-        with Worker(sys.executable, OURS, folder, None) as worker:
-            seconds = float(worker.ready["facts"]["compile"])
-        done += 1
-        say(f"curves: compiled {done} of {len(folders)}")
-        return folder.name, seconds
-
-    # The longest first, so that none is left alone at the end
-    with ThreadPoolExecutor(max(1, min(4, len(os.sched_getaffinity(0))))) as pool:
-        return dict(pool.map(compile_one, reversed(folders)))
 
 
 def measure_point(point: Point, folder: Path, workers: Mapping[str, Worker], rounds: int) -> dict[str, Any]:
@@ -75,13 +53,10 @@ def measure_point(point: Point, folder: Path, workers: Mapping[str, Worker], rou
     facts = {name: worker.ask("open", folder=str(folder))["facts"] for name, worker in workers.items()}
     calls: dict[str, list[float]] = {name: [] for name in workers}
     states: dict[str, Any] = {}
-    names = list(workers)
-    for k in range(rounds):
-        turn = k % len(names)
-        for name in names[turn:] + names[:turn]:
-            answer = workers[name].ask("sample", budget=BUDGET)
-            calls[name] += answer["call"]
-            states[name] = answer["states"]
+    for _, name in turns(list(workers), rounds):
+        answer = workers[name].ask("sample", budget=BUDGET)
+        calls[name] += answer["call"]
+        states[name] = answer["states"]
     judge = Judge(case)
     return {
         "curve": point.curve, "x": point.x, "label": point.label, "title": case.problem.title,
@@ -90,7 +65,7 @@ def measure_point(point: Point, folder: Path, workers: Mapping[str, Worker], rou
                 "median": float(np.median(calls[name])) / 1e3, "p99": float(np.percentile(calls[name], 99)) / 1e3,
                 "ticks": len(calls[name]), "pairs": facts[name].get("pairs"), **judge.tracking(states[name]),
             }
-            for name in names
+            for name in workers
         },
     }  # fmt: skip
 

@@ -13,9 +13,6 @@ from pathlib import Path
 
 from bench.problems import Solid
 
-#: (centre [m] in the link's frame, radius [m])
-Sphere = tuple[tuple[float, float, float], float]
-
 #: Prefix of the links that carry what is fixed in the world
 FIXED = "fixed"
 
@@ -25,8 +22,6 @@ def write_urdf(
     target: Path,
     *,
     locked: Iterable[str] = (),
-    spheres: Mapping[str, Sphere] | None = None,
-    obstacles: Sequence[Sphere] = (),
     solids: Sequence[Solid] = (),
 ) -> None:
     """Write a copy of a URDF without meshes.
@@ -35,9 +30,7 @@ def write_urdf(
         source: URDF to read.
         target: file to write.
         locked: joints that become fixed.
-        spheres: link -> one collision sphere.
-        obstacles: spheres fixed to the root link, written as links ``obstacle0``, ``obstacle1``, ...
-        solids: more shapes; the collision body of number k is named :func:`solid_name`, and a solid that is fixed in
+        solids: shapes; the collision body of number k is named :func:`solid_name`, and a solid that is fixed in
             the world is on a link ``fixed<k>``.
     """
     root = ET.parse(source).getroot()
@@ -55,17 +48,7 @@ def write_urdf(
                 for child in joint.findall(tag):
                     joint.remove(child)
     links = {link.get("name"): link for link in root.iter("link")}
-    for name, sphere in (spheres or {}).items():
-        _add_sphere(links[name], name, sphere)
     base = _root_link(root)
-    for k, sphere in enumerate(obstacles):
-        name = f"obstacle{k}"
-        link = ET.SubElement(root, "link", name=name)
-        _add_sphere(link, name, ((0.0, 0.0, 0.0), sphere[1]))
-        joint = ET.SubElement(root, "joint", name=f"{name}_fixed", type="fixed")
-        ET.SubElement(joint, "parent", link=base)
-        ET.SubElement(joint, "child", link=name)
-        ET.SubElement(joint, "origin", xyz=_numbers(sphere[0]), rpy="0 0 0")
     for k, solid in enumerate(solids):
         _add_solid(root, links, base, k, solid)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -92,12 +75,6 @@ def mujoco_urdf(text: str) -> str:
 def _root_link(root: ET.Element) -> str:
     children = {c.get("link") for j in root.iter("joint") for c in j.findall("child")}
     return next(str(link.get("name")) for link in root.iter("link") if link.get("name") not in children)
-
-
-def _add_sphere(link: ET.Element, name: str, sphere: Sphere) -> None:
-    collision = ET.SubElement(link, "collision", name=f"{name}_sphere")
-    ET.SubElement(collision, "origin", xyz=_numbers(sphere[0]), rpy="0 0 0")
-    ET.SubElement(ET.SubElement(collision, "geometry"), "sphere", radius=repr(sphere[1]))
 
 
 def solid_name(number: int) -> str:

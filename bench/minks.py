@@ -8,9 +8,8 @@ import xml.etree.ElementTree as ET
 import mink
 import mujoco
 import numpy as np
-import qpsolvers
 
-from bench.contender import Contender, exact_solution
+from bench.contender import Contender
 from bench.descriptions import mujoco_urdf, solid_name
 from bench.problems import Array, Case
 
@@ -52,19 +51,17 @@ class Mink(Contender):
             mink.ConfigurationLimit(self.model, gain=1.0),
             mink.VelocityLimit(self.model, velocity_limits(text, problem.joints)),
         ]
-        if problem.obstacles or problem.pairs:
+        if problem.pairs:
             self.limits.append(self._collisions())
             self.facts["pairs"] = float(self.limits[-1].max_num_contacts)
         self.reset()
 
     def _collisions(self) -> mink.CollisionAvoidanceLimit:
-        obstacles = [f"obstacle{k}_sphere" for k in range(len(self.problem.obstacles))]
-        links = [f"{link}_sphere" for link in self.problem.spheres]
         pairs = [([solid_name(a)], [solid_name(b)]) for a, b in self.problem.pairs]
         # mink bounds the displacement of a tick by gain * distance / dt, so a rate costs two factors of dt
         return mink.CollisionAvoidanceLimit(
             self.model,
-            pairs or [(links, obstacles)],
+            pairs,
             gain=self.problem.rate * self.problem.dt**2,
             minimum_distance_from_collisions=self.problem.margin,
             collision_detection_distance=self.detection,
@@ -94,17 +91,6 @@ class Mink(Contender):
         q = np.array(self.configuration.q)
         base = [q[:3], q[[4, 5, 6, 3]]] if self.problem.floating else []
         return np.concatenate([*base, q[self.slots]])
-
-    def _build(self) -> qpsolvers.Problem:
-        return mink.build_ik(
-            self.configuration, self.tasks, self.problem.dt, damping=self.problem.damping, limits=self.limits
-        )
-
-    def reference_error(self) -> float | None:
-        problem = self._build()
-        exact = exact_solution(problem.P, problem.q, problem.G, problem.h)
-        found = qpsolvers.solve_problem(problem, solver="daqp").x
-        return float(np.abs(found - exact).max() / self.problem.dt)
 
 
 #: With the distance of its default below which pairs have rows, 1 cm

@@ -7,9 +7,8 @@ import functools
 import numpy as np
 import pink
 import pinocchio as pin
-import qpsolvers
 
-from bench.contender import Contender, exact_solution
+from bench.contender import Contender
 from bench.descriptions import solid_index
 from bench.problems import Array, Case
 
@@ -37,17 +36,12 @@ class Pink(Contender):
             pink.limits.ConfigurationLimit(self.model, config_limit_gain=1.0),
             pink.limits.VelocityLimit(self.model),
         ]
-        self.barriers = [self._barrier()] if problem.obstacles or problem.pairs else []
+        self.barriers = [self._barrier()] if problem.pairs else []
         self.reset()
 
     def _barrier(self) -> pink.barriers.SelfCollisionBarrier:
         geometry = pin.buildGeomFromUrdf(self.model, str(self.case.urdf), pin.GeometryType.COLLISION)
         names = [g.name for g in geometry.geometryObjects]
-        obstacles = [k for k, n in enumerate(names) if n.startswith("obstacle")]
-        for a in range(len(names)):
-            for b in obstacles:
-                if a not in obstacles:
-                    geometry.addCollisionPair(pin.CollisionPair(a, b))
         solids = [names.index(solid_index(self.problem.solids, k)) for k in range(len(self.problem.solids))]
         for a, b in self.problem.pairs:
             geometry.addCollisionPair(pin.CollisionPair(solids[a], solids[b]))
@@ -62,7 +56,7 @@ class Pink(Contender):
 
     def reset(self) -> None:
         collision = {}
-        if self.problem.obstacles or self.problem.pairs:
+        if self.problem.pairs:
             collision = {"collision_model": self.geometry, "collision_data": pin.GeometryData(self.geometry)}
         self.configuration = pink.Configuration(self.model, self.model.createData(), self.case.q0, **collision)
 
@@ -87,22 +81,5 @@ class Pink(Contender):
     def state(self) -> Array:
         return np.array(self.configuration.q)
 
-    def _build(self) -> qpsolvers.Problem:
-        return pink.build_ik(
-            self.configuration,
-            self.tasks,
-            self.problem.dt,
-            damping=self.problem.damping,
-            limits=self.limits,
-            barriers=self.barriers,
-        )
-
-    def reference_error(self) -> float | None:
-        problem = self._build()
-        exact = exact_solution(problem.P, problem.q, problem.G, problem.h)
-        found = qpsolvers.solve_problem(problem, solver=self.solver).x
-        return float(np.abs(found - exact).max() / self.problem.dt)
-
 
 with_daqp = functools.partial(Pink, solver="daqp")
-with_quadprog = functools.partial(Pink, solver="quadprog")

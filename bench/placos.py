@@ -29,7 +29,7 @@ class Placo(Contender):
         self.robot = placo.RobotWrapper(str(case.urdf))
         expected = ["root_joint", *problem.joints]
         assert list(self.robot.model.names)[1:] == expected, list(self.robot.model.names)
-        if problem.obstacles or problem.pairs:
+        if problem.pairs:
             self._load_pairs()
         self.reset()
         self.solver = placo.KinematicsSolver(self.robot)
@@ -50,7 +50,7 @@ class Placo(Contender):
             self.com = self.solver.add_com_task(case.com[0])
             self.com.configure("com", "soft", 1.0 / problem.length**2)
         self.solver.add_regularization_task(problem.damping)
-        if problem.obstacles or problem.pairs:
+        if problem.pairs:
             avoid = self.solver.add_avoid_self_collisions_constraint()
             avoid.self_collisions_margin = problem.margin
             avoid.self_collisions_trigger = TRIGGER
@@ -59,10 +59,8 @@ class Placo(Contender):
 
     def _load_pairs(self) -> None:
         names = [g.name for g in self.robot.collision_model.geometryObjects]
-        obstacles = [k for k, n in enumerate(names) if n.startswith("obstacle")]
-        pairs = [[a, b] for a in range(len(names)) for b in obstacles if a not in obstacles]
         solids = [names.index(solid_index(self.problem.solids, k)) for k in range(len(self.problem.solids))]
-        pairs += [[solids[a], solids[b]] for a, b in self.problem.pairs]
+        pairs = [[solids[a], solids[b]] for a, b in self.problem.pairs]
         self.facts["pairs"] = float(len(pairs))
         file = self.case.urdf.with_name("placo_pairs.json")
         file.write_text(json.dumps(pairs))

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -96,3 +96,10 @@ def cores() -> tuple[int | None, str]:
     if len(available) < 2:
         return None, "one core, nothing pinned"
     return available[-1], f"workers pinned to core {available[-1]} of {len(available)}, one at a time"
+
+
+def turns(names: Sequence[str], rounds: int) -> Iterator[tuple[int, str]]:
+    """(round, name) so that each begins a round in turn, and a drift of the machine hits all alike."""
+    for k in range(rounds):
+        first = k % len(names)
+        yield from ((k, name) for name in [*names[first:], *names[:first]])

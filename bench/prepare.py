@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from bench.descriptions import Sphere, write_urdf
-from bench.problems import Array, Problem, save
+from bench.descriptions import write_urdf
+from bench.problems import Array, Problem, Solid, save
 from wbc.robot import Robot
 from wbc.robots import load
 
@@ -49,27 +49,22 @@ def panda(folder: Path) -> Path:
 
 def ur5(folder: Path) -> Path:
     """A tool on a circle among three spheres that the arm must pass at a distance."""
-    spheres: dict[str, Sphere] = {
-        "upper_arm_link": ((0.0, 0.0, 0.25), 0.08),
-        "forearm_link": ((0.0, 0.0, 0.2), 0.07),
-        "wrist_1_link": ((0.0, 0.0, 0.0), 0.06),
-        "wrist_3_link": ((0.0, 0.08, 0.0), 0.05),
-    }
+    links = {
+        "upper_arm_link": ([0.0, 0.0, 0.25], 0.08), "forearm_link": ([0.0, 0.0, 0.2], 0.07),
+        "wrist_1_link": ([0.0, 0.0, 0.0], 0.06), "wrist_3_link": ([0.0, 0.08, 0.0], 0.05),
+    }  # fmt: skip
+    solids = [Solid(link, "sphere", [radius], place) for link, (place, radius) in links.items()]
     robot = load("ur5")
     q0 = np.array([0.0, -1.2, 1.9, -2.27, -1.57, 0.0])
     (home,) = placements(robot, q0, ["tool0"])
     poses = np.stack([[circle(home, s, radius=0.12, tilt=0.2, offset=(0.0, 0.05, 0.03))] for s in phases()])
-    obstacles: list[Sphere] = [
-        (tuple(home.translation + np.array(offset)), radius)
-        for offset, radius in (((0.05, -0.21, 0.03), 0.05), ((-0.14, 0.24, 0.05), 0.06), ((-0.05, 0.0, -0.24), 0.08))
-    ]
-    write_urdf(
-        DESCRIPTIONS / "ur_description/urdf/ur5_robot.urdf", folder / "robot.urdf", spheres=spheres, obstacles=obstacles
-    )
+    for offset, radius in (((0.05, -0.21, 0.03), 0.05), ((-0.14, 0.24, 0.05), 0.06), ((-0.05, 0.0, -0.24), 0.08)):
+        solids.append(Solid("", "sphere", [radius], (home.translation + np.array(offset)).tolist()))
+    write_urdf(DESCRIPTIONS / "ur_description/urdf/ur5_robot.urdf", folder / "robot.urdf", solids=solids)
     problem = Problem(
         "ur5", "UR5: pose of the tool, posture, limits, 4 link spheres against 3 obstacles", robot="ur5",
         joints=joint_names(robot), frames=["tool0"], q0=q0.tolist(), length=robot.characteristic_length,
-        spheres=spheres, obstacles=obstacles,
+        solids=solids, pairs=[(a, b) for a in range(len(links)) for b in range(len(links), len(solids))],
     )  # fmt: skip
     save(folder, problem, poses, np.zeros((TICKS, 3)))
     return folder

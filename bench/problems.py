@@ -51,8 +51,6 @@ class Problem:
         posture_weight: weight of the posture task; pose and centre-of-mass tasks have weight 1.
         damping: added to the diagonal of the Hessian.
         dt: tick [s].
-        spheres: link -> (centre, radius) of its collision sphere [m].
-        obstacles: (centre, radius) of spheres fixed in the world [m].
         margin: smallest distance allowed [m].
         rate: a distance d above the margin may shrink by at most rate * d [1/s].
         solids: collision shapes, on links and in the world; :attr:`pairs` says which keep clear.
@@ -73,8 +71,6 @@ class Problem:
     posture_weight: float = 1e-3
     damping: float = 1e-8
     dt: float = 0.005
-    spheres: dict[str, tuple[tuple[float, float, float], float]] = field(default_factory=dict)
-    obstacles: list[tuple[tuple[float, float, float], float]] = field(default_factory=list)
     margin: float = 0.01
     rate: float = 100.0
     solids: list[Solid] = field(default_factory=list)

@@ -43,17 +43,6 @@ class Referee:
     def clearances(self) -> tuple[Array, Array]:
         """Distance of each pair [m], and its derivative, pairs x nv, after :meth:`update`."""
         distances, gradients = [], []
-        for link, (center, radius) in self.problem.spheres.items():
-            frame = self.model.getFrameId(link)
-            placement = self.data.oMf[frame]
-            arm = placement.rotation @ np.array(center)
-            jacobian = pin.getFrameJacobian(self.model, self.data, frame, pin.LOCAL_WORLD_ALIGNED)
-            moving = jacobian[:3] - pin.skew(arm) @ jacobian[3:]
-            for place, size in self.problem.obstacles:
-                away = placement.translation + arm - np.array(place)
-                norm = float(np.linalg.norm(away))
-                distances.append(norm - radius - size)
-                gradients.append(away / norm @ moving)
         solids = self.problem.solids
         for pair, found in zip(
             self.problem.pairs, measured(self.model, self.data, solids, self.problem.pairs), strict=True

@@ -1,10 +1,14 @@
-"""How a process that answers commands line by line begins."""
+"""A process that answers commands: one JSON object a line in, one out."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
+
+Object = dict[str, Any]
 
 
 def begin(core: Sequence[str]) -> None:
@@ -18,3 +22,10 @@ def begin(core: Sequence[str]) -> None:
     answers = os.dup(1)
     os.dup2(2, 1)
     sys.stdout = os.fdopen(answers, "w")
+
+
+def serve(answer: Callable[[Object], Object], ready: Object) -> None:
+    """Say what is ready, then answer commands until standard input ends."""
+    print(json.dumps(ready), flush=True)
+    for line in sys.stdin:
+        print(json.dumps(answer(json.loads(line))), flush=True)

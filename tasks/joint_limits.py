@@ -197,7 +197,9 @@ class JointLimits(Constraint):
                 ca.SX(column[dofs]) for column in columns
             )  # fmt: skip
             lower[dofs], upper[dofs] = interval(
-                ca.vertcat(*[ca.SX(0) if free[i] else kin.q[int(robot.position_index[i])] for i in dofs]),
+                ca.vertcat(*[ca.SX(0) if free[i] else kin.q[int(robot.position_index[i])] for i in dofs])
+                if free[dofs].any()
+                else kin.q[robot.position_index[dofs].tolist()],
                 kin.v[dofs],
                 position=(low, high),
                 velocity=velocity,

@@ -106,7 +106,7 @@ class Posture(Task):
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The formula of the class."""
-        return kin.kinematics.difference(inputs["target"], kin.q)[self._dofs(robot)]
+        return kin.kinematics.difference(inputs["target"], kin.q, self._dofs(robot))
 
     def _names(self, robot: Robot) -> tuple[str, ...]:
         if self.joints is not None:

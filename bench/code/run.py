@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.code.counting import per_pass
-from bench.harness import OURS, Plan, statistics
+from bench.harness import OURS, statistics
 from bench.pool import Worker, cores
 from bench.problems import Array, load
+from bench.sheet import Sheet
+
+NOTE = """\
+The tick as C: `controller.export` of a problem, built by its own Makefile with gcc, and once more for this processor, \
+along the states and run-time inputs of the Python tick, which runs in turns with it. Nanoseconds are by \
+clock_gettime, in Python by perf_counter_ns, not corrected for their own reading, some {reading:.0f} ns. Instructions \
+are means over passes, counted by valgrind, which cannot run the instructions of every processor. Differences are of \
+all commands from Python's."""
 
 #: Builds of the exported folder: what is told to make
 BUILDS = {
@@ -22,33 +31,32 @@ BUILDS = {
     "exported C, -march=native": ("TICK_FLAGS=-O3 -march=native", "ROWS_FLAGS=-O1 -fstrict-aliasing -march=native"),
 }
 PROGRAM = Path(__file__).with_name("cycles.c")
-#: Turns, and pairs of passes in each; passes that counters see
+#: Turns, and passes in each; passes that valgrind sees
 TURNS, ROUNDS, COUNTED = 10, 5, 4
 
 
-def measure(plan: Plan, name: str, say: Callable[[str], None]) -> dict[str, Any]:
-    """Everything of one problem; times in nanoseconds, counts of one tick."""
-    case, (core, _) = load(plan.folder / name), cores()
-    work = (plan.folder / name / "code").absolute()
+def measure(problem: Path, rounds: int | None, say: Callable[[str], None]) -> dict[str, Any]:
+    """Everything of the problem in a folder; times in nanoseconds, instructions of one tick."""
+    case, (core, _) = load(problem), cores()
+    name, work = problem.name, (problem / "code").absolute()
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
-    turns = plan.rounds or TURNS
-    with Worker(plan.python, OURS, plan.folder / name, core) as worker:
+    turns = rounds or TURNS
+    with Worker(sys.executable, OURS, problem, core) as worker:
         say(f"{name}: exporting")
         worker.ask("export", folder=str(work))
         folders = {}
         for label, options in BUILDS.items():
             say(f"{name}: building {label}")
             folders[label] = build(work / "export", work / label.replace(" ", "_"), options)
-        cycles, spent = {label: [] for label in folders}, {label: [] for label in folders}
+        spent: dict[str, list[Array]] = {label: [] for label in folders}
         python: dict[str, list[float]] = {"call": [], "native": []}
         agree = {}
         for turn in range(turns):
             say(f"{name}: the tick as C and in Python, turn {turn + 1} of {turns}")
             for label, folder in folders.items():
                 some, agree[label] = timed(folder, work / "path.bin", core)
-                cycles[label].append(some[:, 0])
-                spent[label].append(some[:, 1])
+                spent[label].append(some)
             for _ in range(ROUNDS):
                 answer = worker.ask("time", ticks=case.ticks)
                 for part, kept in python.items():
@@ -56,21 +64,34 @@ def measure(plan: Plan, name: str, say: Callable[[str], None]) -> dict[str, Any]
     rows = []
     for label, folder in folders.items():
         say(f"{name}: counting instructions of {label}")
-        counter, counts = per_pass("./cycles", str(work / "path.bin"), folder, COUNTED)
-        rows.append({
-            "what": label, "ns": tails(np.concatenate(spent[label])), "cycles": tails(np.concatenate(cycles[label])),
-            "counter": counter, "counts": {what: count / case.ticks for what, count in counts.items()}, **agree[label],
-        })  # fmt: skip
+        counts = instructions(str(work / "path.bin"), folder)
+        own = {} if counts is None else {"instructions": counts / case.ticks}
+        rows.append({"what": label, "ns": tails(np.concatenate(spent[label])), "counts": own, **agree[label]})
     for label, part in (("Python: the native call alone", "native"), ("Python: controller.step(q)", "call")):
         if python[part]:
-            own = {"what": label, "ns": tails(np.array(python[part]))}
-            rows.append(own | {"cycles": None, "counter": "none", "counts": {}})
+            rows.append({"what": label, "ns": tails(np.array(python[part])), "counts": {}})
     return {"title": case.problem.title, "ticks": case.ticks * turns * ROUNDS, "rows": rows}
 
 
-def tails(values: Array) -> dict[str, float] | None:
-    """Median and so on; None where nothing was counted."""
-    return {k: 1e3 * v for k, v in statistics(list(values)).items()} if values.any() else None
+def tails(values: Array) -> dict[str, float]:
+    """Median and so on [ns]."""
+    return {part: 1e3 * value for part, value in statistics(list(values)).items()}
+
+
+def instructions(path: str, folder: Path) -> float | None:
+    """Instructions of a pass by ``valgrind --tool=cachegrind``; None where it is missing or cannot run the program."""
+    if shutil.which("valgrind") is None:
+        return None
+    counts = []
+    for rounds in (1, 1 + COUNTED):
+        tool = ["valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"]
+        command = [*tool, "./cycles", path, str(rounds)]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        counted = re.search(r"I\s+refs:\s+([\d,]+)", done.stderr)
+        if done.returncode or not counted:
+            return None
+        counts.append(float(counted[1].replace(",", "")))
+    return (counts[1] - counts[0]) / COUNTED
 
 
 def build(source: Path, folder: Path, options: tuple[str, ...]) -> Path:
@@ -87,7 +108,7 @@ def build(source: Path, folder: Path, options: tuple[str, ...]) -> Path:
 
 
 def timed(folder: Path, path: Path, core: int | None) -> tuple[Array, dict[str, float]]:
-    """(counter, nanoseconds) of every tick [samples, 2], and how far commands are from Python's."""
+    """Time of every tick [ns], and how far commands are from Python's."""
     times = folder / "times.bin"
 
     def pin() -> None:
@@ -96,6 +117,21 @@ def timed(folder: Path, path: Path, core: int | None) -> tuple[Array, dict[str, 
 
     command = ["./cycles", str(path), str(ROUNDS), str(times)]
     done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True, preexec_fn=pin)
-    bad, largest, cycles, nanoseconds = (float(word) for word in done.stdout.split())
-    samples = np.fromfile(times).reshape(ROUNDS, 2, -1).transpose(0, 2, 1).reshape(-1, 2)
-    return samples, {"not solved": bad, "difference": largest, "read cycles": cycles, "read ns": nanoseconds}
+    bad, largest, reading = (float(word) for word in done.stdout.split())
+    return np.fromfile(times), {"not solved": bad, "difference": largest, "read ns": reading}
+
+
+def sheet(measured: dict[str, Any]) -> Sheet:
+    """One problem."""
+    columns = ("one tick", "ns", "p99", "p99.9", "max", "instructions", "largest difference [rad/s]")
+    rows = []
+    for row in measured["rows"]:
+        times = [f"{row['ns'][part]:.0f}" for part in ("median", "p99", "p99.9", "max")]
+        counted = f"{row['counts']['instructions']:.0f}" if "instructions" in row["counts"] else "-"
+        rows.append((row["what"], *times, counted, f"{row['difference']:.0e}" if "difference" in row else "-"))
+    return Sheet(f"The tick as C. {measured['title']} ({measured['ticks']} ticks each)", columns, rows)
+
+
+def note(measured: dict[str, dict[str, Any]]) -> str:
+    """What the reader must know."""
+    return NOTE.format(reading=next(iter(measured.values()))["rows"][0]["read ns"])

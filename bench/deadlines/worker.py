@@ -9,8 +9,6 @@ Run as ``python -m bench.deadlines.worker NAME FOLDER [CORE]``, see :class:`benc
 from __future__ import annotations
 
 import gc
-import json
-import os
 import sys
 from collections import Counter
 from pathlib import Path
@@ -20,8 +18,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from bench.deadlines.course import DT, HOLD, KINDS, TICKS, Course
+from bench.deadlines.course import DT, KINDS, TICKS, Course
 from bench.problems import load
+from bench.worker_process import begin as pinned, serve
 from wbc.controller import core_of
 
 
@@ -39,9 +38,7 @@ def walk(course: Course, cap: int | None) -> dict[str, Any]:
         q = pin.integrate(course.model, q, step.v * DT)
         places = [course.place(q, hand).translation for hand in course.kind.hands]
         errors[k] = np.linalg.norm(np.array(places) - course.wanted[k], axis=1).mean()
-    found = {"error": float(errors.mean()), "settled": float(errors[HOLD - 1 :: HOLD].mean()), "margin": float(least)}
-    sizes = {"rows": core_of(c).layout.general_rows, "dofs": core_of(c).layout.nv}
-    return {"statuses": statuses, "iterations": iterations, **found, **sizes}
+    return {"statuses": statuses, "iterations": iterations, "error": float(errors.mean()), "margin": float(least)}
 
 
 def durations(course: Course, cap: int | None) -> list[int]:
@@ -68,16 +65,16 @@ def begin(course: Course, cap: int | None) -> tuple[Any, np.ndarray]:
 
 def main() -> None:
     """Build, say so, then serve."""
-    name, folder, *core = sys.argv[1:]
-    if core:
-        os.sched_setaffinity(0, {int(core[0])})
+    _name, folder, *core = sys.argv[1:]
+    pinned(core)
     course = Course(load(Path(folder)))
     gc.collect()
-    print(json.dumps({"ready": name, "caps": KINDS[course.name].caps}), flush=True)
-    for line in sys.stdin:
-        asked = json.loads(line)
-        answer = walk(course, asked["cap"]) if asked["do"] == "walk" else {"native": durations(course, asked["cap"])}
-        print(json.dumps(answer), flush=True)
+
+    def answer(asked: dict[str, Any]) -> dict[str, Any]:
+        cap = asked["cap"]
+        return walk(course, cap) if asked["do"] == "walk" else {"native": durations(course, cap)}
+
+    serve(answer, {"ready": course.name, "caps": KINDS[course.name].caps})
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import importlib
 import subprocess
 import sys
 
-from bench.figures import floors, pages, store
+from bench.figures import pages, store
 from bench.figures.index import FIGURES, Figure, render, write_blocks
 from bench.pool import ROOT
 from wbc.interrupts import obey_interrupts
@@ -80,7 +80,6 @@ def main(given: list[str] | None = None) -> int:
         else:  # a process each
             print(f"{figure.name} ({figure.minutes:g} min)", file=sys.stderr, flush=True)
             subprocess.run([sys.executable, "-m", "bench.figures", "--only", figure.name], cwd=ROOT, check=True)
-    floors.write()
     for page in write_blocks():
         print(f"{page} written")
     return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -12,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from bench.harness import processor
 from bench.pool import ROOT
 from bench.sheet import Sheet
 
@@ -21,12 +21,8 @@ Data = dict[str, Any]
 
 def stamp() -> dict[str, str]:
     """Command, commit, date, machine and its load, to be asked for before anything is measured."""
-    processor = next(
-        (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line),
-        platform.machine(),
-    )
     load, cores = Path("/proc/loadavg").read_text().split()[0], len(os.sched_getaffinity(0))
-    machine = f"{processor}, {cores} cores, load {load}"
+    machine = f"{processor()}, {cores} cores, load {load}"
     command = " ".join(["python", *sys.orig_argv[1:]]).replace(f"{ROOT}/", "")
     commit, date = git("rev-parse", "--short", "HEAD"), f"{datetime.now(UTC):%Y-%m-%d}"
     return {"command": command, "commit": commit, "date": date, "machine": machine}

@@ -1,4 +1,4 @@
-"""``python -m bench.ik``: solve rates and times of inverse kinematics, printed and written to ik.md and ik.json.
+"""``python -m bench.ik``: solve rates and times of inverse kinematics, printed and written to ik.json.
 
 Ctrl-C ends the measuring; what was measured until then is printed and written.
 """
@@ -6,6 +6,7 @@ Ctrl-C ends the measuring; what was measured until then is printed and written.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ from bench.figures.store import stamp
 from bench.harness import machine
 from bench.ik import tables
 from bench.ik.chains import CHAINS, Chain, prepare
-from bench.ik.run import BLOCKS, OURS, PEERS, Protocol, about, many, measure, rows, write
+from bench.ik.run import BLOCKS, OURS, PEERS, Protocol, many, measure, rows, write
 from bench.pool import ROOT
-from bench.program import bars, publish, terminal
+from bench.program import bars, terminal
 from bench.versions import versions
 from wbc.interrupts import obey_interrupts
 
@@ -41,7 +42,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--peers-python", help="interpreter with pink and mink; without it they are left out")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "bench" / "ik")
     parser.add_argument(
-        "--output", type=Path, help="folder for ik.md and ik.json; by default bench for full runs, else build/bench"
+        "--output", type=Path, help="folder for ik.json; by default bench for full runs, else build/bench"
     )
     chosen = parser.parse_args(given)
     own, peers = FULL if chosen.full else QUICK
@@ -59,7 +60,7 @@ def run(chosen: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     pythons = {OURS: sys.executable} | dict.fromkeys(PEERS if chosen.peers_python else (), chosen.peers_python)
     results: dict[str, Any] = {
         "stamp": stamp(), "machine": machine(), "versions": versions(sys.executable, OWN, chosen.peers_python, THEIRS),
-        "protocol": vars(protocol), "interrupted": None, "rows": [], "batches": [], "chains": [],
+        "protocol": vars(protocol), "interrupted": None, "rows": [], "batches": [],
     }  # fmt: skip
     chains = [chain for chain in CHAINS if chain.name in chosen.chains]
     bar = progress.add_task("", total=BLOCKS * len(chains))
@@ -85,7 +86,6 @@ def one(
     write(problem, folder, protocol)
     counts = {name: chosen.count if name == OURS else chosen.peers_count for name in pythons}
     found: dict[str, Any] = {}
-    results["chains"].append(about(problem))
     try:
         for answered in measure(folder, pythons, counts, lambda text: progress.console.print(f"{chain.name}: {text}")):
             found = answered
@@ -102,8 +102,10 @@ def main(given: list[str] | None = None) -> None:
         terminal().print("pink and mink are left out: no --peers-python was given")
     with bars() as progress:
         results = run(chosen, progress)
-    publish(chosen.output / "ik", tables.sheets(results), tables.notes(results), results)
-    complete = results["interrupted"] is None and len(results["chains"]) == len(CHAINS) and chosen.peers_python
+    terminal().print(tables.summary(results), markup=False, highlight=False)
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    (chosen.output / "ik.json").write_text(json.dumps(results, indent=1) + "\n")
+    complete = results["interrupted"] is None and len(results["batches"]) == len(CHAINS) and chosen.peers_python
     if complete and chosen.full and chosen.output == ROOT / "bench":
         write_blocks()
 

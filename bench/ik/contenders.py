@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from bench.problems import Array
-from bench.worker_process import begin
+from bench.worker_process import begin, serve
 
 #: pose [4, 4] -> q of Pinocchio, seconds
 Solve = Callable[[Array], tuple[Array, float]]
@@ -123,8 +123,7 @@ def wbc_batch(given: dict, poses: Array) -> dict:
     solver.solve_batch(start, {"hand": targets[:20]}, **options)
     begin = perf_counter()
     found = solver.solve_batch(start, {"hand": targets}, **options)
-    return {"seconds": perf_counter() - begin, "q": found.q.tolist(), "search": float(np.sum(found.seconds)),
-            "threads": threads}  # fmt: skip
+    return {"seconds": perf_counter() - begin, "q": found.q.tolist(), "threads": threads}
 
 
 def main() -> None:
@@ -136,15 +135,14 @@ def main() -> None:
     solve = CONTENDERS[name](given, given["budget"], given["tolerance"])
     for pose in poses[:20]:
         solve(pose)
-    print(json.dumps({"ready": name}), flush=True)
-    for line in sys.stdin:
-        asked = json.loads(line)
+
+    def answer(asked: dict[str, Any]) -> dict[str, Any]:
         if asked["do"] == "batch":
-            print(json.dumps(wbc_batch(given, poses)), flush=True)
-            continue
+            return wbc_batch(given, poses)
         answers = [solve(pose) for pose in poses[asked["first"] : asked["end"]]]
-        out = {"q": [q.tolist() for q, _ in answers], "seconds": [seconds for _, seconds in answers]}
-        print(json.dumps(out), flush=True)
+        return {"q": [q.tolist() for q, _ in answers], "seconds": [seconds for _, seconds in answers]}
+
+    serve(answer, {"ready": name})
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from bench.ik.chains import Chain, Judge, Problem, configuration
+from bench.ik.chains import Judge, Problem, configuration
 from bench.pool import Worker, WorkerError, cores
 
 OURS, PEERS = "wbc", ("pink", "mink")
@@ -98,7 +98,7 @@ def many(problem: Problem, folder: Path, python: str, tolerance: float) -> dict[
         answer = worker.ask("batch")
     good = judged(problem, answer["q"], tolerance)
     return {"chain": problem.chain.name, "poses": len(good), "rate": 100.0 * float(good.mean()),
-            "seconds": answer["seconds"], "search": answer["search"], "threads": answer["threads"]}  # fmt: skip
+            "seconds": answer["seconds"], "threads": answer["threads"]}  # fmt: skip
 
 
 def judged(problem: Problem, q: list[list[float]], tolerance: float) -> np.ndarray:
@@ -108,36 +108,16 @@ def judged(problem: Problem, q: list[list[float]], tolerance: float) -> np.ndarr
 
 
 def rows(problem: Problem, found: Mapping[str, Answers], tolerance: float) -> list[dict[str, Any]]:
-    """A row for each contender that has answered: rate [%] and its standard error, times [us]."""
+    """A row for each contender that has answered: rate [%], times [us]."""
     out = []
     for name, answers in found.items():
         if not answers.seconds:
             continue
         good, micro = judged(problem, answers.q, tolerance), 1e6 * np.array(answers.seconds)
-        rate, count = float(good.mean()), len(good)
         median, p95, p999 = (float(np.percentile(micro, p)) for p in (50.0, 95.0, 99.9))
         out.append({
-            "chain": problem.chain.name, "joints": len(problem.joints), "solver": name, "poses": count,
-            "rate": 100.0 * rate, "error": 100.0 * deviation(rate, count),
-            **(published(problem.chain, count) if name == OURS else {}),
+            "chain": problem.chain.name, "joints": len(problem.joints), "solver": name, "poses": len(good),
+            "rate": 100.0 * float(good.mean()), "published": problem.chain.published,
             "mean": float(micro.mean()), "median": median, "p95": p95, "p99.9": p999,
         })  # fmt: skip
     return out
-
-
-def published(chain: Chain, count: int) -> dict[str, float | None]:
-    """TRAC-IK's rate and the goal, that rate less two standard errors of a draw of so many poses [%]."""
-    if chain.published is None:
-        return {"published": None, "goal": None}
-    return {"published": chain.published, "goal": chain.published - 200.0 * deviation(chain.published / 100.0, count)}
-
-
-def deviation(rate: float, count: int) -> float:
-    """Standard error of a share of ``count`` draws."""
-    return float(np.sqrt(rate * (1.0 - rate) / count))
-
-
-def about(problem: Problem) -> dict[str, Any]:
-    """URDF, tip and limits of a chain, as they are printed."""
-    limits = [f"{low:.4g} to {high:.4g}" for low, high in zip(problem.lower, problem.upper, strict=True)]
-    return {"chain": problem.chain.name, "urdf": problem.chain.file, "tip": problem.chain.tip, "limits": limits}

@@ -22,22 +22,15 @@ OBSTACLES = (
 
 def parts() -> dict[str, Sheet | str]:
     """Both tables."""
-    obstacle = []
-    for one in obstacles():
-        first, *rest = (
-            f"{1e3 * one[key]:.{digits}f}" for key, digits in (("clearance", 1), ("beyond", 1), ("miss", 3))
-        )
-        times = f"{one['step']:.3f}", f"{one['milliseconds']:.1f}"
-        obstacle.append((one["method"], "yes" if one["done"] else "no", first, f"{one['way']:.3f}", *rest, *times))
-    whole = paths()
-    done = [(name, f"{done} of {whole['paths']}") for name, done in whole["done"].items()]
+    count, done = paths()
+    shown = [(name, f"{number} of {count}") for name, number in done.items()]
     return {
-        "obstacles": Sheet("", OBSTACLES, obstacle),
-        "paths": Sheet("", ("way of resolution", "paths done"), done),
+        "obstacles": Sheet("", OBSTACLES, obstacles()),
+        "paths": Sheet("", ("way of resolution", "paths done"), shown),
     }
 
 
-def obstacles() -> list[dict[str, Any]]:
+def obstacles() -> list[tuple[str, ...]]:
     """Trajectory 1 past a sphere that its forearm goes into, and with a joint limit that it passes."""
     machine = hermies()
     path = route(machine, "1")
@@ -57,22 +50,16 @@ def obstacles() -> list[dict[str, Any]]:
     for name, settings in ways.items():
         past = Driver(machine, replace(settings, method=Method.OBSTACLES), spheres).run(path)
         within = Driver(tight, replace(settings, method=Method.LIMITS)).run(path)
-        out.append(
-            {
-                "method": name,
-                "done": past.code == 0 and within.code == 0,
-                "clearance": float(past.clearance.min()),
-                "way": float(np.linalg.norm(np.diff(past.q, axis=0), axis=1).sum()),
-                "beyond": float((within.q - upper).max()),
-                "miss": float(max(past.errors[-1], within.errors[-1])),
-                "step": float(np.abs(np.diff(past.q, axis=0)).max()),
-                "milliseconds": 1e3 * float(np.median(past.seconds)),
-            }
-        )
+        out.append((
+            name, "yes" if past.code == 0 and within.code == 0 else "no", f"{1e3 * past.clearance.min():.1f}",
+            f"{np.linalg.norm(np.diff(past.q, axis=0), axis=1).sum():.3f}", f"{1e3 * (within.q - upper).max():.1f}",
+            f"{1e3 * max(past.errors[-1], within.errors[-1]):.3f}", f"{np.abs(np.diff(past.q, axis=0)).max():.3f}",
+            f"{1e3 * np.median(past.seconds):.1f}",
+        ))  # fmt: skip
     return out
 
 
-def paths(count: int = 100) -> dict[str, Any]:
+def paths(count: int = 100) -> tuple[int, dict[str, int]]:
     """Random straight paths of a planar arm of three joints with limits of 1.9 rad, whole and step by step."""
     robot = wbc.robots.from_dh([wbc.robots.DHRow(a=1.0, lower=-1.9, upper=1.9, velocity=1.0) for _ in range(3)])
     tip = wbc.tasks.Expression(
@@ -100,4 +87,4 @@ def paths(count: int = 100) -> dict[str, Any]:
                 done[name] += 1
             except InfeasibleError:
                 pass
-    return {"paths": count, "done": done}
+    return count, done

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 
@@ -22,32 +19,29 @@ DT, TICKS, SETTLED = 0.001, 4000, 500
 KINDS = (CommandKind.POSITION, CommandKind.VELOCITY, CommandKind.TORQUE)
 
 
-@dataclass(frozen=True)
-class Hardware:
-    """Servos of an arm: stiffness [N m/rad] and lag [s] for positions, drive [N m s/rad] for velocities,
-    damping [N m s/rad], friction [N m], payload [kg], delay [ms].
-    """
+#: Stiffness of servos of positions [N m/rad]
+STIFFNESS = 2000.0
+#: Lag of theirs [s]
+LAG = 0.1
+#: Gain of servos of velocities [N m s/rad]
+DRIVE = 200.0
+#: Damping of joints [N m s/rad]
+DAMPING = 1.0
 
-    stiffness: float = 2000.0
-    lag: float = 0.1
-    drive: float = 200.0
-    damping: float = 1.0
-    friction: float = 0.0
-    payload: float = 0.0
-    delay: int = 0
 
-    def plant(self, kind: CommandKind, robot: Robot) -> MujocoPlant:
-        """The arm on servos of a kind; those of velocities come with compensation of gravity, the payload's too."""
-        import mujoco
+def plant_of(kind: CommandKind, robot: Robot) -> MujocoPlant:
+    """The arm on servos of a kind; those of velocities come with compensation of gravity."""
+    import mujoco
 
-        model = mujoco.MjModel.from_xml_path(str(ARM))
-        k, d = self.stiffness, self.drive
-        gains = {"position": (k, 0, -k, -k * self.lag), "velocity": (d, 0, 0, -d), "torque": (1, 0, 0, 0)}[kind]
-        model.actuator_gainprm[:, 0], model.actuator_biasprm[:, :3] = gains[0], gains[1:]
-        model.dof_damping[:], model.dof_frictionloss[:] = self.damping, self.friction
-        model.body_mass[model.body("flange").id] += self.payload
-        model.body_gravcomp[1:] = float(kind is CommandKind.VELOCITY)
-        return MujocoPlant(model, robot)
+    model = mujoco.MjModel.from_xml_path(str(ARM))
+    gains = {
+        "position": (STIFFNESS, 0, -STIFFNESS, -STIFFNESS * LAG), "velocity": (DRIVE, 0, 0, -DRIVE),
+        "torque": (1, 0, 0, 0),
+    }[kind]  # fmt: skip
+    model.actuator_gainprm[:, 0], model.actuator_biasprm[:, :3] = gains[0], gains[1:]
+    model.dof_damping[:], model.dof_frictionloss[:] = DAMPING, 0.0
+    model.body_gravcomp[1:] = float(kind is CommandKind.VELOCITY)
+    return MujocoPlant(model, robot)
 
 
 def controller() -> Controller:
@@ -84,15 +78,14 @@ class ByHand:
         return np.asarray(pin.rnea(self.robot.model, self.data, q, v, (self.v - before) / DT + back) + v)
 
 
-def error(follower: ByHand | Servo, kind: CommandKind, hardware: Hardware) -> float:
+def error(follower: ByHand | Servo, kind: CommandKind) -> float:
     """Median distance of the hand from its path after half a second [mm]."""
     control = follower.controller
     robot = control.stack.robot
-    plant = hardware.plant(kind, robot)
+    plant = plant_of(kind, robot)
     plant.reset(HOME, 0.0)
     follower.reset(HOME)
-    start, late = pin.SE3(control["hand"].target), deque[Command](maxlen=hardware.delay + 1)
-    off = []
+    start, off = pin.SE3(control["hand"].target), []
     for k in range(TICKS):
         a = np.pi * k * DT
         goal = start.translation + [0.0, 0.15 * np.sin(a), 0.08 * np.sin(2 * a)]
@@ -102,11 +95,9 @@ def error(follower: ByHand | Servo, kind: CommandKind, hardware: Hardware) -> fl
         if not state.valid:
             return np.inf
         if isinstance(follower, Servo):
-            command = follower.step(state.q, state.v).command
+            plant.apply(follower.step(state.q, state.v).command)
         else:
-            command = Command(kind, follower.step(state.q, state.v))
-        late.append(command)
-        plant.apply(late[0])
+            plant.apply(Command(kind, follower.step(state.q, state.v)))
         plant.advance(DT)
         off.append(1e3 * float(np.linalg.norm(robot.pose(plant.read().q, "tool").translation - goal)))
     return float(np.median(off[SETTLED:]))
@@ -114,19 +105,14 @@ def error(follower: ByHand | Servo, kind: CommandKind, hardware: Hardware) -> fl
 
 def parts() -> dict[str, Sheet | str]:
     """The plain servos by who follows."""
-    return {"plain": plain(controller())}
-
-
-def plain(control: Controller) -> Sheet:
-    """Servos without friction, payload and delay."""
-    rows = []
+    control, rows = controller(), []
     for kind in KINDS:
-        cells = [f"{error(ByHand(control, kind, at), kind, Hardware()):.2g}" for at in ("commanded", "q", "q and v")]
+        cells = [f"{error(ByHand(control, kind, at), kind):.2g}" for at in ("commanded", "q", "q and v")]
         untold = Servo(control, kind)
-        cells.append(f"{error(untold, kind, Hardware()):.2g}")
+        cells.append(f"{error(untold, kind):.2g}")
         told = Servo(control, kind, response=untold.response)
-        cells.append(f"{error(told, kind, Hardware()):.2g}")
+        cells.append(f"{error(told, kind):.2g}")
         rows.append((str(kind), *cells))
     columns = ("hand off its path, median [mm]", "ticks at what was commanded", "at measured q", "at measured q and v",
                "`Servo`, told nothing", "`Servo`, told")  # fmt: skip
-    return Sheet("", columns, rows)
+    return {"plain": Sheet("", columns, rows)}

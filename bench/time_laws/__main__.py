@@ -19,26 +19,20 @@ from bench.pool import ROOT
 from bench.program import Record, bars, measure, publish
 from bench.time_laws import least_time, states, ticks
 from bench.time_laws.tables import sheets
-from tests.trajectory.suite import INSTANCES
 from wbc.interrupts import obey_interrupts
 
 PACKAGES = ("wbc", "toppra", "ruckig", "numpy", "scipy", "pin")
 
 #: Sizes of a quick run and of a full one: problems of each size, or states, or blocks of ticks for each course
-QUICK = {
-    "random set": 8, "small moves": 25, "torques": 6, "states": 20_000, "straight": 200, "walls": 300, "ticks": 12,
-}  # fmt: skip
-FULL = {
-    "random set": 100, "small moves": 200, "torques": 30, "states": 1_000_000, "straight": 2000, "walls": 3000,
-    "ticks": 80,
-}  # fmt: skip
+QUICK = {"random set": 8, "small moves": 25, "torques": 6, "states": 20_000, "ticks": 12}
+FULL = {"random set": 100, "small moves": 200, "torques": 30, "states": 1_000_000, "ticks": 80}
 
 NOTES = """\
 Ratios are the largest |velocity| / limit or |acceleration| / limit of a law. toppra's output is a cubic spline of \
 time, or its path with constant accelerations between grid points: polynomials both, so that all ratios of the random \
-set, the small moves and the suite come from the exact certificate, none from samples. In the random set both follow \
-the same splines, the waypoints evenly over s in [0, 1]; in the small moves and the suite wbc takes its own parameter, \
-the distance. A time is the least of two, for the path, the law and, for wbc, the certificate.
+set and the small moves come from the exact certificate, none from samples. In the random set both follow the same \
+splines, the waypoints evenly over s in [0, 1]; in the small moves wbc takes its own parameter, the distance. A time \
+is the least of two, for the path, the law and, for wbc, the certificate.
 
 Torques are sampled, 8 times in each interval of the grid or more. "With bound" adds what may lie between samples: \
 that counts for wbc, and only what was seen counts against toppra.
@@ -63,10 +57,7 @@ def parts_of(sizes: dict[str, int], seed: int, repeats: int, processes: int) -> 
         "ticks": (len(ticks.COURSES) * n["ticks"], ticks.blocks(rng(6), n["ticks"])),
         "random set": (2 * n["random set"], least_time.random_set(rng(1), n["random set"], repeats)),
         "small moves": (7 * n["small moves"], least_time.small_moves(rng(2), n["small moves"])),
-        "suite": (len(INSTANCES), least_time.suite()),
         "torques": (n["torques"], least_time.torques(rng(3), n["torques"])),
-        "straight": (n["straight"], states.straight_moves(rng(4), n["straight"])),
-        "walls": (n["walls"], states.walls(rng(5), n["walls"])),
         # Last: it takes the longest, and a run that is ended in it has everything else
         "states": (states.chunks(n["states"]), states.random_states(seed, n["states"], processes)),
     }
@@ -91,7 +82,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--full", action="store_true", help="the sizes of the published tables, 10^6 states")
     parser.add_argument("--count", type=int, help="states from which raw ruckig and wbc start")
     parser.add_argument("--problems", type=int, help="problems of every other part, for a shorter run")
-    parser.add_argument("--parts", nargs="+", choices=[*QUICK, "suite"], help="only these")
+    parser.add_argument("--parts", nargs="+", choices=QUICK, help="only these")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="for the states")
     parser.add_argument(

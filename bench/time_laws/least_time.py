@@ -13,11 +13,9 @@ import pinocchio as pin
 
 import wbc.robots
 from bench.time_laws import raw
-from tests.trajectory.suite import INSTANCES, PROBLEMS
 from wbc.errors import WbcError
 from wbc.trajectory import Law, MotionLimits, spline_path, time_optimal
 from wbc.trajectory.least_time.checks import TorqueCheck
-from wbc.trajectory.paths.waypoints import Ends
 from wbc.validation import Array
 
 Record = dict[str, Any]
@@ -109,33 +107,17 @@ def small_moves(rng: np.random.Generator, count: int) -> Iterator[Record]:
             yield record
 
 
-def suite() -> Iterator[Record]:
-    """toppra's robustness suite, with its own clamped splines and the published durations beside."""
-    for name, points, asked, published in INSTANCES:
-        waypoints, velocity, acceleration = PROBLEMS[name]
-        record = {"name": name, "published": published}
-        record |= compared(np.array(waypoints, dtype=np.float64), velocity, acceleration, points, asked, "clamped")
-        yield record
-
-
-def compared(
-    waypoints: Array,
-    velocity: Any,
-    acceleration: Any,
-    points: int,
-    asked: float | None = None,
-    ends: Ends = "not-a-knot",
-) -> Record:
+def compared(waypoints: Array, velocity: Array, acceleration: Array, points: int) -> Record:
     """Raw toppra (waypoints evenly over s in [0, 1]) and ours on one problem, refusals as None."""
-    path = raw.spline(np.linspace(0.0, 1.0, len(waypoints)), waypoints, ends)
-    limits = MotionLimits(velocity=np.array(velocity, float), acceleration=np.array(acceleration, float))
+    path = raw.spline(np.linspace(0.0, 1.0, len(waypoints)), waypoints)
     constraints = [raw.velocity_limits(velocity), raw.acceleration_limits(acceleration)]
-    found, _ = raw.solve(constraints, path, points, asked)
+    found, _ = raw.solve(constraints, path, points)
     theirs: Record = {"duration": None, "ratio": None}
     if found is not None and np.isfinite(found.duration) and found.duration > 0.0:
+        limits = MotionLimits(velocity=velocity, acceleration=acceleration)
         theirs = judged(raw.law_of(found, None, path, limits))
     try:
-        law = time_optimal(spline_path(waypoints, ends), velocity, acceleration, duration=asked, intervals=points - 1)
+        law = time_optimal(spline_path(waypoints), velocity, acceleration, intervals=points - 1)
     except WbcError:
         return {"raw": theirs, "ours": judged(None)}
     return {"raw": theirs, "ours": judged(law)}

@@ -30,9 +30,9 @@ def both(limit: Any) -> Array:
     return np.column_stack([-size, size])
 
 
-def spline(places: Any, waypoints: Any, ends: str = "not-a-knot") -> Any:
+def spline(places: Any, waypoints: Any) -> Any:
     """toppra's spline through waypoints, with its default ends."""
-    return toppra.SplineInterpolator(places, np.asarray(waypoints, dtype=np.float64), ends)
+    return toppra.SplineInterpolator(places, np.asarray(waypoints, dtype=np.float64))
 
 
 def polynomial(path: Any) -> PolynomialPath:
@@ -59,14 +59,10 @@ def torque_limits(dynamics: Any, torque: Array, scheme: str | None = None) -> An
     return constraint.JointTorqueConstraint(dynamics, both(torque), np.zeros(len(torque)), **how)
 
 
-def solve(limits: list[Any], path: Any, points: int | None = None, duration: float | None = None, **how: Any) -> Any:
+def solve(limits: list[Any], path: Any, points: int | None = None, **how: Any) -> Any:
     """(trajectory or None, instance) of toppra on a grid of so many points, or its own grid."""
     grid = None if points is None else np.linspace(*path.path_interval, points)
-    if duration is None:
-        instance = algorithm.TOPPRA(limits, path, gridpoints=grid, **how)
-    else:
-        instance = algorithm.TOPPRAsd(limits, path, gridpoints=grid, **how)
-        instance.set_desired_duration(duration)
+    instance = algorithm.TOPPRA(limits, path, gridpoints=grid, **how)
     return instance.compute_trajectory(0, 0), instance
 
 
@@ -79,7 +75,7 @@ def law_of(trajectory: Any, instance: Any, path: Any, limits: MotionLimits, chec
     return Law(polynomial(path), Timing.accelerations(data.gridpoints, data.sd_vec), limits, checks)
 
 
-def state_to_state(arguments: dict[str, Array], synchronisation: str = "Time") -> Any:
+def state_to_state(arguments: dict[str, Array]) -> Any:
     """ruckig's input for the arguments of ``jerk_limited``."""
     asked: Any = ruckig.InputParameter(len(arguments["start"]))
     for ours, theirs in (("start", "current"), ("target", "target")):
@@ -88,7 +84,6 @@ def state_to_state(arguments: dict[str, Array], synchronisation: str = "Time") -
                 setattr(asked, f"{theirs}_{part}", arguments[ours + suffix])
     for part in ("velocity", "acceleration", "jerk"):
         setattr(asked, f"max_{part}", arguments[part])
-    asked.synchronization = getattr(ruckig.Synchronization, synchronisation)
     return asked
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from bench.sheet import Sheet
-from bench.time_laws.states import BENT
 from tests.trajectory.random_motions import FAMILIES
 
 Record = dict[str, Any]
@@ -33,8 +32,7 @@ OF_TORQUES = {
 def sheets(parts: Parts) -> list[Sheet]:
     """The tables of those parts that were measured."""
     makers = {
-        "random set": random_set, "small moves": small_moves, "suite": suite, "torques": torques,
-        "states": states, "straight": straight, "walls": walls, "ticks": ticks,
+        "random set": random_set, "small moves": small_moves, "torques": torques, "states": states, "ticks": ticks,
     }  # fmt: skip
     return [make(parts[name]) for name, make in makers.items() if parts.get(name)]
 
@@ -99,24 +97,6 @@ def small_moves(records: list[Record]) -> Sheet:
     return Sheet("Small moves: two waypoints of 6 joints, toppra over s in [0, 1]", columns, rows)
 
 
-def near_published(record: Record, name: str) -> bool:
-    """Whether a duration is at most 1 % from the published one."""
-    duration = record[name]["duration"]
-    return duration is not None and abs(duration / record["published"] - 1.0) <= 0.01
-
-
-def suite(records: list[Record]) -> Sheet:
-    """toppra's robustness suite."""
-    rows = []
-    for name, text in (("raw", "toppra, as the suite gives it"), ("ours", "wbc, the same clamped splines by distance")):
-        ratios = known(records, name, "ratio")
-        no_longer = [r for r in records if r[name]["duration"] and r[name]["duration"] <= 1.01 * r["published"]]
-        near, kept = sum(near_published(r, name) for r in records), sum(r <= KEPT for r in ratios)
-        rows.append((text, *(_share(n, len(records)) for n in (len(ratios), near, len(no_longer), kept))))
-    columns = ("", "returns a law", "published duration to 1 %", "at most 1 % longer", "within limits")
-    return Sheet("toppra's robustness suite, its default solver", columns, rows)
-
-
 def torques(records: list[Record]) -> Sheet:
     """Torque limits of random paths."""
     rows = []
@@ -158,31 +138,6 @@ def states(records: list[Record]) -> Sheet:
         "error of states",
     )
     return Sheet("From state to state", columns, rows)
-
-
-def straight(records: list[Record]) -> Sheet:
-    """Straight moves."""
-    rows = []
-    for name, text in (("raw", "ruckig, Synchronization.Phase"), ("ours", "wbc, straight=True")):
-        bends = [r[name] for r in records]
-        rows.append((text, _share(sum(b <= BENT for b in bends), len(bends)), f"{max(bends):.1e}"))
-    title = f"Straight moves of 7 joints ({_percent(median(r['longer'] for r in records))} longer, median)"
-    return Sheet(title, ("", "straight", "largest distance from the line, over its length"), rows)
-
-
-def walls(records: list[Record]) -> Sheet:
-    """Position limits."""
-    rows = []
-    for able, text in ((False, "some joint cannot stop, or come from rest, within them"), (True, "every joint can")):
-        some = [r for r in records if r["able"] == able]
-        out = [r["raw"] for r in some if r["raw"] > 1e-9]
-        ours = sum(r["ours"] is not None and r["ours"] > KEPT - 1.0 for r in some)
-        refused = sum(r["ours"] is None for r in some)
-        rows.append(
-            (text, *(f"{n}" for n in (len(some), len(out))), f"{max(out, default=0.0):.2g}", f"{ours}", f"{refused}")
-        )
-    columns = ("", "moves", "ruckig leaves them", "by, rad", "wbc leaves them", "wbc refuses")
-    return Sheet("Position limits of 1 rad, 3 joints in motion at both ends", columns, rows)
 
 
 def ticks(records: list[Record]) -> Sheet:

@@ -29,7 +29,6 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Course:
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "TICKS", TICKS)
-    monkeypatch.setattr(worker, "HOLD", 50)
     monkeypatch.setattr(run, "TICKS", TICKS)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bench import measured
-from bench.figures import __main__ as command, floors, index, pages, store
+from bench.figures import __main__ as command, index, pages, store
 from bench.figures.index import FIGURES, Figure, render
 from bench.sheet import Sheet
 from tests.project.test_floors import FLOORS
@@ -54,10 +54,6 @@ def test_every_producer_has_parts() -> None:
     assert len(producers) > 15
     without = [module.__name__ for module in producers if not callable(getattr(module, "parts", None))]
     assert without == ["bench.measured.ticks"], "what several of them share"
-
-
-def test_the_picture_of_the_floors_is_that_of_the_table() -> None:
-    assert floors.PICTURE.read_text() == floors.picture()
 
 
 def test_the_page_of_the_architecture_has_every_part_on_its_floor() -> None:

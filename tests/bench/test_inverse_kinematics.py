@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bench.ik import run, tables
+from bench.ik import tables
 from bench.ik.__main__ import main
 from bench.ik.chains import CHAINS, Judge, configuration, prepare
 
@@ -47,22 +47,9 @@ def test_a_small_run_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixt
     main(options(tmp_path))
     assert "pink and mink are left out" in capsys.readouterr().out
     results = json.loads((tmp_path / "ik.json").read_text())
-    (row,), (batch,), (chain,) = results["rows"], results["batches"], results["chains"]
+    (row,), (batch,) = results["rows"], results["batches"]
     assert (row["rate"], row["published"], row["poses"], results["interrupted"]) == (100.0, 99.88, 30, None)
     assert (batch["rate"], batch["poses"]) == (100.0, 30)
-    assert chain["limits"][3] == "-3.072 to -0.0698"
-    page = (tmp_path / "ik.md").read_text()
-    # 99.88 less twice the root of 99.88 * 0.12 / 30
-    assert "| Panda | 7 | wbc | 30 | 100.00 | 0.00 | 99.88 | 98.62 | yes |" in page
-    assert "Ctrl-C" not in page
-    assert tables.summary(results).startswith("| chain | joints | solved [%] | TRAC-IK published [%] |")
-
-
-def test_goals_are_published_rates_less_two_standard_errors_and_means_on_the_same_poses() -> None:
-    ur5, xarm = (next(c for c in CHAINS if c.name == name) for name in ("UR5", "xArm7"))
-    assert run.published(ur5, 10_000)["goal"] == pytest.approx(99.17 - 2 * 100 * (0.9917 * 0.0083 / 10_000) ** 0.5)
-    assert run.published(xarm, 10_000)["goal"] is None
-    times = {"median": 1.0, "p95": 2.0, "p99.9": 3.0, "error": 0.1, "joints": 6, "chain": "UR5"}
-    own = {**times, "solver": "wbc", "poses": 10_000, "rate": 98.9, **run.published(ur5, 10_000), "mean": 150.0}
-    rows = [own, {**times, "solver": "pink", "poses": 9, "rate": 1.0, "mean": 160.0}]
-    assert [cells[8] for cells in tables.main_sheet({"rows": rows}).rows] == ["no", "-"]
+    head, _, cells = tables.summary(results).splitlines()[:3]
+    assert head.startswith("| chain | joints | solved [%] | TRAC-IK published [%] |")
+    assert cells.startswith("| Panda | 7 | 100.00 | 99.88 |")

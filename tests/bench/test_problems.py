@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,19 @@ from bench.reference import Referee
 from tests.repeats import ALL, MORE
 
 MAKERS = {"panda": prepare.panda, "talos": prepare.talos} | ({"ur5": prepare.ur5} if MORE >= ALL else {})
+
+
+def worst_error(ours: Ours, measure: Callable[[], float]) -> float:
+    """Largest error of the answer along the path, every tenth tick [rad/s, m/s]."""
+    ours.reset()
+    errors = []
+    for k in range(ours.case.ticks):
+        ours.aim(k)
+        if k % 10 == 0:
+            errors.append(measure())
+        ours.call()
+        ours.settle()
+    return max(errors)
 
 
 @pytest.fixture(scope="module", params=MAKERS)
@@ -60,26 +75,22 @@ def test_paths_make_limits_bind_and_come_to_rest(case: Case) -> None:
 
 
 def test_answers_are_exact_solutions_of_the_qp_that_was_built(ours: Ours) -> None:
-    error = worker.accuracy(ours)["error"]
-    assert error is not None
-    assert error < 1e-6
+    assert worst_error(ours, ours.reference_error) < 1e-6
 
 
 def test_answers_are_those_of_an_independent_build_of_the_qp(case: Case) -> None:
     # What `calm` adds to the QP is not in the problem
     ours = Ours(case, calm=False)
-    error = worker.accuracy(ours, ours.independent_error)["error"]
-    assert error is not None
-    assert error < 1e-6
+    assert worst_error(ours, ours.independent_error) < 1e-6
 
 
 def test_path_is_followed_clear_of_obstacles(ours: Ours) -> None:
     case, referee = ours.case, Referee(ours.case)
-    states = worker.walk(ours)["states"]
+    states = worker.time_sample(ours, inf)["states"]
     position, rotation = referee.errors(np.array(states[-1]), case.ticks - 1)
     assert position < 3e-3
     assert rotation < 1e-3
-    if case.problem.obstacles:
+    if case.problem.pairs:
         least = []
         for state in states:
             referee.update(np.array(state))
@@ -91,7 +102,7 @@ def test_path_is_followed_clear_of_obstacles(ours: Ours) -> None:
 
 def test_workers_time_every_tick(ours: Ours) -> None:
     times = worker.time_calls(ours, 20)
-    assert {"aim", "call", "settle", "cycle"} <= set(times)
+    assert {"call", "cycle"} <= set(times)
     assert all(len(values) == 20 and min(values) > 0 for values in times.values())
 
 

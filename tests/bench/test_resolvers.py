@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.resolvers.drives import drive, methods
+from bench.measured.resolvers import drive, methods
 
 
 def test_methods_follow_the_tip_and_pairs_come_back() -> None:

@@ -32,7 +32,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, An
 def test_every_part_has_a_table(written: tuple[str, dict[str, Any]]) -> None:
     page, found = written
     assert found["interrupted"] is None
-    assert len(found["tables"]) == len(run.QUICK) + 1
+    assert len(found["tables"]) == len(run.QUICK)
     for table in found["tables"]:
         assert table["rows"]
         assert all(len(row) == len(table["columns"]) for row in table["rows"])
@@ -43,16 +43,16 @@ def test_every_part_has_a_table(written: tuple[str, dict[str, Any]]) -> None:
 
 def test_ctrl_c_keeps_what_was_measured() -> None:
     def endless() -> Iterator[dict[str, Any]]:
-        yield from states.straight_moves(np.random.default_rng(0), 3)
+        yield from least_time.small_moves(np.random.default_rng(0), 1)
         os.kill(os.getpid(), signal.SIGINT)
-        yield from states.straight_moves(np.random.default_rng(0), 1000)
+        yield from least_time.small_moves(np.random.default_rng(0), 1000)
 
-    work = {"straight": (1003, endless()), "walls": (5, states.walls(np.random.default_rng(1), 5))}
+    work = {"small moves": (7007, endless()), "states": (5, states.random_states(1, 5, 1))}
     with Progress(disable=True) as progress:
         parts, where = run.measure(work, progress)
-    assert where == "straight"
-    assert set(parts) == {"straight"}
-    assert 3 <= len(parts["straight"]) < 1000
+    assert where == "small moves"
+    assert set(parts) == {"small moves"}
+    assert 7 <= len(parts["small moves"]) < 7000
     assert len(sheets(parts)) == 1
 
 

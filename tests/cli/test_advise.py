@@ -64,7 +64,3 @@ def test_the_page_has_the_table() -> None:
     code, out, _ = run("--markdown")
     assert code == 0
     assert out.strip() in PAGE.read_text()
-
-
-def test_a_pair_that_is_none_is_refused() -> None:
-    assert run("advise", "spherical_4r", "--current", "alpha")[0] == 2

@@ -175,13 +175,6 @@ def test_a_whole_tree_by_blocks(tmp_path: Path) -> None:
     assert [b["shape"] for b in found["blocks"]] == [[11, 7], [1, 1], [7, 7], [7, 7]]
     assert len(found["blocks"][0]["locus"]) == 8
     assert len(found["witness"]["q"]) == 22
-    for option in (("--screen", 2), ("--approximate",), ("--full",)):
-        code, _, err = run("spdm_on_ssrms", *option)
-        assert code == 2
-        assert "not for a tree" in err
-    code, _, err = run("spdm_on_ssrms", "--set", "elbow, beta")
-    assert code == 2
-    assert "did you mean 'elbow, " in err
 
 
 def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
@@ -193,9 +186,6 @@ def test_both_arms_of_the_dexterous_manipulator(tmp_path: Path) -> None:
     assert "alpha: 15 x 15, incomplete" in out
     full, _ = json.loads(file.read_text())["sets"]
     assert sorted(b["shape"] for b in full["blocks"]) == [[1, 1], [12, 7], [12, 7]]
-    code, _, err = run("ssrms", "--tree")
-    assert code == 2
-    assert "one of spdm, spdm_on_ssrms" in err
 
 
 def test_a_whole_tree_is_certified_by_blocks(tmp_path: Path) -> None:
@@ -212,13 +202,6 @@ def test_a_whole_tree_is_certified_by_blocks(tmp_path: Path) -> None:
     assert [b["everywhere"] for b in proof["blocks"]] == [True] * 4
     assert [b["boxes"] > 0 for b in proof["blocks"]] == [True, False, True, True]
     assert len(list(states.iterdir())) == 2
-
-
-def test_a_screen_takes_no_constraints_of_ones_own() -> None:
-    for own in (("--lock", "joint1"), ("--point", "end3"), ("--plane", "F3,F5"), ("--set", "q1")):
-        code, _, err = run("ssrms", "--screen", 2, *own)
-        assert code == 2
-        assert "screen: " in err
 
 
 #: The command, with every piece of the subdivision slowed so that there is time to interrupt it
@@ -278,7 +261,3 @@ def test_a_certificate_interrupted_as_a_process_is_gone_on_with(background: bool
     assert resumed["left"] == fresh["left"] == 0.0
     assert resumed["boxes"] == pytest.approx(fresh["boxes"])
     assert kept.exists()
-
-
-def test_a_joint_that_is_none_is_named() -> None:
-    assert "did you mean 'joint1'" in run("ssrms", "--lock", "joint")[2]

@@ -23,9 +23,3 @@ def test_a_stale_page_is_named_and_written(tmp_path: Path) -> None:
     assert run("docs", "--folder", folder)[:2] == (0, "written: fixed.md\n")
     assert page.read_text() == wanted
     assert run("docs", "--check", "--folder", folder)[:2] == (0, "")
-
-
-def test_no_pages(tmp_path: Path) -> None:
-    code, out, err = run("docs", "--folder", tmp_path / "none")
-    assert (code, out) == (2, "")
-    assert "clone of the repository" in err

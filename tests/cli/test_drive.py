@@ -137,8 +137,3 @@ def test_arms_without_a_mode_or_a_base(tmp_path: Path) -> None:
     assert (code, "a1 floats: its base is held" in err) == (0, True)
     code, _, err = run("ur5", "--rates", orders, "--mode", "M2")
     assert (code, "the robot has no joint beyond those that its tip takes" in err) == (2, True)
-
-
-def test_keys_need_a_terminal() -> None:
-    code, _, err = run("spherical_4r", "--keys", "--mode", "M4")
-    assert (code, "terminal" in err) == (2, True)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 import wbc
 from tests.cli.test_commands import run as wbc_command
@@ -113,66 +112,6 @@ def test_the_search_begins_where_it_is_told(tmp_path: Path) -> None:
     code, out, _ = run("ur5", "--target", numbers, "--start", start)
     assert code == 0
     np.testing.assert_allclose(printed(out, "1"), near + 0.01, atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["pandda", "--target", DOWN], "did you mean 'panda'"),
-        (["ur5"], "target: give at least one with --target or --targets"),
-        (["ur5", "--target", "1,2"], "target: expected X,Y,Z or X,Y,Z,QX,QY,QZ,QW"),
-        (["ur5", "--target", "1,2,x"], "target: expected numbers"),
-        (["ur5", "--target", "1,2,nan"], "target: expected finite numbers"),
-        (["ur5", "--target", "1,2,3,1,1,0,0"], "quaternion of norm 1.41421"),
-        (["ur5", "--target", DOWN, "--frame", "tool1"], "did you mean 'tool0'"),
-        (["ur5", "--target", DOWN, "--budget", "0"], "budget: expected"),
-        (["ur5", "--target", DOWN, "--seed", "-1"], "seed: expected"),
-        (["ur5", "--target", DOWN, "--tolerance", "0"], "tolerance: expected"),
-        (["ur5", "--target", DOWN, "--sphere", "1,0,0,0.1,1,0,0"], "leave the velocity out"),
-        (["ur5", "--target", DOWN, "--start", "1,2"], "start: expected shape (6,)"),
-        (["ur5", "--target", DOWN, "--backend", "nativ"], "did you mean 'native'"),
-        (["ur5", "--target", DOWN, "--out", "q.txt"], "out: unknown name"),
-        (["ur5", "--target", DOWN, "--out", "none/q.csv"], "there is no such folder"),
-        (["ur5", "--target", DOWN, "--out", "there.csv"], "use --force"),
-        (["ur5", "--targets", "none.csv"], "there is no such file"),
-        (["ur5", "--targets", "none.txt"], "targets: unknown name"),
-        (["ur5", "--targets", "there.csv"], "has no target"),
-        (["ur5", "--targets", "header.csv"], "did you mean 'x'"),
-        (["ur5", "--targets", "short.csv"], "missing qy, qz, qw"),
-        (["ur5", "--targets", "ragged.csv"], "ragged.csv line 3: expected 3 values"),
-        (["ur5", "--targets", "words.csv"], "words.csv line 2: expected numbers"),
-        (["ur5", "--targets", "text.npz"], "cannot be read"),
-        (["ur5", "--targets", "other.npz"], "other.npz array: unknown name"),
-        (["ur5", "--targets", "shape.npz"], "expected the shape n x 7 or n x 4 x 4"),
-        (["ur5", "--targets", "nan.npz"], "nan.npz row 1: expected finite numbers"),
-        (["ur5", "--targets", "turn.npz"], "not a rotation matrix"),
-    ],
-    ids=lambda value: "_".join(value) if isinstance(value, list) else "",
-)
-def test_bad_input_is_one_line_and_exit_code_2(
-    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    files = {
-        "there.csv": "",
-        "header.csv": "xx,y,z\n1,2,3\n",
-        "short.csv": "x,y,z,qx\n1,2,3,1\n",
-        "ragged.csv": "x,y,z\n1,2,3\n1,2\n",
-        "words.csv": "x,y,z\n1,2,a\n",
-        "text.npz": "no archive",
-    }
-    for name, text in files.items():
-        Path(name).write_text(text)
-    np.savez("other.npz", pose=np.zeros((1, 7)))
-    np.savez("shape.npz", poses=np.zeros((2, 6)))
-    np.savez("nan.npz", positions=np.array([[0.4, 0.0, 0.5], [np.nan, 0.0, 0.0]]))
-    np.savez("turn.npz", poses=np.ones((1, 4, 4)) * [[1], [1], [1], [0]] + np.diag([0, 0, 0, 1.0]))
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert message in err
-    assert err.startswith("error: ")
-    assert err.count("\n") == 1
-    assert Path("there.csv").read_text() == ""
 
 
 def test_a_file_is_written_over_where_that_is_asked_for(tmp_path: Path) -> None:

@@ -113,16 +113,3 @@ def test_trust_is_asked_for(tmp_path: Path) -> None:
     code, out, _ = run("replay", tmp_path / "mine.npz", "--trust")
     assert code == 0
     assert "3 ticks: every command is bit-identical" in out
-
-
-def test_bad_input_is_one_line(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "text.npz").write_text("no recording")
-    for arguments, message in (
-        ([tmp_path / "none"], "recording: cannot be read: No such file"),
-        ([tmp_path / "text.npz"], "this file is no recording of ticks"),
-        ([folder, "--backend", "nativ"], "backend: unknown name, did you mean 'native'?"),
-    ):
-        code, out, err = run("replay", *arguments)
-        assert (code, out) == (2, "")
-        assert message in err
-        assert err.count("\n") == 1

@@ -98,51 +98,6 @@ def test_a_folder_is_checked(walked: tuple[Path, str], tmp_path: Path) -> None:
     assert run("walk", "check", tmp_path)[0] == run("walk", "check", tmp_path / "none")[0] == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["--scene", "cylinder_gird"], "did you mean 'cylinder_grid'"),
-        (["--scene", "there/is/none.csv"], "there/is/none.csv"),
-        (["--objective", "fast"], "objective"),
-        (["--plant", "mujco"], "did you mean 'mujoco'"),
-        (["--speed", "-0.1"], "speed"),
-        (["--speed", "nan"], "speed"),
-        (["--turn-rate", "0"], "turn-rate"),
-        (["--to", "13"], "T,A"),
-        (["--to", "13,40"], "place 2.A"),
-        (["--scene", "truss_grid", "--to", "L9,1"], "L9,1"),
-        (["--remove-rows", "30"], "no foothold has 30"),
-        (["--remove", "1.5"], "share"),
-        (["--gravity", "0,1"], "gravity: expected 3 numbers"),
-        (["--set", "hand_radius"], "NAME=NUMBER"),
-        (["--set", "hand_radus=0.1"], "did you mean 'hand_radius'"),
-        (["--robot", "hexapod", "--arms", "4"], "of the robot 'walker'"),
-        (["--vanish", "99,9 at 1"], "99,9"),
-        (["--vanish", "13,9 at"], "NAME at SECONDS"),
-        (["--fail", "arm9 at 1"], "arm9"),
-        (["--fault", "slip arm1 0.01 at 1"], "no masses"),
-        (["published", "--to", "13,99"], "place 2.A"),
-        (["drive"], "give a file of rates"),
-        (["drive", "none.csv"], "none.csv"),
-        (["drive", "keyboard"], "no terminal"),
-        (["drive", "keyboard", "--plant", "mujoco"], "kinematic"),
-        (["drive", "--rate", "1,2 for 3"], "six finite rates"),
-        (["limb"], "say what the limb is to do"),
-        (["limb", "--do", "jump"], "hold FOOTHOLD"),
-        (["limb", "--do", "rate 1,2 for 3"], "six finite rates"),
-        (["limb", "--do", "poses none.csv"], "none.csv"),
-        (["limb", "--do", "hold 13,99"], "13,99"),
-        (["limb", "--do", "hold 13,9", "--limb", "arm7"], "arm7"),
-        (["resume", "nowhere"], "nowhere"),
-    ],
-)
-def test_bad_input_is_named_and_nothing_is_written(arguments: list[str], told: str, tmp_path: Path) -> None:
-    code, out, err = run("walk", *arguments, "--out", tmp_path / "run")
-    assert (code, out) == (2, "")
-    assert told in err
-    assert not (tmp_path / "run").exists()
-
-
 def test_what_is_out_of_reach_is_refused_with_its_reason(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()

@@ -10,9 +10,12 @@ import pinocchio as pin
 import pytest
 
 from tests.climb.by_hand import TRIPODS, climber, gait, level, posture
-from wbc.climb import FREE_LIMB, ClimbScene, ContactMove, ContactPlan, Foothold, Stance
+from tests.climb.walkers import over
+from wbc.climb import FREE_LIMB, ClimbScene, ContactMove, ContactPlan, Foothold, Stance, first_stance, machines
 from wbc.climb.checker import check
-from wbc.climb.loop import TRANSITIONS, Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState, PlanReference
+from wbc.climb.grids import cylinder_grid
+from wbc.climb.limb_work import plan_limb_work
+from wbc.climb.loop import TRANSITIONS, Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState, LoopOptions, PlanReference
 from wbc.climb.loop.limb_state import after
 from wbc.errors import RangeError
 from wbc.shapes import Box, PlacedShape
@@ -225,3 +228,16 @@ def test_plans_that_are_none_are_refused_by_name() -> None:
     other = dataclasses.replace(level([np.zeros(3)]), gravity=np.zeros(3))
     with pytest.raises(RangeError, match="gravity"):
         ClimbLoop(plan).see(other)
+
+
+def test_a_limb_that_lifts_again_at_once_lands_first() -> None:
+    scene, walker = cylinder_grid(), machines.climber("walker")
+    stance = first_stance(walker, scene, walker.with_body(walker.rest, over(13, 8)))
+    near = np.argsort(np.linalg.norm(scene.positions - scene.positions[stance.contacts[0]], axis=1))
+    ids = [scene.footholds[row].id for row in near if row not in stance.contacts][:2]
+    plan = plan_limb_work(walker, scene, stance, walker.limbs[0].name, ids)
+    run = ClimbLoop(plan, options=LoopOptions(period=0.03), backend="vm").run()
+    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    latched = next(time for time, _, state, _ in run.changes if state is LimbState.LATCHING)
+    row = int(np.searchsorted(run.log["t"], latched + 1e-9, side="right")) - 1
+    assert run.log["path_time"][row] <= plan.moves[0].land + 1e-9

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from tests.climb.on_stones import on_stones
 from tests.climb.referee import between, body_speeds, fastest_share, least_distances, slipped
 from wbc.climb import motion
+from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
@@ -23,6 +25,7 @@ from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.shapes import Box
 from wbc.trajectory.least_time.reachability import SpeedProgram
 from wbc.trajectory.least_time.rows import PathRows
+from wbc.validation import Array
 
 #: Robots, how far they step [m] and how many limbs at once: legs, grips that roll, three joints, six joints
 CASES = {
@@ -156,8 +159,8 @@ def test_what_a_stance_lacks_is_said() -> None:
         PathTiming(endless, MotionSpeeds())
 
 
-class _Never:
-    def margin(self, contacts: tuple[int, ...], q: np.ndarray) -> float:
+class _Never(Equilibrium):
+    def margin(self, contacts: Sequence[int], q: Array, *, motors: bool = False, effort: float = 1.0) -> float:
         return -0.25 if FREE_LIMB in contacts else 0.5
 
 
@@ -165,7 +168,7 @@ def test_moves_that_nothing_bears_are_refused() -> None:
     robot = climber("hexapod")
     scene, stances = on_stones(robot, np.random.default_rng(1), 0.05)
     with pytest.raises(MoveError, match=r"do not bear the robot .* lack 0.25 of its weight"):
-        carry_out(robot, scene, stances, MotionOptions(tries=0), balance=_Never())
+        carry_out(robot, scene, stances, MotionOptions(tries=0), balance=_Never(robot, scene))
 
 
 def test_a_proof_that_stays_open_at_few_instants_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:

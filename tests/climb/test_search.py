@@ -16,6 +16,7 @@ from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace, LimbAt, Route
+from wbc.climb.joint_values import beyond_limits
 from wbc.climb.machines import climber
 from wbc.climb.scene import ClimbScene, Foothold, size_of
 from wbc.climb.scenes import draw, placed
@@ -225,3 +226,23 @@ def test_the_truss_climber_leaves_its_place_on_one_hand() -> None:
     place = machine.body_pose(placed(machine, course.goal)).translation
     path = find_stances(machine, course.scene, start, BodyPlace(place))
     assert len(path.stances) > 2
+
+
+@pytest.mark.parametrize("places", [(840, 901), (852, 949), (867, 951)])
+def test_a_body_yields_where_limbs_end_at_limits_just_off_their_footholds(places: tuple[int, int]) -> None:
+    robot = climber("talos")
+    scene = draw("rubble", size_of(robot), 0).scene
+    world = ClimbWorld(robot, scene)
+    touch, foothold = world.touch[0], world.places[places[0]]
+    turn = foothold[:9].reshape(3, 3) @ touch[:9].reshape(3, 3).T
+    begun = world.state_of(robot.rest)
+    begun[:12] = np.concatenate([turn.ravel(), foothold[9:] - turn @ touch[9:]])
+    contacts = np.array(places, dtype=np.int32)
+    how, state, _, _ = world.stand(contacts, contacts, 0.02, begun, followed=False)
+    assert how == PostureOutcome.STANDS
+    q = world.q_of(state)
+    assert beyond_limits(robot.robot, q[None]) is None
+    for limb, at in enumerate(places):
+        pose, wanted = robot.contact_pose(q, limb), world.places[at]
+        np.testing.assert_allclose(pose.translation, wanted[9:], atol=1e-8)
+        np.testing.assert_allclose(pose.rotation.ravel(), wanted[:9], atol=1e-8)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from tests.climb.test_operator import walked
-from wbc.climb import BodyPlace, plan_climb
+from wbc.climb import BodyPlace, Stance, plan_climb
 from wbc.climb.checker import check
 from wbc.climb.drive import ClimbDrive
 from wbc.climb.let_go import joined
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, LimbState
+from wbc.climb.loop.reference import PlanReference
 from wbc.climb.resume import coming_to_rest, stance_in
 from wbc.errors import RangeError
 
@@ -45,6 +46,23 @@ def test_a_body_goes_as_it_is_told_while_a_limb_lands() -> None:
     assert run.log.array("contact")[-1].min() >= 0
     report = check(run.log, plan.climber, plan.scene)
     assert report.clean, str(report)
+
+
+def test_a_body_at_rest_goes_as_it_is_told_while_a_limb_lands() -> None:
+    plan = walked()
+    move = next(move for move in plan.moves if move.land > move.lift + 1.2)
+    held = list(plan.start)
+    for before in sorted(plan.moves, key=lambda move: move.lift):
+        if before.lift <= move.lift:
+            held[before.limb] = before.lands if before.land <= move.lift else -1
+    stance = Stance((*held,), PlanReference(plan, plan.climber.robot).q(0.5 * (move.lift + move.land)))
+    drive, twist = ClimbDrive(plan.climber), np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.02])
+    drive.command(twist)
+    going = drive.following(plan.scene, stance)
+    assert [(move.limb, move.lift) for move in going.moves] == [(move.limb, 0.0)]
+    assert not going.v[0].any()
+    assert not going.v[-1].any()
+    assert np.abs(going.v[going.times.searchsorted(0.5), :6] - twist).max() < 1e-9
 
 
 def test_a_plan_that_does_not_begin_as_the_robot_goes_is_refused() -> None:

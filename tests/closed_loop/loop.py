@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from tests.closed_loop.eyes import Array, Eyes
+from tests.closed_loop.eyes import Array
 from tests.optimised import ticks
-from tests.tasks.robots import FRAMES, Frames
 from wbc.api import Controller
 from wbc.robot import Robot
 from wbc.tasks import Item
@@ -30,21 +29,15 @@ class Run:
 class Loop:
     """One compiled stack; each check switches on the items that it is about."""
 
-    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, name: str, backend: str = "auto") -> None:
+    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, backend: str = "auto") -> None:
         stack = wbc.Stack(robot, dt)
         for key, item in items.items():
             stack.add(item, name=key)
-        self.robot, self.dt, self.eyes = robot, dt, Eyes(robot)
+        self.robot, self.dt = robot, dt
         with ticks():  # thousands of ticks a check
             self.controller: Controller = stack.compile(backend=backend)
         self._names = [entry.name for entry in stack.entries]
-        self.known = name
         self._settle()
-
-    @property
-    def frames(self) -> Frames:
-        """Frames that the checks speak of."""
-        return FRAMES[self.known]
 
     def _settle(self) -> None:
         """Give every input that waits for a first configuration a value, so that a reset has none to work out."""

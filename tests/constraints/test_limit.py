@@ -49,25 +49,6 @@ def test_rows_and_inputs_are_those_of_the_task_and_two_sides() -> None:
     assert [r.label for r in Limit(CenterOfMass(), upper=0.0).rows(machine)] == ["x.upper", "y.upper", "z.upper"]
 
 
-@pytest.mark.parametrize("name", ["panda", "talos"])
-def test_margins_are_the_error_of_the_task_against_both_sides(name: str) -> None:
-    machine, rng = robot(name), np.random.default_rng(4)
-    task = EndEffector(FRAMES[name].tip, relative_to=FRAMES[name].base, axes="frame")
-    limit, plain = numbers(Limit(task, lower=-0.5, upper=0.5, only=("ry", "z")), machine), numbers(task, machine)
-    for _ in range(5):
-        q = random_configuration(machine, rng)
-        target = task.initial(machine, random_configuration(machine, rng))
-        own = {"target": target["target"], "feedforward": rng.normal(size=6)}
-        low, high = rng.normal(size=(2, 2))
-        rates = {"lower_rate": rng.normal(size=2), "upper_rate": rng.normal(size=2)}
-        e, h = plain(q, own), limit(q, {**own, "lower": low, "upper": high, **rates})
-        rows = [4, 2]
-        assert h["value"] == pytest.approx(np.concatenate([e["value"][rows] - low, high - e["value"][rows]]))
-        assert h["jacobian"] == pytest.approx(np.vstack([e["jacobian"][rows], -e["jacobian"][rows]]))
-        drift = [e["drift"][rows] - rates["lower_rate"], rates["upper_rate"] - e["drift"][rows]]
-        assert h["drift"] == pytest.approx(np.concatenate(drift))
-
-
 def test_first_value_of_the_target_is_that_of_the_task() -> None:
     machine = robot("panda")
     q = random_configuration(machine, np.random.default_rng(5))

@@ -1,4 +1,4 @@
-"""Equal stacks give pink's velocities: recorded answers of pink (``bench/pink_answers.py``) on several robots.
+"""Equal stacks give pink's velocities: answers that pink_answers.py recorded of pink on several robots.
 
 FrameTask of pink has the error log6(T'T_target) in the frame's axes, which is no item of this package; it is written
 here as an :class:`Expression`, so that its rows and their derivatives come from this package's kinematics.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
 from typer.testing import CliRunner
 
 from tests.export.cases import STRICT, build, run
@@ -54,19 +53,3 @@ def test_obstacles_and_the_cap_arrive(tmp_path: Path) -> None:
     header = (tmp_path / "out" / "wbc_tick.h").read_text()
     assert "WBC_P_SPHERE1_POSE" in header
     assert "WBC_P_SPHERE2_VELOCITY" in header
-
-
-@pytest.mark.parametrize(
-    ("arguments", "wanted"),
-    [
-        (("pandx",), "panda"),
-        (("panda", "--iteration-cap", "-2", "--backend", "native"), "iteration_cap"),
-        (("panda", "--states", "0"), "states"),
-        (("panda", "--solver-archive", "/none.tar.gz", "--states", "5", "--backend", "vm"), "cannot be read"),
-    ],
-)
-def test_bad_input_is_one_line(arguments: tuple[str, ...], wanted: str, tmp_path: Path) -> None:
-    code, said = wbc(*arguments, "--out", tmp_path / "out")
-    assert code == 2
-    assert wanted in said
-    assert not (tmp_path / "out").exists()

@@ -27,7 +27,7 @@ from tests.repeats import repeats
 from wbc.errors import RangeError, UnknownNameError
 from wbc.extras import MissingPackageError
 from wbc.formats import FORMATS, FormatError, convert, follow
-from wbc.formats.messages import TickTree
+from wbc.formats.messages import TickTree, of_ticks
 from wbc.log import LogFileError, TickRecorder, save
 from wbc.multibody import pin
 
@@ -240,6 +240,24 @@ def test_logs_of_other_recorders_are_runs(tmp_path: Path) -> None:
     assert len(remarks) == 1
     assert "none of the table" in remarks[0]
     assert [tick["x"]["a"] for tick in messages(file)["/tick"]] == [None, 2.0]
+    # A connection writes JSON by itself
+    said = [data for _, _, data in of_ticks(recorder.log(), TickTree(["t", "x.a"]))]
+    assert [tick["x"]["a"] for tick in json.loads(json.dumps(said, allow_nan=False))] == [None, 2.0]
+
+
+@pytest.mark.parametrize("name", ["ur5", "kinova", "solo8"])
+def test_a_log_without_a_stack_shows_the_robot_where_it_is(name: str, tmp_path: Path) -> None:
+    """Columns of any names are its configuration, where there are as many as it has coordinates."""
+    robot = wbc.robots.load(name)
+    columns = {"t": ("s", "f8"), **{f"q.{k}": ("m, rad", "f8") for k in range(robot.nq)}}
+    recorder, rows = TickRecorder(columns, {"robot": name}), [robot.random(k) for k in range(3)]
+    recorder.extend(np.column_stack([np.arange(3.0), rows]))
+    said = messages(convert(save(recorder.log(), tmp_path, "npz"), "mcap")[0])
+    for q, moment in zip(rows, said["/tf"], strict=True):
+        for one in moment["transforms"]:
+            place = np.array([*one["translation"].values(), *one["rotation"].values()])
+            due = robot.pose(q, one["child_frame_id"])
+            assert np.allclose(pin.XYZQUATToSE3(place).homogeneous, due.homogeneous, atol=1e-12)
 
 
 def test_what_cannot_be_converted_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,12 @@ import pytest
 
 import wbc
 from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors
+from tests.loops.test_torques import moving, rows_at
 from tests.repeats import covering, repeats
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
+from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._linkage_speed import LinkageSpeed, bend_of
 from wbc.validation import Array
@@ -155,27 +157,27 @@ def test_gaps_are_told_by_loop() -> None:
     assert gaps["right"] < 1e-9
 
 
-@pytest.mark.parametrize("name", ["four_bar", "delta"])
-def test_slopes_of_what_a_linkage_asks_for(name: str) -> None:
-    """Those of |c / A|^2 / 2 are differences of it."""
-    robot, rng, h = limited(NAMED[name], 20.0), np.random.default_rng(0), 1e-6
+@pytest.mark.parametrize("name", ["four_bar", "ankle", "delta"])
+def test_how_fast_the_forces_of_a_bend_grow(name: str) -> None:
+    """Half of the logarithm's rate is a difference of |y| on the way."""
+    robot, rng, h, most = limited(NAMED[name], 20.0), np.random.default_rng(0), 1e-6, 20.0
     kin = Tracer(Kinematics(robot.model))
     (linkage,) = robot.loops.linkages
-    bend = bend_of(robot, kin, linkage, np.full(len(linkage.dofs), 20.0))
-    asked = ca.SX.zeros(robot.nv)
+    bend = bend_of(robot, kin, linkage, np.full(len(linkage.dofs), most))
+    asked, error = ca.SX.zeros(robot.nv), robot.loops.error(kin)
     asked[list(linkage.dofs)] = bend.asked
-    size = ca.sumsqr(bend.asked / 20.0) / 2.0
-    look = ca.Function("bend", [kin.q, kin.v], [size, bend.slope, bend.growth, asked])
-    q, v = robot.integrate(robot.neutral, 0.2 * rng.normal(size=robot.nv)), rng.normal(size=robot.nv)
-    _, slope, growth, c = (np.array(part).ravel() for part in look(q, v))
+    bias = kin.second(error, MotionExpressions(kin.kinematics))[1]
+    look = ca.Function("bend", [kin.q, kin.v], [asked, bend.rate, bias])
+    q, v = moving(robot, rng)
+    c = np.array(look(q, v)[0]).ravel()
 
-    def at(q: Array, v: Array) -> float:
-        return float(look(q, v)[0])
+    def force(along: float) -> float:
+        there, then = pin.integrate(robot.model, q, along * v), v + along * c
+        rows = rows_at(robot, there)
+        return float(np.linalg.norm(np.linalg.solve(rows @ rows.T * most**2, np.array(look(there, then)[2]))))
 
-    found = [(at(q, v + h * unit) - at(q, v - h * unit)) / (2.0 * h) for unit in np.eye(robot.nv)]
-    assert slope == pytest.approx(found, abs=1e-5 * np.abs(found).max())
-    ends = [at(pin.integrate(robot.model, q, sign * h * v), v + sign * h * c) for sign in (1.0, -1.0)]
-    assert growth[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-4)
+    found = (np.log(force(h)) - np.log(force(-h))) / (4.0 * h)
+    assert float(look(q, v)[1]) == pytest.approx(found, rel=1e-4)
 
 
 def test_only_linkages_with_limits_of_acceleration_are_slowed() -> None:

@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors
+from tests.loops.mechanisms import MOTORS, NAMED, body, hinge, mjcf, random_linkage, with_motors
 from tests.loops.test_loops import opened
 from tests.repeats import repeats
 from wbc.errors import RangeError, UnknownNameError, UnsupportedJointError
@@ -247,17 +247,43 @@ def test_velocities_that_keep_loops_closed_are_within_limits() -> None:
         assert max(robot.loop_gaps(step.q_next).values()) <= 1e-9
 
 
-def test_a_tick_that_leaves_loops_open_says_so() -> None:
-    """Where a step leads no correction of its size closes the ankle."""
+def test_coarse_ticks_of_an_ankle_are_solved() -> None:
+    """One of these gave way: where it led no correction of its size closed the loops."""
     robot = driven("ankle")
-    ends = [
-        (str(step.status), step.relaxed, max(robot.loop_gaps(step.q_next).values())) for step in coarse("ankle", 113)
-    ]
-    assert {status for status, _, gap in ends if gap <= 1e-9} == {"solved"}
-    ((status, relaxed, gap),) = [end for end in ends if end[2] > 1e-9]
-    assert status == "relaxed"
-    assert {slack.item for slack in relaxed} == {"mechanism"}
-    assert max(slack.amount for slack in relaxed) == pytest.approx(2.0 * gap / 0.02**2, rel=0.5)
+    for step in coarse("ankle", 450):
+        assert step.status == "solved"
+        assert max(robot.loop_gaps(step.q_next).values()) <= 1e-9
+
+
+def falling_rod() -> str:
+    """A crank, a rod on a ball joint and a rocker, of millimetres: the rod turns under its weight as no motor can."""
+    y, x = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    rod = body("rod", np.array([0.0, 0.0, 0.003]), '<joint name="ball" type="ball"/>')
+    bodies = body("crank", np.zeros(3), hinge("in", y), rod)
+    bodies += body("rocker", np.array([0.006, 0.002, 0.0]), hinge("out", x))
+    text = mjcf("falling", bodies, '<connect name="pin" body1="rod" body2="rocker" anchor="0.005 0.001 0.001"/>')
+    text = text.replace('pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"', FALLING)
+    return with_motors(text.replace('gravity="0 0 0"', 'gravity="0 0 -9.81"'), ["in"])
+
+
+#: The inertia of its links
+FALLING = 'pos="2e-4 1e-4 3e-4" mass="1" diaginertia="1e-6 1e-6 1e-6"'
+
+
+def test_loops_stay_closed_where_limits_of_motion_give_way() -> None:
+    """They opened by a fiftieth of the mechanism when the rod turned faster than it may."""
+    robot = wbc.robots.load(falling_rod(), shapes="none", velocity=3.0, acceleration=200.0)
+    stack = wbc.Stack(robot, 0.005).add(wbc.tasks.Posture()).add(wbc.tasks.JointLimits())
+    controller, q, v, fastest, relaxed = stack.compile(command="torque"), robot.neutral, np.zeros(robot.nv), 0.0, 0
+    for _ in range(80):
+        step = controller.step(q, v)
+        q, v = np.array(step.q_next), np.array(step.v)
+        relaxed += step.status == "relaxed"
+        fastest = max(fastest, float(np.abs(v).max()))
+        assert max(robot.loop_gaps(q).values()) <= 1e-9
+        assert np.abs(rows_at(robot, q) @ v).max() <= 1e-9
+    assert relaxed > 40
+    assert fastest > 10.0
 
 
 def plants(robot: Robot, text: str) -> dict[str, Plant]:

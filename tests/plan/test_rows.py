@@ -12,7 +12,7 @@ import wbc
 from tests.loops.mechanisms import NAMED
 from tests.plan.scenes import CoalJudge, at, base_with_a_body
 from tests.repeats import repeats
-from wbc.errors import CommandError, InfeasibleError
+from wbc.errors import InfeasibleError
 from wbc.plan import MotionPlanner, PlannedPath
 from wbc.shapes import Box
 
@@ -103,14 +103,6 @@ def test_a_planar_base_drives_round_a_wall() -> None:
         np.testing.assert_allclose(robot.difference(one, other) / 1e-6, rate, atol=1e-4)
 
 
-def test_rows_of_velocities_alone_are_refused() -> None:
-    robot = wbc.robots.load("tiago", shapes="none")
-    stack = wbc.Stack(robot, dt=0.01)
-    stack.add(wbc.tasks.Posture())
-    with pytest.raises(CommandError, match=r"mechanism.*velocities"):
-        stack.plan(robot.neutral, robot.neutral)
-
-
 def test_a_joint_that_is_fixed_no_longer_moves_again() -> None:
     planner = behind_a_wall(("still", wbc.tasks.Fixed(["panda_joint1"]))).planner()
     start = planner.stack.robot.neutral
@@ -158,7 +150,7 @@ def test_without_a_compiler_rows_run_on_the_virtual_machine(monkeypatch: pytest.
     """The same path, from the same expressions."""
     stack = behind_a_wall(("cup", wbc.tasks.AxisAlign("panda_hand_tcp", axis=(0, 0, -1))))
     _, compiled = across(stack, ("cup",))
-    monkeypatch.setattr("wbc.plan.rows.toolchain.available", lambda: False)
+    monkeypatch.setattr("wbc.native.toolchain.available", lambda: False)
     _, interpreted = across(stack, ("cup",))
     np.testing.assert_allclose(interpreted.points, compiled.points, atol=1e-6)
 

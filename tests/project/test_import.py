@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import pathlib
 import subprocess
@@ -9,6 +10,9 @@ import sys
 
 import pytest
 
+from wbc import lazy
+
+ROOT = pathlib.Path(__file__).parents[2]
 HEAVY = ("matplotlib", "typer", "rich", "scipy", "pyarrow", "toppra", "ruckig", "osqp")
 #: What robots are made of, besides
 NUMBERS = ("numpy", "casadi", "pinocchio", "coal", "daqp", "flint")
@@ -54,6 +58,21 @@ def test_completion_imports_no_command() -> None:
     found, loaded = run(program).split("\n", 1)
     assert found.split() == ["track"]
     assert not set(loaded.split()) & {*NUMBERS, *UPPER, "wbc.cli.track"}
+
+
+PACKAGES = [file for folder in ("wbc", "tasks", "robots") for file in sorted((ROOT / folder).rglob("__init__.py"))]
+
+
+@pytest.mark.parametrize(
+    "file", [file for file in PACKAGES if "lazy.attach" in file.read_text()], ids=lambda file: file.parent.name
+)
+def test_public_names_are_those_that_the_parser_finds(file: pathlib.Path) -> None:
+    blocks = (node for node in ast.parse(file.read_text()).body if isinstance(node, ast.If))
+    imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
+    assert lazy.imports_in(file.read_text()) == {
+        a.asname or a.name: (n.module, a.name) for n in imports for a in n.names
+    }
+    assert imports
 
 
 def test_import_of_the_package_imports_none_of_its_floors() -> None:

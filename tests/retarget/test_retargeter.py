@@ -14,6 +14,8 @@ from wbc import robots
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.retarget import Clip, CorrespondenceError, Retargeted, Retargeter, RetargetOptions, RetargetWeights
+from wbc.retarget.mapping import Mapper
+from wbc.retarget.retargeter import stances_of
 from wbc.retarget.solids import LinkBalls, balls_of_joints
 from wbc.track.scene import link_meshes
 
@@ -90,6 +92,22 @@ def test_soles_do_not_sink_by_the_robot_files_own_bodies() -> None:
         pin.forwardKinematics(robot.model, data, q)
         lowest = min(lowest, *(balls.lowest(data.oMi[joint]) for joint, balls in bodies.items()))
     assert -DEPTH < lowest < 0.01
+
+
+@pytest.mark.parametrize("name", ["g1", "talos", "romeo"])
+def test_targets_of_one_who_crawls_lie_on_the_ground_and_not_in_it(name: str) -> None:
+    clip = motions.part(clips.crawl().clip, 0.4, 3.4)
+    match = Retargeter(name).correspondence(clip.skeleton)
+    places = Mapper(match).places(clip.points, clip.turns, stances_of(match, clip).ankle)
+    for limb, targets in places.limbs.items():
+        lies = match.body.limbs[limb].thickness
+        assert targets.middle[:, 2].min() > lies[0]
+        if limb.endswith("arm"):
+            assert targets.wrist[:, 2].min() > lies[1]
+            assert targets.end[:, 2].min() > lies[2]
+            # Bones that are turned are as long as before
+            assert np.ptp(np.linalg.norm(targets.wrist - targets.middle, axis=1)) < 1e-12
+            assert np.ptp(np.linalg.norm(targets.end - targets.wrist, axis=1)) < 1e-12
 
 
 def test_all_links_of_one_who_crawls_stay_above_ground_as_they_are_drawn() -> None:

@@ -18,24 +18,6 @@ WITH_MIMICS = [
 ]
 
 
-@pytest.mark.parametrize("name", WITH_MIMICS)
-def test_couplings_are_those_of_the_file(name: str) -> None:
-    robot = wbc.robots.load(name, lock=(), shapes="none")
-    leaders = RECIPES[name].mimic_leaders
-    wanted = {}
-    for joint, element in joints(example(RECIPES[name].file)).items():
-        mimic = element.find("mimic")
-        leader = leaders.get(joint, mimic.get("joint")) if mimic is not None else None
-        if leader in robot.joint_names and joint in robot.joint_names:
-            wanted[joint] = (leader, float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0")))
-    found = {robot.dof_names[c.follower]: (robot.dof_names[c.leader], c.ratio, c.offset) for c in robot.couplings}
-    assert found == wanted
-    index = robot.position_index
-    for c in robot.couplings:
-        at = c.ratio * robot.neutral[index[c.leader]] + c.offset
-        assert robot.neutral[index[c.follower]] == pytest.approx(at, abs=1e-12)
-
-
 @pytest.mark.parametrize("name", [n for n in WITH_MIMICS if RECIPES[n].lock])
 def test_table_locks_reduce_both_ends(name: str) -> None:
     robot, whole = wbc.robots.load(name, shapes="none"), wbc.robots.load(name, lock=(), shapes="none")

@@ -1,4 +1,4 @@
-"""MJCF files: a crawler with a free, hinge, slide and ball joint and two hinges in one body."""
+"""MJCF files: couplings of joints, meshes beside the file, refusals; random ones are in test_random_mjcf.py."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 import wbc.robots
-from tests.models import placement
 from tests.refusals import assert_refused
 from tests.robots.files import DATA
 from wbc.errors import RobotFileError
 from wbc.extras import MissingPackageError
-from wbc.shapes import Capsule, Sphere
 
 CRAWLER = DATA / "crawler.xml"
 
@@ -24,36 +22,6 @@ def write(folder: Path, body: str, head: str = "") -> Path:
     path = folder / "model.xml"
     path.write_text(f'<mujoco>{head}<worldbody><body name="b">{body}<geom size="0.1"/></body></worldbody></mujoco>')
     return path
-
-
-def test_structure_and_floating_base() -> None:
-    robot = wbc.robots.load(CRAWLER)
-    assert (robot.name, robot.base, robot.nq, robot.nv) == ("crawler", "floating", 15, 13)
-    assert robot.joint_names == ("base", "hinge", "slide", "ball", "h1", "h2")
-    np.testing.assert_allclose(robot.neutral, [0, 0, 1, 0, 0, 0, 1, 0.1, 0.05, 0, 0, 0, 1, 0.1, 0.1])
-    assert "home" in robot.notes["neutral"]
-
-
-def test_shapes_of_the_file() -> None:
-    robot = wbc.robots.load(CRAWLER)
-    assert set(robot.shapes) == {"trunk", "upper", "slider", "palm", "two"}
-    upper, slider, two = (robot.shapes[name][0] for name in ("upper", "slider", "two"))
-    assert slider.shape == Sphere(0.05)
-    assert isinstance(upper.shape, Capsule)
-    assert (upper.shape.radius, upper.shape.length) == pytest.approx((0.04, 0.3))
-    np.testing.assert_allclose(sorted(end[2] for end in upper.ends()), [-0.3, 0.0], atol=1e-12)
-    assert (upper.excess, slider.excess) == (0.0, 0.0)
-    assert isinstance(two.shape, Capsule)
-    assert (two.shape.radius, two.shape.length) == pytest.approx((0.03, 0.14))
-    assert 0.01 < two.excess < 0.02
-    np.testing.assert_allclose(two.placement.translation, 0.0, atol=1e-12)
-    assert "universe" in robot.notes["shapes"]
-
-
-def test_fixed_base_stands_where_the_file_draws_it() -> None:
-    robot = wbc.robots.load(CRAWLER, base="fixed")
-    assert (robot.base, robot.nv) == ("fixed", 7)
-    np.testing.assert_allclose(placement(robot, "trunk", robot.neutral).translation, [0, 0, 1], atol=1e-12)
 
 
 def test_joint_equalities_become_couplings(caplog: pytest.LogCaptureFixture) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import pathlib
 import xml.etree.ElementTree as ElementTree
 
@@ -13,7 +12,7 @@ import pytest
 
 import wbc.robots
 from tests.models import placement
-from tests.robots.files import example, joints
+from tests.robots.files import example
 from wbc.errors import RobotFileError, WbcError
 from wbc.robot import Recipe, Robot
 from wbc.robot.sources.files import example_data_folder, listed_data_folder
@@ -92,25 +91,6 @@ def test_robot_loads_as_its_row_says(name: str) -> None:
     assert len({str(f.name) for f in robot.model.frames}) == robot.model.nframes
     for frame in robot.frames.values():
         assert np.isfinite(placement(robot, frame, robot.neutral).homogeneous).all()
-
-
-@pytest.mark.parametrize("name", [name for name in LOADABLE if TABLE[name].file.endswith(".urdf")])
-def test_limits_are_those_of_the_file(name: str) -> None:
-    robot = bare(name)
-    elements = joints(example(TABLE[name].file))
-    limits = robot.limits
-    assert (limits.position_lower <= limits.position_upper).all()
-    for joint in robot.joint_names[1 if robot.base_nv else 0 :]:
-        element, dof = elements[joint], robot.dofs(joint)
-        limit = element.find("limit")
-        bounded = element.get("type") != "continuous" and limit is not None
-        given = bounded and (limit.get("lower") is not None or limit.get("upper") is not None)
-        wanted = (float(limit.get("lower", "0")), float(limit.get("upper", "0"))) if given else (-math.inf, math.inf)
-        assert (limits.position_lower[dof][0], limits.position_upper[dof][0]) == pytest.approx(wanted)
-        for key in ("velocity", "effort"):
-            number = float(limit.get(key, "0")) if limit is not None else 0.0
-            assert getattr(limits, key)[dof][0] == pytest.approx(number if number else math.inf)
-            assert number or joint in robot.notes[key]
 
 
 @pytest.mark.parametrize("name", LOADABLE)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.ahead_machines import KINDS, shown
+from tests.stack.machines import KINDS, shown
 from wbc.errors import CompileError, UnknownNameError
 from wbc.native import kernel, targets, toolchain
 from wbc.stack import ahead, generic

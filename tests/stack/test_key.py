@@ -13,6 +13,7 @@ from tests.project.layout import module_name
 from tests.project.test_floors import PACKAGE_FILES, imported, part_of
 from tests.stack import small
 from wbc import Stack
+from wbc.native.library import file_bytes
 from wbc.shapes import Box, PlacedShape, Sphere
 from wbc.stack import key
 from wbc.stack.artifact import compile_stack
@@ -81,6 +82,12 @@ def test_a_change_in_any_part_changes_the_key(part: str, monkeypatch: pytest.Mon
         monkeypatch.undo()
         key._own_code.cache_clear()
     assert key.key(stack, "1") == before
+
+
+@pytest.mark.parametrize("size", [0, 1, 1 << 16, (1 << 16) + 1, 3 << 16])
+def test_files_are_read_whole(size: int, tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(bytes(k % 251 for k in range(size)))
+    assert file_bytes(tmp_path / "file") == (tmp_path / "file").read_bytes()
 
 
 def test_add_returns_the_stack_that_it_was_called_on() -> None:

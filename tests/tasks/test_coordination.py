@@ -12,8 +12,8 @@ import pytest
 
 import wbc
 from tests.evaluation import numbers, sample, slope
-from tests.models import X, Z, arm, frame_jacobian, placement, robot as bare
-from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
+from tests.models import X, Z, arm, placement, robot as bare
+from tests.tasks.robots import FRAMES, random_configuration, robot
 from wbc.errors import RangeError, UnknownNameError
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
@@ -26,34 +26,6 @@ HAND, OTHER = "panda_hand", "panda_link4"
 def drawn(item: Item, machine: Robot, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
     rng = np.random.default_rng(seed)
     return random_configuration(machine, rng), {d.name: sample(machine, d, rng) for d in item.inputs(machine)}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_relative_pose_at_the_second_hand_is_its_pose_from_the_first(name: str) -> None:
-    """With the point in b's wanted origin and the axes of a, nothing is left of the difference."""
-    machine, f = robot(name), FRAMES[name]
-    ours = numbers(RelativePose(f.base, f.tip, axes=f.base), machine)
-    other = numbers(EndEffector(f.tip, relative_to=f.base), machine)
-    for seed in range(4):
-        q, values = drawn(ours.item, machine, seed)
-        values["at"] = values["target"].translation
-        given = {key: values[key] for key in ("target", "feedforward")}
-        for what in ("value", "jacobian"):
-            assert ours(q, values)[what] == pytest.approx(other(q, given)[what], abs=1e-10)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_neither_hand_is_preferred(name: str) -> None:
-    """Written from the other hand, every row and its derivative is -R_t' times what it was."""
-    machine, f = robot(name), FRAMES[name]
-    one, two = (numbers(RelativePose(*frames), machine) for frames in ((f.base, f.tip), (f.tip, f.base)))
-    for seed in range(4):
-        q, values = drawn(one.item, machine, seed)
-        target = values["target"]
-        back = {"target": target.inverse(), "at": target.actInv(values["at"]), "feedforward": np.zeros(6)}
-        turn = np.kron(np.eye(2), target.rotation.T)
-        for what in ("value", "jacobian"):
-            assert two(q, back)[what] == pytest.approx(-turn @ one(q, values)[what], abs=1e-9)
 
 
 def test_default_point_is_halfway_between_the_hands_and_may_be_declared() -> None:
@@ -93,27 +65,6 @@ def test_coupling_starts_where_it_is_told() -> None:
     assert staying.inputs(machine)[0].default is None
     assert staying.initial(machine, q)["target"] == pytest.approx([q[0] - 2 * q[1]], abs=1e-12)
     assert replace(staying, target=3.0) == JointCoupling(relation, target=3.0)
-
-
-def plain(machine: Robot, frame: str, q: np.ndarray, rows: slice, length: float) -> float:
-    """Yoshikawa's measure from Pinocchio's Jacobian, without a floor."""
-    jacobian = frame_jacobian(machine, frame, q)
-    jacobian[:3] /= length
-    return float(np.sqrt(np.linalg.det(jacobian[rows] @ jacobian[rows].T)))
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_measure_is_yoshikawas(name: str) -> None:
-    machine, f = robot(name), FRAMES[name]
-    rows = {"pose": slice(0, 6), "position": slice(0, 3), "orientation": slice(3, 6)}
-    for kind, chosen in rows.items():
-        item = Manipulability(f.tip, kind=kind, length=0.4)  # type: ignore[arg-type]
-        for seed in range(3):
-            q = random_configuration(machine, np.random.default_rng(seed))
-            wanted = plain(machine, f.tip, q, chosen, 0.4)
-            assert item.value(machine, q) == pytest.approx(wanted, rel=1e-3, abs=1e-4)
-            found = numbers(item, machine)(q, {"target": 1.0, "feedforward": 0.0})["value"][0]
-            assert found + 1.0 == pytest.approx(item.value(machine, q), rel=1e-10)
 
 
 def test_singular_configurations_have_a_value_and_no_slope() -> None:

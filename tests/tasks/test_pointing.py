@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.spatial.transform import Rotation
 
 import wbc
-from tests.evaluation import numbers, sample, slope
+from tests.evaluation import numbers, slope
 from tests.items import ITEMS
 from tests.models import placement
-from tests.rates import axes, line_of_sight
+from tests.rates import axes
 from tests.tasks.robots import FRAMES, NAMES, random_configuration, robot
 from wbc.api import Controller
 from wbc.robot import Limits, Robot
@@ -24,44 +22,8 @@ STATES = 2
 HAND = "panda_hand"
 
 
-def states(name: str, item: Item, given: dict[str, Any]) -> list[tuple[np.ndarray, np.ndarray, dict[str, Any]]]:
-    """Configurations, velocities and run-time values."""
-    machine, rng = robot(name), np.random.default_rng(zlib.crc32(name.encode()))
-    out = []
-    for _ in range(STATES):
-        values = {d.name: sample(machine, d, rng) for d in item.inputs(machine)} | given
-        if isinstance(item, AxisAlign):
-            values["target"] = values["target"] / np.linalg.norm(values["target"])
-        out.append((random_configuration(machine, rng), rng.uniform(-1, 1, machine.nv), values))
-    return out
-
-
 def declared(name: str, *classes: str) -> list[tuple[Item, dict[str, Any]]]:
     return [pair for cls in classes for pair in ITEMS[cls](robot(name))]
-
-
-def wanted_direction(item: Item, machine: Robot, q: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Where the axis is to point, in the world."""
-    if isinstance(item, LookAt):
-        return line_of_sight(item, machine, q, target)
-    assert isinstance(item, AxisAlign)
-    return placement(machine, item.relative_to, q).rotation @ target
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_error_is_the_shortest_turn(name: str) -> None:
-    machine = robot(name)
-    for item, given in declared(name, "AxisAlign", "LookAt"):
-        assert isinstance(item, (AxisAlign, LookAt))
-        found = numbers(item, machine)
-        for q, _, values in states(name, item, given):
-            rows = placement(machine, item.frame, q).rotation @ axes(item)
-            direction, e = wanted_direction(item, machine, q, values["target"]), found(q, values)["value"]
-            direction = direction / np.linalg.norm(direction)
-            turn = Rotation.from_rotvec(rows[:, :2] @ e)
-            np.testing.assert_allclose(turn.apply(direction), rows[:, 2], rtol=0, atol=1e-12)
-            angle = np.arctan2(np.linalg.norm(np.cross(direction, rows[:, 2])), direction @ rows[:, 2])
-            np.testing.assert_allclose(np.linalg.norm(e), angle, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["panda", "talos"])
@@ -154,19 +116,6 @@ def other_z(machine: Robot, base: str, frame: str, q: np.ndarray, point: np.ndar
     """Height of the first point above the second, along the other frame's z axis."""
     first = placement(machine, frame, q).act(np.array((0.02, 0.0, 0.05)))
     return (placement(machine, base, q).actInv(first) - point)[2:]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_distance_by_pinocchio(name: str) -> None:
-    machine = robot(name)
-    for item, given in declared(name, "Distance"):
-        assert isinstance(item, Distance)
-        found = numbers(item, machine)
-        for q, _, values in states(name, item, given):
-            first = placement(machine, item.frame, q).act(np.array(item.offset))
-            second = placement(machine, item.other, q).act(np.array(values["point"]))
-            wanted = np.linalg.norm(first - second) - values["target"]
-            np.testing.assert_allclose(found(q, values)["value"], [wanted], rtol=0, atol=1e-12)
 
 
 def test_first_value_of_the_point_is_that_of_the_field() -> None:

@@ -1,7 +1,8 @@
 """One walk over the registry: every derivative of every shipped class against finite differences, on four robots.
 
-Rows that are not the derivative of a value (damping, velocity limits, holds, the rate of a pitch plane) are
-held to Pinocchio's velocities instead. A class without a factory, or without its check, fails.
+Values are those that Pinocchio and numpy find. Rows that are not the derivative of a value (damping, velocity limits,
+holds, the rate of a pitch plane) are held to Pinocchio's velocities. A class without a factory, or without its check,
+fails.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from tests.evaluation import Numbers, later, numbers, sample, slope
 from tests.items import ITEMS, NO_VELOCITIES
 from tests.repeats import covering, repeats
 from tests.tasks.robots import NAMES, random_configuration, robot
+from tests.values import ELSEWHERE, VALUES, has_value
 from wbc.robot import Robot
 from wbc.tasks import Item, PitchPlane, Task, registry
 
@@ -79,6 +81,15 @@ def test_rows_are_what_the_class_says(class_name: str, robot_name: str) -> None:
             q, v, values = draw(machine, item, given, rng)
             here = found(q, values, v)
             assert all(np.isfinite(x).all() or name in ("lower", "upper") for name, x in here.items())
+            if has_value(item):
+                wanted = VALUES[class_name](item, machine, q, values)
+                at_rest = found(q, values)
+                close(here["value"] if "value" in here else -at_rest["lower"] / values["gain"], wanted, 1e-10)
+            else:
+                assert {
+                    class_name,
+                    type(getattr(item, "task", item)).__name__,
+                } & ELSEWHERE.keys() or "value" not in here
             if isinstance(item, Task) and own_rows(item):
                 assert rate is not None
                 close(here["jacobian"] @ v, rate(item, machine, q, v))
@@ -113,3 +124,26 @@ def test_first_value_of_an_input_without_default_is_where_the_robot_is(class_nam
         here = numbers(item, machine)(q, values)
         if isinstance(item, Task) and any(d.default is None for d in item.inputs(machine)):
             assert np.abs(here["value"]).max() < 1e-12
+
+
+#: Inputs that values depend on and that have no rate: what is kept from things, the point of an object, and planes that
+#: are worked out anew
+STANDING = {("Obstacle", "margin"), ("SelfCollision", "margin"), ("RelativePose", "at")}
+STANDING |= {("SupportRegion", "normals"), ("SupportRegion", "offsets")}
+
+
+@pytest.mark.parametrize("class_name", SHIPPED)
+def test_what_moves_a_value_has_a_rate_and_weights_are_those_declared(class_name: str) -> None:
+    """A tick feeds the motion of inputs forward by these rates."""
+    machine, rng = robot("panda"), np.random.default_rng(7)
+    for item, given in ITEMS[class_name](machine):
+        weights = getattr(item, "weights", None)
+        if weights is not None and class_name != "Momentum":
+            assert item.row_weights(machine).tolist() == list(weights)
+        if item.refusal(machine, "velocity"):
+            continue
+        found, (q, _, values) = numbers(item, machine), draw(machine, item, given, rng)
+        for d in item.inputs(machine):
+            other = found(q, values | {d.name: sample(machine, d, rng)})
+            if d.rate is None and "value" in other and (class_name, d.name) not in STANDING:
+                np.testing.assert_array_equal(other["value"], found(q, values)["value"], d.name)

@@ -18,7 +18,7 @@ from wbc.api import Stack
 from wbc.controller import core_of
 from wbc.robot import Coupling, Robot
 from wbc.tasks import JointLimits, Posture
-from wbc.tasks.stopping import allowed_accelerations
+from wbc.tasks.stopping import allowed_accelerations, stopping_deceleration
 
 #: Ticks of an adversary
 TICKS = 10_000
@@ -193,3 +193,11 @@ def test_a_joint_that_follows_slower_than_its_leader_brakes_with_it(command: str
         assert q[2] == pytest.approx(0.1 - 1.7 * q[1], abs=1e-9)
         reached = max(reached, abs(q[1]))
     assert reached > 0.99
+
+
+@pytest.mark.parametrize(
+    ("limits", "wanted"), [((7.0, 1e9, 1e9), 7.0), ((1e9, 0.3, 1e9), 30.0), ((1e9, 1e9, 0.06), 2 * 0.06 / (3 * 1e-4))]
+)
+def test_braking_counts_on_all_that_the_limits_leave(limits: tuple[float, float, float], wanted: float) -> None:
+    """The least of A, V / T and 2 (u - l) / (3 T^2): with less a joint would be slower than it has to be."""
+    assert stopping_deceleration(*limits, longest=0.01) == pytest.approx(wanted, rel=1e-12)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,7 @@ from tests.models import free_direction, placement
 from wbc.errors import ContinuityError, InfeasibleError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.shapes import Sphere
 from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture
-from wbc.trajectory import follow, geodesic_path
+from wbc.trajectory import follow, following, geodesic_path
 from wbc.trajectory.paths.path import Path, PolynomialPath
 
 TIP = "panda_hand_tcp"
@@ -164,3 +164,31 @@ def test_a_floating_base_is_refused() -> None:
     floating.add(EndEffector("gripper_left_base_link"), name="hand")
     with pytest.raises(ShapeError, match="several coordinates"):
         follow(floating, Circle(pin.SE3.Identity(), 0.1), np.zeros(7), "hand")
+
+
+def test_so_many_samples_are_made_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """33 of them, twice as many as often as every middle is off, and 4000 at most."""
+
+    class Off:
+        made: ClassVar[list[float]] = []
+
+        def __init__(self, *given: Any) -> None:
+            pass
+
+        def begin(self, start: np.ndarray) -> tuple[Off, np.ndarray]:
+            return self, start
+
+        def at(self, s: float, q: np.ndarray) -> np.ndarray:
+            self.made.append(s)
+            return q
+
+        def go(self, before: float, s: float, q: np.ndarray) -> np.ndarray:
+            return self.at(s, q)
+
+        def errors(self, path: Path, middle: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
+            return np.ones(len(middle), bool), (1.0, 1.0)
+
+    monkeypatch.setattr(following, "_Seeker", Off)
+    with pytest.raises(RangeError, match="needs more than 4000 samples"):
+        follow(stack(), line(tip(ROBOT.neutral), np.array([0.1, 0.0, 0.0])), ROBOT.neutral, "hand")
+    assert len(Off.made) == 2049

@@ -38,19 +38,6 @@ def test_any_robot_has_sliders(name: str) -> None:
     assert controller.step(chosen.start).status == "solved"
 
 
-def test_what_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
-    code, _, err = run("view", "play", "pnda")
-    assert (code, "panda" in err) == (2, True)
-    code, _, err = run("view", "pnda")
-    assert (code, "panda" in err) == (2, True)
-    code, _, err = run("view", str(tmp_path))
-    assert (code, "neither a recording nor replay.html" in err) == (2, True)
-    code, _, err = run("view", "panda", "--export", str(tmp_path / "page.html"))
-    assert (code, "only runs are exported" in err) == (2, True)
-    code, _, err = run("view", "play", "--zeromq", "tcp://0.0.0.0:5555", "--no-browser", "--backend", "vm")
-    assert (code, "this machine" in err) == (2, True)
-
-
 def test_a_folder_with_a_page_alone_is_its_page(tmp_path: Path) -> None:
     (tmp_path / "replay.html").write_text("page")
     code, out, _ = run("view", str(tmp_path), "--no-browser")

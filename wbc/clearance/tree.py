@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 
@@ -25,6 +25,10 @@ class Moves(IntEnum):
     TURNING = 1
     SHIFTING = 2
     FREE = 3
+
+
+#: What a frame does that a scalar moves
+SCALAR = (Moves.TURNING, Moves.SHIFTING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +146,16 @@ class Tree:
         """Poses on the parents ``[frames, 12]``: rotation row by row, then position [m]."""
         return np.array([place(frame.place) for frame in self.frames]).reshape(-1, 12)
 
+    def about_z(self) -> Tree:
+        """The same with frames turned so that scalars turn them about z or shift them along it."""
+        turns = [_turn_to(frame.axis) if frame.moves in SCALAR else pin.SE3.Identity() for frame in self.frames]
+        frames = []
+        for turn, frame in zip(turns, self.frames, strict=True):
+            at = frame.place * turn if frame.parent < 0 else turns[frame.parent].inverse() * frame.place * turn
+            frames.append(replace(frame, place=at, axis=(0.0, 0.0, 1.0)))
+        links = {name: (k, pose if k < 0 else turns[k].inverse() * pose) for name, (k, pose) in self.links.items()}
+        return replace(self, frames=tuple(frames), links=links)
+
     def up(self, frame: int) -> list[int]:
         """A frame and those that carry it, up to the world."""
         out = []
@@ -149,3 +163,11 @@ class Tree:
             out.append(frame)
             frame = self.frames[frame].parent
         return out
+
+
+def _turn_to(axis: tuple[float, float, float]) -> pin.SE3:
+    """A turn that leads z to an axis."""
+    z = np.array(axis) / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), np.zeros(3))

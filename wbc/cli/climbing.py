@@ -81,7 +81,7 @@ def carried_out(
             lines.stop = stopper
         ask = None if lines is None else lines.answer
         session = ClimbSession(request, ClimbHooks(told, stopper, ask, twists, compiled))
-        folder = run_folder(output.out, f"walk-{title.replace(' on ', '-')}", RUN_FILES, output.force, made=False)
+        folder = run_folder(output.out, f"walk-{title.replace(' on ', '-')}", RUN_FILES, output.force)
         # A full collection would look at all modules of the program in the middle of a tick
         gc.collect()
         gc.freeze()

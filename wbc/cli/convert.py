@@ -29,7 +29,7 @@ class ConvertRun:
     out: Annotated[
         Path | None, "File, folder of lerobot, or HOST:PORT of foxglove. Default: beside the run; 127.0.0.1:8765."
     ] = None
-    rate: Annotated[float, "Ticks a second of which poses, margins and binding rows are shown [1/s]."] = 30.0
+    rate: Annotated[float, "Ticks a second of which poses and binding rows are shown [1/s]."] = 30.0
     follow: Annotated[bool, "Go on while the run is written, until it is closed or Ctrl-C."] = False
     trust: Annotated[bool, "Run code from the recording: items and functions that are not wbc's."] = False
 

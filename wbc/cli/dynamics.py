@@ -58,7 +58,7 @@ class Controllers:
             loaded(scenario.robot, condition.payload, condition.heavier, scenario.frame)
         names = scenario.names(self.only)
         written = ("controllers.json", "controllers-*.png")
-        folder = run_folder(self.out, "controllers", written, self.force, clear=False, made=False)
+        folder = run_folder(self.out, "controllers", written, self.force, clear=False)
         found: list[ComparisonRow] = []
         total = sum(len(names) * scenario.seconds * condition.rate for condition in conditions)
         say(f"{scenario.robot.name}, {scenario.seconds:g} s, {self.plant}")
@@ -171,7 +171,7 @@ class Identify:
 
         machine = robots.load(self.robot)
         written = ("identified.json", "motion.png", "motion.npz")
-        folder = run_folder(self.out, "identify", written, self.force, clear=False, made=False)
+        folder = run_folder(self.out, "identify", written, self.force, clear=False)
         with progress_bar() as bar:
             task = bar.add_task("motions", total=self.tries + 1)
             done = experiment(

@@ -66,7 +66,7 @@ class Explore(SceneOptions):
         end = None if self.to is None else numbers("to", self.to)
         if end is not None and len(end) != 3:
             raise ShapeError("to", self.to, "expected X,Y,Z")
-        folder = run_folder(self.out, "explore", WRITTEN, self.force, clear=False, made=False)
+        folder = run_folder(self.out, "explore", WRITTEN, self.force, clear=False)
         explorer = Explorer(stack, q)
         found = explorer.tick(q, np.zeros(6 if self.kind == "pose" else 3) if self.rates is None else self.rates)
         rank, free = found.space.rank, found.space.span - 1

@@ -21,15 +21,14 @@ def run_folder(
     force: bool = False,
     *,
     clear: bool = True,
-    made: bool = True,
 ) -> Path:
-    """The folder that was asked for, or a new one ``runs/NAME-TIME``; made, and without the files of an earlier run.
+    """The folder that was asked for, or a new one ``runs/NAME-TIME``, without the files of an earlier run. A new one is
+    made by whoever first writes into it: what is refused, or killed before that, leaves none.
 
     Args:
         wanted: None: a new one. written: names, or patterns, of all files that such a run writes.
         force: write into a folder that has such a file.
         clear: False: the files of an earlier run stay until :func:`filled` has those of the new one.
-        made: False: a new folder is not made yet: whoever is killed before there is something in it leaves none.
 
     Raises:
         OutputError: it has a file of a run and ``force`` is off, or it cannot be written.
@@ -40,7 +39,7 @@ def run_folder(
         if there and not force:
             reason = f"there is a run in this folder ({there[0].name}); choose another, or use --force"
             raise OutputError("out", str(folder), reason)
-        known = folder.exists()
+        new = [place for place in (folder, *folder.parents) if not place.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         for file in there if clear else ():
             file.unlink()
@@ -48,8 +47,10 @@ def run_folder(
         probe = folder / ".probe"
         probe.touch()
         probe.unlink()
-        if not made and not known:
-            folder.rmdir()
+        # Not where another process has begun to write meanwhile
+        with contextlib.suppress(OSError):
+            for place in new:
+                place.rmdir()
     return folder
 
 
@@ -82,7 +83,6 @@ def recording(stack: contextlib.ExitStack, folder: Path, mcap: bool) -> Callable
     """
 
     def begin(controller: Controller) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
         stack.enter_context(with_mcap(controller, folder))
 
     return begin if mcap else None
@@ -99,6 +99,7 @@ def with_mcap(controller: Controller, folder: Path) -> Iterator[None]:
     from wbc.formats import FormatError, recorded
     from wbc.record.recording import RecordingError
 
+    folder.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as stack:
         stack.enter_context(recorded(controller, folder / RECORDED[0], overwrite=True))
         yield

@@ -58,7 +58,7 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
     """Do a plan on a plant, write its folder and print its summary; exit code 130 if Ctrl-C ended it early.
 
     Raises:
-        WbcError: bad input; nothing is written then but an empty folder.
+        WbcError: bad input; nothing is written then.
     """
     written = (*(f"log.{kind}" for kind in FORMATS), *RECORDED, "summary.json", "report.html", "replay.html")
     folder = run_folder(output.out, f"{plan.robot.name}-{plan.label}", written, output.force)
@@ -74,7 +74,10 @@ def perform(plan: PathRun, output: TrackOutput, plant: Plant | None = None) -> i
         def record(controller: Controller) -> contextlib.AbstractContextManager[object]:
             if recording is None:
                 return contextlib.nullcontext()
-            return with_mcap(controller, folder) if output.mcap else controller.record(recording, overwrite=True)
+            if output.mcap:
+                return with_mcap(controller, folder)
+            folder.mkdir(parents=True, exist_ok=True)
+            return controller.record(recording, overwrite=True)
 
         log = _tracked(plan, bar, stage, stopper, record, plant)
         with stopper.listening():

@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import functools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from wbc.climb.climber import Climber
@@ -80,6 +82,11 @@ def library() -> ctypes.PyDLL:
     )
 
 
+def address_of(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Where an array's numbers are, for the compiled code."""
+    return ctypes.c_void_p(array.ctypes.data)
+
+
 class LimbTable:
     """All limbs of a climber in memory.
 
@@ -127,7 +134,7 @@ class LimbTable:
         out = np.empty((len(angles), 12))
         library().wbc_touches(
             ctypes.byref(self.numbers[limb]), ctypes.c_long(len(angles)),
-            *(ctypes.c_void_p(a.ctypes.data) for a in (angles, out)),
+            address_of(angles), address_of(out),
         )  # fmt: skip
         return out
 

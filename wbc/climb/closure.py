@@ -6,12 +6,11 @@ import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.climb.chain import ROWS, library
+from wbc.climb.chain import ROWS, address_of as _at, library
 from wbc.climb.climber import Climber
 from wbc.climb.joint_values import climb_states, joint_values, with_joint_values
 from wbc.climb.reach import LimbReach
@@ -155,7 +154,3 @@ class Closure:
     @cached_property
     def _reach(self) -> LimbReach:
         return LimbReach(self.climber, margin=0.0)
-
-
-def _at(array: NDArray[Any]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)

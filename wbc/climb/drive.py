@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,13 +15,14 @@ from wbc.climb.climber import Climber
 from wbc.climb.goal import BodyPlace, LimbAt
 from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop import ClimbLoop
+from wbc.climb.loop.reference import PlanReference
 from wbc.climb.motion import MotionOptions, MoveError
-from wbc.climb.plan import ContactPlan
+from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import NoStancesError, StanceOptions
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.turn import BodyTurn, MovingStance
+from wbc.climb.turn import BodyTurn, Guide, MovingStance
 from wbc.errors import InfeasibleError, RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
@@ -127,7 +129,7 @@ class ClimbDrive:
         self.stands = ""
         ahead, turned = float(np.linalg.norm(self._twist[:3])), float(np.linalg.norm(self._twist[3:]))
         if min(stance.contacts) < 0 and (landing := self._landing(scene, stance)) is not None:
-            return landing
+            return self._meanwhile(landing) or landing
         if ahead <= NONE and turned <= NONE:
             return standing_plan(self.climber, scene, stance)
         if min(stance.contacts) >= 0:
@@ -156,13 +158,25 @@ class ClimbDrive:
         held = {move.limb for move in moves}
         if not moves or not loop.steady or any(move.lands == FREE_LIMB for move in moves):
             return None
-        if self._over is None or self._over.scene is not plan.scene:
-            self._over = BodyTurn(self.climber, plan.scene, self.options.motion)
         contacts = tuple(FREE_LIMB if k in held else row for k, row in enumerate(loop.held))
-
         q = reference.q(now)
         state = MovingStance(contacts, q, reference.derivatives(now)[0])
-        return self._over.planned(state, self._body_twist(q), lambda time: reference.q(now + time), moves)
+        return self._going(plan.scene, state, lambda time: reference.q(now + time), moves)
+
+    def _meanwhile(self, landing: ContactPlan) -> ContactPlan | None:
+        """A landing while the body goes at its twist, from rest; None: none is proven."""
+        if not self._twist.any():
+            return None
+        state = MovingStance(landing.start, landing.q[0], np.zeros(self.climber.robot.nv))
+        reference = PlanReference(landing, self.climber.robot)
+        return self._going(landing.scene, state, reference.q, landing.moves)
+
+    def _going(
+        self, scene: ClimbScene, state: MovingStance, guide: Guide, moves: Sequence[ContactMove]
+    ) -> ContactPlan | None:
+        if self._over is None or self._over.scene is not scene:
+            self._over = BodyTurn(self.climber, scene, self.options.motion)
+        return self._over.planned(state, self._body_twist(state.q), guide, moves)
 
     def _body_twist(self, q: Array) -> Array:
         """The twist in the axes of the body."""

@@ -7,7 +7,6 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
 from weakref import WeakSet
 
 import numpy as np
@@ -101,14 +100,6 @@ def _refused(move: int, value: object, reason: str, nearest: Nearest | None, sta
     return error
 
 
-class Balanced(Protocol):
-    """What says whether contacts bear the robot: :class:`wbc.climb.balance.Equilibrium`."""
-
-    def margin(self, contacts: Sequence[int], q: Array) -> float:
-        """Slack of equilibrium in shares of the weight; below 0 there is none."""
-        ...
-
-
 @dataclass(frozen=True)
 class MotionOptions:
     """How motions are made.
@@ -173,7 +164,7 @@ class Mover:
     climber: Climber
     scene: ClimbScene
     options: MotionOptions = field(default_factory=MotionOptions)
-    balance: Balanced | None = None
+    balance: Equilibrium | None = None
     watch: PlanWatch = field(default_factory=PlanWatch, repr=False)
 
     def __post_init__(self) -> None:
@@ -242,7 +233,7 @@ class Mover:
         it at one place; those that contacts cannot follow are refused.
         """
         weighs, short = bool(np.any(self.scene.gravity)), bool(self.closure.short)
-        balance = self.balance.world if weighs and isinstance(self.balance, Equilibrium) else None
+        balance = self.balance.world if weighs and self.balance is not None else None
         band = ElasticBand(self._world, balance, self._needed(one, other))
         swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
         begins = [(SwingShape(f * self.lift), aside) for f in (HEIGHTS if swings else HEIGHTS[:1]) for aside in ASIDES]
@@ -337,7 +328,7 @@ class Mover:
             return None, None, None
         held = tuple(a if a == b else FREE_LIMB for a, b in contacts)
         loads, needed = None, 0.0
-        if isinstance(self.balance, Equilibrium) and np.any(self.scene.gravity):
+        if np.any(self.scene.gravity):
             # Second derivatives of a path are largest at its samples
             where = np.unique(np.concatenate([GRID, path.s]).round(9))
             loads = PathLoads(self.balance, path, held, where, self.options.inertia)
@@ -357,7 +348,7 @@ class Mover:
 
     def _undriven(self, held: Sequence[int], path: MovePath, needed: float) -> tuple[float, float] | None:
         """The first margin of equilibrium with motors that is less than needed, and where on the path [%]."""
-        assert isinstance(self.balance, Equilibrium)
+        assert self.balance is not None
         effort = self.options.effort
         for k in np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int)):
             if not self.balance.driven(held, path.q[k], needed, effort):
@@ -376,7 +367,7 @@ def carry_out(
     scene: ClimbScene,
     stances: StancePath,
     options: MotionOptions | None = None,
-    balance: Balanced | None = None,
+    balance: Equilibrium | None = None,
     mover: Mover | None = None,
 ) -> ContactPlan:
     """The timed motion through stances: held contacts keep their places within 1e-4 m, every move is proven clear

@@ -16,8 +16,6 @@ from wbc.validation import Array
 DIFFERENCE = 1e-5
 #: Least slack at rest from which on a robot moves [weights]
 LEAST = 1e-4
-#: Change of slack with the centre of mass below which no shift changes it [weights/m]
-LEAST_SLOPE = 1e-9
 #: Rows that are added at once, those that lack most
 ADDED = 12
 
@@ -51,9 +49,9 @@ class PathLoads:
         self._balance, self._contacts, self._q = balance, contacts, path.q[0]
         self._center = balance.climber.center_of_mass(path.q[0])
         self._still, self._pull, self._speed = self._wrenches(path, s)
-        self.at_rest, self._at_rest_bounds = self._slacks(self._still)
+        self.at_rest, bounds = self._slacks(self._still)
         self._least = (1.0 - share) * self.at_rest
-        self._bounds = np.unique(self._at_rest_bounds.round(12), axis=0)
+        self._bounds = np.unique(bounds.round(12), axis=0)
 
     @property
     def rows(self) -> tuple[Array, Array]:
@@ -79,17 +77,6 @@ class PathLoads:
         new = bounds[worst[lacks[worst] > 0.0]]
         self._bounds = np.unique(np.concatenate([self._bounds, new.round(12)]), axis=0)
         return float(1.0 / np.sqrt(min(1.0, part.min())))
-
-    def shift(self, needed: float) -> tuple[float, Array]:
-        """Where on the path slack at rest is least, and by what shift of the centre of mass its bound there comes to a
-        slack ``(3)`` [m]: the shortest one; 0 where no shift changes it.
-        """
-        k = int(np.argmin(self.at_rest))
-        # A shift d changes the moment of the contacts by d x force
-        slope = np.cross(self._still[k, :3], self._at_rest_bounds[k, 4:])
-        size = float(slope @ slope)
-        lacks = needed - float(self.at_rest[k])
-        return float(self.s[k]), slope * (lacks / size) if size > LEAST_SLOPE**2 and np.isfinite(lacks) else np.zeros(3)
 
     def _slacks(self, wrenches: Array) -> tuple[Array, Array]:
         return self._balance.wrench_slacks(self._contacts, self._q, self._center, wrenches)

@@ -64,7 +64,7 @@ def surface_frames(scene: ClimbScene, places: Sequence[str]) -> list[pin.SE3]:
         elif out:
             turn = pin.Quaternion.FromTwoVectors(out[-1].rotation[:, 2], normal).matrix() @ out[-1].rotation
         else:
-            turn = _facing(pose, ahead)
+            turn = facing(pose, ahead)
         out.append(pin.SE3(turn, pose.translation))
     return out
 
@@ -84,7 +84,7 @@ def _foothold(scene: ClimbScene, name: str) -> tuple[pin.SE3, float | None]:
     return scene.footholds[scene.row(name)].pose, None
 
 
-def _facing(pose: pin.SE3, ahead: Array) -> Array:
+def facing(pose: pin.SE3, ahead: Array) -> Array:
     """A rotation with the z axis of a pose and x towards a direction, or the pose's where that is along z."""
     try:
         return np.array(frame_along("place", np.zeros(3), pose.rotation[:, 2], ahead).rotation)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.climb.chain import ROWS, library, limb_table
+from wbc.climb.chain import ROWS, address_of as _at, library, limb_table
 from wbc.climb.climber import Climber
 from wbc.errors import RotationError, ShapeError
 from wbc.rotations import matrices
@@ -105,7 +105,3 @@ def poses_of(field: str, poses: Any) -> Array:
     if (np.abs(lengths - 1.0) > validation.ROTATION_TOLERANCE).any():
         raise RotationError(field, poses, "expected quaternions of unit length")
     return np.ascontiguousarray(np.hstack([matrices(given[:, 3:] / lengths).reshape(-1, 9), given[:, :3]]))
-
-
-def _at(array: NDArray[Any]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)

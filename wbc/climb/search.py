@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -116,7 +115,6 @@ class StanceOptions:
         limits: distance from limits of joints [m, rad].
         clearance: distance of links from bodies [m]. apart: of links from each other [m].
         moves: how many moves are looked at, at most.
-        seconds: time of the search, at most [s]; a search that it ends is not the same on another machine.
         gait: sets of limbs, by name, that go at once where that can be.
         forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
         effort: share of the joints' efforts within which torques at rest stay [1]; inf: efforts do not count.
@@ -128,7 +126,6 @@ class StanceOptions:
     clearance: float = 0.01
     apart: float = 0.0
     moves: int = 20000
-    seconds: float = np.inf
     gait: tuple[tuple[str, ...], ...] = ()
     forbidden: frozenset[tuple[tuple[int, ...], tuple[int, ...]]] = frozenset()
     effort: float = np.inf
@@ -141,8 +138,6 @@ class StanceOptions:
         if not self.effort > 0.0:
             raise RangeError("StanceOptions.effort", self.effort, "expected a share above 0")
         validation.integer("StanceOptions.moves", self.moves, 1)
-        if not self.seconds > 0.0:
-            raise RangeError("StanceOptions.seconds", self.seconds, "expected a time above 0 s")
 
 
 #: What :meth:`ClimbWorld.lift` says
@@ -298,7 +293,7 @@ class StanceSearch:
             if gap := self._separation.gap(first.contacts):
                 raise no_stances("goal", self._told_goal(), gap, "goal", self._distance(first))
             self._push(first, self._moves(first))
-        until, most = time.monotonic() + self.options.seconds, self.options.moves + sum(self.tried.values())
+        most = self.options.moves + sum(self.tried.values())
         while self._queue or self._again:
             if self._queue:
                 cost, _, node, moves, after = heapq.heappop(self._queue)
@@ -312,7 +307,7 @@ class StanceSearch:
             self._push(node, moves)
             watch.look(self._so_far)
             tried = sum(self.tried.values())
-            if tried >= most or time.monotonic() > until or watch.passed:
+            if tried >= most or watch.passed:
                 raise self._refusal("limit")
             if self._forbidden(node.contacts, after):
                 continue

@@ -23,7 +23,7 @@ from wbc.climb.faults import PlantFault
 from wbc.climb.folder import PART, begin_folder, read_folder
 from wbc.climb.grids import GRID_ENDS, GRIDS, remove_columns, remove_fraction, remove_rows
 from wbc.climb.loop import ClimbLoop, ClimbRun, LoopOptions
-from wbc.climb.places import body_frames, body_over, surface_frames
+from wbc.climb.places import body_frames, body_over, facing, surface_frames
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.plan_files import PLAN, save_plan
 from wbc.climb.plants import ClimbPlant, PlantErrors, RigidClimbPlant, climb_plant
@@ -228,7 +228,10 @@ def _way(climber: Climber, drawn: DrawnScene, start: str, points: tuple[str, ...
         named = surface_frames(drawn.whole, [name for name in (start, *points) if name]) if start or points else []
         frames = [*([] if start else drawn.course[:1]), *named, *([] if points else drawn.course[1:])]
         ahead = [b.translation - a.translation for a, b in pairwise(frames)]
-        frames = [_facing(frame, way) for frame, way in zip(frames, (*ahead, ahead[-1]), strict=True)]
+        frames = [
+            pin.SE3(facing(frame, way), frame.translation)
+            for frame, way in zip(frames, (*ahead, ahead[-1]), strict=True)
+        ]
         return tuple(body_over(climber, frame) for frame in frames)
     first, last = GRID_ENDS.get(drawn.whole.name, ("", ""))
     names = [start or first, *(points or ((last,) if last else ()))]
@@ -411,13 +414,3 @@ def rules_of(request: ClimbRequest, scene: ClimbScene, begins: pin.SE3) -> Check
         return CheckRules()
     jumps = max(BODY_JUMP, CHANGE * speed), max(BODY_JUMP_TURN, CHANGE * turn_rate)
     return CheckRules(speed=speed, turn_rate=turn_rate, jump=jumps[0], jump_turn=jumps[1])
-
-
-def _facing(pose: pin.SE3, ahead: np.ndarray) -> pin.SE3:
-    """A frame at a pose's place with its z axis, and x along a direction as far as z lets it."""
-    z = pose.rotation[:, 2]
-    x = ahead - (ahead @ z) * z
-    if np.linalg.norm(x) < 1e-9:
-        x = pose.rotation[:, 0]
-    x = x / np.linalg.norm(x)
-    return pin.SE3(np.column_stack([x, np.cross(z, x), z]), pose.translation)

@@ -6,9 +6,10 @@ import ctypes
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.climb.chain import library
+from wbc.climb.chain import address_of, library
 from wbc.climb.climber import Climber
 from wbc.climb.move_path import MovePath
 from wbc.climb.path_loads import PathLoads
@@ -111,18 +112,9 @@ class PathTiming:
         speed = self._speeds(path, s, loads)
         span = 2.0 * np.diff(s) / np.maximum(speed[1:] + speed[:-1], 1e-12)
         # Between points of the grid the path acceleration is constant; long intervals get knots inside
-        parts = [max(1, int(np.ceil(x / KNOTS))) for x in span]
-        times, where, rate = [np.zeros(1)], [np.zeros(1)], [np.zeros(1)]
-        at = 0.0
-        for k, count in enumerate(parts):
-            t = span[k] * np.arange(1, count + 1) / count
-            gain = (speed[k + 1] - speed[k]) / span[k]
-            times.append(at + t)
-            where.append(s[k] + t * (speed[k] + 0.5 * gain * t))
-            rate.append(speed[k] + gain * t)
-            at += span[k]
-        t, x, sd = np.concatenate(times), np.clip(np.concatenate(where), 0.0, 1.0), np.concatenate(rate)
-        x[-1], sd[-1] = 1.0, 0.0
+        parts = np.maximum(np.ceil(span / KNOTS), 1.0).astype(int)
+        t, x, sd = law_knots(s, speed, span, parts)
+        x[-1], sd[[0, -1]] = 1.0, 0.0
         coordinates, slopes = path.at(x), path.at(x, 1)
         rates = slopes * sd[:, None]
         for _ in range(SLOWED):
@@ -212,11 +204,26 @@ def fastest(s: Array, a: Array, b: Array, squared: Array, sided: tuple[Array, Ar
         a, b, count = np.hstack([a, sided[0]]), np.hstack([b, sided[1]]), sided[0].shape[1]
     given = [np.ascontiguousarray(part, dtype=np.float64) for part in (s, a, b, squared)]
     x = np.empty(len(s))
-    if not library().wbc_fastest(
-        ctypes.c_long(len(s)), a.shape[1], count, *(ctypes.c_void_p(part.ctypes.data) for part in (*given, x))
-    ):
+    if not library().wbc_fastest(ctypes.c_long(len(s)), a.shape[1], count, *map(address_of, (*given, x))):
         raise MemoryError(f"a law of {len(s)} points and {a.shape[1]} rows")
     return np.sqrt(x)
+
+
+def law_knots(x: Array, speed: Array, span: Array, parts: NDArray[np.intp]) -> list[Array]:
+    """Knots at places of a way and between them, so many to an interval, of an even change of speed in each: times,
+    places and speeds along the way.
+
+    Args:
+        x, speed: places and the speeds there ``(n)``. span: times of the intervals ``(n - 1)`` [s]. parts: of each.
+    """
+    row = np.repeat(np.arange(len(span)), parts)
+    long, part = span[row], np.arange(1, len(row) + 1) - np.repeat(np.cumsum(parts) - parts, parts)
+    gain, t = (speed[row + 1] - speed[row]) / long, long * part / parts[row]
+    begun = np.concatenate([[0.0], np.cumsum(span)])
+    places = np.minimum(x[row] + t * (speed[row] + 0.5 * gain * t), x[row + 1])
+    times = np.where(part == parts[row], begun[row + 1], begun[row] + t)
+    rates = speed[row] + gain * t
+    return [np.insert(some, 0, first) for some, first in ((times, 0.0), (places, x[0]), (rates, speed[0]))]
 
 
 def _denser(times: Array, q: Array, v: Array, parts: Array) -> tuple[Array, Array, Array]:

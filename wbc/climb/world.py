@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.clearance import SweptBody
-from wbc.climb.chain import library, limb_table
+from wbc.climb.chain import address_of as _at, library, limb_table
 from wbc.climb.clear import SINK, climber_bodies, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
@@ -545,7 +545,3 @@ def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: 
 def _centre(placed: PlacedShape | SweptBody | SceneBody) -> pin.SE3:
     pose = placed.placement or pin.SE3.Identity()
     return pose * pin.SE3(np.eye(3), np.asarray(placed.shape.center, dtype=np.float64))
-
-
-def _at(array: NDArray[Any]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)

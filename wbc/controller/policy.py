@@ -83,7 +83,8 @@ class Fallback:
     ) -> None:
         self._policy, self.prepared = Policy(), False
         self._tick, self._given = tick, (assembly, stack, layout)
-        self.flag, self._v = Memory(layout).flag, Memory(layout)["v"]
+        memory = Memory(layout)
+        self.flag, self._v = memory.flag, memory["v"]
         self._links: dict[str, SolvedTick] = {}
 
     @property

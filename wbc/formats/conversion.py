@@ -1,23 +1,28 @@
-"""From a run to a file of another format."""
+"""From a run to a file of another format, at once or by a process of its own while it is written."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import pathlib
+import select
 import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 
 from wbc import extras, validation
+from wbc.api import Controller
+from wbc.errors import WbcError
 from wbc.formats.errors import FormatError
-from wbc.formats.lerobot import LeRobotSink
+from wbc.formats.files import CsvSink, LeRobotSink, McapSink, NpzSink, RerunSink
 from wbc.formats.live import FoxgloveSink
-from wbc.formats.mcap_file import McapSink
-from wbc.formats.rerun_file import RerunSink
-from wbc.formats.run import RATE, Run, run_of
-from wbc.formats.sink import Sink
-from wbc.formats.tables import CsvSink, NpzSink
+from wbc.formats.run import RATE, Run, Sink, run_of
+from wbc.record.recorder import Recorder
 
+#: Time between two looks at a file that is still written [s]
+LOOK = 0.02
 #: Format -> what writes it; names of files end with it, but those of ``lerobot`` (a folder) and ``foxglove`` (none)
 FORMATS: dict[str, type[Sink]] = {
     "mcap": McapSink,
@@ -39,31 +44,33 @@ def convert(
     wait: Callable[[], bool] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[pathlib.Path, list[str]]:
-    """Write a run, whole or as far as it came, in another format.
+    """Write a run, whole or as far as it came, in another format; returns the file, and what is not in it, in words.
 
         wbc.formats.convert("runs/demo", "mcap")                # beside the recording
 
     Args:
         run: its folder, recording or log. to: one of :data:`FORMATS`.
-        out: the file, or folder of ``lerobot``, which must not be there; ``HOST:PORT`` of ``foxglove``. Default: beside
-            the run, named as its file.
-        rate: ticks a second of which poses, margins and binding rows are shown [1/s]; numbers are those of all ticks.
+        out: a new file, or folder of ``lerobot``; ``HOST:PORT`` of ``foxglove``. Default: beside the run, as its file.
+        rate: ticks a second of which poses and binding rows are shown [1/s]; numbers are those of all ticks.
         trust: see :func:`wbc.replay`. wait: as of :meth:`wbc.log.LogFile.chunks`: the run is still written.
         progress: is told how many ticks are done.
-
-    Returns:
-        The file, and what is not in it, in words.
 
     Raises:
         UnknownNameError: no such format. MissingPackageError: its package is not installed.
         FormatError: there is such a file, or it cannot be written. LogFileError: no run, or damaged.
         RangeError: a rate that is none.
     """
-    kind = format_of(to)
+    kind = _format_of(to)
     rate = validation.scalar("rate", rate, low=1e-3, high=1e4, unit="1/s")
     source = run if isinstance(run, Run) else run_of(run, trust)
-    place, count = place_of(source.path, to, out), 0
-    with _written(place, at_once=to == "foxglove" or wait is not None) as file:
+    place, count = _place_of(source.path, to, out), 0
+    with validation.writing("out", place, FormatError), contextlib.ExitStack() as cleaning:
+        # Beside its place, which then has all or nothing; what is to be seen meanwhile is written there at once
+        file, at_once = place, to == "foxglove" or wait is not None
+        if not at_once:
+            file = place.with_name(f".{place.name}")
+            _remove(file)
+            cleaning.callback(_remove, file)
         sink = kind(file)
         sink.begin(source)
         for log, seen in source.pieces(wait, rate):
@@ -72,60 +79,119 @@ def convert(
             if progress is not None:
                 progress(count)
         sink.close()
+        if not at_once:
+            file.replace(place)
     return place, source.remarks
 
 
-def format_of(to: str) -> type[Sink]:
-    """What writes a format.
-
-    Raises:
-        UnknownNameError: no such format. MissingPackageError: its package is not installed.
-    """
+def _format_of(to: str) -> type[Sink]:
     kind = FORMATS[validation.one_of("to", to, FORMATS)]
     if kind.needs:
         extras.require(*kind.needs)
     return kind
 
 
-def place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, overwrite: bool = False) -> pathlib.Path:
-    """Where the copy of a run goes; ``run`` and ``out`` are as of :func:`convert`.
-
-    Args:
-        overwrite: what is there is removed.
-
-    Raises:
-        FormatError: there is such a file.
-    """
+def _place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, overwrite: bool = False) -> pathlib.Path:
+    """Where the copy of a run goes, which must not be there, or is removed."""
     if to == "foxglove":
         return pathlib.Path(out or "")
-    beside = run.with_suffix(f".{to}" if run.suffix != f".{to}" else f".converted.{to}")
-    place = pathlib.Path(out or beside)
+    place = pathlib.Path(out or run.with_suffix(f".{to}" if run.suffix != f".{to}" else f".converted.{to}"))
     if overwrite:
-        remove(place)
+        _remove(place)
     if place.exists():
         raise FormatError("out", str(place), "there is such a file; choose another")
     return place
 
 
+def _remove(place: pathlib.Path) -> None:
+    """A file or folder, or nothing."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.unlink(missing_ok=True)
+
+
+class RunCopy(contextlib.AbstractContextManager["RunCopy"]):
+    """A process that copies a run into another format while it is written; made by :func:`follow`.
+
+    Attributes:
+        path: where the copy goes.
+    """
+
+    def __init__(self, run: pathlib.Path, to: str, out: pathlib.Path) -> None:
+        self.path = out
+        command = [sys.executable, "-m", __name__, str(run), to, str(out)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    @property
+    def running(self) -> bool:
+        """It still copies."""
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """Wait until all of the run that is written is in the copy; FormatError: it could not be written, and why."""
+        _, said = self._process.communicate()
+        if self._process.returncode:
+            raise FormatError("run", str(self.path), f"its copy ended early: {said.strip().splitlines()[-1:]}")
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+
+def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> RunCopy:
+    """Copy a run into another format while it is recorded, in a process of its own: the loop is not slowed.
+
+        with wbc.formats.follow("ticks.npz", "mcap"), controller.record("ticks.npz"):
+            ...                                             # step as usual
+
+    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed.
+    Arguments and errors are those of :func:`convert`; the recorder's file may begin later.
+    """
+    _format_of(to)
+    path = validation.file_path("run", run)
+    return RunCopy(path, to, _place_of(path, to, out))
+
+
 @contextlib.contextmanager
-def _written(place: pathlib.Path, at_once: bool) -> Iterator[pathlib.Path]:
-    """Where to write: beside the place, which then has all or nothing, or there ``at_once``."""
-    with validation.writing("out", place, FormatError):
-        if at_once:
-            yield place
-            return
-        fresh = place.with_name(f".{place.name}")
+def recorded(
+    controller: Controller, run: str | os.PathLike[str], to: str = "mcap", *, overwrite: bool = False
+) -> Iterator[Recorder]:
+    """Record every tick of a controller, and beside the recording the same in another format while the loop runs.
+
+        with wbc.formats.recorded(controller, "ticks.npz"):         # and ticks.mcap
+            ...                                                     # step as usual: a loop, a program, a plant
+
+    Arguments and errors are those of :meth:`wbc.Controller.record` and :func:`convert`.
+    """
+    _format_of(to)
+    copy = _place_of(validation.file_path("run", run), to, None, overwrite)
+    with controller.record(run, overwrite=overwrite) as recorder, follow(recorder.path, to, copy):
         try:
-            remove(fresh)
-            yield fresh
-            fresh.replace(place)
+            yield recorder
         finally:
-            remove(fresh)
+            recorder.close()
 
 
-def remove(place: pathlib.Path) -> None:
-    """Remove a file or folder, or nothing."""
-    if place.is_dir():
-        shutil.rmtree(place)
-    else:
-        place.unlink(missing_ok=True)
+def main(run: str, to: str, out: str) -> None:
+    """What a process of :func:`follow` does."""
+    # Ctrl-C is of the loop, whose recording is then closed
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ended = False
+
+    def wait() -> bool:
+        """Until the next look; what was written before the loop closed the copy, or was gone, is read as well."""
+        nonlocal ended
+        going_on, ended = not ended, bool(select.select([sys.stdin], [], [], LOOK)[0])
+        return going_on
+
+    while True:
+        try:
+            source = run_of(run)
+            break
+        except WbcError:
+            if not wait():
+                raise
+    convert(source, to, out, wait=wait)
+
+
+if __name__ == "__main__":
+    os.nice(5)
+    main(*sys.argv[1:])

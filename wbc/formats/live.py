@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from wbc.formats.errors import FormatError
-from wbc.formats.messages import NANO, Message, MessageSink
+from wbc.formats.messages import NANO, SCENE, MessageSink
 
 #: Port that Foxglove proposes
 PORT = 8765
@@ -34,37 +34,32 @@ class FoxgloveSink(MessageSink):
         host, _, port = ("" if path == pathlib.Path() else str(path)).rpartition(":")
         if (host or port) and not port.isdigit():
             raise FormatError("address", str(path), "expected HOST:PORT")
-        self._foxglove, self._channels, self._bodies = foxglove, dict[str, Any](), list[Message]()
-        self._context = foxglove.Context()
-        self._began: float | None = None
 
         class LateListener(foxglove.websocket.ServerListener):  # type: ignore[misc]  # without the package it is Any
             """Who comes later is given what was said once."""
 
             def on_subscribe(listener, client: Any, channel: Any) -> None:
-                for message in self._bodies:
-                    if message.topic == channel.topic:
-                        self._put(message)
+                if channel.topic == SCENE:
+                    self._put(*self._still)
 
-        served = {"host": host or "127.0.0.1", "port": int(port or PORT), "context": self._context}
+        self._channels, self._context, self._began = dict[str, Any](), foxglove.Context(), 0.0
+        served = {"host": host or "127.0.0.1", "port": int(port or PORT), "server_listener": LateListener()}
         try:
-            self._server = foxglove.start_server(name="wbc", **served, server_listener=LateListener())
+            self._server = foxglove.start_server(name="wbc", context=self._context, **served)
         except (RuntimeError, OSError) as error:
             raise FormatError("address", str(path), f"cannot be served on: {error}") from error
         self.port = int(self._server.port)
 
     def _open(self, topic: str, schema: dict[str, Any]) -> None:
-        self._channels[topic] = self._foxglove.Channel(topic, schema=schema, context=self._context)
+        from foxglove import Channel
 
-    def _say(self, message: Message) -> None:
-        seconds = message.time / NANO
-        if self._began is None:
-            self._began = time.monotonic() - seconds
-        time.sleep(max(0.0, self._began + seconds - time.monotonic()))
-        self._put(message)
+        self._channels[topic] = Channel(topic, schema=schema, context=self._context)
 
-    def _put(self, message: Message) -> None:
-        self._channels[message.topic].log(message.data, log_time=message.time)
+    def _put(self, topic: str, when: int, data: dict[str, Any]) -> None:
+        if topic != SCENE:
+            self._began = self._began or time.monotonic() - when / NANO
+            time.sleep(max(0.0, self._began + when / NANO - time.monotonic()))
+        self._channels[topic].log(data, log_time=when)
 
     def close(self) -> None:
         self._server.stop()

@@ -1,16 +1,14 @@
-"""A run as messages in JSON with Foxglove's schemas, for files and connections alike."""
+"""A run as messages in JSON with Foxglove's schemas, for files of MCAP and connections alike."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
-from wbc.formats.run import Run, SeenTick
-from wbc.formats.sink import Sink
-from wbc.formats.tick_tree import TickTree, schema_of
+from wbc.formats.run import Run, SeenTick, Sink
 from wbc.log import Log
 from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
@@ -18,188 +16,196 @@ from wbc.viewer.bodies import DrawnMesh
 
 #: Nanoseconds of a second
 NANO = 1_000_000_000
-#: Frame that all others are placed in
-WORLD = "world"
-#: Length of the axes that mark a target [m]
-AXIS = 0.1
-#: Parts of an arrow, as shares of its length
-ARROW = {"shaft_length": 0.8, "shaft_diameter": 0.05, "head_length": 0.2, "head_diameter": 0.1}
-#: Quaternions x, y, z, w that turn an arrow, which points along x, along each axis
-TURNS = ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), (0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)))
-#: Level of foxglove.Log: rows gave way
-WARNING = 3
-#: Level of foxglove.Log: all rows hold
-INFO = 2
+#: Levels of foxglove.Log: all rows hold, and rows gave way
+LEVELS = {True: 2, False: 3}
 #: Group of columns -> field of a joint's state
 JOINT_PARTS = {"q": "position", "v": "velocity", "a": "acceleration"}
+#: Pose of a frame in itself
+IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 #: Topic of ticks
 TICK = "/tick"
+#: Topic of what is said once
+SCENE = "/scene"
+#: Topics -> Foxglove's name of their messages, but of ticks
+KINDS = {"/joint_states": "JointStates", "/tf": "FrameTransforms", SCENE: "SceneUpdate", "/why": "Log"}
+#: Members of a group that keep their names in each tick, at most
+NAMED = 3
+#: Topic, time since the run began [ns], and plain data
+Message = tuple[str, int, dict[str, Any]]
 
 
-class Message(NamedTuple):
-    """Something that is said on a topic.
+class TickTree:
+    """A run's columns ``group.member`` as nested objects.
+
+    Where more than :data:`NAMED` members stand alone beside each other they are an array, as names would take a third
+    of a file.
 
     Attributes:
-        topic: where. time: since the run began [ns]. data: plain data.
+        names: columns in the order of the numbers of a tick. schema: of its messages.
+
+    Args:
+        columns: of the run. apart: those that are left out.
     """
 
-    topic: str
-    time: int
-    data: dict[str, Any]
+    def __init__(self, columns: Iterable[str], apart: Collection[str] = ()) -> None:
+        self.names = list[str]()
+        groups = by_first({name: name for name in columns if name not in apart})
+        self._shape = {key: self._laid_out(members) for key, members in groups.items()}
+        self.schema = schema_of(self.tick([0.0] * len(self.names)) | {"status": ""}, "wbc.Tick")
+
+    def _laid_out(self, members: dict[str, str]) -> Any:
+        """Where the numbers of columns are, by the rests of their names: a place, a slice, or these by key."""
+        begin, parts = len(self.names), by_first(members)
+        if members.keys() == {""}:
+            self.names.append(members[""])
+            return begin
+        if len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
+            self.names += members.values()
+            return slice(begin, len(self.names))
+        return {key: self._laid_out(below) for key, below in parts.items()}
+
+    def tick(self, numbers: list[float]) -> dict[str, Any]:
+        """The message of a tick, from its numbers in the order of :attr:`names`."""
+        return {key: _filled(shape, numbers) for key, shape in self._shape.items()}
+
+
+def _filled(shape: Any, numbers: list[float]) -> Any:
+    if isinstance(shape, dict):
+        return {key: _filled(below, numbers) for key, below in shape.items()}
+    return numbers[shape]
+
+
+def by_first(members: dict[str, str]) -> dict[str, dict[str, str]]:
+    """First part of a name -> rest of the name -> column. A column may be called as what others begin with."""
+    out: dict[str, dict[str, str]] = {}
+    for name, column in members.items():
+        first, _, rest = name.partition(".")
+        out.setdefault(first, {})[rest] = column
+    return out
+
+
+def schema_of(example: Any, title: str = "") -> dict[str, Any]:
+    """The schema of messages such as an example."""
+    if isinstance(example, dict):
+        made = {"type": "object", "properties": {key: schema_of(part) for key, part in example.items()}}
+        return made | ({"title": title} if title else {})
+    if isinstance(example, list):
+        return {"type": "array", "items": schema_of(example[0]) if example else {}}
+    return {"type": {bool: "boolean", int: "integer", float: "number", str: "string"}[type(example)]}
 
 
 def of_ticks(log: Log, tree: TickTree) -> Iterator[Message]:
     """Two messages for each tick: all its numbers, and its joints. What is not finite is null."""
-    rows, joints = np.column_stack([log[name] for name in tree.names]).tolist(), _joints(log)
+    rows, joints = _plain(np.column_stack([log[name] for name in tree.names])), _joints(log)
     codes = log["flag"].tolist() if "flag" in log else None
-    for k, time in enumerate(nanoseconds(log["t"])):
+    for k, t in enumerate(log["t"].tolist()):
         said = {"status": str(STATUSES[codes[k]])} if codes else {}
-        yield Message(TICK, time, tree.tick(rows[k]) | said)
+        yield TICK, round(t * NANO), tree.tick(rows[k]) | said
         if joints:
             states = [{"name": name} | {part: row[k] for part, row in parts.items()} for name, parts in joints.items()]
-            yield Message("/joint_states", time, {"timestamp": stamp(time), "joints": states})
+            yield "/joint_states", round(t * NANO), _stamped(t, joints=states)
 
 
-def _single(units: Mapping[str, str]) -> list[str]:
-    """Joints with one coordinate."""
+def single_joints(units: Mapping[str, str]) -> list[str]:
+    """Joints with one coordinate, of the units of columns."""
     return [name[2:] for name, unit in units.items() if name.startswith("q.") and unit in ("rad", "m")]
 
 
-def _joints(log: Log) -> dict[str, dict[str, list[float]]]:
+def _joints(log: Log) -> dict[str, dict[str, list[Any]]]:
     """Joint -> field of its state -> a number a tick; the two coordinates of one without end are an angle."""
-    out: dict[str, dict[str, list[float]]] = {name: {} for name in _single(log.units)}
+    out: dict[str, dict[str, list[Any]]] = {name: {} for name in single_joints(log.units)}
     for name in [name[2:-2] for name in log.units if name.startswith("q.") and name.endswith(".1")]:
-        if f"q.{name}.2" not in log:
-            out[name] = {"position": np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]).tolist()}
+        if name and f"q.{name}.2" not in log:
+            out[name] = {"position": _plain(np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]))}
     for group, part in JOINT_PARTS.items():
         for name, row in log.group(group).items():
             if name in out:
-                out[name][part] = row.tolist()
+                out[name][part] = _plain(row)
     return out
 
 
-def of_scene(run: Run) -> Iterator[Message]:
-    """What stays as it is, once: bodies of links and obstacles in their frames."""
-    bodies = run.meshes | {f"obstacle/{name}": mesh for name, mesh in run.obstacles.items()}
-    if bodies:
-        yield Message("/scene", 0, {"deletions": [], "entities": [_body(*body) for body in bodies.items()]})
+def _plain(numbers: Array) -> Any:
+    """Numbers as JSON has them: what is not finite is None."""
+    finite = np.isfinite(numbers)
+    if finite.all():
+        return numbers.tolist()
+    plain = numbers.astype(object)
+    plain[~finite] = None
+    return plain.tolist()
+
+
+def of_bodies(bodies: Mapping[str, list[DrawnMesh]]) -> Message:
+    """What is drawn in each frame, which stays as it is."""
+    entities = []
+    for frame, meshes in bodies.items():
+        surfaces = [
+            {
+                "pose": {"position": _named(IDENTITY[:3]), "orientation": _named(IDENTITY[3:])},
+                "points": [_named(point) for point in mesh.corners.round(5).astype(float)],
+                "color": _named(np.array([*mesh.colour, 255]) / 255.0, "rgba"),
+                "indices": mesh.triangles.ravel().tolist(),
+            }
+            for mesh in meshes
+        ]
+        kept = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True, "triangles": surfaces}
+        entities.append(_stamped(0.0, frame_id=frame.removeprefix("robot/"), id=f"body/{frame}") | kept)
+    return SCENE, 0, {"deletions": [], "entities": entities}
 
 
 def of_seen(seen: SeenTick) -> Iterator[Message]:
     """The messages of what is seen of a tick."""
-    time = int(nanoseconds(np.array([seen.t]))[0])
-    prefixed = {"": seen.frames, "target/": seen.targets, "obstacle/": seen.obstacles}
-    placed = {f"{prefix}{name}": pose for prefix, poses in prefixed.items() for name, pose in poses.items()}
-    if placed:
-        place = {"timestamp": stamp(time), "parent_frame_id": WORLD}
-        transforms = [
-            place | {"child_frame_id": name, "translation": _named(pose[:3]), "rotation": _named(pose[3:])}
-            for name, pose in placed.items()
-            if name != WORLD
-        ]
-        yield Message("/tf", time, {"transforms": transforms})
-    if seen.targets:
-        arrows = [_target(name, time) for name in seen.targets]
-        yield Message("/scene", time, {"deletions": [], "entities": arrows})
+    placed, now = _stamped(seen.t, parent_frame_id="world"), round(seen.t * NANO)
+    transforms = [
+        placed
+        | {"child_frame_id": frame.removeprefix("robot/")}
+        | {"translation": _named(pose[:3]), "rotation": _named(pose[3:])}
+        for frame, pose in seen.poses.items()
+        if frame != "robot/world"
+    ]
+    if transforms:
+        yield "/tf", now, {"transforms": transforms}
     if seen.why:
-        level = INFO if seen.status == "solved" else WARNING
         rows = f"binding: {', '.join(seen.binding)}" if seen.binding else "nothing binds"
-        said = {"timestamp": stamp(time), "level": level, "message": f"{seen.why} ({rows})", "name": seen.status}
-        yield Message("/why", time, said)
+        level = LEVELS[seen.status == "solved"]
+        yield "/why", now, _stamped(seen.t, level=level, message=f"{seen.why} ({rows})", name=seen.status)
 
 
-def nanoseconds(seconds: Array) -> list[int]:
-    """Times [s] in nanoseconds."""
-    out: list[int] = np.round(seconds * NANO).astype(np.int64).tolist()
-    return out
-
-
-def stamp(time: int) -> dict[str, int]:
-    """A time in nanoseconds as messages have it."""
-    return {"sec": time // NANO, "nsec": time % NANO}
+def _stamped(seconds: float, **data: Any) -> dict[str, Any]:
+    whole, part = divmod(round(seconds * NANO), NANO)
+    return {"timestamp": {"sec": whole, "nsec": part}} | data
 
 
 def _named(numbers: Array, names: str = "xyzw") -> dict[str, float]:
     return dict(zip(names, numbers.tolist(), strict=False))
 
 
-def _body(frame: str, mesh: DrawnMesh) -> dict[str, Any]:
-    surface = {
-        "pose": _pose(TURNS[0]),
-        "points": [_named(point) for point in mesh.corners.round(5).astype(float)],
-        "color": _colour(np.array(mesh.colour) / 255.0),
-        "indices": mesh.triangles.ravel().tolist(),
-    }
-    return _entity(frame, f"body/{frame}", 0) | {"triangles": [surface]}
-
-
-def _target(name: str, time: int) -> dict[str, Any]:
-    """The three axes of a target."""
-    arrow = {part: AXIS * share for part, share in ARROW.items()}
-    axes = [{"pose": _pose(turn)} | arrow | {"color": _colour(np.eye(3)[k])} for k, turn in enumerate(TURNS)]
-    return _entity(f"target/{name}", f"target/{name}", time) | {"arrows": axes}
-
-
-def _pose(turn: Sequence[float]) -> dict[str, Any]:
-    return {"position": _named(np.zeros(3)), "orientation": _named(np.array(turn))}
-
-
-def _colour(numbers: Array) -> dict[str, float]:
-    return _named(np.append(numbers, 1.0), "rgba")
-
-
-def _entity(frame: str, name: str, time: int) -> dict[str, Any]:
-    still = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True}
-    return {"timestamp": stamp(time), "frame_id": frame, "id": name} | still
-
-
 class MessageSink(Sink):
     """A sink of messages by their times; who inherits has channels to put them in."""
 
     def begin(self, run: Run) -> None:
-        joints = _single(run.units)
+        super().begin(run)
+        self._still, joints = of_bodies(run.bodies), single_joints(run.units)
         self._tree = TickTree(run.units, {f"{group}.{name}" for name in joints for group in JOINT_PARTS})
-        for topic, schema in {TICK: self._tree.schema, **SCHEMAS}.items():
-            self._open(topic, schema)
-        self._bodies = list(of_scene(run))
-        for message in self._bodies:
-            self._put(message)
+        self._open(TICK, self._tree.schema)
+        # Schemas are those of examples, made as messages are
+        corner = DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=np.uint32), (0, 0, 0))
+        state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
+        examples = {"/joint_states": _stamped(0.0, joints=[state]), SCENE: of_bodies({"link": [corner]})[2]}
+        examples |= {topic: data for topic, _, data in of_seen(SeenTick(0.0, {"link": IDENTITY}, why="why"))}
+        for topic, kind in KINDS.items():
+            self._open(topic, schema_of(examples[topic], f"foxglove.{kind}"))
+        if run.bodies:
+            self._put(*self._still)
 
     def write(self, log: Log, seen: list[SeenTick]) -> None:
-        messages = [*of_ticks(log, self._tree), *(message for moment in seen for message in of_seen(moment))]
-        for message in sorted(messages, key=lambda message: message.time):
-            self._say(message)
-
-    def _say(self, message: Message) -> None:
-        """Put a message of a tick; files wait for nothing."""
-        self._put(message)
+        messages = [*of_ticks(log, self._tree), *(message for tick in seen for message in of_seen(tick))]
+        for message in sorted(messages, key=lambda message: message[1]):
+            self._put(*message)
 
     @abstractmethod
     def _open(self, topic: str, schema: dict[str, Any]) -> None:
         """A channel."""
 
     @abstractmethod
-    def _put(self, message: Message) -> None:
-        """Into its channel."""
-
-
-def _schemas() -> dict[str, dict[str, Any]]:
-    """Those of examples that are made as messages are."""
-    pose, mesh = np.zeros(7), DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=int), (0, 0, 0))
-    moment = SeenTick(0.0, {"link": pose}, {"target": pose}, {}, why="why")
-    said = {message.topic: message.data for message in of_seen(moment)}
-    said["/scene"] = {"deletions": [{"id": ""}], "entities": [_body("link", mesh) | _target("target", 0)]}
-    state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
-    said["/joint_states"] = {"timestamp": stamp(0), "joints": [state]}
-    return {topic: schema_of(said[topic], kind) for topic, kind in KINDS.items()}
-
-
-#: Topic -> Foxglove's name of its messages, all but those of ticks, whose schema each run has of its own
-KINDS = {
-    "/joint_states": "foxglove.JointStates",
-    "/tf": "foxglove.FrameTransforms",
-    "/scene": "foxglove.SceneUpdate",
-    "/why": "foxglove.Log",
-}
-#: Topic -> schema of its messages
-SCHEMAS = _schemas()
+    def _put(self, topic: str, when: int, data: dict[str, Any]) -> None:
+        """A message into its channel."""

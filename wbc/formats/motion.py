@@ -1,22 +1,30 @@
-"""Motions that other programs recorded: joints and frames over time."""
+"""Motions that other programs recorded: joints and frames over time, as targets and in place of a robot."""
 
 from __future__ import annotations
 
 import fnmatch
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wbc import validation
+from wbc.api import Controller
 from wbc.errors import UnknownNameError
 from wbc.formats.errors import FormatError
+from wbc.log import Log
 from wbc.multibody import pin
+from wbc.record.recorder import names
 from wbc.robot.robot import Robot, checked_robot
+from wbc.simulation import Command, CommandKind, KinematicPlant, PlantState
+from wbc.tick.outcome import Status
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
+
+#: Times that differ by less are one [s]
+AT_ONCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +49,7 @@ class RecordedMotion:
     """Joints and frames over time.
 
     Attributes:
-        joints: names. t: times of ``q`` [n], from the first message on [s], but those of frames with one pose alone.
+        joints: names. t: times of ``q`` [n], from the first message on [s], but those of what is said once alone.
         q: positions [n x joints, rad or m]; a joint that a message does not name has its last one.
         v: velocities [n x joints, rad/s or m/s]; None where a message gives none, or NaN.
         frames: name -> the frame in its parent.
@@ -68,7 +76,7 @@ class RecordedMotion:
                 raise FormatError("frame", frame, f"is placed in a circle through {above}")
             passed.add(above)
             out, above = self.frames[above].at(time) * out, self.frames[above].parent
-        if relative_to and above != relative_to:
+        if relative_to not in ("", above):
             raise FormatError("relative_to", relative_to, f"{frame} does not hang on it, but on {above}")
         return out
 
@@ -93,12 +101,96 @@ class RecordedMotion:
                     continue
                 raise UnknownNameError("joint", name, robot.joint_names)
             number = model.getJointId(name)
-            first = int(model.idx_qs[number])
+            first, numbers = int(model.idx_qs[number]), int(model.nqs[number])
             if model.nvs[number] != 1:
                 raise FormatError("joint", name, "has several degrees of freedom; its state is no one number")
-            out[:, first] = values
-            if model.nqs[number] == 2:
-                out[:, first], out[:, first + 1] = np.cos(values), np.sin(values)
+            # A joint without end has a cosine and a sine
+            columns = [values] if numbers == 1 else [np.cos(values), np.sin(values)]
+            out[:, first : first + numbers] = np.column_stack(columns)
         if still := [name for name in robot.joint_names if name not in self.joints]:
             log.warning("nothing is recorded of these joints, which stand as in neutral: %s", ", ".join(still))
         return out
+
+
+class PlayedPlant(KinematicPlant):
+    """A plant that moves as was recorded, whatever it is commanded; commands are kept.
+
+    Attributes:
+        given: the commands, with their times [s].
+
+    Args:
+        robot: whose joints they are. motion: what was recorded, two states or more.
+        ignored: as of :meth:`wbc.formats.RecordedMotion.configurations`.
+
+    Raises:
+        FormatError: less than two states. UnknownNameError: a joint that the robot has not.
+    """
+
+    commands = tuple(CommandKind)
+
+    def __init__(self, robot: Robot, motion: RecordedMotion, ignored: Sequence[str] = ()) -> None:
+        if len(motion.t) < 2:
+            raise FormatError("motion", len(motion.t), "expected two joint states or more")
+        self._robot, self._t, self._recorded = robot, motion.t, motion.configurations(robot, ignored)
+        self.given = list[tuple[float, Command]]()
+        super().__init__(robot)
+
+    def reset(self, q: Array, time: float) -> None:
+        """Begin the recording anew; ``q`` is not gone to: read says where the robot was."""
+        self._time, self._shift = float(self._t[0]), time - float(self._t[0])
+
+    def read(self) -> PlantState:
+        """On the line between two recorded states, with the velocity along it; invalid after the last one."""
+        t, now = self._t, self._time
+        k = int(np.clip(np.searchsorted(t, now - AT_ONCE) - 1, 0, len(t) - 2))
+        v = self._robot.difference(*self._recorded[k : k + 2]) / (t[k + 1] - t[k])
+        q = self._robot.integrate(self._recorded[k], v, float(np.clip(now, t[k], t[k + 1]) - t[k]))
+        return PlantState(q, v, now + self._shift, valid=bool(now <= t[-1] + AT_ONCE))
+
+    def apply(self, command: Command) -> None:
+        self.given.append((self._time + self._shift, Command(command.kind, command.values.copy())))
+
+    def advance(self, dt: float) -> None:
+        self._time += dt
+
+
+def answered(
+    controller: Controller,
+    motion: RecordedMotion,
+    aim: Callable[[Controller, float], None] | None = None,
+    *,
+    ignored: Sequence[str] = (),
+) -> Log:
+    """What a stack would have commanded at every state of a recorded motion.
+
+        log = wbc.formats.answered(controller, motion, lambda c, t: c["hand"].set(target=motion.pose("tool0", t)))
+        log.array("command") - log.array("v")               # what it would have done otherwise
+
+    The log has ``t``, ``q.*``, ``v.*`` (as recorded), ``command.*``, and ``status``, a place in ``list(wbc.Status)``.
+
+    Args:
+        aim: sets values of the controller before the tick at a time [s] of the recording.
+        ignored: as of :meth:`wbc.formats.RecordedMotion.configurations`.
+
+    Raises:
+        FormatError, UnknownNameError: as of :class:`PlayedPlant`. WbcError: as of :meth:`wbc.Controller.step`.
+    """
+    validation.instance("controller", controller, Controller, "a wbc Controller")
+    robot, dt = controller.stack.robot, controller.stack.dt
+    plant, statuses, rows = PlayedPlant(robot, motion, ignored), list(Status), list[Array]()
+    controller.reset(plant.read().q)
+    while (state := plant.read()).valid:
+        if aim is not None:
+            aim(controller, state.time)
+        step = controller.step(state.q, state.v)
+        rows.append(np.concatenate([[state.time, statuses.index(step.status)], state.q, state.v, step.command]))
+        plant.advance(dt)
+    said, rates = (
+        names(controller),
+        [(name, f"{unit}/s") for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)],
+    )
+    units = {"t": "s", "status": ""}
+    for group, members in {"q": said["q"], "v": rates, "command": said["v"]}.items():
+        units |= {f"{group}.{name}": unit for name, unit in members}
+    columns = dict(zip(units, np.array(rows).T, strict=True))
+    return Log(columns | {"status": columns["status"].astype(int)}, units, {"robot": robot.name, "dt": dt})

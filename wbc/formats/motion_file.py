@@ -9,6 +9,7 @@ import math
 import os
 import pathlib
 import struct
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +18,6 @@ import numpy as np
 
 from wbc import extras, validation
 from wbc.errors import WbcError
-from wbc.extras import MissingPackageError
 from wbc.formats.errors import FormatError
 from wbc.formats.messages import NANO
 from wbc.formats.motion import Path6, RecordedMotion
@@ -31,33 +31,10 @@ JOINTS = ("sensor_msgs/JointState", "foxglove.JointStates")
 SINGLE = ("geometry_msgs/TransformStamped", "foxglove.FrameTransform")
 #: All that are read
 KINDS_READ = (*JOINTS, *SINGLE, "tf2_msgs/TFMessage", "foxglove.FrameTransforms")
-#: Fields of a time, in seconds and nanoseconds, of JSON, ROS and protobuf
-STAMPS = (("sec", "nsec"), ("sec", "nanosec"), ("seconds", "nanos"))
-#: Joint -> its position and velocity
-State = dict[str, tuple[float, float | None]]
 #: A message of a file: its topic, type, time of recording [s], and fields by attribute
 FoundMessage = tuple[str, str, float, Any]
-
-
-class Clock:
-    """Times of the messages of a topic, or of one frame of it.
-
-    Attributes:
-        said: what they say [s], 0 where they say nothing. recorded: when they were recorded [s].
-    """
-
-    def __init__(self) -> None:
-        self.said, self.recorded = list[float](), list[float]()
-
-    @property
-    def times(self) -> list[float]:
-        """Their own [s]; those of the recording where none has one. A simulation's first message may say 0."""
-        return self.said if any(self.said) else self.recorded
-
-    @property
-    def goes_back(self) -> float:
-        """By how much a message is before the one that came before it, at most [s]."""
-        return float(max(0.0, -np.diff(self.times).min(initial=0.0)))
+#: A joint, or a frame and its parent
+Way = tuple[str, str | None]
 
 
 def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> RecordedMotion:
@@ -66,11 +43,8 @@ def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Rec
         motion = wbc.formats.read_motion("bag")             # a folder of ROS 2, a .bag, or a .mcap
         controller["hand"].target = motion.pose("tool0", t)
 
-    Read are ``sensor_msgs/JointState``, ``tf2_msgs/TFMessage`` and ``geometry_msgs/TransformStamped`` of ROS, and
-    ``foxglove.JointStates``, ``foxglove.FrameTransforms`` and ``foxglove.FrameTransform`` in JSON or protobuf.
-
     Args:
-        topics: those that are read; default: all of these types.
+        topics: those that are read; default: all of :data:`KINDS_READ`.
 
     Raises:
         MissingPackageError: the packages of the extra are not installed.
@@ -81,13 +55,11 @@ def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Rec
     place = validation.file_path("path", path)
     if not validation.exists("path", place):
         raise FormatError("path", str(place), validation.no_such(place, "there is no such file or folder"))
-    others: dict[str, str] = {}
     # Files of a folder whose recorder was killed, which has no metadata, can be read
     loose = [] if (place / "metadata.yaml").exists() else sorted(place.glob("*.mcap")) or sorted(place.glob("*.db3"))
-    files = loose or [place]
-    read = (
-        (_mcap(file, topics, others) for file in files) if files[0].suffix == ".mcap" else [_bag(files, topics, others)]
-    )
+    files, others = loose or [place], dict[str, str]()
+    mcap = files[0].suffix == ".mcap"
+    read = [_mcap(file, topics, others) for file in files] if mcap else [_bag(files, topics, others)]
     try:
         return _gathered(itertools.chain.from_iterable(read), place, others, topics)
     except WbcError:
@@ -100,37 +72,26 @@ def _mcap(path: pathlib.Path, topics: Sequence[str], others: dict[str, str]) -> 
     from mcap.exceptions import EndOfFile
     from mcap.reader import NonSeekingReader
 
-    decoders = dict[int, Callable[[bytes], Any]]()
+    decoders = dict[int, Callable[[bytes], Any] | None]()
     # A file whose writer was killed gives its whole chunks
     with path.open("rb") as file, contextlib.suppress(EndOfFile, struct.error):
         for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
-            kind = schema.name.replace("/msg/", "/") if schema is not None else ""
+            kind, encoding = schema.name.replace("/msg/", "/") if schema else "", channel.message_encoding
             if channel.id not in decoders:
-                said, decoder = f"{kind or 'no schema'} in {channel.message_encoding or 'no encoding'}", None
-                if _wanted(kind, channel.topic, topics):
-                    try:
-                        decoder = _decoder(schema, channel.message_encoding)
-                    except MissingPackageError as error:
-                        said = f"{said}; {error}"
-                if decoder is None:
-                    others[channel.topic] = said
-                    continue
-                decoders[channel.id] = decoder
-            yield channel.topic, kind, message.log_time / NANO, decoders[channel.id](message.data)
+                wanted = _wanted(kind, channel.topic, topics)
+                decoders[channel.id] = _decoder(schema, encoding) if wanted else None
+            if (decoder := decoders[channel.id]) is not None:
+                yield channel.topic, kind, message.log_time / NANO, decoder(message.data)
+            else:
+                others[channel.topic] = f"{kind or 'no schema'} in {encoding or 'no encoding'}"
 
 
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
-    """What makes the fields of messages of their bytes; None: nothing here does.
-
-    Raises:
-        MissingPackageError: what would is not installed.
-    """
+    """What makes the fields of messages of their bytes; None: nothing here does."""
     if encoding == "json":
         return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
     if encoding == "cdr":
-        from rosbags.typesys import Stores, get_typestore
-
-        store = get_typestore(Stores.ROS2_HUMBLE)
+        store = ros2_types()
         return lambda data: store.deserialize_cdr(data, schema.name)
     if encoding == "protobuf":
         extras.require("protobuf", "a recording of Foxglove in protobuf")
@@ -143,15 +104,21 @@ def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
 
 def _bag(paths: Sequence[pathlib.Path], topics: Sequence[str], others: dict[str, str]) -> Iterator[FoundMessage]:
     from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
 
-    with AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+    with AnyReader(paths, default_typestore=ros2_types()) as reader:
         kinds = {connection.id: connection.msgtype.replace("/msg/", "/") for connection in reader.connections}
-        chosen = [one for one in reader.connections if _wanted(kinds[one.id], one.topic, topics)]
-        others |= {one.topic: kinds[one.id] for one in reader.connections if one not in chosen}
+        chosen = [each for each in reader.connections if _wanted(kinds[each.id], each.topic, topics)]
+        others |= {each.topic: kinds[each.id] for each in reader.connections if each not in chosen}
         for connection, time, data in reader.messages(chosen) if chosen else ():
             fields = reader.deserialize(data, connection.msgtype)
             yield connection.topic, kinds[connection.id], time / NANO, fields
+
+
+def ros2_types() -> Any:
+    """Types of the messages of ROS 2, by which rosbags reads and writes them."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_JAZZY)
 
 
 def _wanted(kind: str, topic: str, topics: Sequence[str]) -> bool:
@@ -161,103 +128,112 @@ def _wanted(kind: str, topic: str, topics: Sequence[str]) -> bool:
 def _gathered(
     messages: Iterator[FoundMessage], path: pathlib.Path, others: dict[str, str], topics: Sequence[str]
 ) -> RecordedMotion:
-    clocks = dict[tuple[str, str], Clock]()
-    states: list[tuple[Clock, int, State]] = []
-    poses: dict[str, tuple[str, list[tuple[Clock, int, list[float]]]]] = {}
-    seen = set[str]()
-
-    def stamped(topic: str, child: str, fields: Any, time: float) -> tuple[Clock, int]:
-        clock = clocks.setdefault((topic, child), Clock())
-        clock.said.append(_stamp(fields, kind))
-        clock.recorded.append(time)
-        return clock, len(clock.said) - 1
-
-    for topic, kind, time, fields in messages:
+    # A moment is a clock, of a topic's joints or of one frame, the time that a message says, and that of the recording;
+    # a row is the number of its moment, and where a joint or frame was
+    clocks, moments = dict[tuple[str, str], int](), list[tuple[int, float, float]]()
+    ways, seen = defaultdict[Way, list[tuple[float, ...]]](list), set[str]()
+    for topic, kind, recorded, fields in messages:
         seen.add(topic)
         try:
-            if kind in JOINTS:
-                if state := _state(fields, topic, kind):
-                    states.append((*stamped(topic, "", fields, time), state))
-                continue
-            for placed in [fields] if kind in SINGLE else fields.transforms:
-                parent, child, numbers = _placed(placed, topic)
-                known, moves = poses.setdefault(child, (parent, []))
-                if known != parent:
-                    reason = f"is a second parent of {child!r}, which {known!r} has placed before"
-                    raise FormatError(topic, parent, reason)
-                moves.append((*stamped(topic, child, placed, time), numbers))
+            for frame, stamped, rows in _parts(fields, topic, kind):
+                for way, row in rows.items():
+                    ways[way].append((len(moments), *row))
+                clock = clocks.setdefault((topic, frame), len(clocks))
+                moments.append((clock, _stamp(stamped), recorded))
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            if isinstance(error, WbcError):
-                raise
-            raise FormatError(topic, f"message at {time:.9g} s", f"is no {kind}: {error}") from error
+            raise FormatError(topic, f"message at {recorded:.9g} s", f"is no {kind}: {error}") from error
     if missing := [topic for topic in topics if topic not in seen]:
         raise FormatError("topics", missing[0], "no messages of a type that is read", sorted(seen | others.keys()))
-    if not states and not poses:
+    if not moments:
         said = "; ".join(f"{topic} ({kind})" for topic, kind in others.items()) or "no messages at all"
         raise FormatError("path", str(path), f"has neither joint states nor transforms, but {said}")
-    dated = [(clock.times[k], state) for clock, k, state in states]
-    moved = {child: [(clock.times[k], row) for clock, k, row in moves] for child, (_, moves) in poses.items()}
-    # What stands may have been said long before the recording began
-    times = [[time for time, _ in dated], *([time for time, _ in way] for way in moved.values())]
-    begin = min(min(each) for each in [each for each in times if len(each) > 1] or times if each)
+    numbers, own, recordings = np.array(moments).T
+    # Those of the recording where no message of a clock says one; a simulation's first one may say 0
+    times = np.where(np.isin(numbers, numbers[own != 0.0]), own, recordings)
     remarks = [f"not read: {topic} ({kind})" for topic, kind in sorted(others.items())]
-    remarks += [
-        f"{topic}{f', {child}' if child else ''}: time goes back, by {back:.3g} s at most; messages are taken in the "
-        "order of their times"
-        for (topic, child), clock in clocks.items()
-        if (back := clock.goes_back)
-    ]
-    spans = {key: (min(clock.times), max(clock.times)) for key, clock in clocks.items() if len(clock.times) > 1}
-    if spans:
-        first, last = min(spans, key=lambda key: spans[key][1]), max(spans, key=lambda key: spans[key][0])
-        if (apart := spans[last][0] - spans[first][1]) > max(end - start for start, end in spans.values()):
-            ends, begins = (" ".join(key).strip() for key in (first, last))
-            remarks.append(f"{begins} begins {apart:.6g} s after {ends} ends: are they of one clock?")
-    frames = {}
-    for child, way in moved.items():
-        values = np.array([numbers for _, numbers in way])
-        t, rows = _by_time([time - begin for time, _ in way], values)
-        if len(t) < len(np.unique(np.column_stack([[time for time, _ in way], values]), axis=0)):
-            remarks.append(f"{child} has several poses at one time, of which the last is taken")
-        rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
-        frames[child] = Path6(poses[child][0], t, rows)
-    return RecordedMotion(*_rows(dated, begin, remarks), frames, tuple(remarks))
+    remarks += _odd_times({" ".join(key).strip(): times[numbers == number] for key, number in clocks.items()})
+    ways_by_time = {way: (times[[int(k) for k, *_ in rows]], np.array(rows)[:, 1:]) for way, rows in ways.items()}
+    return _motion(ways_by_time, remarks)
 
 
-def _placed(placed: Any, topic: str) -> tuple[str, str, list[float]]:
-    """Parent, child, and x, y, z [m], quaternion x, y, z, w of a transform."""
-    # What Foxglove has flat, ROS has in parts
-    place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
-    child = str(placed.child_frame_id)
-    numbers = [float(getattr(place.translation, x)) for x in "xyz"]
-    numbers += [float(getattr(place.rotation, x)) for x in "xyzw"]
-    if not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1.0) > UNIT:
-        raise FormatError(topic, numbers, f"the pose of {child!r} is none: a position and a unit quaternion")
-    return str(placed.header.frame_id if parent is None else parent), child, numbers
+def _motion(ways: dict[Way, tuple[Array, Array]], remarks: list[str]) -> RecordedMotion:
+    """A motion of the times and numbers of joints and frames."""
+    # What stands may have been said long before the recording began
+    begin = min(t.min() for t in [t for t, _ in ways.values() if len(t) > 1] or [t for t, _ in ways.values()])
+    joints, frames, twice = dict[str, tuple[Array, Array]](), dict[str, Path6](), list[str]()
+    for (name, parent), (stamps, numbers) in ways.items():
+        order = np.argsort(stamps, kind="stable")
+        t, numbers = stamps[order] - begin, numbers[order]
+        again = np.diff(t) == 0.0
+        if not np.array_equal(numbers[:-1][again], numbers[1:][again], equal_nan=True):
+            twice.append(name)
+        t, numbers = t[np.append(~again, True)], numbers[np.append(~again, True)]
+        if parent is None:
+            joints[name] = t, numbers
+        elif name in frames:
+            reason = f"is a second parent of {name!r}, which {frames[name].parent!r} places as well"
+            raise FormatError("path", parent, reason)
+        else:
+            numbers[:, 3:] /= np.linalg.norm(numbers[:, 3:], axis=1, keepdims=True)
+            frames[name] = Path6(parent, t, numbers)
+    if twice:
+        remarks.append(f"several states at one time, of which the last is taken: {', '.join(twice)}")
+    # A row whenever a joint is named, from when all are known
+    t = np.unique(np.concatenate([np.zeros(0), *(own for own, _ in joints.values())]))
+    t = t[t >= max((own[0] for own, _ in joints.values()), default=0.0)]
+    held = [numbers[np.searchsorted(own, t, side="right") - 1] for own, numbers in joints.values()]
+    q, v = np.array(held).reshape(len(joints), len(t), 2).T.copy()
+    known = len(t) > 0 and not np.isnan(v).any()
+    return RecordedMotion(tuple(joints), t, q, v if known else None, frames, tuple(remarks))
 
 
-def _state(fields: Any, topic: str, kind: str) -> State:
+def _odd_times(clocks: dict[str, Array]) -> Iterator[str]:
+    for name, t in clocks.items():
+        if (back := -np.diff(t).min(initial=0.0)) > 0.0:
+            yield f"{name}: time goes back, by {back:.3g} s at most; messages are taken in the order of their times"
+    if spans := [(t.min(), t.max(), name) for name, t in clocks.items() if len(t) > 1]:
+        (_, ended, first), (began, _, last) = min(spans, key=lambda span: span[1]), max(spans)
+        if began - ended > max(end - start for start, end, _ in spans):
+            yield f"{last} begins {began - ended:.6g} s after {first} ends: are they of one clock?"
+
+
+def _parts(fields: Any, topic: str, kind: str) -> Iterator[tuple[str, Any, dict[Way, tuple[float, ...]]]]:
+    """Frame, "" of joints, what has its stamp, and numbers: q, v, or x, y, z [m], quaternion x, y, z, w."""
+    if kind in JOINTS:
+        if state := _state(fields, topic, kind):
+            yield "", fields, {(name, None): row for name, row in state.items()}
+        return
+    for placed in [fields] if kind in SINGLE else fields.transforms:
+        # What Foxglove has flat, ROS has in parts
+        place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
+        child, parent = str(placed.child_frame_id), str(placed.header.frame_id if parent is None else parent)
+        row = [float(getattr(place.translation, x)) for x in "xyz"]
+        row += [float(getattr(place.rotation, x)) for x in "xyzw"]
+        if not np.isfinite(row).all() or abs(np.linalg.norm(row[3:]) - 1.0) > UNIT:
+            raise FormatError(topic, row, f"the pose of {child!r} is none: a position and a unit quaternion")
+        yield child, placed, {(child, parent): tuple(row)}
+
+
+def _state(fields: Any, topic: str, kind: str) -> dict[str, tuple[float, float]]:
+    """Joint -> its position, and its velocity, NaN where it is not given."""
     if kind.startswith("foxglove"):
-        parts = [(x.name, _optional(x, "position"), _optional(x, "velocity")) for x in fields.joints]
+        parts = [(each.name, _optional(each, "position"), _optional(each, "velocity")) for each in fields.joints]
     else:
-        count = len(fields.name)
-        columns = [fields.name, *([*part] or [None] * count for part in (fields.position, fields.velocity))]
-        if len(sizes := {len(column) for column in columns}) > 1:
-            raise FormatError(topic, sizes, f"numbers for {count} joints were due")
-        parts = list(zip(*columns, strict=True))
-    out: State = {}
+        if sizes := {len(fields.position), len(fields.velocity)} - {0, len(fields.name)}:
+            raise FormatError(topic, sizes, f"numbers for {len(fields.name)} joints were due")
+        parts = list(itertools.zip_longest(fields.name, fields.position, fields.velocity))
+    out: dict[str, tuple[float, float]] = {}
     for name, position, velocity in parts:
         if position is None:
             continue
         if not isinstance(name, str):
             raise FormatError(topic, name, "is no name of a joint")
-        position, velocity = float(position), math.nan if velocity is None else float(velocity)
-        if not math.isfinite(position) or math.isinf(velocity):
-            raise FormatError(topic, (position, velocity), f"the state of {name!r} is no finite number")
         if name in out:
             raise FormatError(topic, name, "has two states in one message")
-        # NaN is what ros2_control writes for what it does not measure
-        out[name] = position, None if math.isnan(velocity) else velocity
+        # NaN is also what ros2_control writes for what it does not measure
+        out[name] = float(position), math.nan if velocity is None else float(velocity)
+        if not math.isfinite(out[name][0]) or math.isinf(out[name][1]):
+            raise FormatError(topic, out[name], f"the state of {name!r} is no finite number")
     return out
 
 
@@ -266,46 +242,15 @@ def _optional(fields: Any, name: str) -> Any:
     return None if hasattr(fields, "HasField") and not fields.HasField(name) else getattr(fields, name, None)
 
 
-def _rows(
-    states: list[tuple[float, State]], begin: float, remarks: list[str]
-) -> tuple[tuple[str, ...], Array, Array, Array | None]:
-    """Joints, times, positions and velocities: a row a message, from the first on after which all joints are known."""
-    joints = tuple(dict.fromkeys(name for _, state in states for name in state))
-    last: State = {}
-    times, rows, twice = list[float](), list[list[tuple[float, float | None]]](), dict[str, None]()
-    at_once, since = State(), -np.inf
-    for time, state in sorted(states, key=lambda pair: pair[0]):
-        at_once, since = at_once if time == since else {}, time
-        twice |= dict.fromkeys(name for name in state if at_once.get(name, state[name]) != state[name])
-        at_once |= state
-        last |= state
-        if len(last) == len(joints):
-            times.append(time - begin)
-            rows.append([last[name] for name in joints])
-    if twice:
-        remarks.append(f"several states at one time, of which the last is taken: {', '.join(twice)}")
-    # A velocity that is not given is NaN here
-    t, numbers = _by_time(times, np.array(rows, dtype=np.float64).reshape(len(rows), len(joints), 2))
-    known = bool(rows) and not np.isnan(numbers[..., 1]).any()
-    return joints, t, numbers[..., 0], numbers[..., 1] if known else None
-
-
-def _by_time(times: Sequence[float], values: Array) -> tuple[Array, Array]:
-    """Sorted by time, of several at one time the last."""
-    t = np.asarray(times, dtype=np.float64)
-    order = np.argsort(t, kind="stable")
-    last = order[np.append(np.diff(t[order]) > 0.0, True)[: len(t)]]
-    return t[last], values[last]
-
-
-def _stamp(fields: Any, kind: str) -> float:
+def _stamp(fields: Any) -> float:
     """The message's own time [s]; 0 where it has none."""
-    own = getattr(fields, "timestamp", None) if kind.startswith("foxglove") else fields.header.stamp
+    own = getattr(getattr(fields, "header", None), "stamp", getattr(fields, "timestamp", None))
     if own is None:
         return 0.0
-    names = next((names for names in STAMPS if all(hasattr(own, name) for name in names)), STAMPS[0])
-    seconds, nanoseconds = (getattr(own, name) for name in names)
-    value = float(seconds + nanoseconds / NANO)
-    if not np.isfinite(value):
+    # As JSON, ROS and protobuf call them
+    seconds, part = (
+        getattr(own, name) for name in ("sec", "seconds", "nsec", "nanosec", "nanos") if hasattr(own, name)
+    )
+    if not math.isfinite(value := float(seconds + part / NANO)):
         raise FormatError("timestamp", value, "is no finite number")
     return value

@@ -1,16 +1,24 @@
-"""A robot of ROS 2 as a plant, over DDS or Zenoh and without ROS."""
+"""A robot of ROS 2 as a plant, over DDS or Zenoh and without ROS, by the types of messages that rosbags knows."""
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import struct
 import time as clock
-from collections.abc import Callable
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
-from wbc import validation
+from wbc import extras, validation
 from wbc.errors import RangeError
-from wbc.formats.ros2_links import DdsLink, Ros2Link, ZenohLink
+from wbc.formats.errors import FormatError
+from wbc.formats.messages import NANO
+from wbc.formats.motion_file import ros2_types
 from wbc.robot.robot import Robot, checked_robot
 from wbc.simulation import Command, CommandKind, PlantError, PlantState
 from wbc.validation import Array
@@ -23,6 +31,12 @@ PATIENCE = 10.0
 THERE = 1e-2
 #: Most of DDS's domains
 DOMAINS = 232
+#: States that are kept until they are taken
+KEPT = 64
+STATE = "sensor_msgs/msg/JointState"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+#: What rmw_zenoh sends beside a message: its number, time [ns], and length and bytes of who sends
+ATTACHMENT = struct.Struct("<qqB16s")
 
 
 class Ros2Plant:
@@ -33,9 +47,6 @@ class Ros2Plant:
         wbc.track.run(..., plant=plant)
 
     A command of velocities is the position to which it leads within the next tick. Times are of this machine's clock.
-
-    Attributes:
-        nq, nv, time_step, commands: as of :class:`wbc.simulation.Plant`.
 
     Args:
         robot: with joints of one coordinate each; what messages say of other joints is not looked at.
@@ -64,27 +75,11 @@ class Ros2Plant:
         if robot.nq != robot.nv:
             raise RangeError("robot", robot.name, "has joints with several coordinates, which JointState has not")
         self.nq, self.nv = robot.nq, robot.nv
-        number = int(validation.scalar("domain", domain, low=0, high=DOMAINS))
-        topics = states.strip("/"), commands.strip("/")
-        self._link: Ros2Link = DdsLink(*topics, number) if zenoh is None else ZenohLink(*topics, number, zenoh)
-        self._q, self._v = np.full(self.nq, math.nan), np.zeros(self.nv)
-        self._heard = -math.inf
+        topics, number = (states.strip("/"), commands.strip("/")), validation.integer("domain", domain, high=DOMAINS)
+        self._link = _DdsLink(topics, number) if zenoh is None else _ZenohLink(topics, number, zenoh)
+        self._q, self._v, self._heard = np.full(self.nq, math.nan), np.zeros(self.nv), -math.inf
         self._now = self._due = 0.0
         self._command = Command(CommandKind.VELOCITY, np.zeros(self.nv))
-
-    def _hear(self) -> None:
-        """Take in what has come."""
-        for message in self._link.take():
-            places = {name: k for k, name in enumerate(message.name)}
-            if any(name not in places for name in self._robot.joint_names):
-                continue
-            order = [places[name] for name in self._robot.joint_names]
-            if len(message.position) != len(places):
-                continue
-            self._q = np.array(message.position)[order]
-            full = len(message.velocity) == len(places)
-            self._v = np.array(message.velocity)[order] if full else np.zeros(self.nv)
-            self._heard = clock.monotonic()
 
     def reset(self, q: Array, time: float) -> None:
         """Go to a configuration, and wait until the robot is there.
@@ -93,33 +88,33 @@ class Ros2Plant:
             PlantError: it says nothing, or does not come there.
         """
         self._wait(lambda: bool(np.isfinite(self._q).all()), "no JointState with all of its joints has come")
-        far = float(np.abs(q - self._q).max())
-        speed = np.where(np.isfinite(self._robot.limits.velocity), self._robot.limits.velocity, 1.0)
+        limits = self._robot.limits.velocity
         # Half as fast as it may
-        self._send(q, np.zeros(self.nv), max(0.1, 2.0 * far / float(speed.min())))
+        slowest = float(np.where(np.isfinite(limits), limits, 1.0).min())
+        self._send(q, np.zeros(self.nv), max(0.1, 2.0 * float(np.abs(q - self._q).max()) / slowest))
         self._wait(lambda: bool(np.abs(self._q - q).max() < THERE), "it does not come to where it is wanted")
         self._now, self._due = time, clock.monotonic()
 
-    def _send(self, q: Array, v: Array, seconds: float) -> None:
-        self._link.send(self._robot.joint_names, q, v, seconds)
-
     def _wait(self, done: Callable[[], bool], reason: str) -> None:
         until = clock.monotonic() + PATIENCE
-        while True:
-            self._hear()
-            if done():
-                return
+        while not done():
             if clock.monotonic() > until:
                 raise PlantError("plant", self._robot.name, reason)
             clock.sleep(1e-3)
+            self.read()
 
     def read(self) -> PlantState:
-        """The last message, invalid where it is older than half a second."""
-        self._hear()
-        valid = clock.monotonic() - self._heard < SILENT and bool(
-            np.isfinite(self._q).all() and np.isfinite(self._v).all()
-        )
-        return PlantState(self._q.copy(), self._v.copy(), self._now, valid)
+        """The last message with all joints, invalid where it is older than half a second."""
+        for message in self._link.take():
+            places = {name: k for k, name in enumerate(message.name)}
+            if places.keys() >= set(self._robot.joint_names) and len(message.position) == len(places):
+                order = [places[name] for name in self._robot.joint_names]
+                full = len(message.velocity) == len(places)
+                self._q = np.array(message.position)[order]
+                self._v = np.array(message.velocity)[order] if full else np.zeros(self.nv)
+                self._heard = clock.monotonic()
+        valid = clock.monotonic() - self._heard < SILENT and np.isfinite([*self._q, *self._v]).all()
+        return PlantState(self._q.copy(), self._v.copy(), self._now, bool(valid))
 
     def apply(self, command: Command) -> None:
         """Keep it: it is sent by :meth:`advance`, which knows for how long it is."""
@@ -127,9 +122,107 @@ class Ros2Plant:
 
     def advance(self, dt: float) -> None:
         """Send the command, and wait until its time is over."""
+        values = self._command.values
         if self._command.kind == CommandKind.POSITION:
-            self._send(self._command.values, np.zeros(self.nv), dt)
+            self._send(values, np.zeros(self.nv), dt)
         else:
-            self._send(self._q + dt * self._command.values, self._command.values, dt)
+            self._send(self._q + dt * values, values, dt)
         self._now, self._due = self._now + dt, self._due + dt
         clock.sleep(max(0.0, self._due - clock.monotonic()))
+
+    def _send(self, q: Array, v: Array, seconds: float) -> None:
+        """A trajectory of one point: be at q with v in so many seconds."""
+        made, none = self._link.types.types, np.zeros(0)
+        span = made["builtin_interfaces/msg/Duration"](int(seconds), round(seconds % 1.0 * NANO))
+        point = made["trajectory_msgs/msg/JointTrajectoryPoint"](q, v, none, none, span)
+        header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
+        message = made[TRAJECTORY](header, list(self._robot.joint_names), [point])
+        self._link.put(bytes(self._link.types.serialize_cdr(message, TRAJECTORY)))
+
+
+class _DdsLink:
+    """Hears states and sends trajectories over Cyclone DDS as ROS 2 does by default: XCDR 1, topics under ``rt/``."""
+
+    def __init__(self, topics: tuple[str, str], domain: int) -> None:
+        extras.require("ros2", "a robot of ROS 2")
+        from cyclonedds.core import DDSException
+        from cyclonedds.domain import DomainParticipant
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.qos import Policy, Qos
+        from cyclonedds.sub import DataReader
+        from cyclonedds.topic import Topic
+
+        self.types, known = ros2_types(), dict[str, Any]()
+        states, commands = (f"rt/{topic}" for topic in topics)
+        state, self._order = (_idl(self.types, kind, known) for kind in (STATE, TRAJECTORY))
+        plain = Policy.History.KeepLast(1), Policy.DataRepresentation(use_cdrv0_representation=True)
+        heard, sent = Qos(Policy.Reliability.BestEffort, *plain), Qos(Policy.Reliability.Reliable(NANO), *plain)
+        try:
+            self._participant = me = DomainParticipant(domain)
+            self._reader = DataReader(me, Topic(me, states, state), qos=heard)
+            self._writer = DataWriter(me, Topic(me, commands, self._order), qos=sent)
+        except DDSException as error:
+            raise FormatError("domain", domain, f"DDS does not connect: {error}") from error
+
+    def take(self) -> Iterable[Any]:
+        # What is said of an endpoint that is gone has no names
+        return (message for message in self._reader.take(KEPT) if hasattr(message, "name"))
+
+    def put(self, data: bytes) -> None:
+        self._writer.write(self._order.deserialize(data))
+
+
+class _ZenohLink:
+    """The same over Zenoh, with keys and attachments of rmw_zenoh, but not its tokens, of which it lists topics."""
+
+    def __init__(self, topics: tuple[str, str], domain: int, locator: str) -> None:
+        extras.require("zenoh", "a robot of ROS 2 over Zenoh")
+        import zenoh
+
+        self.types, config = ros2_types(), zenoh.Config()
+        if locator:
+            config.insert_json5("connect/endpoints", json.dumps([locator]))
+        came = self._came = deque[bytes](maxlen=KEPT)
+        self._sent, self._sender = 0, os.urandom(16)
+        states, commands = (
+            f"{domain}/{topic}/{_dds_name(kind)}/{self.types.hash_rihs01(kind)}"
+            for topic, kind in zip(topics, (STATE, TRAJECTORY), strict=True)
+        )
+        try:
+            session = zenoh.open(config)
+            # An open one keeps the program from ending
+            weakref.finalize(self, session.close)
+            self._subscriber = session.declare_subscriber(states, lambda sample: came.append(bytes(sample.payload)))
+            self._publisher = session.declare_publisher(commands)
+        except zenoh.ZError as error:
+            raise FormatError("zenoh", locator, f"Zenoh does not connect: {error}") from error
+
+    def take(self) -> Iterable[Any]:
+        return [self.types.deserialize_cdr(self._came.popleft(), STATE) for _ in range(len(self._came))]
+
+    def put(self, data: bytes) -> None:
+        self._sent += 1
+        self._publisher.put(data, attachment=ATTACHMENT.pack(self._sent, clock.time_ns(), 16, self._sender))
+
+
+def _dds_name(kind: str) -> str:
+    """``sensor_msgs/msg/JointState`` as DDS and Zenoh call it."""
+    package, _, name = kind.split("/")
+    return f"{package}::msg::dds_::{name}_"
+
+
+def _idl(types: Any, kind: str, known: dict[str, Any]) -> Any:
+    """The class of a message in Cyclone."""
+    from cyclonedds.idl import annotations, make_idl_struct, types as idl
+
+    def of(node: Any, what: Any) -> Any:
+        if node.name == "SEQUENCE":
+            return idl.sequence[of(*what[0])]
+        if node.name == "NAME":
+            return _idl(types, what, known)
+        return str if what[0] == "string" else getattr(idl, what[0])
+
+    if kind not in known:
+        fields = {name: of(*field) for name, field in types.fielddefs[kind][1]}
+        known[kind] = annotations.final(make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), fields))
+    return known[kind]

@@ -28,14 +28,14 @@ def stack_actions(
 
         env = wbc.learning.stack_actions(env, controller.batch(64), Box(-0.1, 0.1, (3,)), aim, lambda seen: seen[:, :7])
 
+    The ``info`` of a step has ``solved`` [n] and ``command`` [n, nv].
+
     Args:
         env: n environments whose actions are velocities of the joints [n, nv].
         batch: of n robots. space: of the actions of one environment, as a policy sees it.
         aim: ``(batch, actions, q)``: sets values of the batch.
         configuration: of observations: q [n, nq]. velocity: measured velocities [n, nv]; give it where the stack limits
             accelerations, as an environment that begins anew knows nothing of the last command.
-
-    The ``info`` of a step has ``solved`` [n] and ``command`` [n, nv].
 
     Raises:
         MissingPackageError: gymnasium is not installed. RangeError: another number of robots, or of actions, than
@@ -55,23 +55,19 @@ def stack_actions(
             self.action_space = gymnasium.vector.utils.batch_space(space, env.num_envs)
             self._seen: Any = None
 
-        def reset(
-            self, *, seed: int | None = None, options: dict[str, Any] | None = None
-        ) -> tuple[Any, dict[str, Any]]:
+        def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
             self._seen, info = self.env.reset(seed=seed, options=options)
             batch.reset(np.asarray(configuration(self._seen), dtype=np.float64))
             return self._seen, info
 
-        def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        def step(self, actions: Any) -> Any:
             if self._seen is None:
                 raise RangeError("step", None, "the environments have no state yet: call reset first")
-            numbers = np.asarray(actions, dtype=np.float64)
-            if len(numbers) != batch.count:
-                raise RangeError("actions", len(numbers), f"expected one for each of {batch.count} environments")
+            if len(actions) != batch.count:
+                raise RangeError("actions", len(actions), f"expected one for each of {batch.count} environments")
             q = np.asarray(configuration(self._seen), dtype=np.float64)
-            aim(batch, numbers, q)
-            measured = None if velocity is None else np.asarray(velocity(self._seen), dtype=np.float64)
-            step = batch.step(q, measured)
+            aim(batch, np.asarray(actions, dtype=np.float64), q)
+            step = batch.step(q, None if velocity is None else np.asarray(velocity(self._seen), dtype=np.float64))
             kind = self.env.single_action_space.dtype
             self._seen, reward, ended, cut, info = self.env.step(step.v.astype(kind))
             return self._seen, reward, ended, cut, info | {"solved": step.solved, "command": step.v}

@@ -13,16 +13,11 @@ from wbc.formats.motion import RecordedMotion
 from wbc.simulation import Connection, Plant
 
 
-def named(joints: Iterable[str], values: Iterable[Any]) -> dict[str, Any]:
-    """What LeRobot calls the positions of joints -> a value each."""
-    return {f"{joint}.pos": value for joint, value in zip(joints, values, strict=True)}
-
-
 class LeRobotDevice:
     """What LeRobot asks of robots and teleoperators alike; there is nothing to calibrate or to configure.
 
     Attributes:
-        name, id: as LeRobot names it. joints: of actions.
+        name, id: as LeRobot names it. joints: of actions. action_features: what an action has.
     """
 
     name = "wbc"
@@ -30,11 +25,7 @@ class LeRobotDevice:
 
     def __init__(self, identity: str, joints: Sequence[str]) -> None:
         self.id, self.joints, self.is_connected = identity, tuple(joints), False
-
-    @property
-    def action_features(self) -> dict[str, type]:
-        """What an action has."""
-        return named(self.joints, [float] * len(self.joints))
+        self.action_features = self._named([float] * len(self.joints))
 
     def calibrate(self) -> None:
         """Nothing to do."""
@@ -42,8 +33,10 @@ class LeRobotDevice:
     configure = calibrate
 
     def disconnect(self) -> None:
-        """End it."""
         self.is_connected = False
+
+    def _named(self, values: Iterable[Any]) -> dict[str, Any]:
+        return {f"{joint}.pos": value for joint, value in zip(self.joints, values, strict=True)}
 
     def _require(self) -> None:
         if not self.is_connected:
@@ -61,40 +54,34 @@ class StackRobot(LeRobotDevice):
         robot.send_action({"panda_joint1.pos": 0.3})
 
     Attributes:
-        robot, controller: what is commanded, and what commands. real_time: whether an action takes a tick's time.
+        controller: what commands.
 
     Args:
         controller: of a stack that commands velocities of joints with one coordinate each.
         posture: name of its task ``Posture``, whose target actions are.
-        plant: the robot; default: one that does what it is told.
+        plant: the robot; default: one that does what it is told at once, which :class:`wbc.simulation.RealTime` paces.
 
     Raises:
-        ShapeError: no controller. UnknownNameError: no such task. RangeError: joints with several coordinates.
+        ShapeError: no controller. UnknownNameError: no such task, or no joint of an action. RangeError: joints with
+            several coordinates, or methods before ``connect``. PlantError: the robot failed.
     """
 
-    observation_features = LeRobotDevice.action_features
-
-    def __init__(
-        self, controller: Controller, posture: str, plant: Plant | None = None, *, real_time: bool = False
-    ) -> None:
+    def __init__(self, controller: Controller, posture: str, plant: Plant | None = None) -> None:
         validation.instance("controller", controller, Controller, "a wbc Controller")
-        self.robot = controller.stack.robot
-        if self.robot.nq != self.robot.nv:
-            raise RangeError("controller", self.robot.name, "has joints with several coordinates")
+        robot = controller.stack.robot
+        if robot.nq != robot.nv:
+            raise RangeError("controller", robot.name, "has joints with several coordinates")
         validation.one_of("posture", posture, [entry.name for entry in controller.stack.entries])
-        super().__init__(self.robot.name, self.robot.joint_names)
-        self.controller, self.real_time, self._posture = controller, real_time, posture
-        self._connection = Connection(plant, self.robot, controller.stack.dt)
+        super().__init__(robot.name, robot.joint_names)
+        self.observation_features = self.action_features
+        self.controller, self._posture, self._start = controller, posture, robot.neutral
+        self._connection = Connection(plant, robot, controller.stack.dt)
 
     def connect(self, calibrate: bool = True) -> None:
-        """Bring the robot to rest at its neutral configuration.
-
-        Raises:
-            PlantError: it cannot be there.
-        """
-        self._q = self._connection.reset(self.robot.neutral).q
+        """Bring the robot to rest at its neutral configuration."""
+        self._q = self._connection.reset(self._start).q
         self.controller.reset(self._q)
-        self._target, self._due, self.is_connected = self._q.copy(), time.monotonic(), True
+        self._target, self.is_connected = self._q.copy(), True
 
     def disconnect(self) -> None:
         """Bring the robot to rest."""
@@ -103,35 +90,20 @@ class StackRobot(LeRobotDevice):
         super().disconnect()
 
     def get_observation(self) -> dict[str, float]:
-        """Positions of the joints.
-
-        Raises:
-            RangeError: it is not connected.
-        """
+        """Positions of the joints [rad or m]."""
         self._require()
-        return named(self.joints, self._q.tolist())
+        return self._named(self._q.tolist())
 
     def send_action(self, action: Mapping[str, Any]) -> dict[str, float]:
-        """Go towards positions for one tick; joints that it does not name keep their last target.
-
-        Returns:
-            Where the joints are after it, which a data set records as what was done.
-
-        Raises:
-            UnknownNameError: no such joint. RangeError: it is not connected. NotFiniteError: a number that is none.
-            PlantError: the robot failed.
+        """Go towards positions for one tick, and say where the joints are after it, which a data set records as what
+        was done; joints that it does not name keep their last target.
         """
         self._require()
-        places, target = named(self.joints, range(len(self.joints))), self._target.copy()
+        places, target = self._named(range(len(self.joints))), self._target.copy()
         for key, value in action.items():
             target[places[validation.one_of("action", key, places)]] = validation.scalar(f"action.{key}", value)
-        self.controller[self._posture].target = target
-        self._target = target
-        step = self.controller.step(self._q)
-        if self.real_time:
-            self._due = max(self._due + self.controller.stack.dt, time.monotonic() - self.controller.stack.dt)
-            time.sleep(max(0.0, self._due - time.monotonic()))
-        self._q = self._connection.drive(step.v).q
+        self.controller[self._posture].target = self._target = target
+        self._q = self._connection.drive(self.controller.step(self._q).v).q
         return self.get_observation()
 
 
@@ -156,14 +128,10 @@ class StackTeleoperator(LeRobotDevice):
         self._began, self.is_connected = time.monotonic(), True
 
     def get_action(self) -> dict[str, float]:
-        """Positions of the recorded joints now.
-
-        Raises:
-            RangeError: it is not connected.
-        """
+        """Positions of the recorded joints now [rad or m]; RangeError: it is not connected."""
         self._require()
         now = time.monotonic() - self._began if self._clock is None else self._clock()
-        return named(self.joints, self._motion.at(now).tolist())
+        return self._named(self._motion.at(now).tolist())
 
     def send_feedback(self, feedback: Mapping[str, Any]) -> None:
         """It is not felt."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc import extras, validation
 from wbc.batch.batch import Batch
-from wbc.batch.batch_step import BatchStep, Pulled
+from wbc.batch.batch_step import Pulled
 from wbc.errors import RangeError
 from wbc.validation import Array
 
@@ -38,32 +38,35 @@ def command_layer(batch: Batch, *values: str) -> torch.nn.Module:
     import torch
 
     validation.instance("batch", batch, Batch, "a wbc Batch")
+    names: list[tuple[str, str]] = [(item, value) for item, _, value in (str(name).rpartition(".") for name in values)]
     # Compiled now, and refused now
-    batch.pullback.require(names := [split(name) for name in values])
+    batch.pullback.require(names)
 
     class TickFunction(torch.autograd.Function):  # type: ignore[misc]  # without torch installed it is Any
         @staticmethod
-        def forward(ctx: Any, q: torch.Tensor, *given: torch.Tensor) -> torch.Tensor:
-            step = _ticked(batch, names, *(tensor.detach().cpu().double().numpy() for tensor in (q, *given)))
-            ctx.step, ctx.like = step, [(tensor.shape, tensor.dtype, tensor.device) for tensor in (q, *given)]
-            module.solved = torch.from_numpy(step.solved.copy())
-            return torch.from_numpy(step.v.copy()).to(q)
+        def forward(ctx: Any, *given: torch.Tensor) -> torch.Tensor:
+            q, *numbers = (np.ascontiguousarray(tensor.detach().cpu().double().numpy()) for tensor in given)
+            told: dict[str, dict[str, Array]] = {item: {} for item, _ in names}
+            for (item, value), array in zip(names, numbers, strict=True):
+                told[item][value] = array
+            batch.set(**told)
+            ctx.step, ctx.given = batch.step(q), [(tensor.shape, tensor.dtype, tensor.device) for tensor in given]
+            ctx.step.keep()
+            module.solved = torch.from_numpy(ctx.step.solved.copy())
+            return torch.from_numpy(ctx.step.v.copy()).to(given[0])
 
         @staticmethod
         @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
         def backward(ctx: Any, weights: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
             pulled = ctx.step.pull(weights.detach().cpu().double().numpy())
-            out: list[torch.Tensor | None] = []
-            for asked, place, (shape, kind, device) in zip(
-                ctx.needs_input_grad, [("q", None), *names], ctx.like, strict=True
-            ):
-                if not asked:
-                    out.append(None)
-                    continue
-                found = torch.from_numpy(_shaped(pulled, *place, shape)).to(kind).to(device)
+
+            def gradient(place: tuple[str, str | None], shape: Any, kind: Any, device: Any) -> torch.Tensor:
+                numbers = torch.from_numpy(_shaped(pulled, *place, shape)).to(kind).to(device)
                 # One value for all robots moves with all of them
-                out.append(found if found.shape == shape else found.sum(0))
-            return tuple(out)
+                return numbers if numbers.shape == shape else numbers.sum(0)
+
+            each = zip(ctx.needs_input_grad, [("q", None), *names], ctx.given, strict=True)
+            return tuple(gradient(place, *like) if asked else None for asked, place, like in each)
 
     class CommandLayer(torch.nn.Module):  # type: ignore[misc]  # the same
         solved = torch.zeros(0, dtype=torch.bool)
@@ -78,30 +81,12 @@ def command_layer(batch: Batch, *values: str) -> torch.nn.Module:
     return module
 
 
-def split(name: str) -> tuple[str, str]:
-    """Item and value of ``ITEM.VALUE``."""
-    item, _, value = str(name).rpartition(".")
-    return item, value
-
-
-def _ticked(batch: Batch, names: list[tuple[str, str]], q: Array, *given: Array) -> BatchStep:
-    values: dict[str, dict[str, Array]] = {}
-    for (item, value), numbers in zip(names, given, strict=True):
-        values.setdefault(item, {})[value] = np.ascontiguousarray(numbers)
-    batch.set(**values)
-    step = batch.step(np.ascontiguousarray(q))
-    step.keep()
-    return step
-
-
 def _shaped(pulled: Pulled, name: str, value: str | None, shape: Any) -> Array:
     """Gradients [n, ...] in the shape of a value."""
     numbers = pulled.by(name, value)
-    rows = len(numbers)
     if tuple(shape[-2:]) not in ((4, 4), (3, 3)) or numbers.shape[1] not in (9, 12):
         return numbers
-    out = np.zeros((rows, *shape[-2:]))
-    out[:, :3, :3] = numbers[:, :9].reshape(rows, 3, 3).transpose(0, 2, 1)
-    if numbers.shape[1] == 12:
-        out[:, :3, 3] = numbers[:, 9:]
+    out = np.zeros((len(numbers), *shape[-2:]))
+    columns = numbers.reshape(len(numbers), -1, 3).transpose(0, 2, 1)
+    out[:, :3, : columns.shape[2]] = columns
     return out

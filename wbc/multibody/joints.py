@@ -6,7 +6,6 @@ quaternion; v is the twist of the child side in its own axes, in the directions 
 
 from __future__ import annotations
 
-import copy
 import math
 from functools import partial
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 
 from wbc.multibody import rotations as turns
 from wbc.multibody.rotations import Array, vector
-from wbc.multibody.spatial import SE3, Copied, SpatialMotion, exp6, log6
+from wbc.multibody.spatial import SE3, Copied, SpatialMotion, exp6, log6, shallow
 
 _PREFIX = "JointModel"
 
@@ -43,7 +42,7 @@ class JointModel(Copied):
 
     def copy(self) -> JointModel:
         """A joint of its own."""
-        out = copy.copy(self)
+        out = shallow(self)
         out.S, out.neutral = self.S.copy(), self.neutral.copy()
         return out
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from wbc.multibody.rotations import Array, skew, vector
 
 #: Relative difference of what is approximately equal
 ALIKE = 1e-12
+
+T = TypeVar("T")
 
 _drawn: list[np.random.Generator] = []
 
@@ -45,6 +47,13 @@ class Copied(LikePinocchio):
 
     def __deepcopy__(self, memo: Any) -> Any:
         return self.copy()
+
+
+def shallow(thing: T) -> T:
+    """A copy of an object that shares what it has; ``copy.copy`` takes five times as long."""
+    out: T = object.__new__(type(thing))
+    vars(out).update(vars(thing))
+    return out
 
 
 class SE3(Copied):
@@ -386,10 +395,16 @@ class Inertia(Copied):
         out.mass, out.lever, out.inertia = self.mass, self.lever.copy(), self.inertia.copy()
         return out
 
+    def isZero(self) -> bool:
+        """Whether it is that of no body, wherever its centre is."""
+        return self.mass == 0.0 and not self.inertia.any()
+
     def __add__(self, other: Inertia) -> Inertia:
         mass = self.mass + other.mass
         # As Pinocchio does where there is no mass
         weight = 1.0 / max(mass, float(np.finfo(np.float64).eps))
+        if other.isZero():
+            return Inertia(mass, (self.mass * self.lever + 0.0) * weight, self.inertia + 0.0)
         gap = self.lever - other.lever
         inertia = self.inertia + other.inertia + _steiner(self.mass * other.mass * weight, gap)
         return Inertia(mass, (self.mass * self.lever + other.mass * other.lever) * weight, inertia)

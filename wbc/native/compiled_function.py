@@ -20,8 +20,14 @@ def compiled(function: ca.Function) -> ca.Function:
     Returns:
         The function itself, which runs on the virtual machine, where there is no compiler or it fails; the log says so.
     """
+    library = function_library(function)
+    return function if library is None else ca.external(function.name(), str(library))
+
+
+def function_library(function: ca.Function) -> pathlib.Path | None:
+    """The library of a function; None where there is no compiler or it fails; the log says so."""
     if not toolchain.available():
-        return function
+        return None
 
     def text() -> str:
         generator = ca.CodeGenerator("function.c", {"with_header": False})
@@ -29,10 +35,10 @@ def compiled(function: ca.Function) -> ca.Function:
         return str(generator.dump())
 
     try:
-        return ca.external(function.name(), str(generated_library(function.serialize(), text)))
+        return generated_library(function.serialize(), text)
     except CompileError as error:
         toolchain.fall_back(str(error))
-        return function
+        return None
 
 
 def generated_library(meaning: str, text: Callable[[], str]) -> pathlib.Path:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from math import comb
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import InfeasibleError
-from wbc.plan.path import PlannedPath, motion_of
+from wbc.plan.path import PlannedPath
 from wbc.plan.planner import MotionPlanner, PlanningOptions
 from wbc.trajectory import Law, PolynomialPath, time_optimal
 from wbc.validation import Array
@@ -97,8 +96,7 @@ class PathFollower:
         while (planned := self._next or self._plan()).done() or self._wait:
             self._next = None
             path, law = planned.result()
-            scene = self._planner.scene(path.coordinates)
-            if scene.violation(motion_of(path.coordinates, path.smooth)) is None:
+            if self._planner.scene(path.coordinates).violation(path.smooth) is None:
                 self._take(path, law)
                 return
         self._next = planned
@@ -116,7 +114,7 @@ class PathFollower:
         """
         scene = self._planner.scene(self.path.coordinates)
         left = self._left(1.0)
-        if self.braking or left is None or scene.violation(motion_of(self.path.coordinates, left)) is None:
+        if self.braking or left is None or scene.violation(left) is None:
             return True
         fast, brisk = self.path.motion_limits()
         speed, hit = self._timing(1), None
@@ -128,7 +126,7 @@ class PathFollower:
             except InfeasibleError:
                 continue
             self.law, self.time, self.braking = law, 0.0, True
-            hit = scene.violation(motion_of(self.path.coordinates, part))
+            hit = scene.violation(part)
             break
         if self.braking:
             self._next = self._plan()
@@ -144,15 +142,7 @@ class PathFollower:
         until = here + share * (end - here)
         if until - here < 1e-9:
             return None
-        inner = path.knots[(path.knots > here + 1e-12) & (path.knots < until - 1e-12)]
-        knots = np.concatenate([[here], inner, [until]])
-        pieces = np.clip(np.searchsorted(path.knots, knots[:-1], side="right") - 1, 0, len(path.knots) - 2)
-        rows = path.coefficients[:, pieces]
-        # The first piece begins within one of the path's
-        shift, first = here - path.knots[pieces[0]], rows[:, 0].copy()
-        for k in range(len(rows)):
-            rows[k, 0] = sum(comb(len(rows) - 1 - j, k - j) * shift ** (k - j) * first[j] for j in range(k + 1))
-        return PolynomialPath(knots, rows)
+        return path.sliced(here, until)
 
     def _timing(self, order: int) -> float:
         """Place on the path, or its rate."""

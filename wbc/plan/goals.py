@@ -16,13 +16,6 @@ from wbc.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class ConfigurationGoal:
-    """A configuration ``q`` [nq]."""
-
-    q: Array
-
-
-@dataclass(frozen=True, eq=False)
 class TargetGoal:
     """Tasks that are to be met: their names, and the numbers of their targets."""
 
@@ -30,7 +23,8 @@ class TargetGoal:
     numbers: tuple[tuple[Slot, Array], ...]
 
 
-Goal = ConfigurationGoal | TargetGoal
+#: A configuration [nq], or tasks that are to be met
+Goal = Array | TargetGoal
 
 
 def goals_of(core: Core, goal: Any) -> tuple[Goal, ...]:
@@ -52,8 +46,8 @@ def _goals_within(core: Core, name: str, goal: Any) -> tuple[Goal, ...]:
         return (_target(core, name, goal),)
     rows = np.asarray(validation.real_array(name, goal))
     if rows.ndim == 2:
-        return tuple(ConfigurationGoal(robot.configuration(f"{name}[{k}]", row)) for k, row in enumerate(rows))
-    return (ConfigurationGoal(robot.configuration(name, rows)),)
+        return tuple(robot.configuration(f"{name}[{k}]", row) for k, row in enumerate(rows))
+    return (robot.configuration(name, rows),)
 
 
 def _is_configuration(goal: Any) -> bool:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import comb
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
-from wbc.clearance import Motion
 from wbc.errors import InfeasibleError
 from wbc.plan.coordinates import PlanningCoordinates
 from wbc.plan.native import NativePlanner
 from wbc.stack.declaration import Declaration
 from wbc.tasks import FrameVelocityLimit
 from wbc.trajectory import Law, PolynomialPath, blend_path, jerk_limited_along, spline_path, standing_path, time_optimal
+from wbc.trajectory.paths.joint_paths import joint_polyline
 from wbc.validation import Array
 
 #: Corners are rounded by this at most [rad, or characteristic lengths], then by half as much, until the path is proven
@@ -25,6 +24,10 @@ ROUNDED = 0.1
 LEAST_ROUNDED = 1e-4
 #: Equality rows hold within this on a smooth path [rad, m], where points between its points may be projected
 KEPT = 1e-6
+#: Points of a path that are nearer to another one are none of its smooth path [rad or m]
+CLOSE = 1e-3
+#: Rounds at most in which points are added to a smooth path
+PASSES = 20
 #: Points of a smooth path at most
 MOST_POINTS = 4000
 #: Samples between two points of a smooth path at which rows are looked at
@@ -73,20 +76,27 @@ class PlannedPath:
         """
         if len(self.points) < 2 or self.length == 0.0:
             return standing_path(self.points[0])
-        if self.native.equalities:
-            return self._spline()
+        rolling = self.coordinates.rolling
+        runs = [self.points] if rolling is None else rolling.runs(self.points)
+        return _joined([self._spline(run) if self.native.path_rows.equalities else self._rounded(run) for run in runs])
+
+    def _rounded(self, points: Array) -> PolynomialPath:
         deviation = ROUNDED
         while deviation >= LEAST_ROUNDED:
-            path = blend_path(self.points, deviation)
+            path = blend_path(points, deviation)
             if self.fault(path) is None:
                 return path
             deviation *= 0.5
-        return _polyline(self.points)
+        return joint_polyline(points)
 
-    def _spline(self) -> PolynomialPath:
-        points = self.points
+    def _spline(self, points: Array) -> PolynomialPath:
         why = ""
-        while len(points) < MOST_POINTS:
+        # A spline swings where two points are much closer to each other than to the others
+        far = np.linalg.norm(np.diff(points, axis=0), axis=1) > CLOSE
+        points = points[np.r_[True, far[:-1] & far[1:], True]]
+        for _ in range(PASSES):
+            if len(points) >= MOST_POINTS:
+                break
             path = spline_path(points)
             middle = 0.5 * (path.knots[:-1] + path.knots[1:])
             if len(path.knots) != len(points):
@@ -115,16 +125,16 @@ class PlannedPath:
         """(how far, what) of the worst thing that a path breaks; None: nothing. Bodies, and limits of polynomials, are
         proven; rows are looked at in samples.
         """
-        nearest = self.native.scene.violation(motion_of(self.coordinates, path))
+        nearest = self.native.scene.violation(path)
         if nearest is not None:
             return nearest.distance, str(nearest)
-        controls = bernstein(path)
+        controls = path.hull()
         low, high = controls.min(axis=(0, 2)), controls.max(axis=(0, 2))
         beyond = np.maximum(self.native.low - low, high - self.native.high)
         if beyond.max() > 1e-9:
             k = int(beyond.argmax())
             return float(beyond[k]), f"{self.coordinates.names[k]} leaves its limits"
-        if self.native.rows:
+        if self.native.path_rows.count:
             share = (np.arange(SAMPLES) + 0.5) / SAMPLES
             s = (path.knots[:-1, None] + share * np.diff(path.knots)[:, None]).ravel()
             off = [self.native.broken(x) for x in path.evaluate(s)]
@@ -188,29 +198,11 @@ class PlannedPath:
         return self.coordinates.configuration(x), self.coordinates.velocity(x, np.asarray(state.velocity))
 
 
-def _polyline(points: Array) -> PolynomialPath:
-    """Straight pieces with corners, at which laws rest."""
-    steps = np.diff(points, axis=0)
-    lengths = np.linalg.norm(steps, axis=1)
-    kept = lengths > 0.0
-    knots = np.concatenate([[0.0], np.cumsum(lengths[kept])])
-    return PolynomialPath(knots, np.array([steps[kept] / lengths[kept, None], points[:-1][kept]]))
-
-
-def bernstein(path: PolynomialPath) -> Array:
-    """Coefficients of the pieces, [pieces, n, degree + 1]."""
-    degree, size = int(path.degree or 0), np.diff(path.knots)
-    power = [path.coefficients[degree - k] * (size**k)[:, None] for k in range(degree + 1)]
-    rows = [sum(comb(i, k) / comb(degree, k) * power[k] for k in range(i + 1)) for i in range(degree + 1)]
-    return np.stack(rows, axis=2)
-
-
-def motion_of(coordinates: PlanningCoordinates, path: PolynomialPath) -> Motion:
-    """A path as a motion of the robot's tree, with s as its time."""
-    controls = bernstein(path)
-    if controls.shape[2] < 2:
-        controls = np.repeat(controls, 2, axis=2)
-    # Rounding may leave the pieces apart by a last digit
-    controls[1:, :, 0] = controls[:-1, :, -1]
-    n = coordinates.count
-    return Motion(path.knots, controls, np.zeros((0, len(path.knots), 12)), np.zeros(n), np.zeros((0, 2)))
+def _joined(paths: list[PolynomialPath]) -> PolynomialPath:
+    """One path after the other; laws rest where the direction changes."""
+    degree = max(int(path.degree or 0) for path in paths)
+    knots, rows = paths[0].knots[:1], list[Array]()
+    for path in paths:
+        knots = np.concatenate([knots, knots[-1] - path.knots[0] + path.knots[1:]])
+        rows.append(np.pad(path.coefficients, ((degree - int(path.degree or 0), 0), (0, 0), (0, 0))))
+    return PolynomialPath(knots, np.concatenate(rows, axis=1))

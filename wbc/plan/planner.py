@@ -14,7 +14,7 @@ from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.controller.handles import Handles
 from wbc.errors import InfeasibleError
 from wbc.plan.coordinates import PlanningCoordinates
-from wbc.plan.goals import ConfigurationGoal, Goal, TargetGoal, goals_of
+from wbc.plan.goals import Goal, TargetGoal, goals_of
 from wbc.plan.native import NativePlanner
 from wbc.plan.path import PlannedPath
 from wbc.plan.rows import PlanningRows, RowsBuilder
@@ -24,6 +24,7 @@ from wbc.stack.artifact import compile_stack
 from wbc.stack.declaration import Declaration
 from wbc.stack.tables import stops
 from wbc.tasks import Fixed
+from wbc.trajectory.paths.joint_paths import joint_polyline
 from wbc.validation import Array
 
 #: Samples between two looks at the clock and at Ctrl-C
@@ -35,16 +36,23 @@ PAD = 2e-3
 LEAST_PAD = 1e-5
 #: Samples of the first search; one that ends without a path is followed by one of twice as many
 FIRST = 2000
+#: Searches without a path before it is looked for a proof that there is none
+PROOF = 1
 #: Length of the longest edges against the diagonal of the space
 RANGE = 0.2
 #: and against that in one search after the other: some spaces want short ones, some long ones
 RANGES = (1.0, 0.5, 2.0)
 #: Descents to configurations that meet a target
 DESCENTS = 100
-#: Searches end with a path that is no longer than this, against the straight line to its goal
-DETOUR = 1.5
+#: Searches end when this times their number is no less than what the shortest path is longer than the straight line to
+#: its goal, as a share of it: the longer it is, the more others may be shorter
+DETOUR = 0.25
+#: Where the first of them took more samples than this, it is less by as much
+EASY = 200
+#: Samples of searches for another path, against those of the first
+MORE = 2
 #: Rounds at most in which corners of a path are pulled in and cut off
-ROUNDS = 2
+ROUNDS = 4
 #: Goals of one target at most: those nearest to the start
 BRANCHES = 4
 #: Goals nearer to each other than this are one [rad, or characteristic lengths]
@@ -75,7 +83,7 @@ class PlanningOptions:
     seed: int = 0
     seconds: float = 10.0
     paths: int = 4
-    cuts: int = 30
+    cuts: int = 20
     range: float | None = None
     step: float = 0.1
 
@@ -122,7 +130,7 @@ class MotionPlanner(Handles):
 
     Raises:
         UnknownNameError: no such task. UnsupportedJointError: a joint without a symbolic model.
-        CommandError: a hard constraint on velocities. CompileError: no compiler, and nothing was compiled ahead.
+        CompileError: no compiler, and nothing was compiled ahead.
     """
 
     def __init__(self, stack: Declaration, keep: Iterable[str] = ()) -> None:
@@ -155,6 +163,7 @@ class MotionPlanner(Handles):
 
         Raises:
             UnknownNameError, ShapeError, NotFiniteError, RotationError, RangeError: bad input.
+            CommandError: hard rows on velocities that are not those of a base which turns in place and drives.
             InfeasibleError: start or goal break a constraint (which pair and by how much, or which row), or no
                 configuration that meets the goal was found.
             NoPathError: none was found in the time; it has the nearest configuration that was reached.
@@ -163,16 +172,21 @@ class MotionPlanner(Handles):
         search.check_start()
         search.find_goals(goals)
         points = search.paths()
-        return PlannedPath(
+        rolling = self.coordinates.rolling
+        path = PlannedPath(
             coordinates=self.coordinates,
             native=search.native,
             stack=self.stack,
-            points=points,
+            points=points if rolling is None else rolling.rolled(points, self._wheels),
             length=search.native.length(points),
             seconds=perf_counter() - search.begin,
             shortening=search.shortening,
             nodes=search.nodes,
         )
+        # Wheels that are not round, or have limits
+        if self._wheels and path.length > 0.0 and (fault := path.fault(joint_polyline(path.points))) is not None:
+            raise InfeasibleError("path", *fault)
+        return path
 
     def branches(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> Array:
         """Free configurations that meet a goal, those nearest to q0 first, in the planner's coordinates [m, n].
@@ -189,15 +203,17 @@ class MotionPlanner(Handles):
 
     def _use(self, coordinates: PlanningCoordinates) -> None:
         self.coordinates = coordinates
+        #: of wheels that follow a base
+        self._wheels = [k for k, scale in enumerate(coordinates.scale) if np.isinf(scale)]
         self._limits = coordinates.limits(*self._stops)
         self._builder = RowsBuilder(self._core, coordinates, self.kept)
         self._rows: dict[tuple[Any, ...], PlanningRows] = {}
         self._native: NativePlanner | None = None
-        robot, self._fixed = self.stack.robot, dict[str, list[int]]()
+        every, self._fixed = np.arange(self.stack.robot.nv), dict[str, list[int]]()
         for entry in self.stack.constraints:
             if isinstance(entry.item, Fixed):
-                dofs = {dof for name in entry.item.joints for dof in range(robot.nv)[robot.dofs(name)]}
-                self._fixed[entry.name] = [k for k, dof in enumerate(coordinates.dofs) if dof in dofs]
+                dofs = [every[self.stack.robot.dofs(name)] for name in entry.item.joints]
+                self._fixed[entry.name] = np.flatnonzero(np.isin(coordinates.dofs, np.concatenate(dofs))).tolist()
 
     def _search(
         self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]
@@ -205,18 +221,18 @@ class MotionPlanner(Handles):
         chosen = replace(PlanningOptions() if options is None else options, **changes)
         q = self.stack.robot.configuration("q0", q0)
         goals = goals_of(self._core, goal)
-        if not self.coordinates.suits(q):
-            self._use(PlanningCoordinates.of(self.stack.robot, self.stack.length, q))
+        targets = [goal for goal in goals if isinstance(goal, TargetGoal)]
         # Of tasks that count for nothing no value is taken
-        named = {name for target in goals if isinstance(target, TargetGoal) for name in target.names}
-        idle = self._idle - named
+        idle = self._idle.difference(*(target.names for target in targets))
         self._core.initialise({slot: name for slot, name in self._core.first.items() if name not in idle}, q)
         self._core.waiting = {}
+        rolling = self._builder.rolling()
+        if rolling != self.coordinates.rolling or not self.coordinates.suits(q):
+            self._use(PlanningCoordinates.of(self.stack.robot, self.stack.length, q, rolling))
         # What is compiled once for many queries is no part of the time of one
         native = self.native(q)
-        for target in goals:
-            if isinstance(target, TargetGoal):
-                native.prepare(self.rows(target.names))
+        for target in targets:
+            _ = self.rows(target.names).compiled
         return _Search(self, q, chosen, native), goals
 
     @property
@@ -229,11 +245,7 @@ class MotionPlanner(Handles):
         return PlanningScene.of(self._core, coordinates or self.coordinates)
 
     def rows(self, goals: tuple[str, ...] = ()) -> PlanningRows:
-        """Rows of every configuration of a path, and of tasks that are met at its end besides.
-
-        Raises:
-            CommandError: a hard constraint on velocities.
-        """
+        """Rows of every configuration of a path, and of tasks that are met at its end besides."""
         switches = tuple(handle.enabled for handle in self._core.handles.values())
         key = (switches, goals)
         if key not in self._rows:
@@ -267,14 +279,14 @@ class _Search:
     def __init__(self, planner: MotionPlanner, q: Array, options: PlanningOptions, native: NativePlanner) -> None:
         self.planner, self.options, self.begin = planner, options, perf_counter()
         self.end = self.begin + options.seconds
-        self.native, self.rows = native, planner.rows()
+        self.native, self.rows = native, native.path_rows
         self.native.pad(LEAST_PAD)
         self.native.begin(options.seed)
         self.native.set(step=options.step)
         self.q0, self.start, self.goals = q, planner.coordinates.of_configuration(q), list[Array]()
         #: near start and goals, with room on all sides
         self.first, self.last = self.start, list[Array]()
-        self.nodes, self.pad, self.shortening = (0, 0), PAD, 0.0
+        self.nodes, self.pad, self.shortening, self.drawn = (0, 0), PAD, 0.0, 0
 
     def check_start(self) -> None:
         """Refuse a start that breaks a constraint."""
@@ -315,16 +327,17 @@ class _Search:
         """
         faults = list[tuple[float, str]]()
         for goal in goals:
-            if isinstance(goal, ConfigurationGoal):
-                x = self.planner.coordinates.of_configuration(goal.q, self.start)
-                self._widen(x)
-                if reason := self.fault(x, goal.q):
-                    faults.append(reason)
-                else:
-                    self.goals.append(x)
-            else:
+            if isinstance(goal, TargetGoal):
                 self._widen(self.start)
                 faults += self._descend(goal)
+                continue
+            x = self.planner.coordinates.of_configuration(goal, self.start)
+            x[self.planner._wheels] = self.start[self.planner._wheels]
+            self._widen(x)
+            if reason := self.fault(x, goal):
+                faults.append(reason)
+            else:
+                self.goals.append(x)
         if not self.goals:
             raise InfeasibleError("goal", *faults[0])
         self.last = [self.native.away(x, 2.0 * PAD) for x in self.goals]
@@ -336,7 +349,8 @@ class _Search:
         native = self.native
         if native.bounded:
             return
-        reach = BEYOND * self.planner.coordinates.scale
+        scale = self.planner.coordinates.scale
+        reach = BEYOND * np.where(np.isfinite(scale), scale, 0.0)
         low, high = np.minimum(self.start, x) - reach, np.maximum(self.start, x) + reach
         native.sample_low[:] = np.where(np.isfinite(native.low), native.low, low)
         native.sample_high[:] = np.where(np.isfinite(native.high), native.high, high)
@@ -389,34 +403,32 @@ class _Search:
         """
         native, options = self.native, self.options
         best: Array | None = None
-        shortest, samples, found = np.inf, FIRST, 0
+        shortest, samples, searched, detour = np.inf, FIRST, 0, DETOUR
         for attempt in range(10**6):
-            if found >= options.paths or (attempt and perf_counter() > self.end):
+            if searched >= options.paths or (attempt and perf_counter() > self.end):
                 break
             points = self._one(attempt, samples, shortest)
-            if points is None:
-                if best is not None:
-                    break
+            if points is None and best is None:
+                if attempt == PROOF and all(
+                    reasons := [native.scene.separation(native.low, native.high, self.start, x) for x in self.goals]
+                ):
+                    raise self._nothing(f"no path leads to any of {len(reasons)} goals: {'; '.join(set(reasons))}")
                 samples *= 2
                 self.pad = max(LEAST_PAD, 0.25 * self.pad)
                 continue
-            found += 1
-            length = native.length(points)
-            if length < shortest:
-                best, shortest = points, length
-            if attempt == 0 and self.nodes == (0, 0):
+            if attempt == 0 and self.nodes == (0, 0) and points is not None:
                 return points
-            if shortest <= DETOUR * self._distance(points[0], points[-1]):
+            searched += 1
+            if best is None:
+                samples, detour = MORE * self.drawn, DETOUR * min(1.0, EASY / self.drawn)
+            if points is not None and (length := native.length(points)) < shortest:
+                best, shortest = points, length
+            assert best is not None
+            if shortest <= (1.0 + detour * searched) * self._distance(best[0], best[-1]):
                 break
         if best is None:
             raise self._nothing()
         return best
-
-    def _shortened(self, points: Array) -> Array:
-        begin = process_time()
-        points = self.native.shortened(points, self.options.cuts, ROUNDS)
-        self.shortening += process_time() - begin
-        return points
 
     def _one(self, attempt: int, samples: int, shortest: float) -> Array | None:
         """A path of one search, made shorter."""
@@ -432,11 +444,11 @@ class _Search:
         roots = [k for k, x in enumerate(self.last) if native.free(x)]
         for k in roots:
             native.root(1, self.last[k])
-        if attempt == 0 and not native.rows:
+        if attempt == 0 and not self.rows.count:
             for k in roots:
-                if native.edge(self.first, self.last[k]):
-                    return self._ended(np.array([self.first, self.last[k]]), k)
-        for _ in range(0, samples, SLICE):
+                if len(way := native.way(self.first, self.last[k])) > 1:
+                    return self._ended(way, k)
+        for self.drawn in range(SLICE, samples + SLICE, SLICE):
             met = native.grow(SLICE)
             if met or perf_counter() > self.end:
                 break
@@ -444,24 +456,27 @@ class _Search:
         if met != 1:
             return None
         points = native.path()
-        ends = [float(np.abs(points[-1] - self.last[k]).max()) for k in roots]
-        return self._shortened(self._ended(points, roots[int(np.argmin(ends))]))
+        end = min(roots, key=lambda k: float(np.abs(points[-1] - self.last[k]).max())) if len(roots) > 1 else roots[0]
+        begin = process_time()
+        points = native.shortened(self._ended(points, end), options.cuts, ROUNDS)
+        self.shortening += process_time() - begin
+        return points
 
     def _ended(self, points: Array, goal: int) -> Array:
         """A path between what is near start and goal, with both."""
         whole = [points] if self.first is self.start else [self.start[None], points]
         return np.concatenate(whole if self.last[goal] is self.goals[goal] else [*whole, self.goals[goal][None]])
 
-    def _nothing(self) -> NoPathError:
+    def _nothing(self, reason: str = "") -> NoPathError:
         tree, goals = self.native.node(0), np.array(self.last)
         scale = self.planner.coordinates.scale
         off = np.array([np.linalg.norm((tree - x) / scale, axis=1) for x in goals])
         goal, node = np.unravel_index(int(off.argmin()), off.shape)
         distance = float(off[goal, node])
-        reason = (
+        searched = (
             f"no path was found in {self.options.seconds:.3g} s, with {self.nodes[0]} configurations reached from the "
             f"start and {self.nodes[1]} from {len(goals)} goals; the nearest is {distance:.3g} rad off a goal"
         )
-        error = NoPathError("goal", distance, reason)
+        error = NoPathError("goal", distance, reason or searched)
         error.nearest, error.distance = self.planner.coordinates.configuration(tree[node]), distance
         return error

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from wbc.controller.core import Core
-from wbc.errors import CommandError, CompileError
-from wbc.native import toolchain
-from wbc.native.compiled_function import generated_library
+from wbc.errors import CommandError
+from wbc.native.compiled_function import function_library
 from wbc.native.library import load_library
 from wbc.plan.coordinates import PlanningCoordinates
+from wbc.plan.rolling import SAME, RollingBase
 from wbc.plan.stand_in import MeasuredApart
 from wbc.stack.layout import Block
 from wbc.symbolic.evaluation import SingleState
@@ -23,11 +24,14 @@ from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks import FrameVelocityLimit, MovingFrame
 from wbc.tasks._linkage_speed import LinkageSpeed
-from wbc.tasks.base import Constraint, Task
+from wbc.tasks.base import Constraint, Task, Values
 from wbc.tasks.inputs import as_value
 
 #: Constraints that say nothing of configurations: of speeds, or of what measured bodies do, which the scene has
-OTHERS = (MeasuredApart, FrameVelocityLimit, LinkageSpeed, MovingFrame)
+WITHOUT_CONFIGURATION = (MeasuredApart, FrameVelocityLimit, LinkageSpeed, MovingFrame)
+
+#: Configurations besides the neutral one at which rows on velocities are looked at
+LOOKS = 4
 
 _NUMBERS = ctypes.POINTER(ctypes.POINTER(ctypes.c_double))
 _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int, _NUMBERS, _NUMBERS, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
@@ -55,30 +59,23 @@ class PlanningRows:
         """All of them."""
         return self.equalities + self.margins
 
+    @cached_property
     def compiled(self) -> tuple[int, int, int]:
         """(address of the C function, sizes of its integer and real memory); it lives as long as this.
 
         Without a compiler it is one that calls CasADi's virtual machine.
         """
-        if toolchain.available():
-            try:
-                library = load_library(generated_library(self.function.serialize(), self._text))
-                self._kept.append(library)
-                address = ctypes.cast(library.rows, ctypes.c_void_p).value or 0
-                return address, int(self.function.sz_iw()), int(self.function.sz_w())
-            except CompileError as error:
-                toolchain.fall_back(str(error))
-        joined = ca.Function(
-            "joined", self.function.sx_in(), [ca.vertcat(*map(ca.vec, self.function(*self.function.sx_in())))]
-        )
-        call = _FUNCTION(_on_machine(SingleState(joined), self.count))
-        self._kept.append(call)
-        return ctypes.cast(call, ctypes.c_void_p).value or 0, 1, 1
+        x, p = self.function.sx_in()
+        if (library := function_library(self.function)) is not None:
+            self._kept.append(load_library(library))
+            return _address(self._kept[0].rows), int(self.function.sz_iw()), int(self.function.sz_w())
+        joined = ca.Function("joined", [x, p], [ca.vertcat(*map(ca.vec, self.function(x, p)))])
+        self._kept.append(_FUNCTION(_on_machine(SingleState(joined), self.count)))
+        return _address(self._kept[0]), 1, 1
 
-    def _text(self) -> str:
-        generator = ca.CodeGenerator("rows.c", {"with_header": False})
-        generator.add(self.function)
-        return str(generator.dump())
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def _on_machine(state: SingleState, count: int) -> Callable[..., int]:
@@ -108,32 +105,27 @@ class RowsBuilder:
         self._core, self._coordinates, self._kept = core, coordinates, kept
         self._kinematics = Kinematics(core.stack.robot.model)
         self._p = ca.SX.sym("p", core.layout.parameters)
+        self._slips: dict[tuple[Block, ...], tuple[list[str], ca.Function]] = {}
 
     def rows(self, goals: Collection[str] = ()) -> PlanningRows:
-        """Those of a path, and of the tasks in ``goals`` besides.
+        """Those of a path, and of the tasks in ``goals`` besides."""
+        tasks = [
+            (block, self._expanded(block, block.entry.item.error))
+            for block in self._core.layout.blocks.values()
+            if isinstance(block.entry.item, Task) and block.entry.name in {*self._kept, *goals}
+        ]
+        hard = list(self._hard())
+        equal = [(block, self._expanded(block, item.residual)) for block, item in hard if block.form == "rows"]
+        margins = [(block, self._expanded(block, item.margins)) for block, item in hard if block.form == "margins"]
+        return self._joined([*tasks, *equal], margins)
 
-        Raises:
-            CommandError: a hard constraint says something of velocities that no configuration keeps.
-        """
-        equal, margins = list[tuple[Block, ca.SX]](), list[tuple[Block, ca.SX]]()
+    def _hard(self) -> Iterator[tuple[Block, Constraint]]:
+        """Constraints that hold on a whole path."""
         for block in self._core.layout.blocks.values():
             entry, item = block.entry, block.entry.item
-            if isinstance(item, Task):
-                if entry.name in self._kept or entry.name in goals:
-                    equal.append((block, self._expanded(block, item.error)))
-                continue
-            if isinstance(item, OTHERS) or entry.price is not None or not entry.hard or entry.level > 0:
-                continue
-            if not self._core.handles[entry.name].enabled or not isinstance(item, Constraint):
-                continue
-            if block.form == "margins":
-                margins.append((block, self._expanded(block, item.margins)))
-            elif block.form == "rows":
-                self._check(block, item)
-                error = self._expanded(block, item.residual)
-                if error.numel():
-                    equal.append((block, error))
-        return self._joined(equal, margins)
+            counts = entry.price is None and entry.hard and entry.level == 0 and self._core.handles[entry.name].enabled
+            if counts and isinstance(item, Constraint) and not isinstance(item, WITHOUT_CONFIGURATION):
+                yield block, item
 
     def _joined(self, equal: list[tuple[Block, ca.SX]], margins: list[tuple[Block, ca.SX]]) -> PlanningRows:
         x = ca.SX.sym("x", self._coordinates.count)
@@ -152,30 +144,62 @@ class RowsBuilder:
         function = ca.Function("rows", [x, self._p], ca.cse([whole, ca.densify(ca.jacobian(whole, x))]))
         return PlanningRows(count, whole.numel() - count, tuple(labels), tuple(units), function)
 
+    def _traced(self, block: Block) -> tuple[Tracer, Values]:
+        def values(block: Block) -> Values:
+            return {name: as_value(slot.input, self._p[slot.span]) for name, slot in block.slots.items()}
+
+        carrier = None
+        if block.entry.frame:
+            pose = values(self._core.layout.blocks[block.entry.frame])["pose"]
+            assert isinstance(pose, Pose)
+            carrier = Carrier(pose, ca.SX(6, 1))
+        return Tracer(self._kinematics, carrier), values(block)
+
     def _expanded(self, block: Block, expression: Callable[..., ca.SX | None]) -> ca.SX:
-        values = {name: as_value(slot.input, self._p[slot.span]) for name, slot in block.slots.items()}
-        tracer = Tracer(self._kinematics, self._carrier(block))
-        found = expression(self._core.stack.robot, tracer, values)
-        return ca.SX(0, 1) if found is None else ca.SX(tracer.expanded(ca.SX(found))[0])
+        tracer, values = self._traced(block)
+        traced = expression(self._core.stack.robot, tracer, values)
+        return ca.SX(0, 1) if traced is None else ca.SX(tracer.expanded(ca.SX(traced))[0])
 
-    def _carrier(self, block: Block) -> Carrier | None:
-        if not block.entry.frame:
-            return None
-        slot = self._core.layout.blocks[block.entry.frame].slots["pose"]
-        pose = as_value(slot.input, self._p[slot.span])
-        assert isinstance(pose, Pose)
-        return Carrier(pose, ca.SX(6, 1))
-
-    def _check(self, block: Block, item: Constraint) -> None:
-        """Refuse rows on velocities that are no rows on configurations.
+    def rolling(self) -> RollingBase | None:
+        """What hard rows on velocities, which no row on configurations stands for, leave of a base; None: none.
 
         Raises:
-            CommandError: they are such.
+            CommandError: other motions than a path can keep to.
         """
-        robot = self._core.stack.robot
-        error = self._expanded(block, item.residual)
-        free = error.numel() == 0 or any(error[k].is_zero() for k in range(error.numel()))
-        coupled = type(item).__name__ == "Mechanism" and not robot.locked_dofs
-        if free and not coupled:
-            reason = "its rows are of velocities, which a path of configurations cannot keep; plan without it"
-            raise CommandError(block.entry.name, type(item).__name__, reason)
+        hard = {block: item for block, item in self._hard() if block.form == "rows"}
+        if (key := tuple(hard)) not in self._slips:
+            self._slips[key] = self._slip(hard)
+        names, rows_of = self._slips[key]
+        if not names:
+            return None
+        robot, p, text = self._core.stack.robot, self._core.tick.p, ", ".join(names)
+        ways = [np.zeros(robot.nv), *np.random.default_rng(0).uniform(-1.0, 1.0, (LOOKS, robot.nv))]
+        samples = np.array([np.asarray(rows_of(robot.integrate(robot.neutral, way), p)) for way in ways])
+        asked = float(np.abs(samples[:, :, -1]).max())
+        if not asked <= SAME:
+            raise CommandError(text, asked, "its rows ask for a velocity; plan without it")
+        return RollingBase.of_rows(text, robot, samples[:, :, :-1])
+
+    def _slip(self, hard: Mapping[Block, Constraint]) -> tuple[list[str], ca.Function]:
+        """Items with rows on velocities alone, and (q, p) -> (A, their sides).
+
+        Raises:
+            CommandError: they are about a frame that moves.
+        """
+        robot, layout = self._core.stack.robot, self._core.layout
+        matrices, names = [ca.SX(0, robot.nv + 1)], list[str]()
+        for block, item in hard.items():
+            error, first = self._expanded(block, item.residual), len(robot.couplings) * (block is layout.mechanism)
+            rows = [k for k in range(first, len(block.rows)) if not error.numel() or error[k].is_zero()]
+            if not rows:
+                continue
+            tracer, values = self._traced(block)
+            found = item.velocity_rows(robot, tracer, values, ca.SX(self._core.stack.dt))
+            assert found is not None
+            matrix, *sides = tracer.expanded(found.matrix, found.lower, found.upper)
+            if matrix.shape[1] != robot.nv:
+                reason = "it rolls in a frame that moves; plan without it"
+                raise CommandError(block.entry.name, type(item).__name__, reason)
+            names.append(block.entry.name)
+            matrices += [ca.horzcat(matrix[rows, :], side[rows]) for side in sides]
+        return names, ca.Function("slip", [self._kinematics.q, self._p], [ca.densify(ca.vertcat(*matrices))])

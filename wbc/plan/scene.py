@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from wbc.clearance import Nearest, Pair, Sweeper, SweptBody, SweptScene
+from wbc.clearance.barriers import Barriers
 from wbc.clearance.motion import Motion
 from wbc.controller.core import Core
 from wbc.multibody import pin
 from wbc.plan.coordinates import PlanningCoordinates
 from wbc.plan.stand_in import MeasuredApart
+from wbc.shapes import PlacedShape
 from wbc.tasks import SelfCollision
+from wbc.trajectory import PolynomialPath
 from wbc.validation import Array
 
 #: What a proof leaves open: distances are kept to this [m]
@@ -33,29 +37,27 @@ class PlanningScene:
     bodies: tuple[SweptBody, ...]
     pairs: tuple[Pair, ...]
     key: bytes
-    sweepers: dict[str, Sweeper] = field(default_factory=dict)
 
     @classmethod
     def of(cls, core: Core, coordinates: PlanningCoordinates, key: bytes = b"") -> PlanningScene:
         """That of a stack's obstacles and self-collisions which are enabled, at their present run-time values."""
-        bodies: dict[str, SweptBody] = {}
-        pairs: list[Pair] = []
+        bodies, pairs = dict[str, SweptBody](), list[Pair]()
+
+        def on_link(link: str, number: int, placed: PlacedShape) -> str:
+            name = f"{link}[{number}]"
+            bodies.setdefault(name, SweptBody(name, placed.shape, link, placed.placement))
+            return name
+
         for entry in core.stack.constraints:
-            if not isinstance(entry.item, MeasuredApart):
+            soft = entry.price is not None or not entry.hard
+            if soft or not isinstance(entry.item, MeasuredApart) or not core.handles[entry.name].enabled:
                 continue
             item, robot = entry.item.item, core.stack.robot
-            if not core.handles[entry.name].enabled:
-                continue
-            if entry.price is not None or not entry.hard:
-                continue
             values = {n: core.tick.p[s.span] for n, s in core.layout.blocks[entry.name].slots.items()}
             margin = float(values["margin"][0])
             if isinstance(item, SelfCollision):
-                for (a, b), most in item.kept_pairs(robot):
-                    for link, number, placed in (a, b):
-                        name = f"{link}[{number}]"
-                        bodies.setdefault(name, SweptBody(name, placed.shape, link, placed.placement))
-                    pairs.append(Pair(f"{a[0]}[{a[1]}]", f"{b[0]}[{b[1]}]", min(margin, most)))
+                for (one, other), most in item.kept_pairs(robot):
+                    pairs.append(Pair(on_link(*one), on_link(*other), min(margin, most)))
                 continue
             pose = pin.SE3(values["pose"][:9].reshape(3, 3, order="F"), values["pose"][9:])
             pose = core.frame_pose(entry.name) * pose
@@ -65,10 +67,8 @@ class PlanningScene:
                 name = f"{name} (obstacle)" if name in coordinates.tree.links else name
                 bodies[name] = SweptBody(name, shape, placement=pose)
                 parts.append(name)
-            for link, number, placed in item.pairs(robot):
-                name = f"{link}[{number}]"
-                bodies.setdefault(name, SweptBody(name, placed.shape, link, placed.placement))
-                pairs += [Pair(name, part, margin) for part in parts]
+            for body in item.pairs(robot):
+                pairs += [Pair(on_link(*body), part, margin) for part in parts]
         return cls(coordinates, tuple(bodies.values()), tuple(pairs), key)
 
     @staticmethod
@@ -88,16 +88,13 @@ class PlanningScene:
         return np.concatenate(spans)
 
     def swept(self) -> SweptScene:
-        """The scene, of which a proof may leave :data:`OPEN`."""
-        pairs = [Pair(p.first, p.second, p.required - OPEN) for p in self.pairs]
-        return SweptScene(self.coordinates.tree, self.bodies, pairs)
+        """Its tree, bodies and pairs, with arrays of their own."""
+        return SweptScene(self.coordinates.tree, self.bodies, self.pairs)
 
-    @property
+    @cached_property
     def sweeper(self) -> Sweeper:
         """Proofs of motions, to :data:`OPEN`."""
-        if "all" not in self.sweepers:
-            self.sweepers["all"] = Sweeper(SweptScene(self.coordinates.tree, self.bodies, self.pairs))
-        return self.sweepers["all"]
+        return Sweeper(self.swept())
 
     def nearest(self, x: Array) -> Nearest | None:
         """The pair of the least margin at x; None where there is no pair."""
@@ -106,9 +103,26 @@ class PlanningScene:
         still = Motion.linear(self.coordinates.tree, [0.0, 1.0], np.array([x, x]))
         return self.sweeper.sweep(still, aim="least", tolerance=1e-6, far=np.inf).nearest
 
-    def violation(self, motion: Motion) -> Nearest | None:
-        """Where two bodies are nearer than they may be during a motion, or where that is not proven; None: nowhere."""
+    def separation(self, low: Array, high: Array, start: Array, goal: Array) -> str:
+        """What keeps a start and a goal apart on all paths within limits; empty: nothing is proven."""
+        circles = self.coordinates.circles
+        return Barriers(self.coordinates.tree, self.bodies, self.pairs, low, high, circles).between(start, goal)
+
+    def violation(self, path: PolynomialPath) -> Nearest | None:
+        """Where two bodies are nearer than they may be on a path of the coordinates, or where that is not proven; None:
+        nowhere.
+        """
         if not self.pairs:
             return None
-        swept = self.sweeper.sweep(motion, aim="any", tolerance=OPEN)
+        swept = self.sweeper.sweep(_motion(path), aim="any", tolerance=OPEN)
         return None if swept.clear else swept.nearest
+
+
+def _motion(path: PolynomialPath) -> Motion:
+    """A path as a motion of scalars, with s as its time."""
+    controls = path.hull()
+    if controls.shape[2] < 2:
+        controls = np.repeat(controls, 2, axis=2)
+    # Rounding may leave the pieces apart by a last digit
+    controls[1:, :, 0] = controls[:-1, :, -1]
+    return Motion(path.knots, controls, np.zeros((0, len(path.knots), 12)), np.zeros(path.dof), np.zeros((0, 2)))

@@ -41,14 +41,18 @@ LINK_CORNERS = 500
 NEAR_ENOUGH = 1e-5
 #: Half the thickness of what is drawn as a plane [m]
 THIN = 2e-4
-#: Links besides feet that have rows of the ground at a time
+#: Links besides feet that have rows of the ground at a time; of arms one a limb more
 NEAREST = 8
 #: The ground's rows begin this far above it: links that roll lower another corner within a tick [m]
 ABOVE = 3e-4
 #: What a foot that goes below the ground costs, see docs/soft.md
 GROUND_PRICE = 1e5
-#: How fast feet come down to the ground's rows, as share of one over the time of a tick
+#: Item whose rows keep hands and arms above the ground
+ARMS = "arms above ground"
+#: How fast feet and legs come down to the ground's rows, as share of one over the time of a tick
 GROUND_RATE = 0.5
+#: The same of hands and arms that lie on the ground: faster ones rattle from corner to corner [1]
+LINK_RATE = 0.1
 #: A foot whose stance is younger than this gives way to those that stand [s]
 LANDING = 0.1
 #: After so many ticks it is tried again
@@ -60,7 +64,7 @@ FOOT_ENGAGED = 3e-3
 #: A hand, which its task draws less [m]
 HAND_ENGAGED = 3e-2
 #: How much more the height of a hand that lies on the ground counts than that of one in the air [1]
-LYING = 1e3
+LYING = 1e2
 #: Rows of the ground that give way by more ask hands to rise [m/s]
 PUSHED = 0.02
 #: Ticks that bring the robot to the first frame
@@ -149,7 +153,7 @@ class Engine:
         self.controller: Controller = stack.compile()
         if free:
             for item in self._ground:
-                self.controller[item].rate = GROUND_RATE / dt
+                self.controller[item].rate = (LINK_RATE if item == ARMS else GROUND_RATE) / dt
         inputs = [(f.item, part, None) for f in followers for part in ("target", "feedforward")[: 1 if f.stands else 2]]
         self._group = InputGroup(core_of(self.controller), inputs)
         self._places = tuple(dict.fromkeys(("pelvis", *(f.place for f in followers if f.place))))
@@ -171,7 +175,12 @@ class Engine:
         ends = self.body.limbs.values()
         shapes: dict[str, list[PlacedShape]] = {}
         last = {limb.joints[-1] for limb in ends}
+        #: frames of links besides ends: of arms, and of all others
+        self._arms: list[str] = []
         self._links: list[str] = []
+        of_arms = {
+            joint for name, limb in self.body.limbs.items() if not self.body.is_foot(name) for joint in limb.joints
+        }
         for name, limb in self.body.limbs.items():
             ball = np.linalg.norm(limb.surface, axis=1) <= limb.radius + NEAR_ENOUGH
             if not self.body.is_foot(name) or limb.contact == "flat" or ball.all() or not ball.any():
@@ -188,11 +197,11 @@ class Engine:
                 frame = f"retarget_ground_{joint}"
                 robot = with_frame(robot, frame, joint, pin.SE3.Identity())
                 shapes[frame] = [_solid(balls.corners(LINK_CORNERS, NEAR_ENOUGH))]
-                self._links.append(frame)
+                (self._arms if joint in of_arms else self._links).append(frame)
         return robot.with_shapes({**robot.shapes, **shapes}).with_self_pairs(pairs)
 
     def _add_ground(self, stack: Stack) -> None:
-        """Rows of the ground: one for each foot, which ends while it is held, and one for hands and other links.
+        """Rows of the ground: of each foot, which end while it is held, of hands and arms, and of other links.
 
         A foot that is held comes down to its place on the ground as fast as the plan says. A row that lets it come down
         slower would be served by turns of its leg, which lift corners of its hull.
@@ -205,11 +214,15 @@ class Engine:
             ground = tasks.Obstacle(HalfSpace(), links=(ends.pop(name),), pose=ground_pose)
             stack.add(ground, name=item, soft=GROUND_PRICE)
         self._ground = [*self._own_ground.values()]
-        if links := (*ends.values(), *self._links):
-            closest = min(len(self.body.limbs) + NEAREST, len(links))
-            ground = tasks.Obstacle(HalfSpace(), links=links, pose=ground_pose, closest=closest)
-            stack.add(ground, name="above ground", soft=GROUND_PRICE)
-            self._ground.append("above ground")
+        arms = [ends.pop(name) for name in [*ends] if not self.body.is_foot(name)] + self._arms
+        groups = {
+            name: links for name, links in (("above ground", [*ends.values(), *self._links]), (ARMS, arms)) if links
+        }
+        for name, links in groups.items():
+            closest = min(NEAREST + len(self.body.limbs) * (name == ARMS), len(links))
+            ground = tasks.Obstacle(HalfSpace(), links=tuple(links), pose=ground_pose, closest=closest)
+            stack.add(ground, name=name, soft=GROUND_PRICE)
+            self._ground.append(name)
 
     def _add_limb(self, stack: Stack, name: str, gain: float) -> list[_PlanFollower]:
         """Add what follows a limb's targets."""
@@ -352,6 +365,8 @@ class Engine:
         changing = set(np.flatnonzero(np.concatenate([[True], (held[1:] != held[:-1]).any(axis=1)])).tolist())
         #: limb -> the first tick in which it may be held again
         not_before = dict.fromkeys(self._limbs, 0)
+        #: limb -> the tick from which it is held
+        since = dict.fromkeys(self._limbs, -plan.ticks)
         waiting: list[str] = []
         risen: set[str] = set()
         gave: list[tuple[int, tuple[str, ...]]] = []
@@ -366,16 +381,17 @@ class Engine:
                 risen &= set(kept)
                 self._hold({n: self._grip(plan, n, k, risen) if n in kept else ContactGrip.FREE for n in self._limbs})
                 waiting = [name for name in waiting if name not in there]
+                since |= dict.fromkeys(there, k)
             write(rows[k])
             step = step_of(q)
-            if step.status is not solved and (landing := self._landing(plan, k)):
+            if step.status is not solved and (landing := self._landing(plan, k, since)):
                 # Feet that come to stand give way before those that stand
                 self._hold(dict.fromkeys(landing, ContactGrip.FREE))
                 not_before |= dict.fromkeys(landing, k + AGAIN)
                 waiting += landing
                 step = step_of(q, v)
             lying = [n for n, limb in plan.limbs.items() if limb.lies[k] and self._held.get(n) is ContactGrip.FIRM]
-            if lying and any(slack.item == "above ground" and slack.amount > PUSHED for slack in step.relaxed):
+            if lying and any(slack.item == ARMS and slack.amount > PUSHED for slack in step.relaxed):
                 # Hands that lie on the ground rise where their links would sink
                 risen |= set(lying)
                 self._hold(dict.fromkeys(lying, ContactGrip.LEVEL))
@@ -416,11 +432,11 @@ class Engine:
                 out.append(name)
         return out
 
-    def _landing(self, plan: MotionPlan, tick: int) -> list[str]:
-        """Limbs that are held and whose stance has not begun long ago."""
+    def _landing(self, plan: MotionPlan, tick: int, since: Mapping[str, int]) -> list[str]:
+        """Limbs that are held and whose stance has not begun long ago, or that are held since not long ago."""
         first = max(tick - round(LANDING / self.dt), 0)
         held = [name for name, grip in self._held.items() if grip is not ContactGrip.FREE]
-        return [name for name in held if tick > 0 and not plan.limbs[name].stands[first]]
+        return [n for n in held if tick > 0 and (since[n] > first or not plan.limbs[n].stands[first])]
 
 
 def _solid(corners: Array) -> PlacedShape:

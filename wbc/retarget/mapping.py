@@ -14,6 +14,12 @@ from wbc.retarget.correspondence import Correspondence, LimbMatch
 
 #: From the trunk of a person on all fours, whose rest stands upright, to one that lies
 LYING_TRUNK = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+#: What lies on the ground is this high above it or so, where the skeleton is on it or below [m]
+CLEAR = 0.006
+#: What is higher than so many times this is not raised [1]
+FAR_ABOVE = 20.0
+#: A bone that stands upright falls ahead where it cannot reach below the ground: share of its length [1]
+AHEAD_SHARE = 0.05
 #: Of a body whose front is steeper than the angle of this sine its back says where it heads
 STEEP = 0.9
 
@@ -69,6 +75,11 @@ def frames_of(first: Array, second: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
+def lift(heights: Array) -> Array:
+    """By how much what has these heights must be higher so that it is clear of the ground; smooth in the height [m]."""
+    return np.asarray(0.5 * (np.sqrt((heights - CLEAR) ** 2 + CLEAR**2) - (heights - CLEAR)))
+
+
 class Mapper:
     """Turns points of a skeleton into targets of a robot; the same for a clip and for one frame."""
 
@@ -80,6 +91,8 @@ class Mapper:
         self._hips = self._pair("leg") or self._pair("arm") or (bases[0], bases[-1])
         self._shoulders = self._pair("arm") if "left_arm" in match.limbs and body.plan.upright else None
         self._trunk = self._trunk_frames(rest[None])
+        #: knees, elbows and wrists follow the skeleton and may meet the ground
+        self._lies = body.plan.upright and body.robot.base != "fixed"
         hips = rest[list(self._hips)].mean(axis=0)
         waist = body.places[0] if body.waist is None else body.waist
         #: from the pelvis to the waist, in the body's axes [m]
@@ -159,8 +172,19 @@ class Mapper:
             lift = np.array([0.0, 0.0, self._heights.get("left_leg", 0.0)])
             place = match.scale * (hips - np.array([0.0, 0.0, ground])) + lift
         head = turns[:, match.head] @ axes if turns is not None and match.head >= 0 and body.head else None
+        place[:, 2] += self._rise(points, place, pelvis)
         trunk = Places(place, pelvis, chest, head, {})
         return replace(trunk, limbs={name: self._limb(name, points, turns, trunk, ankle) for name in match.limbs})
+
+    def _rise(self, points: Array, place: Array, pelvis: Array) -> Array:
+        """How much the trunk must be higher so that knees lie on the ground and not in it [frames] [m]."""
+        rise = np.zeros(len(place))
+        for name, match in self.match.limbs.items() if self._lies else ():
+            if name.endswith("leg"):
+                bones = normalised(points[:, match.middle] - points[:, match.base], self._still[name][0])
+                knees = place[:, 2] + pelvis[:, 2] @ self._bases[name] + self._lengths[name][0] * bones[:, 2]
+                rise = np.maximum(rise, lift(knees - self.match.body.limbs[name].thickness[0]))
+        return rise
 
     def _limb(
         self, name: str, points: Array, turns: Array | None, trunk: Places, ankle: dict[str, float]
@@ -178,8 +202,11 @@ class Mapper:
         middle = base + upper * bones[:, 0]
         rotation = self._rotation(match, points, turns, trunk, limb.contact == "flat")
         if not self.match.body.is_foot(name):
-            wrist = middle + lower * bones[:, 1]
-            return LimbPlaces(middle, wrist, wrist + hand * bones[:, 2], rotation if turns is not None else None)
+            lie = limb.thickness if self._lies else (-np.inf,) * 3
+            middle = _next_joint(base, upper * bones[:, 0], lie[0], trunk.heading)
+            wrist = _next_joint(middle, lower * bones[:, 1], lie[1], trunk.heading)
+            end = _next_joint(wrist, hand * bones[:, 2], lie[2], trunk.heading)
+            return LimbPlaces(middle, wrist, end, rotation if turns is not None else None)
         height = np.array([0.0, 0.0, self._heights[name]])
         wrist = self.match.scale * (points[:, match.end] - np.array([0.0, 0.0, ankle[match.source]])) + height
         wrist[:, :2] += (trunk.heading @ self._shifts[name])[:, :2]
@@ -204,6 +231,22 @@ class Mapper:
         ahead, left = points[:, match.tip] - points[:, match.end], trunk.turn[:, :, 1]
         side = left - ahead * (np.sum(left * ahead, axis=1) / np.maximum(np.sum(ahead**2, axis=1), 1e-12))[:, None]
         return np.asarray(frames_of(side, np.cross(ahead, side)) @ before.T @ axes)
+
+
+def _next_joint(start: Array, bones: Array, thickness: float, headings: Array) -> Array:
+    """Where bones [frames, 3] [m] end; those that would end nearer to the ground than a thickness [m] are turned."""
+    end = start + bones
+    heights = end[:, 2] - thickness
+    if not (heights < FAR_ABOVE * CLEAR).any():
+        return end
+    lengths = np.linalg.norm(bones, axis=1)
+    rise = np.clip(bones[:, 2] + lift(heights), -lengths, lengths)
+    # The bone goes out level as far as its length says, ahead where it stood upright
+    way = bones[:, :2] + AHEAD_SHARE * lengths[:, None] * headings[:, :2, 0]
+    way /= np.maximum(np.linalg.norm(way, axis=1), SHORT)[:, None]
+    along, more = np.abs(np.sum(bones[:, :2] * way, axis=1)), bones[:, 2] ** 2 - rise**2
+    out = more / np.maximum(along + np.sqrt(np.maximum(along**2 + more, 0.0)), SHORT)
+    return np.asarray(start + np.column_stack([bones[:, :2] + out[:, None] * way, rise]))
 
 
 def _headings(rotations: Array) -> Array:

@@ -19,10 +19,10 @@ class RetargetWeights:
     """Weights of the tasks against each other: of a metre and a radian."""
 
     #: position and turn of the pelvis
-    pelvis: float = 20.0
-    turn: float = 10.0
+    pelvis: float = 60.0
+    turn: float = 2.0
     #: turn of the chest, and of the head
-    chest: float = 4.0
+    chest: float = 2.0
     head: float = 0.5
     #: knees and elbows
     middle: float = 2.0

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from wbc.retarget.body import LIMBS
 from wbc.retarget.clip import Array, Marks, intervals
-from wbc.retarget.mapping import LimbPlaces, Places
+from wbc.retarget.mapping import LimbPlaces, Places, lift
 from wbc.retarget.robot_body import RobotBody, RobotLimb
 from wbc.retarget.stances import smoothed
 from wbc.rotations import continuous_quaternions, exponential
@@ -22,8 +22,6 @@ BLEND = 0.12
 SHARE = 0.4
 #: A stance within this height of the ground is on it [m]
 GROUND = 0.03
-#: A foot in the air is this high or so, where the skeleton's would be on the ground or below [m]
-CLEAR = 0.006
 #: Cosine of turns beyond which the axis is no more read off the skew part [1]
 NEARLY_TURNED = -0.99
 #: A foot stands flat where its sole is tilted by less than the angle of this cosine
@@ -185,7 +183,7 @@ def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, 
 def raised(robot: RobotLimb, limb: LimbPlaces) -> tuple[Array, Array | None]:
     """Positions and rotations of a limb's contact frame, clear of the ground."""
     end, rotation = limb.end.copy(), None if limb.rotation is None else limb.rotation.copy()
-    end[:, 2] += _lift(_lowest(robot, end, rotation))
+    end[:, 2] += lift(_lowest(robot, end, rotation))
     return end, rotation
 
 
@@ -194,11 +192,6 @@ def _lowest(robot: RobotLimb, end: Array, rotation: Array | None) -> Array:
     if rotation is None or robot.contact != "flat":
         return np.asarray(end[:, 2] - robot.radius)
     return np.asarray((rotation[:, 2] @ robot.surface.T).min(axis=1) + end[:, 2])
-
-
-def _lift(heights: Array) -> Array:
-    """By how much a foot in the air must be higher so that it is clear of the ground; smooth in the height [m]."""
-    return np.asarray(0.5 * (np.sqrt((heights - CLEAR) ** 2 + CLEAR**2) - (heights - CLEAR)))
 
 
 def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[Array, Array | None]:

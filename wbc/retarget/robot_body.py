@@ -72,6 +72,7 @@ class RobotLimb:
         contact: flat or point. radius: of the ball; 0 of a flat foot [m].
         corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
         surface: corners of the hull of what the end is made of, in the contact frame [corners, 3] [m].
+        thickness: height of middle, wrist and end above the ground where the limb lies on it [m].
         pitch: least and most turn of the end against its last bone, from the bone along the end's z axis, about the
             axis to the left, that joints behind the middle hinge allow [2] [rad].
         guessed: the description says nothing of the foot's or hand's size.
@@ -87,6 +88,7 @@ class RobotLimb:
     radius: float
     corners: Array
     surface: Array
+    thickness: tuple[float, float, float]
     pitch: tuple[float, float]
     guessed: bool
 
@@ -285,14 +287,23 @@ def _limb(
         far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
         radius = float(np.clip(np.linalg.norm(far, axis=1).max(initial=radius), radius, BALL * radius))
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
+    # A knee lies on its front, an elbow on its back: the outer sides of their bends
+    outer = plan.axes[:, 0] if name.endswith("leg") else -plan.axes[:, 0]
+    thick, thin = (_reach(balls.get(joint), data.oMi[joint], outer) if joint else 0.0 for joint in (middle, wrist))
     limb = RobotLimb(
         joints, base, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, contact, radius, corners,
-        surface, _pitch(robot, data, joints[joints.index(middle) + 1 :], places, plan.axes), guessed,
+        surface, (thick, thin, radius),
+        _pitch(robot, data, joints[joints.index(middle) + 1 :], places, plan.axes), guessed,
     )  # fmt: skip
     placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
     if wrist:
         placed[limb.wrist] = (wrist, pin.SE3.Identity())
     return limb, placed
+
+
+def _reach(balls: LinkBalls | None, pose: pin.SE3, way: Array) -> float:
+    """How far a link with this pose stands out from its joint along a direction [m]; 0 without bodies."""
+    return 0.0 if balls is None else float((balls.centers @ (pose.rotation.T @ way) + balls.radii).max())
 
 
 def _pitch(robot: Robot, data: pin.Data, joints: tuple[int, ...], places: Array, axes: Array) -> tuple[float, float]:

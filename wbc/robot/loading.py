@@ -133,7 +133,8 @@ def finish(
     from wbc.robot.geometry.link_shapes import description_shapes, fit_shapes
 
     if shapes in _FITTED:
-        fitted = fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs, geometry=geometry)
+        meshes = geometry if is_mjmodel(geometry) else None
+        fitted = fit_shapes(robot, kind=_FITTED[shapes], package_dirs=package_dirs, geometry=meshes)
         return _with_pairs(fitted, recipe)
     described = description_shapes(robot, package_dirs, exact=shapes == "exact", geometry=geometry)
     return _with_pairs(described, recipe)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -50,8 +51,43 @@ def tables(stack: Declaration, layout: Layout, program: TickProgram) -> dict[str
     return {"stack.h": header(stack, layout, program), "memory.h": structures(layout)}
 
 
+Tables = dict[str, tuple[str, Iterable[float]]]
+
+
+class StackNumbers(NamedTuple):
+    """What C knows of a stack: sizes, and tables, each with the kind of its numbers."""
+
+    sizes: dict[str, float]
+    tables: Tables
+
+
+#: Program -> numbers of its stack, which the cache and the tick are both made of
+_NUMBERS: WeakKeyDictionary[TickProgram, StackNumbers] = WeakKeyDictionary()
+
+
 def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
     """``stack.h``: the sizes and tables of a stack."""
+    numbers = stack_numbers(stack, layout, program)
+    tables = {name: np.array(numbers.tables[name][1]) for name in ("j_start", "j_col")}
+    lines = [
+        "/* Sizes and tables of one stack; generated */",
+        "#include <stddef.h>",
+        *(f"#define {name} {size.hex() if isinstance(size, float) else size}" for name, size in numbers.sizes.items()),
+        *(_table(kind, name, values) for name, (kind, values) in numbers.tables.items()),
+        *_blocks(tables["j_start"][: layout.leading + 1], tables["j_col"]),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def stack_numbers(stack: Declaration, layout: Layout, program: TickProgram) -> StackNumbers:
+    """Sizes and tables of the stack that a program was built for."""
+    known = _NUMBERS.get(program)
+    if known is None:
+        known = _NUMBERS[program] = _numbers(stack, layout, program)
+    return known
+
+
+def _numbers(stack: Declaration, layout: Layout, program: TickProgram) -> StackNumbers:
     jt, at = program.rows.sparsity_out("jt"), program.rows.sparsity_out("at")
     j_start, j_col = sparsity_rows(jt)
     a_start, a_end, a_col = program.sensed.entries(*program.balls.entries(*sparsity_rows(at)))
@@ -66,119 +102,121 @@ def header(stack: Declaration, layout: Layout, program: TickProgram) -> str:
     stop_at, stop_low, stop_high = stops(stack, layout)
     spare = spare_rows(stack, layout)
     forces = forces_in_loops(stack, layout)
-    lines = [
-        "/* Sizes and tables of one stack; generated */",
-        "#include <stddef.h>",
-        *(
-            f"#define {name} {value}"
-            for name, value in {
-                "NQ": layout.nq,
-                "NV": layout.variables,
-                "NP": layout.parameters,
-                "MT": layout.task_rows,
-                "MC": layout.general_rows,
-                "NB": layout.bound_blocks,
-                "MH": layout.margin_rows,
-                "NNZJ": jt.nnz(),
-                "NNZA": len(a_col),
-                "BALLS": len(program.balls.items),
-                "SEGMENTS": len(program.balls.segment_rows),
-                "SENSED": len(program.sensed.blocks),
-                "FAR": FAR,
-                "NNZK": upper.nnz(),
-                "CALM": int(stack.calm),
-                "BENDING": sum(bent_rows(layout, program)),
-                "ELASTIC": int(layout.elastic),
-                "REDUCED": taken_out(stack, layout),
-                "REDUCED_NV": layout.variables if taken_out(stack, layout) else 0,
-                "SPARED": len(spare),
-                "FORCES": forces,
-                "FORCED_NV": layout.variables if forces else 0,
-                "FORCE_FIRST": layout.loop_forces.start,
-                "CLOSING": 0 if program.arrival is None else program.arrival.numel_out("opened"),
-                "CLOSING_FIRST": 0 if layout.mechanism is None else layout.mechanism.start,
-                "COMMAND": COMMANDS.index(stack.command),
-                "UNITS": len(units),
-                "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
-                "LONGEST": max(1.0, *dofs, *scales),
-                "ACTIVE_MAX": layout.variables + len(orders) + 1,
-            }.items()
-        ),
-        _table("int", "j_start", j_start),
-        _table("int", "j_col", j_col),
-        _table("int", "a_start", a_start),
-        _table("int", "a_end", a_end),
-        _table("int", "a_col", a_col),
-        _table("int", "give_order", give_order(stack, layout, at)),
-        _table("int", "late_row", late_rows(layout, at)),
-        _table("int", "spare_first", np.cumsum([0, *(len(rows) for rows, _ in spare)])),
-        _table("int", "spare_row", [row for rows, _ in spare for row in rows]),
-        _table("int", "spare_held", [held for _, held in spare]),
-        _table("int", "row_torque", torque_rows(stack, layout)),
-        _table("int", "row_order", orders),
-        _table("int", "bound_sequence", sequence),
-        _table("int", "unit_start", [u[0] for u in units]),
-        _table("int", "unit_size", [u[1] for u in units]),
-        _table("int", "k_row", upper.get_triplet()[0]),
-        _table("int", "k_col", upper.get_triplet()[1]),
-        _table("int", "bent", bent_rows(layout, program)),
-        _table("int", "margin_at", margin_table(layout)),
-        _table("int", "rate_at", rate_table(layout)),
-        _table("int", "gain_at", gain_table(layout)),
-        _table("double", "force_scale", force_scales(stack, layout, program)),
-        _table("int", "brake_at", brake_at),
-        _table("double", "brake_limit", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
-        _table("int", "stop_at", stop_at),
-        _table("int", "stop_q", np.maximum(stack.robot.position_index, 0)),
-        _table("double", "stop_low", np.clip(stop_low, -1e30, 1e30)),
-        _table("double", "stop_high", np.clip(stop_high, -1e30, 1e30)),
-        _table("double", "row_scale", scales),
-        _table("double", "dof_scale", dofs),
-        _table("double", "damping", stack.damping / dofs**2),
-        *(_table("int", name, values) for name, values in (program.balls.places() | program.sensed.places()).items()),
-        _table("double", "row_reach", program.balls.reaches),
-        _table("double", "segment_half", program.balls.halves),
-        *_soft(stack, layout),
-        *_levels(stack, layout),
-        *_blocks(j_start[: layout.leading + 1], j_col),
-    ]
-    return "\n".join(lines) + "\n"
+    sizes: dict[str, float] = {
+        "NQ": layout.nq,
+        "NV": layout.variables,
+        "NP": layout.parameters,
+        "MT": layout.task_rows,
+        "MC": layout.general_rows,
+        "NB": layout.bound_blocks,
+        "MH": layout.margin_rows,
+        "NNZJ": jt.nnz(),
+        "NNZA": len(a_col),
+        "BALLS": len(program.balls.items),
+        "SEGMENTS": len(program.balls.segment_rows),
+        "SENSED": len(program.sensed.blocks),
+        "FAR": FAR,
+        "NNZK": upper.nnz(),
+        "CALM": int(stack.calm),
+        "BENDING": sum(bent_rows(layout, program)),
+        "ELASTIC": int(layout.elastic),
+        "REDUCED": taken_out(stack, layout),
+        "REDUCED_NV": layout.variables if taken_out(stack, layout) else 0,
+        "SPARED": len(spare),
+        "FORCES": forces,
+        "FORCED_NV": layout.variables if forces else 0,
+        "FORCE_FIRST": layout.loop_forces.start,
+        "CLOSING": 0 if program.arrival is None else program.arrival.numel_out("opened"),
+        "CLOSING_FIRST": 0 if layout.mechanism is None else layout.mechanism.start,
+        "COMMAND": COMMANDS.index(stack.command),
+        "UNITS": len(units),
+        "LAST_ORDER": max((o for o in orders if o < PRICED), default=0),
+        "LONGEST": max(1.0, *dofs, *scales),
+        "ACTIVE_MAX": layout.variables + len(orders) + 1,
+    }
+    tables: Tables = {
+        "j_start": ("int", j_start),
+        "j_col": ("int", j_col),
+        "a_start": ("int", a_start),
+        "a_end": ("int", a_end),
+        "a_col": ("int", a_col),
+        "give_order": ("int", give_order(stack, layout, at)),
+        "late_row": ("int", late_rows(layout, at)),
+        "spare_first": ("int", np.cumsum([0, *(len(rows) for rows, _ in spare)])),
+        "spare_row": ("int", [row for rows, _ in spare for row in rows]),
+        "spare_held": ("int", [held for _, held in spare]),
+        "row_torque": ("int", torque_rows(stack, layout)),
+        "row_order": ("int", orders),
+        "bound_sequence": ("int", sequence),
+        "unit_start": ("int", [u[0] for u in units]),
+        "unit_size": ("int", [u[1] for u in units]),
+        "k_row": ("int", upper.get_triplet()[0]),
+        "k_col": ("int", upper.get_triplet()[1]),
+        "bent": ("int", bent_rows(layout, program)),
+        "margin_at": ("int", margin_table(layout)),
+        "rate_at": ("int", rate_table(layout)),
+        "gain_at": ("int", gain_table(layout)),
+        "force_scale": ("double", force_scales(stack, layout, program)),
+        "brake_at": ("int", brake_at),
+        "brake_limit": ("double", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
+        "stop_at": ("int", stop_at),
+        "stop_q": ("int", np.maximum(stack.robot.position_index, 0)),
+        "stop_low": ("double", np.clip(stop_low, -1e30, 1e30)),
+        "stop_high": ("double", np.clip(stop_high, -1e30, 1e30)),
+        "row_scale": ("double", scales),
+        "dof_scale": ("double", dofs),
+        "damping": ("double", stack.damping / dofs**2),
+        **{name: ("int", values) for name, values in (program.balls.places() | program.sensed.places()).items()},
+        "row_reach": ("double", program.balls.reaches),
+        "segment_half": ("double", program.balls.halves),
+    }
+    for more in (_soft(stack, layout), _levels(stack, layout)):
+        sizes |= more.sizes
+        tables |= more.tables
+    return StackNumbers(sizes, {name: (kind, list(values)) for name, (kind, values) in tables.items()})
 
 
-def _soft(stack: Declaration, layout: Layout) -> list[str]:
+def _soft(stack: Declaration, layout: Layout) -> StackNumbers:
     """What soft rows need; see ``native/tick.h``."""
-    return [
-        f"#define DOFS {layout.nv}",
-        f"#define SOFT_ROWS {0 if layout.cascade else sum(at >= 0 for at in layout.price_at)}",
-        f"#define PRICES {int(any(at >= 0 for at in layout.price_at))}",
-        f"#define KEPT {int(max(kept_rows(layout), default=-1) >= 0)}",
-        _table("int", "kept_of", kept_rows(layout)),
-        _table("int", "price_at", layout.price_at),
-        f"#define SLEWED {len(layout.slewed[0])}",
-        *(_table("int", name, each) for name, each in zip(("slewed_at", "slewed_dof"), layout.slewed, strict=True)),
-        _table("double", "slack_reported", reported_slacks(stack, layout)),
-    ]
+    sizes: dict[str, float] = {
+        "DOFS": layout.nv,
+        "SOFT_ROWS": 0 if layout.cascade else sum(at >= 0 for at in layout.price_at),
+        "PRICES": int(any(at >= 0 for at in layout.price_at)),
+        "KEPT": int(max(kept_rows(layout), default=-1) >= 0),
+        "SLEWED": len(layout.slewed[0]),
+    }
+    tables: Tables = {
+        "kept_of": ("int", kept_rows(layout)),
+        "price_at": ("int", layout.price_at),
+        "slewed_at": ("int", layout.slewed[0]),
+        "slewed_dof": ("int", layout.slewed[1]),
+        "slack_reported": ("double", reported_slacks(stack, layout)),
+    }
+    return StackNumbers(sizes, tables)
 
 
-def _levels(stack: Declaration, layout: Layout) -> list[str]:
+def _levels(stack: Declaration, layout: Layout) -> StackNumbers:
     """What strict levels need; see ``native/tick.h``."""
     if not layout.cascade:
-        return [f"#define LEADING {layout.leading}", "#define LEVELS 0"]
+        return StackNumbers({"LEADING": layout.leading, "LEVELS": 0}, {})
     spans = [layout.level_rows(place) for place in range(len(layout.levels))]
     most = max(span.stop - span.start for span in spans)
     soft = [layout.row_levels.count(place) for place in range(len(spans))]
-    return [
-        f"#define LEADING {layout.leading}",
-        f"#define LEVELS {len(spans)}",
-        f"#define LEVEL_NUMBERS {len(LEVEL_NUMBERS)}",
-        f"#define LEVEL_MOST {max(most, layout.variables + layout.general_rows)}",
-        f"#define SOFT_MAX {max(soft)}",
-        f"#define LEFT_FREE {left_free(stack).hex()}",
-        f"#define DAMPING {stack.damping.hex()}",
-        _table("int", "level_start", [*(span.start for span in spans), layout.task_rows]),
-        _table("int", "row_level", layout.row_levels),
-        _table("double", "task_scale", layout.row_scales(stack)),
-    ]
+    sizes: dict[str, float] = {
+        "LEADING": layout.leading,
+        "LEVELS": len(spans),
+        "LEVEL_NUMBERS": len(LEVEL_NUMBERS),
+        "LEVEL_MOST": max(most, layout.variables + layout.general_rows),
+        "SOFT_MAX": max(soft),
+        "LEFT_FREE": left_free(stack),
+        "DAMPING": stack.damping,
+    }
+    tables: Tables = {
+        "level_start": ("int", [*(span.start for span in spans), layout.task_rows]),
+        "row_level": ("int", layout.row_levels),
+        "task_scale": ("double", layout.row_scales(stack)),
+    }
+    return StackNumbers(sizes, tables)
 
 
 def unit_groups(stack: Declaration) -> list[tuple[int, int]]:

@@ -12,12 +12,14 @@ works on the same fields of :class:`wbc.stack.memory.Memory`: so a tick changes 
 
 from __future__ import annotations
 
+import os
 import pathlib
 import re
 from collections.abc import Callable
 from dataclasses import field
 
 from wbc.native import kernel, toolchain
+from wbc.native.library import file_bytes
 from wbc.native.targets import TargetMachine
 from wbc.quick_dataclasses import dataclass
 from wbc.stack.commands import COMMANDS
@@ -53,9 +55,10 @@ REAL_TABLES = (
     "task_scale", "row_reach", "segment_half",
 )  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
-FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost", "arrival")
+FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost", "arrival", "closed_at")
 COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)")], "lost": [(1, "moved", "DOFS")]}
 COPIED["arrival"] = [(0, "start", "NQ"), (1, "way", "DOFS")]
+COPIED["closed_at"] = [(0, "nearly", "NQ"), (1, "closing", "DOFS")]
 #: Arrays that only C knows and the functions write
 WRITTEN = (
     "jt",
@@ -157,9 +160,11 @@ def compiling(variant: Variant, target: TargetMachine | None = None) -> Callable
 
 def origins(variant: Variant) -> dict[str, str]:
     """Name -> text of what :func:`sources` is made of: quicker to read than to make, and it changes when that does."""
-    here = pathlib.Path(__file__).parent
-    files = [*sorted((here / "native").iterdir()), *(here / name for name in MAKERS)]
-    return {"variant": repr(variant)} | {file.name: file.read_text(encoding="utf-8") for file in files}
+    here = os.path.dirname(__file__)
+    native = os.path.join(here, "native")
+    files = [*((name, native) for name in sorted(os.listdir(native))), *((name, here) for name in MAKERS)]
+    texts = {name: file_bytes(os.path.join(folder, name)).decode() for name, folder in files}
+    return {"variant": repr(variant)} | texts
 
 
 def sources(variant: Variant) -> dict[str, str]:

@@ -39,6 +39,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import casadi as ca
@@ -50,7 +51,6 @@ from wbc.robot import Robot
 from wbc.stack.declaration import Declaration, bends
 from wbc.stack.distances import Balls, Sensed
 from wbc.stack.layout import Block, Layout, Slot
-from wbc.stack.second import SecondOrder
 from wbc.stack.shares import kept_direction, speeds, unlimited, widened
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce, curvature
@@ -61,6 +61,9 @@ from wbc.tasks._direction import Direction
 from wbc.tasks.base import Bounds, Constraint, Rows, Task
 from wbc.tasks.inputs import as_value
 from wbc.tasks.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from wbc.stack.second import SecondOrder
 
 ROWS_OUTPUTS = (
     "error",
@@ -92,12 +95,13 @@ class TickProgram:
     sensed: Sensed = field(default_factory=Sensed)
     lost: ca.Function | None = None
     arrival: ca.Function | None = None
+    closed_at: ca.Function | None = None
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
         every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
-        every |= {"lost": self.lost, "arrival": self.arrival}
+        every |= {"lost": self.lost, "arrival": self.arrival, "closed_at": self.closed_at}
         return {name: function for name, function in every.items() if function is not None}
 
 
@@ -114,7 +118,7 @@ def left_to_loops(stack: Declaration, layout: Layout) -> tuple[Balls, Sensed]:
 def loaded(stack: Declaration, layout: Layout, functions: Mapping[str, ca.Function]) -> TickProgram:
     """The program of a stack whose functions were built before."""
     balls, sensed = left_to_loops(stack, layout)
-    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost", "arrival")}
+    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost", "arrival", "closed_at")}
     return TickProgram(functions["rows"], **others, balls=balls, sensed=sensed)
 
 
@@ -140,7 +144,13 @@ class _ProgramBuilder:
         self.force = ca.SX.sym("force", layout.task_rows + layout.general_rows)
         self.forces: list[AppliedForce] = []
         self.tasks: dict[str, tuple[ca.SX, ca.SX, ca.SX, ca.SX]] = {}
-        self.second = SecondOrder(self) if stack.command != "velocity" else None
+        self.second = self._second_order() if stack.command != "velocity" else None
+
+    def _second_order(self) -> SecondOrder:
+        """It comes with the dynamics, which most stacks do without."""
+        from wbc.stack.second import SecondOrder
+
+        return SecondOrder(self)
 
     @cached_property
     def later(self) -> ca.SX:
@@ -445,10 +455,11 @@ def build(stack: Declaration, layout: Layout) -> TickProgram:
         torque = checked_function("torque", [*inputs, b.second.x, enabled], found, ["torque"])
     bent = ca.vertcat(ca.SX(0, 1), *[b.lost(block) for block in layout.of_form("margins", "rows")])
     lost = checked_function("lost", inputs, [ca.densify(bent)], ["lost"]) if bent.nnz() else None
-    arrival = None
+    arrival = closed_at = None
     if b.second is not None and stack.robot.loops:
         arrival = checked_function("arrival", inputs, b.arrival(), ["next_q", "opened", "closing_columns"])
-    return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival)
+        closed_at = checked_function("closed_at", inputs, [ca.densify(b.later)], ["next_q"])
+    return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival, closed_at)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:
@@ -471,9 +482,8 @@ def checked_function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], label
     Raises:
         ShapeError: symbols that are no inputs.
     """
-    free = ca.symvar(ca.veccat(*outputs))
-    known = {s.__hash__() for s in ca.symvar(ca.veccat(*inputs))}
-    stray = [s.name() for s in free if s.__hash__() not in known]
-    if stray:
+    given = ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)]
+    function = ca.Function(name, inputs, outputs, given, labels, {"allow_free": True})
+    if stray := function.get_free():
         raise ShapeError(f"stack.{name}", stray, "an item's expression contains symbols that are not its inputs")
-    return ca.Function(name, inputs, outputs, ["q", "v", "p", "dt", "more", "enabled"][: len(inputs)], labels)
+    return function

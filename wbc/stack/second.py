@@ -158,9 +158,9 @@ class SecondOrder:
         return Rows(self._wide(jacobian), low, ca.SX.inf(len(block.rows))), value, factor
 
     def _limits(self, block: Block, item: Constraint) -> Rows:
-        """Bounds on accelerations as rows. A joint that something has thrown beyond its limit of velocity is brought
-        back within the tick: limits of acceleration are of what is planned. Before a limit of position a joint counts
-        on no more than its motor has.
+        """Bounds on accelerations as rows. Of a joint beyond its limit of velocity by more than limits of acceleration
+        take back within the tick the sides cross. Before a limit of position a joint counts on no more than its motor
+        has.
         """
         b, v = self._b, self._kinematics.v
         longest = b.stack.dt_range[1]
@@ -171,9 +171,8 @@ class SecondOrder:
         ends = [b.column(block, "lower", bounds.lower), b.column(block, "upper", bounds.upper)]
         for i in np.flatnonzero(np.isfinite(most := item.velocity_limits(self._robot))).tolist():
             back = (clip(v[i], -most[i], most[i]) - v[i]) / b.dt
-            for end in ends:
-                slower = ca.if_else(v[i] > most[i], ca.fmin(end[i], back), ca.fmax(end[i], back))
-                end[i] = ca.if_else(ca.fabs(v[i]) > most[i], slower, end[i])
+            ends[0][i] = ca.if_else(v[i] < -most[i], ca.fmax(ends[0][i], back), ends[0][i])
+            ends[1][i] = ca.if_else(v[i] > most[i], ca.fmin(ends[1][i], back), ends[1][i])
         return Rows(self._wide(ca.SX.eye(self._layout.nv)), *ends)
 
     @cached_property

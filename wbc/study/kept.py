@@ -41,6 +41,7 @@ class Kept:
 
     def __init__(self, folder: Path, study: Study) -> None:
         self.folder, self.study = folder, study
+        folder.mkdir(parents=True, exist_ok=True)
         self._file = (folder / TRIALS).open("a+", encoding="utf-8")
         try:
             lock(self._file, wait=False)

@@ -32,7 +32,7 @@ AXES: dict[str, Vector] = {
 
 @dataclass(frozen=True)
 class SymbolicJoint:
-    """The maps of one joint; ``nq`` coordinates, ``nv`` velocities."""
+    """The maps of one joint; ``nq`` coordinates, ``nv`` velocities, which are ``added`` to these: T(q) = 1."""
 
     nq: int
     nv: int
@@ -41,6 +41,7 @@ class SymbolicJoint:
     tangent: Callable[[ca.SX], ca.SX]
     integrate: Callable[[ca.SX, ca.SX], ca.SX]
     difference: Callable[[ca.SX, ca.SX], ca.SX]
+    added: bool = False
 
     def bias(self, q: ca.SX, v: ca.SX) -> ca.SX:
         """dS/dt v = d(S(q) v)/dq T(q) v, 6 numbers; structurally zero where S is constant."""
@@ -60,7 +61,7 @@ def vector_joint(
     n: int, placement: Callable[[ca.SX], tuple[ca.SX, ca.SX]], subspace: Callable[[ca.SX], ca.SX]
 ) -> SymbolicJoint:
     """A joint whose configuration space is R^n."""
-    return SymbolicJoint(n, n, placement, subspace, lambda q: eye(n), lambda q, v: q + v, lambda q0, q1: q1 - q0)
+    return SymbolicJoint(n, n, placement, subspace, lambda q: eye(n), lambda q, v: q + v, lambda q0, q1: q1 - q0, True)
 
 
 def _column(linear: Vector | None = None, angular: Vector | None = None) -> ca.SX:

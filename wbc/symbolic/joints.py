@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache, partial
 from typing import Any
 
 import casadi as ca
@@ -30,10 +31,12 @@ _MAKERS: dict[str, Callable[[Any], SymbolicJoint]] = {
 
 
 def _along(name: str, axis: maps.Vector) -> dict[str, Callable[[Any], SymbolicJoint]]:
+    # A robot has many of these, which are all the same
+    turn, endless, slide = (cache(partial(kind, axis)) for kind in (maps.revolute, maps.unbounded, maps.prismatic))
     return {
-        f"R{name}": lambda _: maps.revolute(axis),
-        f"RUB{name}": lambda _: maps.unbounded(axis),
-        f"P{name}": lambda _: maps.prismatic(axis),
+        f"R{name}": lambda _: turn(),
+        f"RUB{name}": lambda _: endless(),
+        f"P{name}": lambda _: slide(),
         f"H{name}": lambda joint: maps.helical(axis, float(joint.pitch)),
     }
 

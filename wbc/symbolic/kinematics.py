@@ -7,7 +7,7 @@ which is the referee in the tests.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import casadi as ca
@@ -16,6 +16,7 @@ from wbc.errors import UnknownNameError
 from wbc.multibody import algebra, own
 from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import kernels, rotations as rot
+from wbc.symbolic.joint_maps import eye
 from wbc.symbolic.joints import SymbolicJoint, mimic_joint, symbolic_joint
 
 WORLD = "world"
@@ -230,14 +231,10 @@ class Kinematics:
         """(origins, linear, angular), 3 x n each, world axes: the motion columns of every joint that moves a body."""
         known = self._chains.get(joint)
         if known is None and joint > 0:
-            linear, angular = self.joint_twist(joint)
-            own = (ca.repmat(self.joint_pose(joint).position, 1, self._width(joint)), linear, angular)
-            above = self._chain(self.parents[joint])
-            if above is None:
-                known = own
-            else:
-                known = (ca.horzcat(above[0], own[0]), ca.horzcat(above[1], own[1]), ca.horzcat(above[2], own[2]))
-            self._chains[joint] = known
+            support = self.support(joint)
+            origins = [ca.repmat(self.joint_pose(j).position, 1, self._width(j)) for j in support]
+            linear, angular = zip(*map(self.joint_twist, support), strict=True)
+            known = self._chains[joint] = ca.horzcat(*origins), ca.horzcat(*linear), ca.horzcat(*angular)
         return known
 
     def columns(self, rows: int, blocks: Iterable[tuple[int, ca.SX]]) -> ca.SX:
@@ -309,22 +306,44 @@ class Kinematics:
 
     def tangent_map_at(self, q: ca.SX) -> ca.SX:
         """T at another configuration."""
-        blocks = [j.tangent(qj) for _, j, qj, _ in self._split(q, self.v)]
+        blocks = [eye(at.stop - at.start) if maps is None else maps.tangent(q[at]) for maps, at, _ in self._manifolds]
         return ca.sparsify(ca.diagcat(*blocks)) if blocks else ca.SX(0, 0)
 
     def integrate(self, q: ca.SX, v: ca.SX) -> ca.SX:
         """q (+) v on the manifold (unit time)."""
-        return ca.vertcat(*[j.integrate(qj, vj) for _, j, qj, vj in self._split(q, v)])
+        parts = [(maps, q[at], v[to]) for maps, at, to in self._manifolds]
+        return ca.vertcat(*[a + b if maps is None else maps.integrate(a, b) for maps, a, b in parts])
 
-    def difference(self, q0: ca.SX, q1: ca.SX) -> ca.SX:
-        """v with q0 (+) v = q1, the shortest."""
-        return ca.vertcat(*[j.difference(a, q1[self._q_slices[k]]) for k, j, a, _ in self._split(q0, self.v)])
+    def difference(self, q0: ca.SX, q1: ca.SX, dofs: Sequence[int] | None = None) -> ca.SX:
+        """v with q0 (+) v = q1, the shortest; ``dofs``: these numbers of it."""
+        chosen = range(self.nv) if dofs is None else dofs
+        parts = []
+        for maps, at, to in self._manifolds:
+            if not any(to.start <= k < to.stop for k in chosen):
+                parts.append(ca.SX(to.stop - to.start, 1))
+                continue
+            first, last = q0[at], q1[at]
+            parts.append(last - first if maps is None else maps.difference(first, last))
+        whole = ca.vertcat(*parts)
+        return whole if dofs is None else whole[list(dofs)]
 
-    def _split(self, q: ca.SX, v: ca.SX) -> list[tuple[int, SymbolicJoint, ca.SX, ca.SX]]:
-        """(joint, maps, coordinates, velocities) of every joint that owns coordinates, in the order of q."""
+    @cached_property
+    def _manifolds(self) -> list[tuple[SymbolicJoint | None, slice, slice]]:
+        """(maps, where in q, where in v) of joints that own coordinates, in the order of q; None: of joints that follow
+        each other there and whose velocities are added, together.
+        """
+        out: list[tuple[SymbolicJoint | None, slice, slice]] = []
         own = [k for k in range(1, self.njoints) if k not in self.followers]
-        own.sort(key=lambda k: self._q_slices[k].start)
-        return [(k, self.symbolic(k), q[self._q_slices[k]], v[self._v_slices[k]]) for k in own]
+        for k in sorted(own, key=lambda k: self._q_slices[k].start):
+            maps, at, to = self.symbolic(k), self._q_slices[k], self._v_slices[k]
+            if not maps.added:
+                out.append((maps, at, to))
+                continue
+            if out and out[-1][0] is None and (out[-1][1].stop, out[-1][2].stop) == (at.start, to.start):
+                _, before, above = out.pop()
+                at, to = slice(before.start, at.stop), slice(above.start, to.stop)
+            out.append((None, at, to))
+        return out
 
     def derivative(self, expression: ca.SX) -> ca.SX:
         """d f(q (+) dv) / d dv at dv = 0, rows x nv: df/dq T(q), exact on quaternions and unit circles.

@@ -25,11 +25,11 @@ from wbc.quick_dataclasses import dataclass
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.curvature import AppliedForce
 from wbc.symbolic.kinematics import WORLD, Kinematics, Pose
-from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.rotations import rotation_rate
 
 if TYPE_CHECKING:
     from wbc.symbolic.gaps import Gap
+    from wbc.symbolic.motion import MotionExpressions
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,6 @@ import ctypes
 import functools
 import itertools
 import os
-import pathlib
-import re
 from typing import Any
 
 import casadi as ca
@@ -18,7 +16,7 @@ from wbc.native import toolchain
 from wbc.native.library import load_library
 from wbc.stack import generic
 from wbc.stack.behind import NativeBehind
-from wbc.stack.codegen import blocks, header
+from wbc.stack.codegen import blocks, stack_numbers
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
@@ -46,9 +44,10 @@ def _evaluate() -> int:
         CompileError: its library does not have it.
     """
     # The one that is loaded: the wheel has the same library by several names, and another would be a second copy of it
-    for path in sorted(pathlib.Path(ca.__file__).parent.glob("libcasadi.*")):
+    folder = os.path.dirname(ca.__file__)
+    for name in sorted(name for name in os.listdir(folder) if name.startswith("libcasadi.")):
         try:
-            found: Any = ctypes.PyDLL(str(path), mode=_LOADED)._ZN6casadi21_function_buffer_evalEPv
+            found: Any = ctypes.PyDLL(os.path.join(folder, name), mode=_LOADED)._ZN6casadi21_function_buffer_evalEPv
         except (OSError, AttributeError):
             continue
         return ctypes.cast(found, ctypes.c_void_p).value or 0
@@ -153,6 +152,8 @@ class GenericTick(CompiledTick):
             ("moved", layout.nv),
             ("start", layout.nq),
             ("way", layout.nv),
+            ("nearly", layout.nq),
+            ("closing", layout.nv),
             ("force", layout.task_rows + layout.general_rows),
         )
         copies = {name: np.zeros(max(1, count)) for name, count in sizes_of_copies}
@@ -177,6 +178,7 @@ class GenericTick(CompiledTick):
             written = [field("next_q"), self._written("opened", program.arrival.nnz_out(1))]
             written.append(self._written("closing_columns", program.arrival.nnz_out(2)))
             calls["arrival"] = program.arrival, [copies["start"], copies["way"], p, dt], written
+            calls["closed_at"] = program.closed_at, [copies["nearly"], copies["closing"], p, dt], [field("next_q")]
         if program.torque is not None:
             calls["torque"] = program.torque, [*state, field("v"), field("enabled")], [field("torque")]
         self._bound: list[Any] = [copies]
@@ -197,47 +199,44 @@ class _ContextStruct:
     """The sizes and tables of a stack as ``wbc_context`` has them: numbers and addresses of eight bytes each."""
 
     def __init__(self, stack: Declaration, layout: Layout, program: TickProgram) -> None:
-        text = header(stack, layout, program)
-        numbers = dict(re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE))
-        tables = dict(re.findall(r"^static const \w+ (\w+)\[\] = \{(.*)\};$", text, re.MULTILINE))
+        sizes, tables = stack_numbers(stack, layout, program)
         jt = program.rows.sparsity_out("jt")
         found = blocks(np.array(jt.colind()[: layout.leading + 1]), np.array(jt.row(), dtype=np.intp))
         blocked = np.array(found, np.intc).reshape(-1, 4)
-        numbers["BLOCKED"] = str(len(found))
-        self.names = [
+        names = [
             "serial", *generic.SIZES, *generic.REALS, *generic.INT_TABLES, *generic.REAL_TABLES, "evaluate",
             *generic.FUNCTIONS, *(name for given in generic.COPIED.values() for _, name, _ in given), "memory", "rest",
             "own", *generic.FORWARDED,
         ]  # fmt: skip
-        self._entries = np.zeros(len(self.names), np.int64)
+        self._place = {name: k for k, name in enumerate(names)}
+        self._entries = np.zeros(len(names), np.int64)
         self._kept: list[np.ndarray] = []
         for name in generic.SIZES:
-            self.set(name, int(numbers.get(name, "0")))
+            self.set(name, len(found) if name == "BLOCKED" else int(sizes.get(name, 0)))
         for name in generic.REALS:
-            value = float.fromhex(numbers[name]) if "x" in numbers.get(name, "") else float(numbers.get(name, "0"))
-            self._entries.view(np.float64)[self.names.index(name)] = value
+            self._entries.view(np.float64)[self._place[name]] = sizes.get(name, 0.0)
         for k, name in enumerate(generic.INT_TABLES[-4:]):
             self._table(name, np.ascontiguousarray(blocked[:, k]))
         for name in generic.INT_TABLES[:-4]:
-            self._table(name, np.array(tables.get(name, "0").split(", "), np.intc))
+            self._table(name, np.array([*tables.get(name, ("int", ()))[1], 0], np.intc))
         for name in generic.REAL_TABLES:
-            self._table(name, np.array([float.fromhex(x) for x in tables.get(name, "0").split(", ")]))
+            self._table(name, np.array([*tables.get(name, ("double", ()))[1], 0.0]))
         self.set("evaluate", _evaluate())
         self.pointer = ctypes.c_void_p(self._entries.ctypes.data)
 
     def __getitem__(self, name: str) -> int:
-        return int(self._entries[self.names.index(name)])
+        return int(self._entries[self._place[name]])
 
     def set(self, name: str, value: int) -> None:
         """A whole number, or an address; with a new serial, by which C sees that something has changed."""
         self._entries[0] = next(_serials)
-        self._entries[self.names.index(name)] = value
+        self._entries[self._place[name]] = value
 
     def set_together(self, values: dict[str, int]) -> None:
         """Several at once: no tick sees but some of them, as one copy is made under the interpreter's lock."""
         entries = self._entries.copy()
         for name, value in values.items():
-            entries[self.names.index(name)] = value
+            entries[self._place[name]] = value
         entries[0] = next(_serials)
         self._entries[:] = entries
 

@@ -369,14 +369,18 @@ class SolvedTick(Buffers):
         return out
 
     def _uncrossed(self, qp: QP) -> tuple[QP, NDArray[np.bool_]]:
-        """Rows whose bounds have crossed are met half-way; and which of them give way by more than rounding."""
+        """Rows whose bounds have crossed meet them as ``meeting`` of ``native/solve.h`` says; and which of them give
+        way by more than rounding.
+        """
         n = qp.n
         gap = qp.lower[n:] - qp.upper[n:]
-        if not (gap > 0.0).any():
+        rows = np.flatnonzero(gap > 0.0)
+        if not rows.size:
             return qp, np.zeros(gap.size, dtype=np.bool_)
-        out = qp.copy()
-        middle = 0.5 * (qp.lower[n:] + qp.upper[n:])
-        out.lower[n:], out.upper[n:] = np.where(gap > 0, middle, qp.lower[n:]), np.where(gap > 0, middle, qp.upper[n:])
+        out, low, high, columns = qp.copy(), qp.lower[n + rows], qp.upper[n + rows], qp.A[rows] != 0.0
+        moves = (self._orders[rows] > SacrificeOrder.HOLD) & (columns.sum(axis=1) == 1) & self._elastic
+        moves &= columns[:, : self._velocities].any(axis=1)
+        out.lower[n + rows] = out.upper[n + rows] = np.where(moves, np.clip(0.0, high, low), 0.5 * (low + high))
         return out, gap > 4.0 * TOLERANCE * self._units
 
 

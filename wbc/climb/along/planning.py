@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
 from wbc import validation
@@ -22,7 +21,7 @@ from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.search import counted_words, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.time_law import cubics_need, fastest
+from wbc.climb.time_law import cubics_need, fastest, law_knots
 from wbc.climb.world import ClimbWorld
 from wbc.errors import RangeError
 from wbc.multibody import pin
@@ -165,18 +164,6 @@ def _speeds(curve: PPoly, x: Array, rate: Array, pull: Array, most: float) -> Ar
     return fastest(x, np.hstack([a, a]), b, np.minimum(1.0 / np.maximum(used, 1e-9) ** 2, most**2))
 
 
-def _denser(x: Array, speed: Array, span: Array, parts: NDArray[np.intp]) -> list[Array]:
-    """Knots at places of the way and between them, so many to an interval: times, places and speeds along the way."""
-    row = np.repeat(np.arange(len(span)), parts)
-    long, part = span[row], np.arange(1, len(row) + 1) - np.repeat(np.cumsum(parts) - parts, parts)
-    gain, t = (speed[row + 1] - speed[row]) / long, long * part / parts[row]
-    begun = np.concatenate([[0.0], np.cumsum(span)])
-    places = np.minimum(x[row] + t * (speed[row] + 0.5 * gain * t), x[row + 1])
-    times = np.where(part == parts[row], begun[row + 1], begun[row] + t)
-    rates = speed[row] + gain * t
-    return [np.insert(some, 0, first) for some, first in ((times, 0.0), (places, x[0]), (rates, speed[0]))]
-
-
 def _pairs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     """The first with the second, the third with the fourth, and so on."""
     return list(zip(numbers[::2], numbers[1::2], strict=True))
@@ -208,7 +195,7 @@ class _TimedWay:
             span = np.diff(x) / mean
             gains = np.abs(np.diff(speed)) / GAINED
             parts = np.ceil(np.maximum(np.maximum(span / SLOW, np.sqrt(gains)), 1.0)).astype(int)
-            times, at, speeds = _denser(x, speed, span, parts)
+            times, at, speeds = law_knots(x, speed, span, parts)
             values, rates = np.asarray(curve(at)), np.asarray(curve(at, 1)) * speeds[:, None]
             needs = np.maximum.reduceat(cubics_need(times, values, rates, rate, pull), np.cumsum(parts) - parts)
             if halved == HALVED or needs.max() < NEARLY:

@@ -7,13 +7,12 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc.climb.along.body_track import BodyTrack
-from wbc.climb.chain import library
+from wbc.climb.chain import address_of as _at, library
 from wbc.climb.first import cheapest_first
 from wbc.climb.world import ClimbWorld
 from wbc.validation import Array
@@ -193,7 +192,3 @@ def _enough(code: int) -> int:
     if code == -2:
         raise MemoryError(LACKING)
     return code
-
-
-def _at(array: NDArray[Any]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)

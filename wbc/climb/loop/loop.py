@@ -464,7 +464,7 @@ class ClimbLoop:
         if self._torques:
             self._given_way = 0 if step.status == "solved" else self._given_way + 1
             if self._given_way * dt > OVERLOAD and not self._broken:
-                self._break(f"motors and contacts have given way for {OVERLOAD:g} s")
+                self._break(_gave_way(step))
         if ahead >= self._reference.end and not self._broken and all(limb.coming is None for limb in self._limbs):
             # Motors at their limits, or a load that nobody knows, may have kept the body from where the plan ends
             if self._followed() > ARRIVED:
@@ -553,10 +553,12 @@ class ClimbLoop:
                 # A plan that is given up comes to rest behind that, as soon as joints can, the limb still held
                 if not self._needs and not (ready and self._may_lift(move) and self._borne(limb, move)):
                     ahead = max(min(ahead, move.lift), self._path_time)
-            # What comes after a landing counts on its load, which by torques takes a time
-            landing = self._torques and limb.state in (LimbState.REACHING, LimbState.LATCHING)
-            if landing and move is not None and move.land < ahead and move.land in self._hand_overs.resting:
-                ahead = max(min(ahead, move.land), self._path_time)
+            if move is not None and move.land < ahead and limb.state not in STANDING:
+                # What comes after a landing counts on its load, which by torques takes a time, or has its limb lift
+                loads = self._torques and limb.state is not LimbState.SWINGING
+                again = any(later.lift < ahead for later in limb.moves[1:2])
+                if again or (loads and move.land in self._hand_overs.resting):
+                    ahead = max(min(ahead, move.land), self._path_time)
         self._late = False
         for limb in self._limbs:
             for _ in range(CHANGES):
@@ -745,6 +747,19 @@ class ClimbLoop:
 
     def _end(self, outcome: ClimbOutcome, reason: str) -> None:
         self._outcome, self._reason = outcome, reason
+
+
+def _gave_way(step: Step) -> str:
+    """What has given way for long in a tick: limits of joints alone are no lack of torques or contacts."""
+    most: dict[str, float] = {}
+    for slack in step.relaxed:
+        most[slack.row if slack.item == "limits" else ""] = slack.amount
+    if not most or "" in most:
+        return f"motors and contacts have given way for {OVERLOAD:g} s"
+    joint = max(most, key=lambda row: most[row])
+    return (
+        f"{joint} has been beyond its limits for {OVERLOAD:g} s: its motor is limp, or bears a load that nobody knows"
+    )
 
 
 def _rate_along(planned: Array, v: Array) -> float:

@@ -15,6 +15,8 @@
 #define STALLED 4
 #define STALLS 0.5
 #define CLOSE 1e-10
+/* Contacts that limbs alone leave open by less are closed by the body too: what sweeps leave at limits of joints [lengths] */
+#define GIVES 1e-5
 /* Weights of contacts and of the equilibrium's bounds over those of angles from rest [1/m^2 of the robot's length] */
 #define HOLDS 1e4
 #define BEARS 1e3
@@ -240,27 +242,34 @@ static int yields(const climb_t *c, const int *contact) {
     return 0;
 }
 
-/* Brings all contacts to where they are wanted, by their limbs alone or by all at once; whether they are */
+/* Largest row of the errors of contacts at their places, turns times a length [m] */
+static double most_open(const climb_t *c, const int *contact, const double *base, const double *angle) {
+    placed_t placed;
+    double r[6], E[6][6], most = 0.0;
+    for (int l = 0; l < c->limbs; l++) {
+        if (contact[l] < 0) continue;
+        place_steps(c->limb + l, base, angle + c->offset[l], &placed);
+        contact_error(c->limb + l, placed.tip, c->foothold + 12 * contact[l], r, E);
+        for (int i = 0; i < c->limb[l].rows; i++) most = fmax(most, fabs(r[i]));
+    }
+    return most;
+}
+
+/* Brings all contacts to where they are wanted: by their limbs alone; by the body too where limbs have fewer angles than rows, or
+ * end at a limit so near that it gives way by as little; whether they are */
 static int tighten(const climb_t *c, const int *contact, double *base, double *angle) {
-    placed_t placed[MOST_LIMBS];
-    double r[6], E[6][6];
     if (!yields(c, contact)) {
+        int reached = 1;
         for (int l = 0; l < c->limbs; l++)
-            if (contact[l] >= 0 && !reach_from(c->limb + l, base, c->foothold + 12 * contact[l], angle + c->offset[l])) return 0;
-        return 1;
+            if (contact[l] >= 0 && !reach_from(c->limb + l, base, c->foothold + 12 * contact[l], angle + c->offset[l])) reached = 0;
+        if (reached || most_open(c, contact, base, angle) > GIVES * c->length) return reached;
     }
     const wish_t none = {0};
+    placed_t placed[MOST_LIMBS];
     double left;
     for (int k = 0; k < ITERATIONS; k++) {
-        double most = 0.0;
         sweep(c, contact, &none, base, angle, placed, &left);
-        for (int l = 0; l < c->limbs; l++) {
-            if (contact[l] < 0) continue;
-            place_limb(c->limb + l, base, angle + c->offset[l], placed + l);
-            contact_error(c->limb + l, placed[l].tip, c->foothold + 12 * contact[l], r, E);
-            for (int i = 0; i < c->limb[l].rows; i++) most = fmax(most, fabs(r[i]));
-        }
-        if (most < 0.5 * EXACT * c->length) return 1;
+        if (most_open(c, contact, base, angle) < 0.5 * EXACT * c->length) return 1;
     }
     return 0;
 }

@@ -2,8 +2,7 @@
  *
  * One of the two is a capsule or a ball that moves; the other one such too, or a convex body that stands, of which the box about it
  * counts. The bound is that of proof.h. */
-#ifndef WBC_LANES_H
-#define WBC_LANES_H
+#pragma once
 
 #include "places.h"
 
@@ -31,9 +30,9 @@ static void stand_lanes(plan_t *p, int b) {
     for (int k = 0; k < s->chain_length[b]; k++, way += WAYS) {
         const int f = s->chain[s->depth * b + k];
         const lanes_t *pose = (const lanes_t *)p->lane_pose + 12 * f, axis[3] = {pose[2], pose[5], pose[8]};
-        const lanes_t gone = *(const lanes_t *)p->share * p->gone[f], by = abs_lanes(gone);
+        const lanes_t gone = ((const lanes_t *)p->gone)[f], by = abs_lanes(gone);
         for (int m = 0; m < WAYS; m++) way[WAYS + m] = way[m];
-        if (p->gone[f] == 0.0) continue;
+        if (!bits(gone != 0.0)) continue;
         if (s->kind[f] != TURNING) {
             for (int m = 0; m < 6; m++) way[WAYS + m] += gone * axis[m % 3];
             bent -= 2.0 * by * turned, off += by, reached += by;
@@ -69,25 +68,20 @@ static extent_t extent_of(const plan_t *p, int b, int off, const lanes_t *n) {
 /* How far a pair is apart along n, which leads from `ball` to `other` */
 static extent_t apart_along(const plan_t *p, const outline_t *pair, const lanes_t *n) {
     const lanes_t back[3] = {-n[0], -n[1], -n[2]};
-    const extent_t a = extent_of(p, pair->ball, pair->ball_off, n);
-    if (pair->form == BALLS) {
-        const extent_t b = extent_of(p, pair->other, pair->other_off, back);
-        return (extent_t){-a.here - b.here - pair->core, -a.within - b.within - pair->core};
-    }
     const double *box = p->boxes + 15 * pair->other;
-    lanes_t top = {0};
-    for (int m = 0; m < 3; m++)
-        top += back[m] * box[9 + m] + box[12 + m] * abs_lanes(n[0] * box[m] + n[1] * box[3 + m] + n[2] * box[6 + m]);
-    return (extent_t){-a.here - top - pair->core, -a.within - top - pair->core};
+    const extent_t a = extent_of(p, pair->ball, pair->ball_off, n);
+    extent_t b = {{0}, {0}};
+    if (pair->form == BALLS) b = extent_of(p, pair->other, pair->other_off, back);
+    for (int m = 0; m < 3 && pair->form == BALL_BOX; m++)
+        b.here = b.within += back[m] * box[9 + m] + box[12 + m] * abs_lanes(n[0] * box[m] + n[1] * box[3 + m] + n[2] * box[6 + m]);
+    return (extent_t){-a.here - b.here - pair->core, -a.within - b.within - pair->core};
 }
 
-/* A pair is too near at some lanes: what is behind the first of these counts no longer, and what ends there */
+/* A pair is too near at some lanes: these, or what is behind the first of them, count no longer */
 static void strike(plan_t *p, int k, unsigned lanes) {
-    const unsigned behind = lanes & ~p->ended;
     p->struck = k;
-    p->alive &= behind ? (1u << __builtin_ctz(behind)) - 1u : p->alive >> 1;
-    p->alive &= ~p->ended;
-    if (!p->partial || !p->alive) p->sweep->stopped = k;
+    p->alive &= p->counts == EACH ? ~lanes : (1u << __builtin_ctz(lanes)) - 1u;
+    if (p->counts == WHOLE || !p->alive) p->sweep->stopped = k;
 }
 
 /* Lanes at which a pair is not proven to be apart, of those in `near` */
@@ -117,41 +111,32 @@ static unsigned undecided(plan_t *p, int k, unsigned near) {
     return near & ~bits(apart);
 }
 
-/* A pair where it may be nearer than required, lane by lane into `near`: within a piece, or at its middle */
-static void near_pair(plan_t *p, int k) {
+/* Lanes at which a pair is not proven to be far enough apart */
+static unsigned near_pair(plan_t *p, int k) {
     const outline_t *pair = p->outlines + k;
-    const double off = p->offs[pair->ball_off] + p->offs[pair->other_off];
-    unsigned near = p->alive;
-    if (pair->form != UNSEEN && off < INFINITY) {
-        const lanes_t *ball = (const lanes_t *)p->lane_centre + 3 * pair->ball, reached = p->sweep->required[k] + pair->radii + *(const lanes_t *)p->share * off;
-        lanes_t square = {0};
-        if (pair->form == BALLS) {
-            const lanes_t *other = (const lanes_t *)p->lane_centre + 3 * pair->other;
-            for (int m = 0; m < 3; m++) square += (ball[m] - other[m]) * (ball[m] - other[m]);
-        } else {
-            const double *box = p->boxes + 15 * pair->other;
-            const lanes_t x = ball[0] - box[9], y = ball[1] - box[10], z = ball[2] - box[11];
-            for (int m = 0; m < 3; m++) {
-                const lanes_t over = abs_lanes(box[m] * x + box[3 + m] * y + box[6 + m] * z) - box[12 + m], e = (lanes_t)((mask_t)over & (over > 0.0));
-                square += e * e;
-            }
-        }
-        near &= bits((square < reached * reached) & (reached > 0.0));
-        if (near && pair->round) near = undecided(p, k, near);
+    if (pair->form == UNSEEN) return p->alive;
+    const lanes_t *offs = (const lanes_t *)p->offs, reached = p->sweep->required[k] + pair->radii + offs[pair->ball_off] + offs[pair->other_off];
+    const lanes_t *ball = (const lanes_t *)p->lane_centre + 3 * pair->ball, *other = (const lanes_t *)p->lane_centre + 3 * pair->other;
+    const double *box = p->boxes + 15 * pair->other;
+    lanes_t d[3];
+    if (pair->form == BALLS) {
+        for (int m = 0; m < 3; m++) d[m] = ball[m] - other[m];
+    } else {
+        const lanes_t x = ball[0] - box[9], y = ball[1] - box[10], z = ball[2] - box[11];
+        for (int m = 0; m < 3; m++) d[m] = max_lanes(abs_lanes(box[m] * x + box[3 + m] * y + box[6 + m] * z) - box[12 + m], (lanes_t){0});
     }
-    for (; near; near &= near - 1) {
-        const int l = __builtin_ctz(near);
-        p->near[p->pairs * l + p->near_count[l]++] = k;
-    }
+    const unsigned near = p->alive & bits((dot_lanes(d, d) < reached * reached) & (reached > 0.0));
+    return near && pair->round ? undecided(p, k, near) : near;
 }
 
-/* All pairs, those that were too near last first, until one is too near */
-static void near_pairs(plan_t *p) {
-    memset(p->near_count, 0, sizeof p->near_count);
-    for (int k = 0; k < RECENT && p->sweep->stopped < 0; k++)
-        if (p->recent[k] >= 0) near_pair(p, p->recent[k]);
-    for (int k = 0; k < p->pairs && p->sweep->stopped < 0; k++)
-        if (k != p->recent[0] && k != p->recent[1] && k != p->recent[2]) near_pair(p, k);
+/* Those of some pairs, 0: of all, that are not proven so, and at which lanes, one behind the other; how many. It ends with one that is too near */
+static int near_pairs(plan_t *p, const int *pairs, int count, int *near) {
+    int left = 0;
+    for (int m = pairs ? 0 : -RECENT; m < count && p->sweep->stopped < 0; m++) {
+        const int k = m < 0 ? p->recent[m + RECENT] : pairs ? pairs[m] : m;
+        if (k < 0 || (!pairs && m >= 0 && (k == p->recent[0] || k == p->recent[1] || k == p->recent[2]))) continue;
+        const unsigned lanes = near_pair(p, k);
+        if (lanes) near[2 * left] = k, near[2 * left++ + 1] = (int)lanes;
+    }
+    return left;
 }
-
-#endif

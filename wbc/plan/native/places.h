@@ -1,7 +1,6 @@
 /* Where joints and bodies are in the middle of a piece of a motion from x to y, how far they may be off it, and which pairs of bodies
  * are near to each other there. All joints turn about z, or shift along it: see wbc/plan/coordinates.py. */
-#ifndef WBC_PLACES_H
-#define WBC_PLACES_H
+#pragma once
 
 #include "plan.h"
 
@@ -13,16 +12,17 @@ static void stand(plan_t *p, int b) {
     s->stamp[b] = s->node;
 }
 
-/* What never changes of bodies: balls about them, boxes about those that stand in the world, and how far points of the others can
- * be from the axis of each joint of their chain, or 1 where it shifts */
-static void prepare(plan_t *p) {
+/* What stays of bodies until they or the limits change: balls about them, boxes about those that stand in the world, and how far points
+ * of the others can be from the axis of each joint of their chain, or 1 where it shifts */
+void wbc_plan_prepare(plan_t *p) {
     sweep_t *s = p->sweep;
+    double radius[s->bodies + 1];
     s->node++;
     for (int b = 0; b < s->bodies; b++) {
         const double *line = s->line + 8 * b;
         double span[3], far = 0.0;
         minus3(line + 3, line, span);
-        p->radius[b] = endless(s->shape[b].kind) ? INFINITY : 0.5 * sqrt(dot3(span, span)) + line[6];
+        radius[b] = endless(s->shape[b].kind) ? INFINITY : 0.5 * sqrt(dot3(span, span)) + line[6];
         for (int e = 0; e < 2; e++) far = fmax(far, sqrt(dot3(line + 3 * e, line + 3 * e)) + line[7]);
         for (int f = s->body_frame[b], k = 0; f >= 0; f = s->parent[f]) {
             const double *place = s->place + 12 * f, *axis = s->axis + 5 * f;
@@ -49,17 +49,18 @@ static void prepare(plan_t *p) {
     for (int k = 0; k < p->pairs; k++) {
         const int i = s->first[k], j = s->second[k], swap = s->body_frame[i] < 0, ball = swap ? j : i, other = swap ? i : j;
         const int one = (s->depth + 1) * i + s->stop_first[k], two = (s->depth + 1) * j + s->stop_second[k];
-        const int moves = s->body_frame[other] >= 0, seen = p->radius[i] < INFINITY && p->radius[j] < INFINITY;
-        const double about = moves ? p->radius[other] : s->shape[other].size[4];
+        const int moves = s->body_frame[other] >= 0, seen = radius[i] < INFINITY && radius[j] < INFINITY;
+        const double about = moves ? radius[other] : s->shape[other].size[4];
         const shape_t *shape = s->shape + other;
-        p->outlines[k] = (outline_t){p->radius[ball] + about, s->line[8 * ball + 6] + (moves ? s->line[8 * other + 6] : shape->size[4]),
+        p->outlines[k] = (outline_t){radius[ball] + about, s->line[8 * ball + 6] + (moves ? s->line[8 * other + 6] : shape->size[4]),
                                      !seen ? UNSEEN : moves ? BALLS : BALL_BOX, ball, other, swap ? two : one, swap ? one : two,
                                      seen && is_round(s->shape + ball) && (moves ? is_round(shape) : convex(shape)), moves || is_box(shape)};
     }
 }
 
-/* All joints, and the balls about bodies that move, at LANES places x + t (y - x) */
-static void place_lanes(plan_t *p, lanes_t t) {
+/* All joints, and the balls about bodies that move, in the middles of some stretches, LANES at most; how far joints go until their
+ * ends, and points of bodies at most: what their first joints do, summed up */
+static void place_lanes(plan_t *p, const stretch_t *all, int count) {
     const sweep_t *s = p->sweep;
     p->lane_node++;
     for (int f = 0; f < s->frames; f++) {
@@ -74,11 +75,14 @@ static void place_lanes(plan_t *p, lanes_t t) {
                 pose[9 + i] = A[3 * i] * B[9] + A[3 * i + 1] * B[10] + A[3 * i + 2] * B[11] + A[9 + i];
             }
         }
-        p->gone[f] = 0.0;
+        lanes_t *gone = (lanes_t *)p->gone + f, q = {0};
+        *gone = (lanes_t){0};
         if (s->kind[f] == FIXED) continue;
-        const int k = s->coordinate[f];
-        p->gone[f] = axis[3] * (p->y[k] - p->x[k]) * p->half;
-        const lanes_t q = axis[3] * (p->x[k] + t * (p->y[k] - p->x[k])) + axis[4];
+        for (int l = 0, k = s->coordinate[f]; l < count; l++) {
+            const stretch_t *at = all + l;
+            const double way = axis[3] * (at->y[k] - at->x[k]);
+            q[l] = axis[3] * at->x[k] + axis[4] + 0.5 * (at->low + at->high) * way, (*gone)[l] = 0.5 * (at->high - at->low) * way;
+        }
         if (s->kind[f] == TURNING) {
             lanes_t sine, cosine;
             sine_cosine(q, &sine, &cosine);
@@ -99,20 +103,11 @@ static void place_lanes(plan_t *p, lanes_t t) {
             centre[i] = pose[9 + i];
             for (int m = 0; m < 3; m++) centre[i] += 0.5 * (line[m] + line[3 + m]) * pose[3 * i + m];
         }
-    }
-}
-
-/* How far points of bodies may be off within half a piece: what their first joints do, summed up */
-static void place_offs(plan_t *p) {
-    const sweep_t *s = p->sweep;
-    for (int b = 0; b < s->bodies; b++) {
-        double *off = p->offs + (s->depth + 1) * b;
-        off[0] = 0.0;
+        lanes_t *off = (lanes_t *)p->offs + (s->depth + 1) * b;
         for (int k = 0; k < s->chain_length[b]; k++) {
             const int f = s->chain[s->depth * b + k];
-            const double way = fabs(p->gone[f]);
-            off[k + 1] = off[k];
-            if (way > 0.0) off[k + 1] += (s->kind[f] == TURNING ? fmin(way, 2.0) : way) * p->reaches[s->depth * b + k];
+            const lanes_t way = abs_lanes(((const lanes_t *)p->gone)[f]), most = s->kind[f] == TURNING ? min_lanes(way, (lanes_t){0} + 2.0) : way;
+            off[k + 1] = off[k] + chosen(way > 0.0, most * p->reaches[s->depth * b + k], (lanes_t){0});
         }
     }
 }
@@ -124,13 +119,3 @@ static void stand_at(plan_t *p, int lane) {
     p->lane = lane;
     for (int m = 0; m < 12 * s->frames; m++) s->pose[m] = p->lane_pose[LANES * m + lane];
 }
-
-/* All joints at x + t (y - x), at all lanes; `half` of the way to y is what they do until the ends of the piece */
-static void place_joints(plan_t *p, double t, double half) {
-    p->half = half;
-    for (int l = 0; l < LANES; l++) p->share[l] = 1.0;
-    place_lanes(p, (lanes_t){0} + t);
-    stand_at(p, 0);
-}
-
-#endif

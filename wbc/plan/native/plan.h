@@ -1,7 +1,6 @@
 /* What a planner works on: all arrays are Python's, which keeps them as long as this is used; wbc/plan/native.py fills it,
  * the order of the fields is the same there. Configurations are n coordinates x; distances |x - y| are weighted. */
-#ifndef WBC_PLAN_H
-#define WBC_PLAN_H
+#pragma once
 
 #include "sweep.c"
 #include "vector_lanes.h"
@@ -26,6 +25,15 @@ typedef struct {
 /* Beyond so large a turn the linear part says nothing [rad] */
 #define TURNED 1.5
 
+/* A piece of what is straight from x to y, from one share of it to another */
+typedef struct {
+    const double *x, *y;
+    double low, high;
+} stretch_t;
+
+/* What counts where not all is free: nothing; what is before it; every lane for itself */
+enum { WHOLE, FIRST, EACH };
+
 /* How a pair is seen to be far apart: by the balls about both, by a ball and a box in the world, or not so */
 enum { BALLS, BALL_BOX, UNSEEN };
 
@@ -38,25 +46,19 @@ typedef struct {
 
 typedef struct {
     sweep_t *sweep;
-    double *gone;     /* frames: how far joints go within half a piece */
-    double *radius;   /* bodies: of the ball about each */
+    double *gone;     /* frames x LANES: how far joints go within half a piece */
     double *normals;  /* pairs x 3: the directions that parted them last, or 0 */
-    double half;      /* half of the piece at hand */
     double open;      /* what a proof may leave open of what is required [m] */
     double *boxes;       /* bodies x 15: pose and half sides of the box about what stands in the world */
     double *reaches;     /* bodies x depth: how far points can be from the joints of a chain */
-    double *offs;        /* bodies x (depth + 1): how far the first joints of it may take them within half a piece */
+    double *offs;        /* bodies x (depth + 1) x LANES: how far the first joints of it may take them within half a piece */
     double *lane_pose;   /* frames x 12 x LANES: places that are looked at at once */
     double *lane_centre; /* bodies x 3 x LANES: of the balls there */
     double *lane_ends;   /* bodies x 6 x LANES: of the cores of bodies there */
     double *lane_ways;   /* bodies x (depth + 1) x WAYS x LANES: what joints do to these within half a piece: see lanes.h */
-    double *share;       /* LANES: 1, a piece of the motion; 0, its middle */
     int *lane_stamp;     /* bodies: whether both are of the places at hand */
     outline_t *outlines; /* pairs */
-    int *near;           /* LANES x pairs: what is near to each other there */
-    int near_count[LANES];
     int recent[RECENT];
-    const double *x, *y; /* ends of the motion at hand */
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
     const double *weight, *scale;           /* n: what a coordinate counts, its square and itself */
@@ -75,10 +77,11 @@ typedef struct {
     int *parent[2];         /* -1: a root */
     double *work;           /* for one projection: see project.h */
     int meet[2];            /* nodes at which the trees met */
+    double heading;   /* of a base that rolls: the angle in it along which it drives */
+    int rolls;        /* the first coordinates are x, y and angle of a base that does not slip: 1; that drives along any direction, 2 */
     int struck;       /* the pair that was too near last */
-    int partial;      /* whether of an edge that is not free what is free of it counts */
+    int counts;       /* of what is not free: WHOLE, FIRST, EACH */
     unsigned alive;   /* places that are looked at together and still count */
-    unsigned ended;   /* the first of these is the end of the motion: 1 */
     int lane_node; /* counts the places that were looked at together */
     int lane;      /* the one at hand */
 } plan_t;
@@ -105,5 +108,3 @@ static double uniform(plan_t *p) {
 }
 
 static int has_rows(const plan_t *p) { return p->path.equalities + p->path.margins > 0; }
-
-#endif

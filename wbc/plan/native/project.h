@@ -1,6 +1,5 @@
 /* The nearest configuration that keeps rows, by Newton steps on those that do not hold. */
-#ifndef WBC_PROJECT_H
-#define WBC_PROJECT_H
+#pragma once
 
 #include "plan.h"
 
@@ -18,9 +17,11 @@ static void evaluate(plan_t *p, kept_rows_t *rows, const double *x, int slopes) 
     rows->function(in, out, rows->iw, rows->w, 0);
 }
 
-/* How far equalities are from 0 at most; margins below 0 count too */
-static double broken(const kept_rows_t *rows) {
+/* How far equalities of the path are from 0 at x at most; margins below 0 count too */
+double wbc_plan_broken(plan_t *p, const double *x) {
+    kept_rows_t *rows = &p->path;
     double most = 0.0;
+    evaluate(p, rows, x, 0);
     for (int k = 0; k < rows->equalities + rows->margins; k++) {
         const double off = k < rows->equalities ? fabs(rows->value[k]) : -rows->value[k];
         if (!(off <= most)) most = off;
@@ -30,17 +31,17 @@ static double broken(const kept_rows_t *rows) {
 
 static int keeps(plan_t *p, kept_rows_t *rows, const double *x) {
     evaluate(p, rows, x, 0);
-    for (int k = 0; k < rows->equalities; k++)
-        if (!(fabs(rows->value[k]) <= p->tolerance)) return 0;
-    for (int k = rows->equalities; k < rows->equalities + rows->margins; k++)
-        if (!(rows->value[k] >= 0.0)) return 0;
+    for (int k = 0; k < rows->equalities + rows->margins; k++)
+        if (!(k < rows->equalities ? fabs(rows->value[k]) <= p->tolerance : rows->value[k] >= 0.0)) return 0;
     return 1;
 }
 
-/* dx, the least in the metric, with A dx = -r for m rows; `free` says which coordinates may move. A: m x n, G: m x m, y: m */
-static int least_step(const plan_t *p, int m, const double *A, const double *r, const char *movable, double *G, double *y, double *dx) {
-    double trace = 0.0;
-    for (int i = 0; i < m; i++)
+/* dx, the least in the metric, with A dx = -r for m rows; `movable` says which coordinates may move. A: m x n, G: (m + 1) x m, of which
+ * the last row y becomes what G G' x = -r has half way */
+static int least_step(const plan_t *p, int m, const double *A, const double *r, const char *movable, double *G, double *dx) {
+    double trace = 0.0, *y = G + m * m;
+    for (int i = 0; i < m; i++) {
+        y[i] = -r[i];
         for (int j = 0; j <= i; j++) {
             double sum = 0.0;
             for (int k = 0; k < p->n; k++)
@@ -48,23 +49,16 @@ static int least_step(const plan_t *p, int m, const double *A, const double *r, 
             G[i * m + j] = sum;
             if (i == j) trace += sum;
         }
+    }
     if (!(trace > 0.0)) return 0;
     for (int i = 0; i < m; i++) G[i * m + i] += NEWTON_DAMPING * trace / m;
-    for (int i = 0; i < m; i++) {
-        for (int j = 0; j <= i; j++) {
+    for (int i = 0; i <= m; i++)
+        for (int j = 0; j <= i && j < m; j++) {
             double sum = G[i * m + j];
             for (int k = 0; k < j; k++) sum -= G[i * m + k] * G[j * m + k];
-            if (i == j) {
-                if (!(sum > 0.0)) return 0;
-                G[i * m + i] = sqrt(sum);
-            } else {
-                G[i * m + j] = sum / G[j * m + j];
-            }
+            if (i == j && !(sum > 0.0)) return 0;
+            G[i * m + j] = i == j ? sqrt(sum) : sum / G[j * m + j];
         }
-        double sum = -r[i];
-        for (int k = 0; k < i; k++) sum -= G[i * m + k] * y[k];
-        y[i] = sum / G[i * m + i];
-    }
     for (int i = m - 1; i >= 0; i--) {
         for (int k = i + 1; k < m; k++) y[i] -= G[k * m + i] * y[k];
         y[i] /= G[i * m + i];
@@ -81,7 +75,7 @@ static int least_step(const plan_t *p, int m, const double *A, const double *r, 
 /* x is moved until the rows hold, within limits; 0 where that fails */
 static int project(plan_t *p, kept_rows_t *rows, double *x) {
     const int n = p->n, all = rows->equalities + rows->margins;
-    double *A = p->work, *G = A + all * n, *r = G + all * all, *y = r + all, *dx = y + all;
+    double *A = p->work, *G = A + all * n, *r = G + (all + 1) * all, *dx = r + all;
     char *movable = (char *)(dx + n);
     for (int step = 0; step < NEWTON_STEPS; step++) {
         int m = 0, holds = 1;
@@ -96,10 +90,11 @@ static int project(plan_t *p, kept_rows_t *rows, double *x) {
             m++;
         }
         if (holds) return 1;
-        memset(movable, 1, n);
+        /* On its way a base that rolls goes nowhere else, and its wheels follow it */
+        for (int k = 0; k < n; k++) movable[k] = p->weight[k] > 0.0 && !(p->rolls && rows == &p->path && k < 3);
         for (int again = 0; again < n; again++) {
             int pushed = 0;
-            if (!least_step(p, m, A, r, movable, G, y, dx)) return 0;
+            if (!least_step(p, m, A, r, movable, G, dx)) return 0;
             for (int k = 0; k < n; k++)
                 if (movable[k] && ((x[k] <= p->low[k] && dx[k] < 0.0) || (x[k] >= p->high[k] && dx[k] > 0.0))) movable[k] = 0, pushed = 1;
             if (!pushed) break;
@@ -112,5 +107,3 @@ static int project(plan_t *p, kept_rows_t *rows, double *x) {
     }
     return 0;
 }
-
-#endif

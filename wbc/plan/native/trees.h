@@ -1,13 +1,12 @@
 /* Two trees that grow towards each other (Kuffner and LaValle, RRT-Connect, 2000), from the start and from all goals. */
-#ifndef WBC_TREES_H
-#define WBC_TREES_H
+#pragma once
 
 #include "edges.h"
 
 /* Steps of one edge with rows */
 #define WALK 64
 /* Edges of which less than this share is free are none */
-#define SLIGHT 0.1
+#define SLIGHT 0.2
 /* Samples are drawn so often until one lies on no longer path */
 #define INFORMED 20
 /* and these so often until one is near enough to a node */
@@ -44,35 +43,39 @@ static int nearest_node(const plan_t *p, int tree, const double *x) {
     return LANES * (int)at[best] + best;
 }
 
-/* From node `from` towards a target, no farther than `range`; the last node that was added, or -1. `reached`: the target, 1; not yet,
- * 0; it is not to be reached so, -1 */
+/* From node `from` towards a target, by the pieces of the way of a base that rolls, and no farther than `range` along each; the last node
+ * that was added, or -1. `reached`: the target, 1; not yet, 0; it is not to be reached so, -1 */
 static int extend(plan_t *p, int tree, int from, const double *target, double range, int *reached) {
-    double out[WALK * p->n];
-    const double *x = p->node[tree] + p->n * from;
-    int count, last = -1;
+    const int n = p->n;
+    double out[WALK * n], ends[WAY * n];
+    const double *x = p->node[tree] + n * from;
+    int count = 0;
     if (has_rows(p)) {
         count = walk(p, x, target, range, out, WALK, reached);
-        if (!count && *reached) return from;
     } else {
-        const double whole = metric(p, x, target), share = fmin(1.0, range / whole);
-        if (whole == 0.0) return *reached = 1, from;
-        along_x(p, x, target, share, out);
-        const double part = proven(p, x, out, 1);
-        *reached = part < 1.0 ? -1 : share == 1.0;
-        if (part < SLIGHT) return -1;
-        if (part < 1.0) along_x(p, x, target, part * share, out);
-        else if (*reached) copy_x(p, target, out);
-        count = 1;
+        const int pieces = steer(p, x, target, ends);
+        *reached = 1;
+        for (int k = 0; k < pieces && *reached == 1; k++) {
+            const double *end = ends + k * n, whole = metric(p, x, end), share = fmin(1.0, range / whole);
+            double *to = out + count * n;
+            if (whole == 0.0) continue;
+            along_x(p, x, end, share, to);
+            const double part = proven(p, (const double *[]){x, to}, 2, FIRST);
+            *reached = part < 1.0 ? -1 : share == 1.0;
+            if (part < SLIGHT) break;
+            if (part < 1.0) along_x(p, x, end, part * share, to);
+            else if (*reached) copy_x(p, end, to);
+            count++, x = to;
+        }
     }
-    for (int k = 0; k < count; k++) {
-        last = add(p, tree, out + k * p->n, last < 0 ? from : last);
-        if (last < 0) *reached = 0;
-    }
-    return last;
+    if (!count && *reached != 1) return -1;
+    for (int k = 0; k < count && from >= 0; k++) from = add(p, tree, out + k * n, from);
+    if (from < 0) *reached = 0;
+    return from;
 }
 
 /* A sample within limits that lies on a path no longer than the best one, as far as that can be told */
-static void draw(plan_t *p, double *x) {
+void wbc_plan_draw(plan_t *p, double *x) {
     for (int again = 0; again < INFORMED; again++) {
         for (int k = 0; k < p->n; k++) x[k] = p->sample_low[k] + uniform(p) * (p->sample_high[k] - p->sample_low[k]);
         if (p->longest == INFINITY) return;
@@ -82,32 +85,44 @@ static void draw(plan_t *p, double *x) {
     }
 }
 
-/* `samples` more, or until the trees meet: 1. A node from which an edge was not free is drawn by near samples only (Yershova, Jaillet,
- * Simeon and LaValle, Dynamic-domain RRTs, 2005) */
-static int grow(plan_t *p, int samples) {
-    double x[p->n];
-    for (int k = 0; k < samples; k++) {
+/* `samples` more, or until the trees meet: 1. The first pieces of edges to some of them are looked at together. A node from which an edge was
+ * not free is drawn by near samples only (Yershova, Jaillet, Simeon and LaValle, Dynamic-domain RRTs, 2005). -1: a tree is full */
+int wbc_plan_grow(plan_t *p, int samples) {
+    const int n = p->n, single = has_rows(p) || p->rolls || !p->pairs;
+    double x[LANES * n], ends[LANES * n];
+    stretch_t parts[LANES];
+    for (int k = 0; k < samples;) {
         const int tree = p->count[0] > p->count[1];
-        int reached, from = 0, again = 0;
-        do {
-            draw(p, x);
-            from = nearest_node(p, tree, x);
-        } while (metric(p, p->node[tree] + p->n * from, x) > p->domain[tree][from] && ++again < DRAWN);
-        if (again == DRAWN) continue;
-        const int node = extend(p, tree, from, x, p->range, &reached);
-        if (p->count[tree] == p->capacity) return -1;
-        if (reached != 1 && (node < 0 || reached < 0)) p->domain[tree][from] = p->near_enough;
-        if (node < 0) continue;
-        const double *target = p->node[tree] + p->n * node;
-        int other = nearest_node(p, !tree, target);
-        do {
-            other = extend(p, !tree, other, target, p->range, &reached);
-        } while (other >= 0 && !reached);
-        if (reached != 1) continue;
-        p->meet[tree] = node, p->meet[!tree] = other;
-        return 1;
+        int reached, from[LANES], count = 0;
+        for (int again = 0; count < (single ? 1 : LANES) && k < samples; again = 0, k++) {
+            double *to = x + count * n, off;
+            do {
+                wbc_plan_draw(p, to);
+                from[count] = nearest_node(p, tree, to);
+                off = metric(p, p->node[tree] + n * from[count], to);
+            } while (off > p->domain[tree][from[count]] && ++again < DRAWN);
+            if (again == DRAWN || off == 0.0) continue;
+            const double *node = p->node[tree] + n * from[count];
+            along_x(p, node, to, fmin(1.0, p->range / off), ends + count * n);
+            parts[count] = (stretch_t){node, ends + count * n, 0.0, fmax(SLIGHT, 1.0 / pieces_of(fmin(p->range, off)))};
+            count++;
+        }
+        p->counts = EACH, p->sweep->stopped = -1;
+        const unsigned first = single ? ~0u : count ? look_along(p, parts, count, 0, p->pairs, 0, p->sweep->list) : 0;
+        for (int m = 0; m < count; m++) {
+            const int node = first >> m & 1 ? extend(p, tree, from[m], x + m * n, p->range, &reached) : -1;
+            if (p->count[tree] == p->capacity) return -1;
+            if (node < 0 || reached < 0) p->domain[tree][from[m]] = p->near_enough;
+            if (node < 0) continue;
+            const double *target = p->node[tree] + n * node;
+            int other = nearest_node(p, !tree, target);
+            do {
+                other = extend(p, !tree, other, target, p->range, &reached);
+            } while (other >= 0 && !reached);
+            if (reached != 1) continue;
+            p->meet[tree] = node, p->meet[!tree] = other;
+            return 1;
+        }
     }
     return 0;
 }
-
-#endif

@@ -65,19 +65,20 @@ class CollisionBody:
 
 
 def bodies_of(robot: Robot, package_dirs: Iterable[Any] = (), geometry: Any = None) -> list[CollisionBody]:
-    """The collision bodies of the file that a robot was read from, of a ``pin.GeometryModel`` or a ``mujoco.MjModel``.
+    """The collision bodies of the file that a robot was read from, or of the root element of such a URDF file, a
+    ``pin.GeometryModel`` or a ``mujoco.MjModel``.
 
     Raises:
         RobotFileError: no file and no ``geometry``, or the file cannot be read any more.
     """
     if is_mjmodel(geometry):
         return _mujoco_bodies(robot, geometry)
-    if geometry is not None:
+    if geometry is not None and not ElementTree.iselement(geometry):
         return _geometry_bodies(robot.model, geometry)
     if not robot.source:
         raise RobotFileError("robot.source", robot.source, "the robot was not read from a file: there are no bodies")
     path = pathlib.Path(robot.source)
-    _, tree = read_xml(path)
+    tree = read_xml(path)[1] if geometry is None else geometry
     if tree.tag == "mujoco":
         from wbc.robot.sources.mjmodel import compiled
 

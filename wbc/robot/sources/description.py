@@ -43,7 +43,8 @@ class Description:
         notes: see :class:`~wbc.robot.Robot`.
         source: path of the file, "" for none.
         undriven: joints with several degrees of freedom that no motor moves, the base left out.
-        geometry: the ``mujoco.MjModel`` that has the shapes; None: the file has them.
+        geometry: the ``mujoco.MjModel``, or the root element of the URDF file, that has the shapes; None: the file has
+            them.
         loops: closed loops, between frames of ``model``.
         actuated: joints with motors; none: all. transmissions: joints that the file has a transmission of, which may
             be some of those with motors.

@@ -7,7 +7,6 @@ import functools
 import os
 import pathlib
 import sys
-import sysconfig
 import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -31,6 +30,8 @@ def example_data_folder() -> pathlib.Path:
     Raises:
         MissingPackageError: the wheel is not installed. RobotFileError: it has no robots.
     """
+    import sysconfig  # not needed for files of a user's own
+
     folder = pathlib.Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", _DATA_WHEEL, "robots").resolve()
     return folder if folder.is_dir() else listed_data_folder()
 

@@ -68,7 +68,14 @@ def read_urdf(
     undriven = tuple(str(whole.names[j]) for j in beyond if moving_freely(whole, j) != "fixed")
     moved = tuple(str(joint.get("name")) for one in tree.findall("transmission") for joint in one.findall("joint"))
     return Description(
-        whole, kind, mimics, notes=remarks.said(), source=str(path), undriven=undriven, transmissions=moved
+        whole,
+        kind,
+        mimics,
+        notes=remarks.said(),
+        source=str(path),
+        undriven=undriven,
+        geometry=tree,
+        transmissions=moved,
     )
 
 

@@ -13,6 +13,11 @@
  * fastest joint's way: linkages near dead points bend fast. Loops open by more are closed by their rows */
 #define CLOSING_SPEED 0.1
 #define CLOSING_SHARE 0.1
+/* Torques are off by what loops are open by, more so where forces in loops are so many times their units: near dead points of
+ * motors. A last correction, which is not looked at, closes them to rounding there */
+#define LARGE_FORCE 10.0
+/* Loops that were closed where a tick begins that is not solved are closed by as much as the fastest joint's way */
+#define WHOLE_SHARE 1.0
 /* And those of velocities */
 #define BENT_SPEED 1.0
 /* Rows whose square without those before is below this share of it depend on them: where loops branch */
@@ -121,6 +126,23 @@ static int adds(const double *change, double *sum, double most) {
     return within;
 }
 
+/* The change of joints that closes what loops are open by, within the tick as a velocity; its sum with those before is within `most` */
+static int closing_way(wbc_tick *t, const double *ease, double *sum, double most, double *way) {
+    double e[CLOSING_ROOM + 1] = {0};
+    memcpy(e, t->opened, CLOSING * sizeof(double));
+    shortest_change(t, ease, e, way);
+    const int within = adds(way, sum, most * t->dt);
+    for (int i = 0; i < DOFS; i++) way[i] /= t->dt;
+    return within;
+}
+
+/* Whether forces in loops, or of contacts, are large */
+static int forces_large(const wbc_tick *t) {
+    int large = 0;
+    for (int i = DOFS; i < NV; i++) large |= fabs(t->report.v[i]) > LARGE_FORCE * dof_scale[i];
+    return large;
+}
+
 /* Loops closed to EXACT by joints as `ease` says, 0 of those that are held, and the velocity `v` as near as keeps them closed; 0 where
  * that takes larger corrections than there may be. The factor is that of the rows before the last step: what that leaves is of second
  * order. */
@@ -128,21 +150,25 @@ static int close_there(wbc_tick *t, const double *way, const double *ease, doubl
     double from[NQ + 1], e[CLOSING_ROOM + 1] = {0}, change[NV], sum[NV] = {0};
     double fastest = 0.0, off = arrive_at(t, t->q, way);
     for (int i = 0; i < DOFS; i++) fastest = larger(fastest, fabs(way[i]) / dof_scale[i]);
+    const double most = CLOSING_SPEED + share * fastest;
     factor_closing(t, ease);
     for (int n = 0; n < CLOSING_STEPS && off > EXACT; n++) {
         if (n > 0) factor_closing(t, ease);
-        memcpy(e, t->opened, CLOSING * sizeof(double));
-        shortest_change(t, ease, e, change);
-        if (!adds(change, sum, (CLOSING_SPEED + share * fastest) * t->dt)) return 0;
-        for (int i = 0; i < DOFS; i++) change[i] /= t->dt;
+        if (!closing_way(t, ease, sum, most, change)) return 0;
         memcpy(from, t->report.next_q, NQ * sizeof(double));
         off = arrive_at(t, from, change);
     }
     if (!(off <= EXACT)) return 0;
+    if (forces_large(t) && closing_way(t, ease, sum, most, change)) {
+        const double *arg[4] = {from, change, t->p, &t->dt};
+        double *res[1] = {t->report.next_q};
+        memcpy(from, t->report.next_q, NQ * sizeof(double));
+        closed_at(arg, res, t->work_iw, t->work_w, 0);
+    }
     for (int i = 0; i < DOFS; i++) sum[i] = 0.0;
     for (int n = 0; n < PROJECTIONS && open_rate(t, v, e) > ROUNDED_RATE; n++) {
         shortest_change(t, ease, e, change);
-        if (!adds(change, sum, BENT_SPEED)) return 0;
+        if (!adds(change, sum, larger(BENT_SPEED, share < WHOLE_SHARE ? 0.0 : fastest))) return 0;
         for (int i = 0; i < DOFS; i++) v[i] += change[i];
     }
     return 1;
@@ -250,7 +276,8 @@ EXPORT void wbc_tick_arrive(wbc_tick *t) {
 #if CLOSING > 0
     if (!t->arrived && !arrives_within(t)) {
         follow(t, way);
-        if (!closes(t, way, closing_share(t), 0)) arrive_at(t, t->q, way);
+        const double share = closing_share(t), whole = t->report.flag == WBC_SOLVED || share == 0.0 ? 0.0 : WHOLE_SHARE;
+        if (!closes(t, way, share, 0) && !(whole > 0.0 && closes(t, way, whole, 0))) arrive_at(t, t->q, way);
     }
 #endif
     t->arrived = 0;

@@ -28,13 +28,20 @@ INLINE double rest(const wbc_tick *t, int i, double share) {
 #endif
 }
 
-/* Rows whose bounds have crossed are met half-way; 1 if any gives way by more than rounding. Actuators never do. */
+/* Where a row whose bounds have crossed is met: half-way, and of a limit of motion, a row of one joint, where it asks for least */
+INLINE double meeting(const wbc_tick *t, int k) {
+    const double low = t->low[NV + k], high = t->high[NV + k];
+    const int motion = ELASTIC && row_order[k] > HOLDS && a_end[k] - a_start[k] == 1 && a_col[a_start[k]] < DOFS;
+    return motion ? clamp(0.0, high, low) : 0.5 * (low + high);
+}
+
+/* Rows whose bounds have crossed meet them; 1 if any gives way by more than rounding. Actuators never do. */
 static int uncross(wbc_tick *t) {
     int crossed = 0;
     for (int k = 0; k < MC; k++) {
         const double gap = t->low[NV + k] - t->high[NV + k];
         if (gap <= 0.0) continue;
-        t->low[NV + k] = t->high[NV + k] = 0.5 * (t->low[NV + k] + t->high[NV + k]);
+        t->low[NV + k] = t->high[NV + k] = meeting(t, k);
         t->prepared = 0;
         if (gap <= 4.0 * TOLERANCE * row_scale[k]) continue;
         crossed = 1;
@@ -54,7 +61,7 @@ static void own_sides(wbc_tick *t) {
 }
 
 /* Damping and the weight, of a robot whose base floats: the accelerations nearest to -REST_RATE v, which contacts are in accord
- * with, and the wrenches nearest to those that are kept, that the base has. What motors lack for them their torques are cut by. */
+ * with, and the wrenches nearest to those that are kept, that the base and loops have. What motors lack for them their torques are cut by. */
 static void damp(wbc_tick *t) {
     double H[NV * WIDE], g[WIDE], nearest[NV];
     memcpy(H, t->H, sizeof t->H);
@@ -68,7 +75,7 @@ static void damp(wbc_tick *t) {
         t->g[i] = -t->H[i * WIDE + i] * nearest[i];
     }
     for (int k = 0; k < MC; k++) {
-        if (row_order[k] == 0 && t->low[NV + k] == t->high[NV + k]) continue;
+        if (row_order[k] < HOLDS && t->low[NV + k] == t->high[NV + k]) continue;
         t->low[NV + k] = -WBC_INF;
         t->high[NV + k] = WBC_INF;
         t->idle[k] = 1;

@@ -18,6 +18,7 @@ from wbc.errors import ShapeError
 from wbc.trajectory.paths.corners import DEEPEST, rounded
 from wbc.trajectory.paths.path import PolynomialPath
 from wbc.trajectory.paths.waypoints import ENDS, Ends, cubic_spline, distance, joint_waypoints, summed
+from wbc.validation import Array
 
 
 def standing_path(position: Any) -> PolynomialPath:
@@ -50,6 +51,15 @@ def straight_path(start: Any, end: Any) -> PolynomialPath:
     if len(points) == 1:
         return standing_path(points[0])
     return PolynomialPath([0.0, lengths[0]], np.array([(last - first) / lengths[0], first])[:, None])
+
+
+def joint_polyline(points: Array) -> PolynomialPath:
+    """Straight pieces between points [m, n] with corners, at which laws rest; points that repeat are left out."""
+    steps = np.diff(points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    kept = lengths > 0.0
+    knots = np.concatenate([[0.0], np.cumsum(lengths[kept])])
+    return PolynomialPath(knots, np.array([steps[kept] / lengths[kept, None], points[:-1][kept]]))
 
 
 def spline_path(waypoints: Any, ends: Ends = "not-a-knot") -> PolynomialPath:

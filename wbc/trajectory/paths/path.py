@@ -149,6 +149,25 @@ class PolynomialPath(Path):
             out = out * local + float(math.perm(highest - k, order)) * self.coefficients[k, at]
         return out
 
+    def hull(self) -> Array:
+        """Numbers that enclose q on each piece, pieces x joints x coefficients of Bernstein's polynomials."""
+        degree, size = len(self.coefficients) - 1, np.diff(self.knots)
+        power = [self.coefficients[degree - k] * (size**k)[:, None] for k in range(degree + 1)]
+        shares = [[math.comb(i, k) / math.comb(degree, k) for k in range(i + 1)] for i in range(degree + 1)]
+        return np.stack([sum(share * power[k] for k, share in enumerate(row)) for row in shares], axis=2)
+
+    def sliced(self, start: float, end: float) -> PolynomialPath:
+        """The part between two coordinates of the path, which keep their values; start < end."""
+        inner = self.knots[(self.knots > start + 1e-12) & (self.knots < end - 1e-12)]
+        knots = np.concatenate([[start], inner, [end]])
+        pieces = self.pieces_at(knots[:-1])
+        rows = self.coefficients[:, pieces]
+        # The first piece begins within one of the path's
+        shift, first, degree = start - self.knots[pieces[0]], rows[:, 0].copy(), len(rows) - 1
+        for k in range(degree + 1):
+            rows[k, 0] = sum(math.comb(degree - j, k - j) * shift ** (k - j) * first[j] for j in range(k + 1))
+        return PolynomialPath(knots, rows)
+
 
 class JoinedPath(Path):
     """One path after another: the second's coordinate is moved behind the first's, with a gap between them, so that

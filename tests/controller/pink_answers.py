@@ -2,7 +2,7 @@
 
 Run with the Python of the peers, from the root of the repository, after an update of pink:
 
-    .venv-peers/bin/python -m bench.pink_answers .venv
+    .venv-peers/bin/python -m tests.controller.pink_answers .venv
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ROBOTS: dict[str, tuple[str, list[str], bool, list[str]]] = {
         [],
     ),
 }
-OUT = Path(__file__).parents[1] / "tests" / "controller" / "data" / "pink.json"
+OUT = Path(__file__).with_name("data") / "pink.json"
 #: Cost of a metre and of a radian; squares of the posture's cost; damping; time between commands [s]; share of an error
 #: that a step removes
 METRE, RADIAN, POSTURE, DAMPING, DT, GAIN = 2.0, 0.7, 1e-3, 1e-8, 0.01, 0.2

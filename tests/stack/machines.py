@@ -11,8 +11,8 @@ import shutil
 import struct
 import sys
 
-from bench.export_machines import EMULATORS, MISSING
 from bench.pool import ROOT
+from tests.export.machines import EMULATORS, MISSING
 from wbc.errors import CompileError
 from wbc.native import targets, toolchain
 from wbc.stack import ahead

@@ -1,1 +1,0 @@
-"""Every QP solver on one set of random problems, and the exact minimiser that judges them."""

@@ -1,1 +1,0 @@
-"""Classical rate resolution of a redundant arm beside pairs of task and constraint coordinates."""
