@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from tests.chromium import Chromium, Page
+from tests.processes import descendants, left
 from tests.viewer import arms
 from wbc.controller.step import state_of
 from wbc.viewer import Viewer, show
@@ -52,16 +53,15 @@ class Loop(threading.Thread):
 
 @pytest.fixture
 def loop() -> Iterator[Loop]:
+    before = descendants()
     running = Loop()
     running.start()
     yield running
     running.over.set()
     running.join()
     running.viewer.close()
-    # A way round that was begun is compiled to its end, which may take longer than all that is looked at here
-    for thread in threading.enumerate():
-        if thread.name == "way round":
-            thread.join()
+    # What a way round in the viewer's process has begun to compile ends by itself, some seconds later than that
+    left(before, 60.0)
 
 
 @functools.cache
