@@ -138,8 +138,9 @@ class PathFollower:
         """The beginning of what is left of the path; None where nothing is."""
         path = self.law.path
         assert isinstance(path, PolynomialPath)
-        here, end = self._timing(0), float(path.knots[-1])
-        until = here + share * (end - here)
+        first, end = float(path.knots[0]), float(path.knots[-1])
+        here = max(self._timing(0), first)
+        until = min(here + share * (end - here), end)
         if until - here < 1e-9:
             return None
         return path.sliced(here, until)

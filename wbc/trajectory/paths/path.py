@@ -157,7 +157,13 @@ class PolynomialPath(Path):
         return np.stack([sum(share * power[k] for k, share in enumerate(row)) for row in shares], axis=2)
 
     def sliced(self, start: float, end: float) -> PolynomialPath:
-        """The part between two coordinates of the path, which keep their values; start < end."""
+        """The part between two coordinates of the path, which keep their values.
+
+        Raises:
+            RangeError: they are not on the path, or the end is not behind the start.
+        """
+        start = validation.scalar("start", start, low=float(self.knots[0]), high=float(self.knots[-1]))
+        end = validation.scalar("end", end, low=start, open_low=True, high=float(self.knots[-1]))
         inner = self.knots[(self.knots > start + 1e-12) & (self.knots < end - 1e-12)]
         knots = np.concatenate([[start], inner, [end]])
         pieces = self.pieces_at(knots[:-1])
