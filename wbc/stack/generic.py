@@ -55,10 +55,9 @@ REAL_TABLES = (
     "task_scale", "row_reach", "segment_half",
 )  # fmt: skip
 #: CasADi functions; what C gives them elsewhere than where they read it, and how much of it
-FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost", "arrival", "closed_at")
+FUNCTIONS = ("rows", "ahead", "curvature", "torque", "lost", "arrival")
 COPIED = {"ahead": [(1, "mean", "DOFS")], "curvature": [(4, "force", "(MT + MC)")], "lost": [(1, "moved", "DOFS")]}
 COPIED["arrival"] = [(0, "start", "NQ"), (1, "way", "DOFS")]
-COPIED["closed_at"] = [(0, "nearly", "NQ"), (1, "closing", "DOFS")]
 #: Arrays that only C knows and the functions write
 WRITTEN = (
     "jt",

@@ -95,13 +95,12 @@ class TickProgram:
     sensed: Sensed = field(default_factory=Sensed)
     lost: ca.Function | None = None
     arrival: ca.Function | None = None
-    closed_at: ca.Function | None = None
 
     @property
     def functions(self) -> dict[str, ca.Function]:
         """Those that exist, by name."""
         every = {"rows": self.rows, "ahead": self.ahead, "curvature": self.curvature, "torque": self.torque}
-        every |= {"lost": self.lost, "arrival": self.arrival, "closed_at": self.closed_at}
+        every |= {"lost": self.lost, "arrival": self.arrival}
         return {name: function for name, function in every.items() if function is not None}
 
 
@@ -118,7 +117,7 @@ def left_to_loops(stack: Declaration, layout: Layout) -> tuple[Balls, Sensed]:
 def loaded(stack: Declaration, layout: Layout, functions: Mapping[str, ca.Function]) -> TickProgram:
     """The program of a stack whose functions were built before."""
     balls, sensed = left_to_loops(stack, layout)
-    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost", "arrival", "closed_at")}
+    others = {name: functions.get(name) for name in ("ahead", "curvature", "torque", "lost", "arrival")}
     return TickProgram(functions["rows"], **others, balls=balls, sensed=sensed)
 
 
@@ -455,11 +454,10 @@ def build(stack: Declaration, layout: Layout) -> TickProgram:
         torque = checked_function("torque", [*inputs, b.second.x, enabled], found, ["torque"])
     bent = ca.vertcat(ca.SX(0, 1), *[b.lost(block) for block in layout.of_form("margins", "rows")])
     lost = checked_function("lost", inputs, [ca.densify(bent)], ["lost"]) if bent.nnz() else None
-    arrival = closed_at = None
+    arrival = None
     if b.second is not None and stack.robot.loops:
         arrival = checked_function("arrival", inputs, b.arrival(), ["next_q", "opened", "closing_columns"])
-        closed_at = checked_function("closed_at", inputs, [ca.densify(b.later)], ["next_q"])
-    return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival, closed_at)
+    return TickProgram(rows, ahead, second, torque, balls, sensed, lost, arrival)
 
 
 def shared_pattern(transposed: ca.SX) -> ca.SX:

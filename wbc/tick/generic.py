@@ -152,8 +152,6 @@ class GenericTick(CompiledTick):
             ("moved", layout.nv),
             ("start", layout.nq),
             ("way", layout.nv),
-            ("nearly", layout.nq),
-            ("closing", layout.nv),
             ("force", layout.task_rows + layout.general_rows),
         )
         copies = {name: np.zeros(max(1, count)) for name, count in sizes_of_copies}
@@ -178,7 +176,6 @@ class GenericTick(CompiledTick):
             written = [field("next_q"), self._written("opened", program.arrival.nnz_out(1))]
             written.append(self._written("closing_columns", program.arrival.nnz_out(2)))
             calls["arrival"] = program.arrival, [copies["start"], copies["way"], p, dt], written
-            calls["closed_at"] = program.closed_at, [copies["nearly"], copies["closing"], p, dt], [field("next_q")]
         if program.torque is not None:
             calls["torque"] = program.torque, [*state, field("v"), field("enabled")], [field("torque")]
         self._bound: list[Any] = [copies]

@@ -160,10 +160,8 @@ static int close_there(wbc_tick *t, const double *way, const double *ease, doubl
     }
     if (!(off <= EXACT)) return 0;
     if (forces_large(t) && closing_way(t, ease, sum, most, change)) {
-        const double *arg[4] = {from, change, t->p, &t->dt};
-        double *res[1] = {t->report.next_q};
         memcpy(from, t->report.next_q, NQ * sizeof(double));
-        closed_at(arg, res, t->work_iw, t->work_w, 0);
+        arrive_at(t, from, change);
     }
     for (int i = 0; i < DOFS; i++) sum[i] = 0.0;
     for (int n = 0; n < PROJECTIONS && open_rate(t, v, e) > ROUNDED_RATE; n++) {

@@ -20,7 +20,6 @@ int ahead(const double **arg, double **res, long long *iw, double *w, int mem);
 int curvature(const double **arg, double **res, long long *iw, double *w, int mem);
 int lost(const double **arg, double **res, long long *iw, double *w, int mem);
 int torque(const double **arg, double **res, long long *iw, double *w, int mem);
-int closed_at(const double **arg, double **res, long long *iw, double *w, int mem);
 int arrival(const double **arg, double **res, long long *iw, double *w, int mem);
 
 /* What is commanded */
