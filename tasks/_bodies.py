@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
 from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError, nearest
 from wbc.proximity import MAX_PAIRS, Body
+from wbc.robot import Robot
 from wbc.shapes import Geometry, PlacedShape
 from wbc.shapes.solid import why_apart
-from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.tasks.base import Row, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Link, number of the shape within the link, shape
 LinkShape = tuple[str, int, PlacedShape]
-
-
-def joint_of(robot: Robot, link: str) -> int:
-    """Number of the joint that carries a frame; 0 for the world."""
-    return 0 if link == WORLD else int(robot.tree.frames[frame_index(robot.tree, link)].parentJoint)
 
 
 def shapes_of(robot: Robot, links: Iterable[str]) -> tuple[LinkShape, ...]:

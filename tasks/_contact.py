@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -13,13 +13,11 @@ from wbc import validation
 from wbc.errors import RangeError
 from wbc.multibody import algebra
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Task, Torques, Values
 from wbc.tasks.frames import frame_pose
 from wbc.tasks.hold import Hold
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Components of a wrench, of a force its first three
 WRENCH_LABELS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -84,7 +82,6 @@ class Contact(Constraint):
         )
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The frame's pose at ``q``."""
         return {"target": frame_pose(robot, self.frame, q)}
 
     @property
@@ -92,7 +89,6 @@ class Contact(Constraint):
         return Hold(self.frame, kind="pose" if self.components == 6 else "position")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """Those of the motion."""
         return self._hold.rows(robot)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
@@ -100,7 +96,6 @@ class Contact(Constraint):
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """That of the motion."""
         return self._hold.residual(robot, kin, inputs)
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX | None:
@@ -169,7 +164,6 @@ class ContactWrench(Constraint):
     floating: bool = False
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """Those of the contact's cone."""
         return self.contact.cone_rows(robot)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
@@ -210,7 +204,6 @@ class ContactForce(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """The components of the wrench."""
         sizes = force_sizes(robot)
         return tuple(Row(WRENCH_LABELS[k], WRENCH_UNITS[k], float(sizes[k])) for k in self.contact.axes)
 
@@ -252,7 +245,6 @@ class Unactuated(Constraint):
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
-        """None."""
         zero = ca.SX.zeros(len(robot.unactuated))
         return Torques(robot.unactuated, zero, zero)
 

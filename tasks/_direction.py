@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Command, Constraint, Row, Rows, Task, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Price of a task's direction against the task's own weight: what is off the line is this many times as expensive as
 #: what is missing along it

@@ -19,8 +19,12 @@ if TYPE_CHECKING:
     from wbc.robot.loops import Linkage
     from wbc.validation import Array
 
-#: Part of what joints can accelerate by that the bend of a linkage may take; the rest brakes it
+#: Part of what joints can accelerate by that the bend of a linkage may take
 SHARE = 0.5
+#: The rest brakes it
+BRAKE = 1.0 - SHARE
+#: What it counts on before limits of position: bends grow on the way
+STOP = 0.5 * BRAKE
 #: Joints without a limit of acceleration have so many times the largest of the others
 UNLIMITED = 1e3
 #: Below this singular value, as part of the root mean square of all, rows of a linkage count as dependent
@@ -31,6 +35,8 @@ LEAST = 1e-12
 TICKS = 3.0
 #: A linkage whose bend takes less than this part of the limits is not slowed: the bend hardly depends on its speed
 SLIGHT = 1e-3
+#: Nor one whose bend takes so many times the limits: its loops branch
+STEEP = 10.0
 #: Most of :attr:`Bend.missed` where a linkage is slowed
 MISSED = 1e-8
 #: A linkage is at rest below this part of the speed that its joints reach in a tick
@@ -39,18 +45,32 @@ AT_REST = 1e-3
 
 @dataclass(frozen=True)
 class LinkageSpeed(Constraint):
-    """Speeds from which the joints of a linkage can follow it, one row a linkage; made by the stack where its joints
-    have limits A of acceleration.
+    """Velocities from which a linkage can stop on its way within the limits of its joints, a row a linkage and one a
+    joint of it with limits of position; made by the stack where they have limits A of acceleration.
 
-        v0' (v - v0 - c dt) / A^2 <= s (s_max - s),    s = |v0 / A|,    r = d log|y| / dt / 2
+        s' (v - v0 - c dt) <= s_max - s,    s = |v0 / A|_4,    s' = ds/dv,    r = d log|y| / dt / 2
 
-        s_max = min(s sqrt(SHARE / |c / A|), w) >= s - (1 - SHARE) dt,    TICKS w dt + w^2 / (2 (1 - SHARE)) = s / r
+        s_max = min(s sqrt(SHARE / |c / A|_4), w) >= s - D dt,    TICKS w dt + w^2 / (2 D) = s / r
 
-    The norm |x / A| is over the joints that move the loops. At v0 these ask for accelerations, of which c = -A^2 J'y
-    are the least: (J A^2 J') y = (dJ/dt) v0. At the first of both speeds the bend takes SHARE of the limits. At w the
-    linkage can brake by the rest, TICKS later, until y is infinite, if it grows on as the inverse square of what is
-    left of the way: before a dead point, whose weak rows count in y before they do in c. The row asks for less speed
-    and not for another direction, in which the linkage would bend less here and come as near to its dead point.
+        q_l <= q + v (dt + t) + c t^2 / 2 <= q_u,    t = s / (2 E),    E = D / 2,    D = 1 - SHARE
+
+    |x|_4 = (sum x_i^4)^(1/4) over the joints that move the loops. At v0 these ask for accelerations, of which
+    c = -A^2 J'y are the least: (J A^2 J') y = (dJ/dt) v0. At the first of both speeds the bend takes SHARE of the
+    limits. At w the linkage can brake by the rest, TICKS later, until y is infinite, if it grows on as the inverse
+    square of what is left of the way: before a dead point, whose weak rows count in y before they do in c. The row asks
+    for less speed and not for another direction, in which the linkage would bend less here and come as near to its
+    dead point.
+
+    The last line says that it stops within the limits of position. Its way x has dx/dl = v / s and d2x/dl2 = c / s^2 by
+    the length l, of which braking by E A takes s t. A tick of it leads to v0 (1 - E dt / s) + c dt, and as
+
+        (s - E dt) dt + (s - E dt)^2 / (2 E) = (s^2 - E^2 dt^2) / (2 E) < s t,
+
+    the linkage stops no further on than it would have: what is within these rows stays so by braking, whatever the
+    lengths of ticks, with accelerations of |c / A| + E < 1 at most. Joints that each brake in time on their own do not
+    say so, as a slow one takes along others that cannot stop as soon. E leaves as much for bends that grow on the way.
+    The row of a joint is the line with s and c t^2 to first order about v0, over dt + t; no row asks for more than
+    braking by D does, or by what of it bends leave within A.
 
     Attributes:
         limits: whose limits they are.
@@ -64,35 +84,64 @@ class LinkageSpeed(Constraint):
     limits: JointLimits
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One a linkage, named by its loops."""
-        return tuple(Row(linkage.name, "rad/s") for linkage in self._limited(robot))
+        """One a linkage, named by its loops, then those of its joints with limits of position."""
+        out = list[Row]()
+        for linkage in self._limited(robot):
+            out.append(Row(linkage.name, "rad/s"))
+            out += [Row(robot.dof_names[dof], f"{robot.dof_units[dof]}/s") for dof in self._ended(robot, linkage)]
+        return tuple(out)
 
     def _limited(self, robot: Robot) -> list[Linkage]:
         limits = self.limits.limits(robot).acceleration
         return [linkage for linkage in robot.loops.linkages if np.isfinite(limits[list(linkage.dofs)]).any()]
 
+    def _ended(self, robot: Robot, linkage: Linkage) -> list[int]:
+        """Degrees of freedom of a linkage that have limits of position."""
+        limits = self.limits.limits(robot)
+        ends = np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper)
+        return [dof for dof in linkage.dofs if ends[dof] and robot.position_index[dof] >= 0]
+
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        linkages, kept = self._limited(robot), self.limits.limits(robot).acceleration
-        matrix, most = ca.SX(len(linkages), robot.nv), ca.SX.zeros(len(linkages))
-        for k, linkage in enumerate(linkages):
-            dofs, limits = list(linkage.dofs), kept[list(linkage.dofs)]
-            limits = np.where(np.isfinite(limits), limits, UNLIMITED * limits[np.isfinite(limits)].max())
-            weights, bend = ca.DM(limits), bend_of(robot, kin, linkage, limits)
-            speed = ca.sqrt(ca.sumsqr(kin.v[dofs] / weights) + (AT_REST * dt) ** 2)
-            size = ca.sumsqr(bend.asked / weights) + LEAST
-            # 1 over what is left of the way, and s / s_max
-            near, ticks = ca.fmax(bend.rate, 0.0) / speed, TICKS * dt
-            slow = 0.5 * (ticks * near + ca.sqrt((ticks * near) ** 2 + 2.0 / (1.0 - SHARE) * near))
-            slow = ca.fmax(ca.sqrt(ca.sqrt(size) / SHARE), speed * slow)
-            left = ca.fmax(1.0 / slow, 1.0 - (1.0 - SHARE) * dt / speed)
-            along, unit = kin.v[dofs] / weights / speed, float(limits.min())
-            matrix[k, dofs] = unit * (along / weights).T
-            side = unit * (ca.dot(along, (kin.v[dofs] + dt * bend.asked) / weights) + speed * (left - 1.0))
-            # Where loops branch their rows depend on each other, and no accelerations are what they ask for
-            bends = ca.logic_and(size > SLIGHT**2, ca.fmax(size, bend.missed / MISSED) <= 1.0)
-            most[k] = ca.if_else(bends, side, ca.inf)
-        return Rows(matrix, -ca.inf * ca.SX.ones(len(linkages)), most)
+        parts = [self._rows_of(robot, kin, linkage, dt) for linkage in self._limited(robot)]
+        matrix, lower, upper = (ca.vertcat(*ends) for ends in zip(*parts, strict=True))
+        return Rows(matrix, lower, upper)
+
+    def _rows_of(self, robot: Robot, kin: Tracer, linkage: Linkage, dt: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Rows of a linkage, their lower and upper sides."""
+        dofs, ended, kept = list(linkage.dofs), self._ended(robot, linkage), self.limits.limits(robot)
+        known = kept.acceleration[dofs]
+        limits = np.where(np.isfinite(known), known, UNLIMITED * known[np.isfinite(known)].max())
+        weights, unit, bend = ca.DM(limits), float(limits.min()), bend_of(robot, kin, linkage, limits)
+        v, rest, size = kin.v[dofs] / weights, AT_REST * dt, _norm(bend.asked / weights, LEAST)
+        # Where loops branch their rows depend on each other, and no accelerations are what they ask for
+        regular = ca.fmax(size / STEEP, bend.missed / MISSED) <= 1.0
+        speed, asked = _norm(v, rest), ca.if_else(regular, bend.asked, 0.0)
+        along = (v / speed) ** 3 / weights
+        # Joints that bend against their velocity have less left to brake by
+        braking = ca.mmin((1.0 + asked / weights * ca.sign(v)) / (ca.fabs(v) / speed + LEAST))
+        braking = ca.fmin(ca.fmax(braking, 0.0), BRAKE) * dt
+        # 1 over what is left of the way, and s / s_max
+        near, ticks = ca.fmax(bend.rate, 0.0) / speed, TICKS * dt
+        slow = 0.5 * (ticks * near + ca.sqrt((ticks * near) ** 2 + 2.0 / BRAKE * near))
+        slow = ca.fmax(ca.sqrt(size / SHARE), speed * slow)
+        most = ca.dot(along, dt * asked) + ca.fmax(speed / slow, speed - braking) - (rest / speed) ** 3 * rest
+        matrix = ca.SX(1 + len(ended), robot.nv)
+        matrix[0, dofs] = unit * along.T
+        lower, upper = [-ca.SX.inf(1)], [ca.if_else(ca.logic_and(size > SLIGHT, regular), unit * most, ca.inf)]
+        stops, braked = 0.5 / STOP * speed, (1.0 - braking / ca.fmax(speed, braking)) * kin.v[dofs] + dt * asked
+        for k, dof in enumerate(ended, 1):
+            place = dofs.index(dof)
+            curved = 0.5 * asked[place] * stops**2
+            row = (0.5 / STOP * kin.v[dof] + 4.0 * curved / speed) * along
+            ahead = ca.dot(row, kin.v[dofs]) - curved - kin.q[int(robot.position_index[dof])]
+            row[place] += dt + stops
+            row, ahead = row / (dt + stops), ahead / (dt + stops)
+            least = ca.dot(row, braked)
+            matrix[k, dofs] = row.T
+            lower.append(ca.fmin(ahead + float(kept.position_lower[dof]) / (dt + stops), least))
+            upper.append(ca.fmax(ahead + float(kept.position_upper[dof]) / (dt + stops), least))
+        return matrix, ca.vertcat(*lower), ca.vertcat(*upper)
 
 
 @dataclass(frozen=True)
@@ -138,6 +187,11 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
     rate = 0.5 * growth / (ca.sumsqr(forces) + LEAST / ca.trace(seen @ seen.T))
     missed = ca.sumsqr(jacobian @ asked + bias) / (ca.sumsqr(bias) + LEAST**2)
     return Bend(asked, rate, missed)
+
+
+def _norm(x: ca.SX, least: ca.SX | float) -> ca.SX:
+    """(sum x_i^4 + least^4)^(1/4)."""
+    return ca.sqrt(ca.sqrt(ca.sumsqr(x**2) + least**4))
 
 
 def _bracket(q: ca.SX, tangent: ca.SX, v: ca.SX, c: ca.SX) -> ca.SX:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Command, Constraint, Row, Rows, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -28,11 +26,9 @@ class Load(Constraint):
         return "" if command == "torque" else 'is a force: compile with command="torque"'
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """None."""
         return ()
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """None."""
         return Rows(ca.SX(0, robot.nv), ca.SX(0, 1), ca.SX(0, 1))
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from wbc.errors import ShapeError
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.robot import Robot
 
 
 def plain(value: Any, robot: Robot) -> Any:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
+from wbc.robot import Robot
 from wbc.tasks.base import Row
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 def selection(field: str, value: Any) -> tuple[str, ...]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
@@ -16,9 +17,6 @@ from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest
 from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,6 @@ class AxisAlign(Task):
         object.__setattr__(self, "around", checked_around("AxisAlign.around", self.around, self.axis))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         return (
             Input("target", unit="1", size=3, rate="feedforward", direction=True),
             Input("feedforward", unit="1/s", size=3, default=np.zeros(3)),

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs
 from wbc.tasks._stereographic import Triple, triple, unit
 from wbc.tasks.base import Constraint, Input, Row, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -82,11 +80,9 @@ class AxisCone(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row [rad]."""
         return (Row("cone", "rad"),)
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, in the axes of the frame."""
         # A direction that its rate has moved on is a little longer than 1
         direction = unit(inputs["direction"])
         if self.relative_to != WORLD:

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from wbc import pickling
 from wbc.errors import RangeError
 from wbc.quick_dataclasses import dataclass
-from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
+from wbc.symbolic.kinematics import WORLD, Kinematics, joint_of
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._plain import plain
 from wbc.tasks.units import UNITS, checked_unit
@@ -219,8 +219,11 @@ class Item:
         raise TypeError(f"{type(self).__name__} declares no rows")
 
     def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """Declared weight of each row, multiplied with the item's weight and the run-time mask."""
-        return np.ones(len(self.rows(robot)))
+        """Weight of each row, multiplied with the item's weight and the run-time mask: the field ``weights`` of a task
+        that has one, else 1.
+        """
+        declared = getattr(self, "weights", None)
+        return np.ones(len(self.rows(robot))) if declared is None else np.array(declared, dtype=np.float64)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """Values at configuration ``q`` of the inputs whose default is None."""
@@ -473,9 +476,5 @@ def require_motion(robot: Robot, field: str, frame: str, reference: str = WORLD)
     Raises:
         RangeError: both are fixed to the same body.
     """
-    if _joint(robot, frame) == _joint(robot, reference):
+    if joint_of(robot.tree, frame) == joint_of(robot.tree, reference):
         raise RangeError(field, frame, f"no joint moves this frame against {reference!r}")
-
-
-def _joint(robot: Robot, frame: str) -> int:
-    return 0 if frame == WORLD else int(robot.tree.frames[frame_index(robot.tree, frame)].parentJoint)

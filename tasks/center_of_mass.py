@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from wbc.errors import RangeError
 from wbc.multibody import algebra
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, into_axes, point_rows, resolve_axes, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights, into_axes, point_rows, resolve_axes
 
 
 @dataclass(frozen=True)
@@ -65,19 +63,13 @@ class CenterOfMass(Task):
             raise RangeError("CenterOfMass", mass, f"the moving links of {robot.name!r} have no mass [kg]")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         return (
             Input("target", unit="m", size=3, rate="feedforward"),
             Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [m]."""
         return point_rows()
-
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, 3)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the centre of mass is at ``q``."""
@@ -85,6 +77,5 @@ class CenterOfMass(Task):
         return {"target": np.array(algebra(tree).centerOfMass(tree, tree.createData(), q))}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         axes = resolve_axes(robot, "CenterOfMass.axes", self.axes, None)
         return into_axes(kin, kin.center_of_mass() - inputs["target"], axes)

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Row, Task, Values
-from wbc.tasks.frames import checked_weights, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights
 
 
 @dataclass(frozen=True)
@@ -61,14 +57,9 @@ class Damping(Task):
         """One row a degree of freedom; the unit is that of its integral, as for every task."""
         return tuple(Row(n, u) for n, u in zip(robot.dof_names, robot.dof_units, strict=True))
 
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, robot.nv)
-
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """Zero: there is nothing to correct."""
         return ca.SX.zeros(robot.nv)
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The identity."""
         return ca.SX(ca.DM.eye(robot.nv))

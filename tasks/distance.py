@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
@@ -17,9 +18,6 @@ from wbc.tasks._nearest import distance
 from wbc.tasks._stereographic import Triple, triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,6 @@ class Distance(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row [m]."""
         return (Row("distance", "m"),)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Command, Input, Row, Task, Values
 from wbc.tasks.center_of_mass import CenterOfMass
-from wbc.tasks.frames import checked_weights, point_rows, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights, point_rows
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,6 @@ class DivergentComponent(Task):
         object.__setattr__(self, "weights", checked_weights("DivergentComponent.weights", self.weights, 3))
 
     def validate(self, robot: Robot) -> None:
-        """Check that the robot has mass, see :meth:`Item.validate`."""
         CenterOfMass().validate(robot)
 
     def refusal(self, robot: Robot, command: Command) -> str:
@@ -88,19 +85,13 @@ class DivergentComponent(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [m]."""
         return point_rows()
-
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, 3)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the centre of mass is at ``q``."""
         return CenterOfMass().initial(robot, q)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """c - target."""
         return ca.SX(kin.center_of_mass() - inputs["target"])
 
     def acceleration(self, inputs: Values, error: ca.SX, rate: ca.SX) -> ca.SX:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError
+from wbc.robot import Robot
 from wbc.robot.transmission import Transmission
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits
 from wbc.tasks._selection import joint_dofs
 from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Torques, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,6 @@ class DriveTorqueLimits(Constraint):
         object.__setattr__(self, "torque", checked_limits("DriveTorqueLimits.torque", 0.0, self.torque, count)[1])
 
     def validate(self, robot: Robot) -> None:
-        """Check the joints, see :meth:`Item.validate`."""
         field, followers = "DriveTorqueLimits.transmission", {c.follower for c in robot.couplings}
         dofs = joint_dofs(robot, field, self.transmission.joints)
         if len(dofs) != len(self.transmission.joints):
@@ -96,7 +93,6 @@ class DriveTorqueLimits(Constraint):
         return tuple(int(model.idx_vs[model.getJointId(name)]) for name in self.transmission.joints)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``scale`` and ``torque``."""
         count = len(self.transmission.drives)
         most = np.broadcast_to(np.array(self.torque, dtype=float), count).copy()
         return (
@@ -105,7 +101,6 @@ class DriveTorqueLimits(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a drive."""
         most = np.broadcast_to(np.array(self.torque, dtype=float), len(self.transmission.drives))
         sizes = np.where(np.isfinite(most), np.maximum(most, 1e-3), 1.0)
         drives = zip(self.transmission.drives, sizes, strict=True)
@@ -116,6 +111,5 @@ class DriveTorqueLimits(Constraint):
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
-        """See the class."""
         most = inputs["scale"] * inputs["torque"]
         return Torques(self.dofs(robot), -most, most, self.transmission.inverse.T)

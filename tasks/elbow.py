@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._stereographic import triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import (
     checked_weights,
@@ -20,11 +22,7 @@ from wbc.tasks.frames import (
     into_axes,
     point_rows,
     resolve_axes,
-    weights_of_rows,
 )
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Elbow(Task):
 
     def __post_init__(self) -> None:
         offset = validation.real_array("Elbow.offset", self.offset, (3,))
-        object.__setattr__(self, "offset", tuple(float(x) for x in offset))
+        object.__setattr__(self, "offset", triple(offset))
         object.__setattr__(self, "weights", checked_weights("Elbow.weights", self.weights, 3))
 
     def validate(self, robot: Robot) -> None:
@@ -76,26 +74,19 @@ class Elbow(Task):
         resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         return (
             Input("target", unit="m", size=3, rate="feedforward"),
             Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [m]."""
         return point_rows()
-
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, 3)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the point is at ``q``."""
         return {"target": frame_pose(robot, self.frame, q).act(np.array(self.offset))}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         axes = resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
         if axes != self.frame:
             point = kin.pose(self.frame).point(rot.constant(self.offset))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
@@ -20,11 +21,7 @@ from wbc.tasks.frames import (
     into_axes,
     point_rows,
     resolve_axes,
-    weights_of_rows,
 )
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 KINDS = ("pose", "position", "orientation")
 
@@ -85,12 +82,10 @@ class EndEffector(Task):
         object.__setattr__(self, "weights", checked_weights("EndEffector.weights", self.weights, count))
 
     def validate(self, robot: Robot) -> None:
-        """Check frames and axes, see :meth:`Item.validate`."""
         super().validate(robot)
         resolve_axes(robot, "EndEffector.axes", self.axes, self.frame, self.relative_to)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         if self.kind == "pose":
             return (
                 Input("target", "pose", unit="m", rate="feedforward"),
@@ -111,17 +106,12 @@ class EndEffector(Task):
         turning = tuple(Row(f"r{label}", "rad") for label in "xyz")
         return {"pose": point_rows() + turning, "position": point_rows(), "orientation": turning}[self.kind]
 
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, 6 if self.kind == "pose" else 3)
-
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the frame is at ``q``."""
         pose = frame_pose(robot, self.relative_to, q).actInv(frame_pose(robot, self.frame, q))
         return {"target": {"pose": pose, "position": pose.translation, "orientation": pose.rotation}[self.kind]}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         axes = resolve_axes(robot, "EndEffector.axes", self.axes, self.frame, self.relative_to)
         target = inputs["target"]
         if self.kind == "position":

@@ -5,25 +5,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import NotFiniteError, ShapeError, UnknownNameError
 from wbc.pickling import by_name_or_value
+from wbc.robot import Robot
 from wbc.symbolic.evaluation import SingleState
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, weights_of_rows
+from wbc.tasks.frames import checked_weights
 from wbc.tasks.units import checked_unit
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True, init=False)
@@ -138,16 +135,11 @@ class Expression(Task):
             raise NotFiniteError("Expression.function", rows, reason)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """The declared inputs."""
         return self.declared
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """One row an entry of the result."""
         return self._rows(self._trace(robot))
-
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, self._trace(robot).error.numel() if self.weights is None else 0)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         """The user's function, its result checked and made a column."""

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.tasks._load import Load
 from wbc.tasks.base import Input, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -51,9 +49,7 @@ class ExternalWrench(Load):
     frame: str
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``wrench``."""
         return (Input("wrench", unit="N, N m", size=6, default=np.zeros(6)),)
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
-        """J'w."""
         return ca.SX(kin.jacobian(self.frame).T @ inputs["wrench"])

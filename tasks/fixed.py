@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
 from wbc import validation
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
 from wbc.tasks.base import Bounds, Constraint, Row, SacrificeOrder, Values
 from wbc.tasks.braking import clip
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,6 @@ class Fixed(Constraint):
         return dof_rows(robot)
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
-        """See the class."""
         lower, upper = -ca.SX.inf(robot.nv), ca.SX.inf(robot.nv)
         for i in joint_dofs(robot, "Fixed.joints", self.joints):
             limit = float(robot.limits.acceleration[i]) if self.acceleration else math.inf

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -10,14 +10,11 @@ import numpy as np
 from wbc import validation
 from wbc.errors import NotFiniteError, RangeError, ShapeError
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,6 @@ class FrameVelocityLimit(Constraint):
         return tuple(Row(labels[name][axis], units[name]) for name, axis, _ in self._limits())
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         jacobian = kin.frame_jacobian(self.frame)
         if self.relative_to != WORLD:
             base = kin.frame_jacobian(self.relative_to)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.multibody import algebra, pin
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Row
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Axes that turn with the task's own frame.
 OWN = "frame"
@@ -77,8 +75,3 @@ def checked_weights(field: str, weights: Any, count: int | None = None) -> tuple
     if array.ndim != 1 or (count is not None and array.shape != (count,)):
         raise ShapeError(field, weights, f"expected {'one number a row' if count is None else f'{count} numbers'}")
     return tuple(validation.scalar(f"{field}[{i}]", w, low=0.0) for i, w in enumerate(array))
-
-
-def weights_of_rows(weights: tuple[float, ...] | None, count: int) -> NDArray[np.float64]:
-    """Declared weights as an array; ones for None."""
-    return np.ones(count) if weights is None else np.array(weights, dtype=np.float64)

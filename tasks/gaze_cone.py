@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._cone import angle_between, checked_half_angle, cone_margin, half_angle_inputs, reach
 from wbc.tasks._stereographic import Triple, triple
 from wbc.tasks.base import Constraint, Input, Row, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -92,11 +90,9 @@ class GazeCone(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row [m]."""
         return (Row("cone", "m"),)
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, in the axes of the frame."""
         point = kin.pose(self.point_frame).point(inputs["point"])
         seen = kin.pose(self.frame).inverse_point(point) - rot.constant(self.apex)
         seen, length = reach(self.axis, seen)

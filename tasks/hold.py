@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._pointing import shortest_turn
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.frames import frame_pose
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 HELD_KINDS = ("pose", "position", "orientation", "axis", "roll")
 #: Least square of the part of the x axis across the target's z axis that counts for ``roll``
@@ -78,13 +76,11 @@ class Hold(Constraint):
         object.__setattr__(self, "gain", validation.scalar("Hold.gain", self.gain, low=0.0, unit="1/s"))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``gain``."""
         part = self.kind if self.kind in ("position", "orientation") else ""
         target = Input("target", "pose", unit="m, rad", part=part)
         return (target, Input("gain", unit="1/s", default=self.gain, low=0.0))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The frame's pose at ``q``."""
         return {"target": frame_pose(robot, self.frame, q)}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -96,7 +92,6 @@ class Hold(Constraint):
         return rows.get(self.kind, position + orientation[:2])
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         pose, target = kin.pose(self.frame), inputs["target"]
         jacobian = kin.frame_jacobian(self.frame)
         matrix = []
@@ -116,7 +111,6 @@ class Hold(Constraint):
         return Rows(ca.vertcat(*matrix), wanted, wanted)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """e of the class."""
         return self._error(kin, inputs)
 
     def _error(self, kin: Tracer, inputs: Values) -> ca.SX:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import casadi as ca
 import numpy as np
@@ -14,13 +14,11 @@ from wbc import validation
 from wbc.errors import BoundsError, DuplicateNameError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 from wbc.multibody import is_pose, own
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.shapes import FAR
 from wbc.symbolic.kinematics import Pose
 from wbc.tasks.base import Input, Kind
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Inputs that every item has, or may have, without declaring them.
 RESERVED = ("gain", "weight", "enabled", "mask", "rate")

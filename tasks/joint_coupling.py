@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights
 
 #: One row: (joint, coefficient) pairs.
 Relation = tuple[tuple[str, float], ...]
@@ -91,7 +89,6 @@ class JointCoupling(Task):
         object.__setattr__(self, "gain", gain)
 
     def validate(self, robot: Robot) -> None:
-        """Check the joints, see :meth:`Item.validate`."""
         single = [j for j in robot.joint_names if _width(robot, j) == 1]
         for k, relation in enumerate(self.coefficients):
             for joint, coefficient in relation:
@@ -102,7 +99,6 @@ class JointCoupling(Task):
                     raise RangeError(field, coefficient, reason)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         count, units = len(self.coefficients), ", ".join(dict.fromkeys(row.unit for row in self.rows(robot)))
         rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
         return (
@@ -117,17 +113,12 @@ class JointCoupling(Task):
         units = [robot.dof_units[robot.dofs(relation[0][0]).start] for relation in self.coefficients]
         return tuple(Row(name + more, unit) for name, more, unit in zip(names, repeated, units, strict=True))
 
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, len(self.coefficients))
-
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The sums at ``q``; an unbounded joint counts as its angle in (-pi, pi]."""
         sums = [sum(c * _coordinate(robot, joint, q) for joint, c in relation) for relation in self.coefficients]
         return {"target": np.array(sums)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         errors: list[ca.SX] = []
         for k, relation in enumerate(self.coefficients):
             total = sum((c * kin.joint(joint) for joint, c in relation), ca.SX(0)) - inputs["target"][k]

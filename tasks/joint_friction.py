@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.tasks._limits import checked_limits
 from wbc.tasks._load import Load
 from wbc.tasks.base import Input, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)

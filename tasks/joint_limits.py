@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.quick_dataclasses import dataclass
-from wbc.robot import Limits
+from wbc.robot import Limits, Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import dof_rows, joint_dofs, selection
 from wbc.tasks.base import Bounds, Constraint, Input, Row, SacrificeOrder, Values
 from wbc.tasks.braking import braking_bound, clip
 from wbc.tasks.stopping import allowed_accelerations
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Part of its limit of acceleration by which a joint of a linkage counts on braking before a limit of position: the
 #: rest is for what the linkage asks of it on the way, and for the other joints that it takes along
@@ -44,8 +41,8 @@ class JointLimits(Constraint):
     v0 is the velocity that accelerations are counted from (that given to ``step``, else the last command); V and A are
     ``robot.limits.velocity`` and ``.acceleration``; s is ``velocity_scale``. A joint that follows others has one
     interval with its leaders. In stacks that command accelerations or torques these are bounds on the acceleration.
-    Joints of closed loops count on A / 4 in b, and rows ``"<name> linkages"`` slow loops down before they bend more
-    than A allows (docs/robots.md).
+    Joints of closed loops count on A / 4 in b; rows ``"<name> linkages"`` slow loops before bends and limits that A
+    does not follow (docs/robots.md).
 
     Where limits exclude each other actuators come first, acceleration before velocity. From a viable state (v0^2 / (2
     A) <= d, limits unchanged) that does not happen, and the position limit is not passed however dt varies. From
@@ -152,7 +149,6 @@ class JointLimits(Constraint):
         return limits.position_lower, limits.position_upper
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:
-        """See the class."""
         return self._intervals(robot, kin, inputs, partial(allowed_interval, dt=dt, shortest_dt=self.shortest_dt))
 
     def acceleration_bounds(

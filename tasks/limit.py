@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import inputs as run_time
 from wbc.tasks._limits import LimitValues, checked_limits, limit_inputs, limit_margins, limit_rows
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Constraint, Input, Row, Task, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -114,11 +112,9 @@ class Limit(Constraint):
         return limit_rows(self.lower, self.upper, self._selected(robot))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """What the task says."""
         return self.task.initial(robot, q)
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         factor = self.task.row_factor(robot, kin, inputs)
         error = self._pick(robot, self.task.error(robot, kin, inputs))
         return limit_margins(error, inputs, None if factor is None else self._pick(robot, factor))

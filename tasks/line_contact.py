@@ -68,7 +68,6 @@ class LineContact(Pressing, Contact):
         return (*(Row(axis, "m/s") for axis in "xyz"), Row("ry", "rad/s"), Row("rz", "rad/s"))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         pose, jacobian = kin.pose(self.frame), kin.frame_jacobian(self.frame)
         wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
         matrix = ca.vertcat(jacobian[:3, :], (pose.rotation.T @ jacobian[3:, :])[1:, :])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
@@ -17,9 +18,6 @@ from wbc.tasks._pointing import checked_around, checked_axis, row_axes, shortest
 from wbc.tasks._stereographic import INNER, Triple, fade, square, triple
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,6 @@ class LookAt(Task):
         object.__setattr__(self, "width", width)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         return (
             Input("target", unit="m", size=3, rate="feedforward"),
             Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),

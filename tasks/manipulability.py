@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.multibody import pin
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD, frame_index
 from wbc.symbolic.manipulability import FLOOR
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Input, Row, Task, Values
 from wbc.tasks.frames import frame_pose
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 LABELS = ("x", "y", "z", "rx", "ry", "rz")
 ROWS_OF_KIND = {"pose": LABELS, "position": LABELS[:3], "orientation": LABELS[3:]}
@@ -118,16 +116,13 @@ class Manipulability(Task):
             raise RangeError("Manipulability.frame", self.frame, reason)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         least = FLOOR ** len(self._rows)
         return (Input("target", low=least, rate="feedforward"), Input("feedforward", unit="1/s", default=0.0))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row, a pure number."""
         return (Row("w", "1"),)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The measure at ``q``."""
         return {"target": self.value(robot, q)}
 
     def value(self, robot: Robot, q: NDArray[np.float64]) -> float:
@@ -135,7 +130,6 @@ class Manipulability(Task):
         return float(np.prod(np.sqrt(self._singular_values(robot, q) ** 2 + FLOOR**2)))
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         w = kin.manipulability(self.frame, self.relative_to, self._rows, self._length(robot))
         error: ca.SX = ca.log(w / inputs["target"]) if self.form == "log" else w - inputs["target"]
         return error

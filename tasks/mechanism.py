@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.braking import clip
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
-
 
 #: How fast a loop that is open closes [characteristic lengths or rad per second]
 CLOSING = 0.1
@@ -64,7 +61,6 @@ class Mechanism(Constraint):
         return (*rows, *(Row(label, f"{unit}/s") for label, unit in robot.loops.rows))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         count = len(robot.couplings) + len(robot.locked_dofs)
         matrix, right = ca.SX(count, robot.nv), ca.SX.zeros(count)
         for k, coupling in enumerate(robot.couplings):

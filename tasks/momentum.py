@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.multibody import pin
+from wbc.robot import Robot
 from wbc.symbolic.dynamics import Centroidal, Dynamics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights
 
 MOMENTUM_KINDS = ("both", "linear", "angular")
 
@@ -80,7 +78,6 @@ class Momentum(Task):
         return {"both": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}[self.kind]
 
     def validate(self, robot: Robot) -> None:
-        """Check that the robot has mass, see :meth:`Item.validate`."""
         mass = _inertia(robot).mass
         if mass <= 0.0:
             raise RangeError("Momentum", mass, f"the moving links of {robot.name!r} have no mass [kg]")
@@ -105,7 +102,7 @@ class Momentum(Task):
         # About the centre of mass, unlike the matrix that Inertia itself is in the world
         mean = max(float(np.trace(total.inertia)) / 3, SMALLEST_INERTIA * total.mass * length**2)
         scales = np.repeat([total.mass * length, mean], 3)[self._rows]
-        weights: NDArray[np.float64] = weights_of_rows(self.weights, self._count) / scales**2
+        weights: NDArray[np.float64] = super().row_weights(robot) / scales**2
         return weights
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
@@ -113,7 +110,6 @@ class Momentum(Task):
         return ca.SX(-inputs["lag"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The rows of A."""
         return Centroidal(Dynamics(kin.kinematics)).matrix[self._rows, :]
 
 

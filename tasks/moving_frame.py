@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -10,11 +10,9 @@ import numpy as np
 from wbc import validation
 from wbc.multibody import pin
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -69,9 +67,7 @@ class MovingFrame(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """None."""
         return ()
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """None."""
         return Rows(ca.SX(0, robot.nv), ca.SX(0, 1), ca.SX(0, 1))

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
@@ -14,15 +14,14 @@ from wbc import validation
 from wbc.errors import MissingShapeError, RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.proximity import OBSTACLE, Body, PairSensor
+from wbc.robot import Robot
 from wbc.shapes import Capsule, Convex, Shape, Solid, Sphere
+from wbc.symbolic.kinematics import joint_of
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies, _gap as gap
 from wbc.tasks._ball import BallRow
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Obstacle(Constraint):
             raise MissingShapeError("Obstacle.links", None, "no moving link of this robot has collision shapes")
         for link in self.links or ():
             bodies.check_shaped(robot, "Obstacle.links", link, available)
-            if not bodies.joint_of(robot, link):
+            if not joint_of(robot.tree, link):
                 raise RangeError("Obstacle.links", link, "no joint moves this link, so it cannot keep clear")
         own = [placed.shape for _, _, placed in self.pairs(robot)]
         bodies.check_distances("Obstacle.shape", itertools.product(own, self.parts))
@@ -177,7 +176,6 @@ class Obstacle(Constraint):
         return (*own, *bodies.sensed_labels(self.sensed_rows(robot), self.corners))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """See the class."""
         rows, drifts = [], [ca.SX(0, 1)]
         for link, _, placed in self.pairs(robot):
             if not self._suffixes(placed.shape):
@@ -205,7 +203,7 @@ class Obstacle(Constraint):
 
 
 def _available(robot: Robot) -> tuple[str, ...]:
-    return tuple(name for name, shapes in robot.shapes.items() if shapes and bodies.joint_of(robot, name))
+    return tuple(name for name, shapes in robot.shapes.items() if shapes and joint_of(robot.tree, name))
 
 
 def _checked_shape(shape: object) -> Shape | tuple[Convex, ...]:

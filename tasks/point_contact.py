@@ -71,7 +71,6 @@ class PointContact(Pressing, Contact):
         )
 
     def cone(self, inputs: Values) -> Cone:
-        """The pyramid of the class."""
         slope = math.cos(math.pi / self.edges) * inputs["friction"]
         angles = [2.0 * math.pi * k / self.edges for k in range(self.edges)]
         faces = [ca.horzcat(-math.cos(x), -math.sin(x), slope) for x in angles]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import DuplicateNameError, ShapeError
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights
 
 STARTS = ("first", "neutral")
 
@@ -85,7 +83,6 @@ class Posture(Task):
         checked_weights("Posture.weights", self.weights, count)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``feedforward``, see the class."""
         default = robot.neutral.copy() if self.start == "neutral" else None
         return (
             Input("target", "configuration", unit="rad, m", default=default, rate="feedforward", joints=self.joints),
@@ -96,16 +93,10 @@ class Posture(Task):
         """One row a degree of freedom of the chosen joints."""
         return tuple(Row(robot.dof_names[k], robot.dof_units[k]) for k in self._dofs(robot))
 
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, len(self._dofs(robot)))
-
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The configuration ``q``."""
         return {"target": np.array(q, dtype=np.float64)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         return kin.kinematics.difference(inputs["target"], kin.q, self._dofs(robot))
 
     def _names(self, robot: Robot) -> tuple[str, ...]:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._stereographic import triple
 from wbc.tasks.base import Input, Row, Task, Values
-from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows, weights_of_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
+from wbc.tasks.frames import checked_weights, frame_pose, into_axes, point_rows
 
 RELATIVE_KINDS = ("pose", "position", "orientation")
 MIDWAY = "midway"
@@ -93,14 +92,13 @@ class RelativePose(Task):
         object.__setattr__(self, "weights", checked_weights("RelativePose.weights", self.weights, self._count))
         if self.at is not None:
             point = validation.real_array("RelativePose.at", self.at, (3,))
-            object.__setattr__(self, "at", tuple(float(x) for x in point))
+            object.__setattr__(self, "at", triple(point))
 
     @property
     def _count(self) -> int:
         return 6 if self.kind == "pose" else 3
 
     def validate(self, robot: Robot) -> None:
-        """Check frames and axes, see :meth:`Item.validate`."""
         super().validate(robot)
         validation.one_of("RelativePose.axes", self.axes, (MIDWAY, *robot.frame_names))
 
@@ -117,17 +115,12 @@ class RelativePose(Task):
         turning = tuple(Row(f"r{label}", "rad") for label in "xyz")
         return {"pose": point_rows() + turning, "position": point_rows(), "orientation": turning}[self.kind]
 
-    def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights."""
-        return weights_of_rows(self.weights, self._count)
-
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
         """The target where the frames are at ``q``, and the point in the middle between them."""
         pose = frame_pose(robot, self.frame_a, q).actInv(frame_pose(robot, self.frame_b, q))
         return {"target": pose, "at": pose.translation / 2 if self.at is None else np.array(self.at)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         target: Pose = inputs["target"]
         parts: list[ca.SX] = []
         if self.kind != "position" or self.axes == MIDWAY:

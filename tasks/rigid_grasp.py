@@ -72,11 +72,9 @@ class RigidGrasp(Contact):
         return tuple(out)
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """The limited components."""
         return tuple(force_row(robot, WRENCH_LABELS[k], WRENCH_UNITS[k]) for k in self._limited)
 
     def cone(self, inputs: Values) -> Cone:
-        """The box of the class."""
         most = ca.vertcat(*[inputs[i.name] for i in self.limits()])
         return Cone(ca.SX.eye(6)[self._limited, :], -most, most)
 

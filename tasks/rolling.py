@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import DuplicateNameError, RangeError, ShapeError
 from wbc.multibody import pin
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import Pose
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Rows, SacrificeOrder, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Floor under the length of the ground's normal as seen in the plane of a wheel, which is 1 for one that stands upright
 #: and 0 for one that lies flat.
@@ -128,7 +126,6 @@ class Rolling(Constraint):
         object.__setattr__(self, "gain", validation.scalar("Rolling.gain", self.gain, low=0.0, unit="1/s"))
 
     def validate(self, robot: Robot) -> None:
-        """Check the joints, see :meth:`Item.validate`."""
         model = robot.model
         for wheel in self.wheels:
             validation.one_of("Rolling.wheels", wheel.joint, robot.joint_names)
@@ -168,7 +165,6 @@ class Rolling(Constraint):
         return tuple(out)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         ground: Pose = inputs["ground"]
         normal = ground.rotation[:, 2]
         matrix, right = [], []

@@ -17,6 +17,7 @@ from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._contact import Cone, Contact, Pressing, checked_positive, force_row
+from wbc.tasks._stereographic import triple
 from wbc.tasks.base import Row, Rows, Values
 from wbc.tasks.frames import frame_pose
 from wbc.tasks.rolling import FLAT
@@ -80,7 +81,7 @@ class RollingContact(Pressing, Contact):
         axis = validation.unit_vector(
             "RollingContact.axis", validation.real_array("RollingContact.axis", self.axis, (3,))
         )
-        object.__setattr__(self, "axis", tuple(float(x) for x in axis))
+        object.__setattr__(self, "axis", triple(axis))
         super().__post_init__()
 
     def validate(self, robot: Robot) -> None:
@@ -109,7 +110,6 @@ class RollingContact(Pressing, Contact):
         return tuple(Row(name, "m/s") for name in ("rolling", "sideways", "contact"))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         pose, jacobian = kin.pose(self.frame), kin.frame_jacobian(self.frame)
         arm, directions = self._contact(inputs, pose.rotation)
         wanted = -inputs["gain"] * self.residual(robot, kin, inputs)
@@ -146,7 +146,6 @@ class RollingContact(Pressing, Contact):
         )
 
     def cone(self, inputs: Values) -> Cone:
-        """The pyramid of the class."""
         mu = inputs["friction"] / math.sqrt(2.0)
         rows = [
             ca.horzcat(0, 0, 1),

@@ -7,7 +7,7 @@ import logging
 import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -15,14 +15,13 @@ import numpy as np
 from wbc import validation
 from wbc.errors import DuplicateNameError, MissingShapeError, RangeError, ShapeError
 from wbc.proximity import Body, PairSensor
+from wbc.robot import Robot
 from wbc.robot.pairs.link_pairs import link_pairs as every_link_pair, neighbours, shaped_links
+from wbc.symbolic.kinematics import joint_of
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks import _bodies as bodies, _gap as gap
 from wbc.tasks.base import Constraint, Input, Numbers, Row, SacrificeOrder, Sensor, Values
 from wbc.validation import Array
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 log = logging.getLogger("wbc")
 
@@ -124,7 +123,7 @@ class SelfCollision(Constraint):
         for a, b in self.pairs or ():
             for link in (a, b):
                 bodies.check_shaped(robot, "SelfCollision.pairs", link, available)
-            if bodies.joint_of(robot, a) == bodies.joint_of(robot, b):
+            if joint_of(robot.tree, a) == joint_of(robot.tree, b):
                 raise RangeError("SelfCollision.pairs", (a, b), "no joint moves these links against each other")
         every = ((a[2].shape, b[2].shape) for a, b in self._every_shape_pair(robot))
         bodies.check_distances("SelfCollision.pairs", every)
@@ -163,7 +162,6 @@ class SelfCollision(Constraint):
             raise RangeError("SelfCollision.pairs", len(pairs), reason)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``margin``."""
         return (Input("margin", unit="m", default=self.margin, low=0.0),)
 
     def link_pairs(self, robot: Robot) -> tuple[tuple[str, str], ...]:
@@ -171,7 +169,7 @@ class SelfCollision(Constraint):
         if self.pairs is not None:
             return self.pairs
         if robot.self_pairs is not None:
-            joint = {name: bodies.joint_of(robot, name) for name in shaped_links(robot)}
+            joint = {name: joint_of(robot.tree, name) for name in shaped_links(robot)}
             return tuple((a, b) for a, b in robot.self_pairs if a in joint and b in joint and joint[a] != joint[b])
         known = neighbours(robot)
         return tuple(pair for pair in every_link_pair(robot) if pair not in known)
@@ -210,7 +208,6 @@ class SelfCollision(Constraint):
         return (*own, *bodies.sensed_labels(self.sensed_rows(robot), self.corners))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """See the class."""
         rows, kept, pairs = [], [], self._split(robot)[0]
         for ((a, _, first), (b, _, second)), most in zip(pairs, self._kept(robot, pairs), strict=True):
             more = gap.gaps(gap.on_link(kin, a, first), gap.on_link(kin, b, second))

@@ -67,11 +67,9 @@ class SlidingContact(Pressing, Contact):
         object.__setattr__(self, "slow", validation.scalar("SlidingContact.slow", self.slow, low=0.0, open_low=True))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``."""
         return (Row("normal", "m/s"),)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         normal, wanted = inputs["target"].rotation[:, 2], -inputs["gain"] * self.residual(robot, kin, inputs)
         return Rows(normal.T @ kin.frame_jacobian(self.frame)[:3, :], wanted, wanted)
 
@@ -96,7 +94,6 @@ class SlidingContact(Pressing, Contact):
         return (*super().limits(), Input("slow", unit="m/s", default=self.slow, low=1e-6))
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``."""
         return (force_row(robot, "normal"),)
 
     def cone(self, inputs: Values) -> Cone:

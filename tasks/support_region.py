@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks.base import Constraint, Input, Row, Values
 from wbc.tasks.center_of_mass import CenterOfMass
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: Distance of a plane that is none [m]
 FAR = 1e3
@@ -69,21 +67,17 @@ class SupportRegion(Constraint):
         object.__setattr__(self, "planes", validation.integer("SupportRegion.planes", self.planes, 3))
 
     def validate(self, robot: Robot) -> None:
-        """Check that the robot has mass, see :meth:`Item.validate`."""
         CenterOfMass().validate(robot)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``normals`` and ``offsets``."""
         return (
             Input("normals", size=3 * self.planes, default=np.zeros(3 * self.planes)),
             Input("offsets", unit="m", size=self.planes, default=np.full(self.planes, FAR)),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``edge 1`` and so on [m]."""
         return tuple(Row(f"edge {k}", "m") for k in range(1, self.planes + 1))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         normals = ca.reshape(inputs["normals"], 3, self.planes)
         return ca.SX(inputs["offsets"] - normals.T @ kin.center_of_mass())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -10,14 +10,12 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits
 from wbc.tasks._selection import joint_dofs, selection
 from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Torques, Values
 from wbc.tasks.braking import clip
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 #: In place of a torque that is not known
 NOT_KNOWN = 1e30
@@ -109,7 +107,6 @@ class TorqueLimits(Constraint):
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:
-        """See the class."""
         dofs = self.dofs(robot)
         most = inputs["scale"] * ca.SX(ca.DM(robot.limits.effort[list(dofs)]))
         if "last" not in inputs:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 
 from wbc import validation
+from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._limits import checked_limits, limit_inputs, limit_margins, limit_rows
+from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Constraint, Input, Row, Values
 from wbc.tasks.frames import point_in, point_rows
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -80,11 +77,9 @@ class WorkspaceBox(Constraint):
         return limit_inputs(self.lower, self.upper, ("m",) * 3)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z of each bound [m]."""
         return limit_rows(self.lower, self.upper, point_rows())
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         return limit_margins(point_in(kin, self.frame, self.offset, self.relative_to), inputs)
 
     def declaration(self, robot: Robot) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -12,16 +12,13 @@ import numpy as np
 from wbc import validation
 from wbc.errors import NotFiniteError, ShapeError
 from wbc.multibody import pin
+from wbc.robot import Robot
 from wbc.symbolic import rotations as rot
 from wbc.symbolic.kinematics import WORLD, Pose
 from wbc.symbolic.tracer import Tracer
+from wbc.tasks._stereographic import Triple
 from wbc.tasks.base import Constraint, Input, Row, Values
 from wbc.tasks.frames import point_in
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -103,11 +100,9 @@ class WorkspacePolyhedron(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a plane [m]."""
         return tuple(Row(f"plane[{k}]", "m") for k in range(len(self.normals)))
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class."""
         walls: Pose = inputs["pose"]
         point = walls.inverse_point(point_in(kin, self.frame, self.offset, self.relative_to))
         offsets: ca.SX = inputs["offsets"]

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
 from wbc.quick_dataclasses import dataclass
+from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._contact import WRENCH_LABELS, WRENCH_UNITS, force_row
 from wbc.tasks._selection import selection
 from wbc.tasks.base import Command, Constraint, Input, Row, Rows, SacrificeOrder, Values
-
-if TYPE_CHECKING:
-    from wbc.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,6 @@ class WrenchSum(Constraint):
         return "" if command == "torque" else 'is about forces: compile with command="torque"'
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``point``."""
         return (
             Input("target", unit="N, N m", size=6, default=np.zeros(6)),
             Input("point", unit="m", size=3, default=np.zeros(3)),

@@ -47,11 +47,7 @@ FORMULAS: tuple[tuple[str, ...], ...] = (
         'difference(inputs["target"], kin.q,',
         'difference(ca.vertcat(inputs["target"][1:], inputs["target"][0]), kin.q,',
     ),
-    (
-        "damping",
-        "return weights_of_rows(self.weights, robot.nv)",
-        "return weights_of_rows(self.weights, robot.nv)[::-1].copy()",
-    ),
+    ("base", "else np.array(declared, dtype=np.float64)", "else np.array(declared[::-1], dtype=np.float64)"),
     ("expression", "{d.name: inputs[d.name] for", "{d.name: ca.SX(ca.DM(d.default)) for"),
     ("braking", "(2 / acceleration) * distance", "(1 / acceleration) * distance", "constraints/test_braking.py"),
     ("_gap", "distance - a.shape.radius, -(b.pose", "distance, -(b.pose", "constraints/test_pairs.py"),

@@ -198,7 +198,8 @@ def integer(field: str, value: Any, low: int = 0, high: int = 2**31 - 1) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise ShapeError(field, value, "expected an integer")
     if not low <= value <= high:
-        raise RangeError(field, value, f"expected an integer within [{low}, {high}]")
+        unbounded = value < low and high == 2**31 - 1
+        raise RangeError(field, value, f"expected {low} or more" if unbounded else f"expected {low} to {high}")
     return int(value)
 
 
@@ -248,6 +249,14 @@ def exists(field: str, value: Any) -> bool:
         return file_path(field, value).exists()
     except OSError:
         return False
+
+
+def existing(field: str, value: Any, refusal: type[WbcError]) -> pathlib.Path:
+    """The path of a file or folder; what is not there is the caller's error."""
+    path = file_path(field, value)
+    if not exists(field, path):
+        raise refusal(field, str(path), no_such(path, "there is no such file or folder"))
+    return path
 
 
 @contextlib.contextmanager

@@ -18,6 +18,8 @@ from wbc.shapes import Box
 Array = np.ndarray
 ROBOTS = ("panda", "ur5", "tiago", "g1")
 SCENES = ("shelf", "cage", "table", "window")
+#: Scenes drawn at most until one has a free start and goal: of tables before TIAGo about 1 in 30 has
+SCENES_DRAWN = 500
 #: What the robots are made of, and the frame of the hand that is placed
 MADE: dict[str, tuple[str, dict[str, Any], str]] = {
     "panda": ("panda", {}, "panda_hand_tcp"),
@@ -141,7 +143,7 @@ def stack_of(robot: str, boxes: Any) -> wbc.Stack:
 def problem(robot: str, scene: str, seed: int) -> tuple[Problem, MotionPlanner]:
     """A problem whose start and goal are free, and its planner."""
     rng = np.random.default_rng([seed, ROBOTS.index(robot), SCENES.index(scene)])
-    for _ in range(50):
+    for _ in range(SCENES_DRAWN):
         boxes, regions = boxes_of(scene, robot, rng)
         planner = MotionPlanner(stack_of(robot, boxes))
         ends = _ends(planner, regions, rng)

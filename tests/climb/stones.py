@@ -84,7 +84,7 @@ def _sought(
             trial[9:12] = middle + np.array([*rng.uniform(-0.3, 0.3, 2), rng.uniform(0.3, 1.0)]) * 0.5 * world.length
             trial[:9] = (trial[:9].reshape(3, 3) @ pin.exp3(rng.uniform(-0.2, 0.2, 3))).ravel()
             trial[12:] = np.concatenate(world.limbs.rest)
-        how, found, _, _ = world.stand(held, carrying, margin, trial, followed=False)
+        how, found, _ = world.stand(held, carrying, margin, trial, followed=False)
         ends = zip(world.offsets, world.offsets[1:], bears, strict=False)
         held_angles = [12 + k for low, high, at in ends if at >= 0 for k in range(low, high)]
         if how == PostureOutcome.STANDS and np.abs(found - state)[held_angles].max(initial=0.0) < FLIPPED:

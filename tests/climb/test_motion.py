@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,9 +16,10 @@ from tests.climb.referee import between, body_speeds, fastest_share, least_dista
 from wbc.climb import motion
 from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances
+from wbc.climb.closure import Closure
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
-from wbc.climb.move_path import SwingShape
+from wbc.climb.move_path import SwingShape, move_path
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
@@ -181,6 +184,30 @@ def test_a_proof_that_stays_open_at_few_instants_is_asked_again(monkeypatch: pyt
         Mover(robot, scene).moved(*stances.stances[:2])
     assert open_.value.nearest is not None
     assert open_.value.nearest.distance > open_.value.nearest.required
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.5, True), (1.5, False)])
+def test_links_that_lack_less_than_is_known_of_the_base_between_instants_are_looked_at_with_more(
+    monkeypatch: pytest.MonkeyPatch, share: float, passes: bool
+) -> None:
+    robot, proven = climber("hexapod"), Clearances.moving
+    scene, stances = on_stones(robot, np.random.default_rng(1), 0.06)
+
+    def moving(clear: Clearances, contacts: Any, times: Array, q: Array, v: Array | None, within: Any = None) -> Any:
+        if v is None or len(times) != looks[0]:
+            return proven(clear, contacts, times, q, v, within)
+        blur = clear.blur(times, q, v)
+        assert blur > 0.0
+        return SimpleNamespace(first="link", second="stone", distance=0.01 - share * blur, required=0.01, time=0.5)
+
+    looks = [len(move_path(Closure(robot), *stances.stances[:2], SwingShape(0.02), dict(enumerate(scene.normals))).s)]
+    monkeypatch.setattr(Clearances, "moving", moving)
+    monkeypatch.setattr(Mover, "_shapes", lambda *_: iter([SwingShape(0.02)]))
+    if passes:
+        assert Mover(robot, scene).moved(*stances.stances[:2])[0].times[-1] > 0.0
+    else:
+        with pytest.raises(MoveError, match="link and stone"):
+            Mover(robot, scene).moved(*stances.stances[:2])
 
 
 def test_a_tip_is_near_its_own_stone_only() -> None:

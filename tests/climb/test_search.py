@@ -92,7 +92,7 @@ def test_no_posture_of_the_search_is_one_that_motions_refuse(name: str, family: 
             state = world.state_of(start)
             state[9:12] += on + 0.15 * world.length * rng.uniform(-1.0, 1.0, 3)
             state[:9] = (state[:9].reshape(3, 3) @ pin.exp3(rng.uniform(-0.3, 0.3, 3))).ravel()
-            outcome, state, _, _ = world.stand(contacts, contacts, 0.0, state, followed=False)
+            outcome, state, _ = world.stand(contacts, contacts, 0.0, state, followed=False)
             if outcome == PostureOutcome.STANDS:
                 rows = [int(world.hold[place]) if place >= 0 else FREE_LIMB for place in contacts]
                 assert clearances.standing(rows, world.q_of(state)) is None
@@ -238,7 +238,7 @@ def test_a_body_yields_where_limbs_end_at_limits_just_off_their_footholds(places
     begun = world.state_of(robot.rest)
     begun[:12] = np.concatenate([turn.ravel(), foothold[9:] - turn @ touch[9:]])
     contacts = np.array(places, dtype=np.int32)
-    how, state, _, _ = world.stand(contacts, contacts, 0.02, begun, followed=False)
+    how, state, _ = world.stand(contacts, contacts, 0.02, begun, followed=False)
     assert how == PostureOutcome.STANDS
     q = world.q_of(state)
     assert beyond_limits(robot.robot, q[None]) is None

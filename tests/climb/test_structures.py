@@ -153,7 +153,7 @@ def test_the_body_makes_way_for_a_limb_that_lifts() -> None:
     assert world.stuck(contacts, state) == 1
     kept = contacts.copy()
     kept[walker().row("arm1")] = FREE_LIMB
-    outcome, after, _, _, moves = world.lift(contacts, kept, 0.0, state)
+    outcome, after, _, moves = world.lift(contacts, kept, 0.0, state)
     assert (outcome, moves) == (PostureOutcome.STANDS, True)
     assert world.stuck(contacts, after) == 0
     # Nor does it begin there

@@ -245,6 +245,12 @@ def test_logs_of_other_recorders_are_runs(tmp_path: Path) -> None:
     assert [tick["x"]["a"] for tick in json.loads(json.dumps(said, allow_nan=False))] == [None, 2.0]
 
 
+@pytest.mark.parametrize("to", ["mcap", "csv", "npz"])
+def test_a_run_without_ticks_is_converted(to: str, tmp_path: Path) -> None:
+    recorder = TickRecorder({"t": ("s", "f8"), "q.a": ("rad", "f8")}, {"robot": "none of the table"})
+    assert convert(save(recorder.log(), tmp_path, "npz"), to)[0].is_file()
+
+
 @pytest.mark.parametrize("name", ["ur5", "kinova", "solo8"])
 def test_a_log_without_a_stack_shows_the_robot_where_it_is(name: str, tmp_path: Path) -> None:
     """Columns of any names are its configuration, where there are as many as it has coordinates."""

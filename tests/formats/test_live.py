@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,18 @@ import websockets
 import wbc
 from tests.formats.runs import recorded
 from tests.refusals import assert_refused
+from wbc import extras
 from wbc.formats import FormatError, Ros2Plant, convert
-from wbc.formats.live import FoxgloveSink
-from wbc.formats.run import run_of
+from wbc.formats.run import Piece, Run
+from wbc.formats.writers import serve
 from wbc.simulation import Connection
+
+
+def free_port() -> int:
+    """Of this machine."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 def test_rerun_reads_its_recording(tmp_path: Path) -> None:
@@ -48,13 +57,23 @@ def test_rerun_reads_its_recording(tmp_path: Path) -> None:
 
 def test_foxglove_is_told_every_tick(tmp_path: Path) -> None:
     """A client that speaks the protocol itself: subscribes, and reads what comes."""
+    extras.require("foxglove", "a server in a thread")
     recording = recorded(tmp_path, 0, ticks=20)
-    log, sink, run = wbc.Recording(recording).log(), FoxgloveSink(Path("127.0.0.1:0")), run_of(recording)
-    sink.begin(run)
+    log, run, port = wbc.Recording(recording).log(), Run(recording), free_port()
+    served, heard = threading.Event(), threading.Event()
+
+    def pieces() -> Iterator[Piece]:
+        served.set()
+        heard.wait()
+        yield from run.pieces()
+
+    server = threading.Thread(target=serve, args=(run, pieces(), Path(f"127.0.0.1:{port}")))
+    server.start()
+    assert served.wait(20.0)
 
     async def listen() -> dict[str, list[Any]]:
         told: dict[str, list[Any]] = {}
-        address = f"ws://127.0.0.1:{sink.port}"
+        address = f"ws://127.0.0.1:{port}"
         async with websockets.connect(address, subprotocols=["foxglove.sdk.v1"], max_size=None) as socket:
             topics: dict[int, str] = {}
             while len(topics) < 5:
@@ -63,18 +82,19 @@ def test_foxglove_is_told_every_tick(tmp_path: Path) -> None:
             wanted = [{"id": number, "channelId": number} for number in topics]
             await socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
             await asyncio.sleep(0.3)
-            player = threading.Thread(target=lambda: [sink.write(*piece) for piece in run.pieces()])
-            player.start()
+            heard.set()
             while len(told.get("/tick", ())) < len(log):
                 data = await asyncio.wait_for(socket.recv(), 20.0)
                 if isinstance(data, bytes) and data[0] == 1:
                     number, _ = struct.unpack_from("<IQ", data, 1)
                     told.setdefault(topics[number], []).append(json.loads(data[13:]))
-            player.join()
         return told
 
-    told = asyncio.run(listen())
-    sink.close()
+    try:
+        told = asyncio.run(listen())
+    finally:
+        heard.set()
+        server.join()
     assert [tick["t"] for tick in told["/tick"]] == log["t"].tolist()
     assert told["/scene"][0]["entities"]
     assert told["/tf"]
@@ -227,9 +247,7 @@ def test_a_robot_of_ros2_is_a_plant(over: str, tmp_path: Path) -> None:
     robot, domain = wbc.robots.load("ur5"), 100 + os.getpid() % 100
     (tmp_path / "endpoint.py").write_text({"dds": ENDPOINT, "zenoh": ZENOH}[over])
     path = os.pathsep.join([str(Path(wheel.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     asked = [*([str(port)] if over == "zenoh" else []), str(domain), ",".join(robot.joint_names)]
     command = [sys.executable, str(tmp_path / "endpoint.py"), *asked]
     other = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": path}, stdout=subprocess.PIPE)

@@ -339,6 +339,16 @@ def test_the_same_stack_would_have_done_the_same(seed: int, tmp_path: Path) -> N
     assert np.abs(answered(controller, motion).array("command") - recording["v"]).max() > 1e-3
 
 
+def test_targets_are_asked_for_at_times_of_the_recording() -> None:
+    """Joints that are known after frames are, as those of two publishers: time counts from the first message."""
+    robot, times = wbc.robots.load("ur5"), list[float]()
+    controller = wbc.Stack(robot, dt=0.1).add(wbc.tasks.Posture(), name="posture").compile(backend="vm")
+    motion = RecordedMotion(("elbow_joint",), np.array([0.5, 0.8]), np.zeros((2, 1)), None, {})
+    log = answered(controller, motion, lambda _, time: times.append(time))
+    assert np.allclose(log["t"], [0.5, 0.6, 0.7, 0.8])
+    assert times == log["t"].tolist()
+
+
 def test_a_played_plant_goes_its_own_way(tmp_path: Path) -> None:
     motion = read_motion(
         foxglove(tmp_path / "x.mcap", {"s": ("foxglove.JointStates", [state(elbow_joint=x) for x in (0.0, 1.0)])})

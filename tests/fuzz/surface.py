@@ -50,7 +50,7 @@ MADE = (
     *("SelfPairs", "LinkPair", "ConvexParts", "Witness", "Coupling", "Path", "Advice", "CarriedMotion", "ClosedForm"),
     *("CompleteSet", "Leg", "LoopError", "MotionCue", "PairCount", "PairStack", "PairStep", "PairSurvey"),
     *("Parts", "TreeSet", "TreeSets"),
-    *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus", "NumericWitness"),
+    *("Analysis", "BlockAnalysis", "Branch", "Cost", "Counts", "Determinant", "JointBlock", "Locus"),
     *("PublishedSets", "Relation", "Screened", "SymbolicJacobian", "TreeAnalysis", "TreeCertificate", "Value", "Seen"),
     *("Sample", "Basis", "Condition", "Mode", "MissingPartError", "RateFileError", "PointSet", "Resolver", "Source"),
     *("Coordinate", "TREES", "PRESETS", "ALGORITHMS"),

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wbc.robot import Robot
 from wbc.validation import Array
 
 #: What every mechanism begins with; angles are radians
@@ -31,6 +32,15 @@ def body(name: str, position: Array, joints: str, inner: str = "") -> str:
 def hinge(name: str, axis: Array) -> str:
     """A hinge at the link's origin."""
     return f'<joint name="{name}" axis="{numbers(axis)}"/>'
+
+
+def within(robot: Robot, room: float) -> Robot:
+    """With positions no further than a room from neutral, nor beyond the file's limits."""
+    index, low, high = robot.position_index, robot.limits.position_lower.copy(), robot.limits.position_upper.copy()
+    has = index >= 0
+    low[has] = np.maximum(low[has], robot.neutral[index[has]] - room)
+    high[has] = np.minimum(high[has], robot.neutral[index[has]] + room)
+    return robot.with_limits(position_lower=low, position_upper=high)
 
 
 def four_bar() -> str:

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors
+from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors, within
 from tests.loops.test_torques import moving, rows_at
 from tests.repeats import covering, repeats
 from wbc.errors import RangeError
@@ -26,11 +26,7 @@ DT = 0.005
 
 def limited(text: str, acceleration: float, room: float = np.inf) -> Robot:
     """Of at most 3 rad/s, with limits of acceleration, and within a room about neutral."""
-    robot = wbc.robots.load(text, shapes="none").with_limits(velocity=3.0, acceleration=acceleration)
-    index = robot.position_index
-    has, low, high = index >= 0, np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-    low[has], high[has] = robot.neutral[index[has]] - room, robot.neutral[index[has]] + room
-    return robot.with_limits(position_lower=low, position_upper=high)
+    return within(wbc.robots.load(text, shapes="none").with_limits(velocity=3.0, acceleration=acceleration), room)
 
 
 def ticks(robot: Robot, command: str, count: int, seed: int) -> Iterator[tuple[wbc.Step, Array, Array]]:

@@ -13,7 +13,7 @@ import pytest
 from numpy.polynomial import polynomial
 
 import wbc
-from tests.loops.mechanisms import MOTORS, NAMED, SPECIAL, random_linkage, with_motors
+from tests.loops.mechanisms import MOTORS, NAMED, SPECIAL, random_linkage, with_motors, within
 from tests.loops.test_reading import CASSIE
 from tests.loops.test_torques import linkage, needed, rows_at
 from tests.repeats import repeats
@@ -47,11 +47,7 @@ SPARSE = 8
 def bounded(robot: Robot, seed: int) -> Robot:
     """Of 3 rad/s, of accelerations that are drawn, and of positions within the file's and 1 rad of neutral."""
     acceleration = float(np.random.default_rng(seed).choice([5.0, 20.0, 100.0]))
-    index, low, high = robot.position_index, robot.limits.position_lower.copy(), robot.limits.position_upper.copy()
-    has = index >= 0
-    low[has] = np.maximum(low[has], robot.neutral[index[has]] - 1.0)
-    high[has] = np.minimum(high[has], robot.neutral[index[has]] + 1.0)
-    return robot.with_limits(velocity=3.0, acceleration=acceleration, position_lower=low, position_upper=high)
+    return within(robot, 1.0).with_limits(velocity=3.0, acceleration=acceleration)
 
 
 def run(robot: Robot, count: int, seed: int) -> None:

@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import NAMED, four_bar, random_linkage
+from tests.loops.mechanisms import NAMED, four_bar, random_linkage, within
 from tests.repeats import repeats
 from wbc.errors import DuplicateNameError, NotFiniteError, RangeError, UnknownNameError, UnsupportedJointError
 from wbc.robot import JointCurve, Loop, LoopError, Robot
@@ -69,13 +69,7 @@ def walk(controller: wbc.Controller, ticks: int, seed: int = 0) -> list[Array]:
 
 def limited(text: str, room: float = np.inf) -> Robot:
     """Of at most 3 rad/s, and within a room about neutral."""
-    robot = wbc.robots.load(text).with_limits(velocity=3.0)
-    if not np.isfinite(room):
-        return robot
-    index, low, high = robot.position_index, np.full(robot.nv, -np.inf), np.full(robot.nv, np.inf)
-    has = index >= 0
-    low[has], high[has] = robot.neutral[index[has]] - room, robot.neutral[index[has]] + room
-    return robot.with_limits(position_lower=low, position_upper=high)
+    return within(wbc.robots.load(text).with_limits(velocity=3.0), room)
 
 
 def followed(robot: Robot) -> wbc.Stack:

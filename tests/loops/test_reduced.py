@@ -69,3 +69,16 @@ def test_joints_of_one_loop_give_first(command: str) -> None:
     assert names[12:] == ["motor"] * 3
     late = late_rows(layout, at)
     assert sum(late) == (len(robot.unactuated) if command == "torque" else 0)
+
+
+def test_more_joints_without_motors_than_rows_of_loops() -> None:
+    """Twelve and nine of a delta: its torques are those of the problem without its rows, and no search is needed."""
+    robot = driven("delta")
+    assert len(robot.unactuated) > len(robot.loops.rows)
+    controller = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").compile(command="torque")
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        q, v = moving(robot, rng)
+        controller.reset(q)
+        step = controller.step(q, 0.1 * v)
+        assert (step.status, step.iterations) == ("solved", 0)

@@ -41,10 +41,10 @@ def panda(*boxes: tuple[tuple[float, ...], tuple[float, ...]], margin: float = 0
     return stack
 
 
-def base_with_a_body() -> Robot:
-    """A base that drives in any direction, with a cylinder as its body."""
-    locked = ["*gripper*", "*wheel*", "*finger*", "arm_*", "head_*", "torso_*"]
-    robot = wbc.robots.load("tiago_pro", shapes="none", lock=locked)
+def base_with_a_body(name: str = "tiago_pro") -> Robot:
+    """A base that drives in any direction, or ``tiago``'s on two wheels, with a cylinder as its body."""
+    hands = ["*gripper*", "*finger*"] if name == "tiago_pro" else ["hand_*"]
+    robot = wbc.robots.load(name, shapes="none", lock=[*hands, "*wheel*", "arm_*", "head_*", "torso_*"])
     body = wbc.shapes.PlacedShape(Cylinder(0.3, 0.3), at(0.0, 0.0, 0.2))
     return robot.with_shapes({robot.frames["base"]: [body]})
 

@@ -160,3 +160,4 @@ def test_the_command_line(tmp_path: Path) -> None:
     assert np.linalg.norm(wbc.robots.load("panda").pose(q, "panda_hand_tcp").translation - reach.translation) < 1e-6
     bad = runner.invoke(app, ["plan", "panda", *start, "--target", "0.55,0,0.35", *box])
     assert bad.exit_code != 0
+    assert "--to" in runner.invoke(app, ["plan", "panda", *start]).output

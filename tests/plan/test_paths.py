@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,7 @@ import pytest
 import wbc
 from tests.plan.scenes import SHELF, CoalJudge, at, base_with_a_body, panda, reaching
 from tests.repeats import repeats
-from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import InfeasibleError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.plan import MotionPlanner, NoPathError
 from wbc.shapes import Box, Cylinder, HalfSpace, Sphere
 
@@ -152,16 +153,25 @@ def test_what_is_not_found_in_the_time_has_the_nearest() -> None:
     assert CoalJudge(stack).margin(caught.value.nearest) > -OPEN
 
 
-def test_bad_input_is_named(shelf: MotionPlanner) -> None:
-    q = shelf.stack.robot.neutral
-    with pytest.raises(UnknownNameError, match="hand"):
-        shelf.plan(q, {"hnd": LEFT})
-    with pytest.raises(ShapeError, match="goal"):
-        shelf.plan(q, q[:5])
-    with pytest.raises(RangeError, match="at least one"):
-        shelf.plan(q, [])
-    with pytest.raises(RangeError, match="seconds"):
-        shelf.plan(q, q, seconds=0.0)
+@pytest.mark.parametrize(
+    ("goal", "more", "error", "says"),
+    [
+        ({"hnd": LEFT}, {}, UnknownNameError, "hand"),
+        (np.zeros(5), {}, ShapeError, "goal"),
+        ([], {}, RangeError, "at least one"),
+        (np.zeros(7), {"seconds": 0.0}, RangeError, "seconds"),
+        (np.zeros(7), {"second": 1.0}, UnknownNameError, "seconds"),
+        (np.zeros(7), {"options": 3}, ShapeError, "options"),
+    ],
+)
+def test_bad_input_is_named(
+    shelf: MotionPlanner, goal: Any, more: dict[str, Any], error: type[WbcError], says: str
+) -> None:
+    with pytest.raises(error, match=says):
+        shelf.plan(shelf.stack.robot.neutral, goal, **more)
+
+
+def test_a_kept_task_has_to_be_in_the_stack() -> None:
     with pytest.raises(UnknownNameError, match="keep"):
         panda().planner(keep=("cup",))
 

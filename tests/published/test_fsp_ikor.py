@@ -21,6 +21,7 @@ from PIL import Image
 
 import wbc
 import wbc.published.ikor.driver
+from tests.published.ikor_norms import unmatched
 from wbc.errors import RangeError, UnknownNameError, WbcError
 from wbc.published.ikor import (
     Code,
@@ -45,7 +46,6 @@ from wbc.published.ikor import (
     without_platform,
 )
 from wbc.published.ikor.avoidance import gaps
-from wbc.published.ikor.cases import unmatched
 from wbc.published.ikor.lines import euler_angles, rotation_of
 from wbc.published.ikor.settings import AXES
 from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal

@@ -31,6 +31,7 @@ from tests.published.newton_euler_arm import (
     step_model,
     tip_error,
 )
+from tests.published.newton_euler_counts import operations, printed_total
 from tests.refusals import assert_refused
 from wbc.errors import BoundsError, RangeError, ShapeError, UnknownNameError
 from wbc.published.newton_euler import (
@@ -52,7 +53,6 @@ from wbc.published.newton_euler import (
     linear_model,
     simulate,
 )
-from wbc.published.newton_euler.counts import operations, printed_total
 from wbc.published.newton_euler.three_link import (
     BASE,
     BEHIND,

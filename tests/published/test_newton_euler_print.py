@@ -63,8 +63,16 @@ def test_table_1_levers(i: int, lever: Array, off: float) -> None:
 
 
 def test_classes_of_joints() -> None:
-    """1, 4, 4 are given (6 in the table); by the definitions of the text 1, 3, 3: no r_i-1,i lies on an axis."""
-    assert [ARM.joint_class(i) for i in range(3)] == [1, 3, 3]
+    """1, 4, 4 are given (6 in the table); by the definitions of the text 1, 3, 3: no r_i-1,i lies on an axis.
+
+    1: no lever lies along the axis, 2: that of the link before, 3: its own, 4: both.
+    """
+
+    def along(lever: Array, axis: Array) -> bool:
+        return bool(np.linalg.norm(np.cross(axis, lever)) <= 1e-9 * np.linalg.norm(lever))
+
+    pairs = [(ARM.before(i)[:2], link) for i, link in enumerate(ARM.links)]
+    assert [1 + along(lever, axis) + 2 * along(own.lever, own.axis) for (axis, lever), own in pairs] == [1, 3, 3]
 
 
 def test_b88_leaves_the_base_turning_out_of_the_accelerations() -> None:

@@ -11,7 +11,7 @@ import wbc
 from tests.models import placement
 from tests.refusals import assert_refused
 from wbc import errors
-from wbc.motion_control.motion import mass_matrix
+from wbc.multibody import mass_matrix
 from wbc.robots import operator_arm
 from wbc.robots.operator_arms import OPERATOR_ARMS
 

@@ -23,11 +23,9 @@ from wbc.errors import CommandError
 from wbc.robot import Robot
 from wbc.stack.layout import Block, Layout
 from wbc.stack.program import build
-from wbc.tasks import Constraint, Task, TorqueLimits, inputs as run_time
+from wbc.tasks import Constraint, Task, inputs as run_time
 
 DT = 0.003
-#: Classes with rows of which a constraint on velocities has no rate of its own
-ONLY_TORQUES = {TorqueLimits}
 
 
 def every_item(machine: Robot) -> tuple[Stack, dict[str, Numbers], list[str]]:

@@ -218,6 +218,8 @@ CHANGES: list[tuple[Any, dict[str, Any], list[tuple[dict[str, Any], type[WbcErro
             ({"speed": np.array([1.0, -0.5])}, RangeError, "speed"),
             ({"s": np.array([0.0, 1.0, 0.5]), "speed": np.ones(3)}, RangeError, "timing.s"),
             ({"s": np.zeros(2)}, RangeError, "timing.s"),
+            ({"s": np.array([0.0, 1e-320]), "speed": np.array([0.1, 0.2])}, RangeError, "timing.s"),
+            ({"s": np.array([0.0, 1.0, 1.0 + 2e-16]), "speed": np.array([0.1, 0.1, 0.9])}, RangeError, "timing.s"),
             ({"speed": np.ones(3)}, ShapeError, "speed"),
             ({"speed": np.array([1.0, NAN])}, NotFiniteError, "speed"),
         ],
@@ -233,6 +235,11 @@ CHANGES: list[tuple[Any, dict[str, Any], list[tuple[dict[str, Any], type[WbcErro
             ({"start": NAN}, NotFiniteError, "start"),
             ({"start": "a"}, ShapeError, "start"),
         ],
+    ),
+    (
+        PolynomialPath.joined,
+        {"paths": [smooth(1), smooth(1)]},
+        [({"paths": bad}, ShapeError, "paths") for bad in (NAN, [], [smooth(1), smooth(2)], [smooth(1), 1.0])],
     ),
 ]
 

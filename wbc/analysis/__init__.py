@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from wbc.analysis.certificates.boxes import Counts as Counts
     from wbc.analysis.certificates.certificate import RankCertificate as RankCertificate, certify as certify
     from wbc.analysis.certificates.screen import Screened as Screened, screen as screen
-    from wbc.analysis.certificates.weakest import NumericWitness as NumericWitness
-    from wbc.analysis.completeness import Analysis as Analysis, RankWitness as RankWitness, analyse as analyse
+    from wbc.analysis.certificates.weakest import RankWitness as RankWitness
+    from wbc.analysis.completeness import Analysis as Analysis, analyse as analyse
     from wbc.analysis.jacobians.jacobian import (
         Cost as Cost,
         SymbolicJacobian as SymbolicJacobian,

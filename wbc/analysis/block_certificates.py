@@ -13,7 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.analysis.blocks import block_model, lift, parted_task, problem
 from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, UNDECIDED, RankCertificate, certify
-from wbc.analysis.certificates.weakest import NumericWitness, descended, joint_values
+from wbc.analysis.certificates.weakest import RankWitness, descended, joint_values
 from wbc.analysis.completeness import TRIES
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, rank, singular_values
@@ -46,7 +46,7 @@ class TreeCertificate:
     everywhere: bool
     left: float
     eps: float
-    witness: NumericWitness | None
+    witness: RankWitness | None
     lost: JointBlock | None
     seconds: float
 
@@ -140,19 +140,19 @@ def _whole(
     model: ExactModel,
     task: tuple[Rows, ...],
     rows: tuple[Rows, ...],
-    bad: Sequence[tuple[JointBlock, ExactModel, NumericWitness]],
+    bad: Sequence[tuple[JointBlock, ExactModel, RankWitness]],
     eps: float,
-) -> tuple[NumericWitness | None, JointBlock | None]:
+) -> tuple[RankWitness | None, JointBlock | None]:
     """Of places of the other joints that for which the task of the whole robot is farthest from a loss of rank."""
     numeric = NumericRows(model.robot)
     for block, alone, witness in bad:
         lifted = lift(model, alone)
-        best: NumericWitness | None = None
+        best: RankWitness | None = None
         for _ in range(TRIES):
             q = lifted(joint_values(alone, witness.q))
             sigma, J_R = singular_values(numeric.value(task, q)), numeric.value(rows, q)
             if sigma[-1] >= eps and rank(J_R) < model.robot.nv and (best is None or sigma[-1] > best.task[-1]):
-                best = NumericWitness(q, sigma, singular_values(J_R))
+                best = RankWitness(q, sigma, singular_values(J_R))
         if best is not None:
             return best, block
     return None, None

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.analysis.certificates.certificate import INCOMPLETE
-from wbc.analysis.completeness import RankWitness, find_witness
+from wbc.analysis.certificates.weakest import RankWitness
+from wbc.analysis.completeness import find_witness
 from wbc.analysis.jacobians.jacobian import symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task

@@ -15,6 +15,7 @@ from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.points import real_point
 from wbc.analysis.certificates.certificate import COMPLETE, INCOMPLETE, RankCertificate, certify
+from wbc.analysis.certificates.weakest import RankWitness
 from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import NumericRows, check_task, rank, singular_values
@@ -37,21 +38,6 @@ _LEAST = 1e-6
 _SEARCH = 0.9
 #: What is left at least for points of branches [s]
 _AFTER = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class RankWitness:
-    """A configuration where the task has full rank and task and constraints together have not.
-
-    Attributes:
-        q: configuration of the robot [nq]. branch: of the locus, on which it lies; None: it was found by numbers.
-        task: singular values of the task Jacobian there. augmented: those of task and constraints.
-    """
-
-    q: Array
-    branch: LocusBranch | None
-    task: Array
-    augmented: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +117,7 @@ def analyse(
     )
     witness = None
     if certificate is not None and certificate.witness is not None:
-        at = certificate.witness
-        witness = RankWitness(at.q, None, at.task, at.augmented)
+        witness = certificate.witness
     elif found.verdict == UNDECIDED:
         witness = find_witness(model.robot, found, wanted, rows, model.configuration, budget)
     verdict = found.verdict
@@ -247,4 +232,4 @@ def find_witness(
     if not child.reports:
         return None
     number, q, own, every = child.reports[-1]
-    return RankWitness(q, found.algorithmic[number], own, every)
+    return RankWitness(q, own, every, found.algorithmic[number])

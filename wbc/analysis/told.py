@@ -8,8 +8,8 @@ from wbc.analysis.algebra.notation import Notation
 from wbc.analysis.block_certificates import TreeCertificate
 from wbc.analysis.blocks import BlockAnalysis, TreeAnalysis
 from wbc.analysis.certificates.certificate import RankCertificate
-from wbc.analysis.certificates.weakest import NumericWitness
-from wbc.analysis.completeness import Analysis, RankWitness
+from wbc.analysis.certificates.weakest import RankWitness
+from wbc.analysis.completeness import Analysis
 from wbc.analysis.formulas import Formulas
 
 
@@ -124,11 +124,7 @@ def tree_record(name: str, found: TreeAnalysis) -> dict[str, Any]:
 def certificate_record(found: RankCertificate) -> dict[str, Any]:
     """A certificate as data."""
     return {
-        "verdict": found.verdict,
-        "eps": found.eps,
-        "peak": found.peak,
-        "everywhere": found.everywhere,
-        "left": found.left,
+        **_taken(found, "verdict", "eps", "peak", "everywhere", "left"),
         "boxes": found.counts.boxes,
         "joints": [f"q{k + 1}" for k in found.joints],
         "symmetries": found.symmetries,
@@ -140,15 +136,15 @@ def certificate_record(found: RankCertificate) -> dict[str, Any]:
 def tree_certificate_record(found: TreeCertificate) -> dict[str, Any]:
     """A certificate of a tree as data."""
     return {
-        "verdict": found.verdict,
-        "everywhere": found.everywhere,
-        "left": found.left,
-        "eps": found.eps,
-        "seconds": found.seconds,
+        **_taken(found, "verdict", "everywhere", "left", "eps", "seconds"),
         "blocks": [{"block": str(block), **certificate_record(own)} for block, own in found.blocks],
         "lost": None if found.lost is None else str(found.lost),
         "witness": _witness_record(found.witness),
     }
+
+
+def _taken(found: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(found, name) for name in names}
 
 
 def _took(found: Analysis | TreeAnalysis) -> str:
@@ -163,7 +159,7 @@ def _witness(found: RankWitness) -> list[str]:
     ]
 
 
-def _numeric_witness(found: NumericWitness) -> list[str]:
+def _numeric_witness(found: RankWitness) -> list[str]:
     q = ", ".join(f"{x:.9g}" for x in found.q)
     task = f"task {found.task[-1]:.4g}, " if len(found.task) else ""
     return [
@@ -172,7 +168,7 @@ def _numeric_witness(found: NumericWitness) -> list[str]:
     ]
 
 
-def _witness_record(found: NumericWitness | RankWitness | None) -> dict[str, Any] | None:
+def _witness_record(found: RankWitness | None) -> dict[str, Any] | None:
     """A witness as data, if there is one."""
     return None if found is None else {"q": found.q.tolist(), "task": found.task.tolist()}
 

@@ -70,34 +70,29 @@ class Ball:
         """How far the centre stays away from obstacles at least [m]."""
         return self.radius + float(self.kept.min())
 
-    def struck(self, centres: Array, corner: float) -> tuple[Flags, set[str]]:
-        """(at which places [m, 3] the centre is too near wherever it is within ``corner`` of them; to what)."""
+    def struck(self, centres: Array, corner: float, wide: bool = False) -> tuple[Flags, set[str]]:
+        """(at which places [m, 3] the centre, or the upright disc, is too near wherever it is within ``corner`` of it;
+        to what).
+        """
         out, names = np.zeros(len(centres), dtype=bool), set[str]()
         for obstacle, kept in zip(self.obstacles, self.kept, strict=True):
-            place = obstacle.placement or pin.SE3.Identity()
-            local = (centres - place.translation) @ place.rotation
-            assert isinstance(obstacle.shape, Geometry)
-            near = segments_from(obstacle.shape, local, local) < self.radius + kept - corner
+            place, shape = obstacle.placement or pin.SE3.Identity(), obstacle.shape
+            assert isinstance(shape, Geometry)
+            if wide:
+                near = self._from_disc(shape, place, centres, corner) < kept
+            else:
+                local = (centres - place.translation) @ place.rotation
+                near = segments_from(shape, local, local) < self.radius + kept - corner
             out |= near
             names |= {obstacle.name} if near.any() else set()
         return out, names
 
-    def crushed(self, centres: Array, corner: float) -> tuple[Flags, set[str]]:
-        """The same of the upright disc."""
-        out, names, count = np.zeros(len(centres), dtype=bool), set[str](), len(centres)
-        disc, upright = Cylinder(self.disc[0] - corner, self.disc[1]), np.tile(np.eye(3).ravel(), (count, 1))
-        for obstacle, kept in zip(self.obstacles, self.kept, strict=True):
-            assert isinstance(obstacle.shape, Geometry)
-            place = (obstacle.placement or pin.SE3.Identity()) * pin.SE3(np.eye(3), obstacle.shape.center)
-            stands = np.r_[place.rotation.ravel(), place.translation]
-            table, poses = (
-                ShapeTable([disc] * count + [obstacle.shape]),
-                np.vstack([np.hstack([upright, centres]), stands]),
-            )
-            near = distances(table, poses, np.arange(count), np.full(count, count))[:, 0] < kept
-            out |= near
-            names |= {obstacle.name} if near.any() else set()
-        return out, names
+    def _from_disc(self, shape: Geometry, place: pin.SE3, centres: Array, corner: float) -> Array:
+        """Distances of a shape from upright discs that are smaller by ``corner`` [m]."""
+        disc, count, stands = Cylinder(self.disc[0] - corner, self.disc[1]), len(centres), place.act(shape.center)
+        upright = np.hstack([np.tile(np.eye(3).ravel(), (count, 1)), centres])
+        poses = np.vstack([upright, np.r_[place.rotation.ravel(), stands]])
+        return distances(ShapeTable([disc] * count + [shape]), poses, np.arange(count), np.full(count, count))[:, 0]
 
     def places(self, tree: Tree, x: Array) -> Array:
         """Where the centre is at coordinates [m, n] in the world, and the body's axis [m, 6]."""
@@ -174,7 +169,7 @@ class PlaceGrid:
         level = np.ptp(places[:, 2]) <= LEVEL
         axes, radius = 2 if level else 3, ball.disc[0]
         # What stays upright on its level is as wide as its disc
-        self._wide = level and radius > ball.radius and np.abs(places[:, 5]).min() > 1.0 - LEVEL
+        self._wide = bool(level and radius > ball.radius and np.abs(places[:, 5]).min() > 1.0 - LEVEL)
         corner = LEVEL_CORNER * radius if self._wide else (LEVEL_CORNER if level else CORNER) * ball.least
         self._ball, self._corner, self._level = ball, corner, places[0, 2]
         self._root, self._reach = tree.frames[ball.chain[-1]].place.translation, ball.reaches(tree, *limits)[-1]
@@ -186,7 +181,7 @@ class PlaceGrid:
         centres = np.full((len(cells), 3), self._level)
         centres[:, : cells.shape[1]] = cells
         far = np.linalg.norm(centres - self._root, axis=1) > self._reach + self._corner
-        near, names = (self._ball.crushed if self._wide else self._ball.struck)(centres, self._corner)
+        near, names = self._ball.struck(centres, self._corner, self._wide)
         return near | far, names
 
 

@@ -102,6 +102,15 @@ class Motion:
         return cls._of(tree, times, np.stack(parts, axis=2), poses, slack, free_slack)
 
     @classmethod
+    def polynomial(cls, tree: Tree, times: Any, controls: Array) -> Motion:
+        """Scalars with these Bernstein coefficients [k - 1, scalars, degree + 1] of polynomials that meet at the knots
+        but for rounding; of a tree without free joints.
+        """
+        controls = np.repeat(controls, 3 - min(controls.shape[2], 2), axis=2)
+        controls[1:, :, 0] = controls[:-1, :, -1]
+        return cls._of(tree, times, controls, None, 0.0, 0.0)
+
+    @classmethod
     def _of(cls, tree: Tree, times: Any, controls: Array, poses: Any, slack: Any, free_slack: Any) -> Motion:
         count = len(tree.free)
         given = np.zeros((0, len(controls) + 1, 7)) if poses is None else validation.real_array("poses", poses)

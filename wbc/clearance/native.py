@@ -16,44 +16,18 @@ from wbc.clearance.scene import SweptScene
 from wbc.geometry.kernel import HEADERS, ShapeTable, checked
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
+from wbc.native.structures import CStructures
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
 #: The C of a sweep, which the planner includes
 SOURCES = Path(__file__).parent / "native"
-_INTEGERS = ("knots", "degree", "scalars", "frees", "frames", "bodies", "pairs", "depth", "aim")
-_ARRAYS = (
-    *("control", "variation", "rate", "slack", "free_pose", "free_turn", "free_variation", "free_slack"),
-    *("parent", "kind", "coordinate", "place", "axis", "pose", "deviation", "drift"),
-    *("body_frame", "body_place", "body_pose", "line", "world_line", "shape"),
-    *("chain", "chain_length", "moved", "stamp"),
-    *("first", "second", "stop_first", "stop_second", "required"),
-    *(
-        "exempt_start",
-        "exempt_from",
-        "exempt_to",
-        "exempt_side",
-        "exempt_point",
-        "low",
-        "high",
-        "when",
-        "chosen",
-        "list",
-    ),
-)
 #: How often a motion is halved at most, in ``native/sweep.c`` and to its knots
 HALVINGS = 128
 
 
-class _SweepStruct(ctypes.Structure):
-    """``sweep_t`` of ``native/sweep.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in _INTEGERS),
-        *((name, ctypes.c_double) for name in ("tolerance", "far", "least")),
-        *((name, ctypes.c_void_p) for name in _ARRAYS),
-        *((name, ctypes.c_int) for name in ("node", "stopped", "measured", "nodes", "even")),
-    ]
+#: ``sweep_t`` of ``native/sweep.h``
+_SweepStruct = CStructures(SOURCES / "sweep.h").structure("sweep_t")
 
 
 @functools.cache
@@ -144,15 +118,7 @@ class NativeSweep:
 
     def _hold(self, **arrays: Any) -> None:
         """Keep arrays as the code wants them; what it fills is contiguous already, and stays the same."""
-        integers = (
-            "parent",
-            "kind",
-            "coordinate",
-            "chain",
-            "chain_length",
-            "stop_first",
-            "stop_second",
-        )
+        integers = ("parent", "kind", "coordinate", "chain", "chain_length", "stop_first", "stop_second")
         for name, array in arrays.items():
             kind = np.int32 if name in integers or (name.startswith("exempt_") and name != "exempt_point") else None
             kept = np.ascontiguousarray(array, dtype=kind)

@@ -146,6 +146,23 @@ class Tree:
         """Poses on the parents ``[frames, 12]``: rotation row by row, then position [m]."""
         return np.array([place(frame.place) for frame in self.frames]).reshape(-1, 12)
 
+    def moved_by(self, names: tuple[str, ...], by: Mapping[int, tuple[int, float, float]]) -> Tree:
+        """The same with other scalars x, of these names: scalar i is ratio x_k + offset, by[i] = (k, ratio, offset)."""
+        frames = list(self.frames)
+        for f, frame in enumerate(frames):
+            if frame.moves in SCALAR:
+                k, ratio, offset = by[frame.coordinate]
+                scale, offset = frame.scale * ratio, frame.scale * offset + frame.offset
+                frames[f] = replace(frame, coordinate=k, scale=scale, offset=offset)
+        return replace(self, frames=tuple(frames), coordinates=names)
+
+    def shifted(self, frame: int, by: Array) -> Tree:
+        """The same with all that a frame carries moved by a vector in its axes [m]."""
+        shift = pin.SE3(np.eye(3), by)
+        frames = [replace(f, place=shift * f.place) if f.parent == frame else f for f in self.frames]
+        links = {name: (k, shift * pose if k == frame else pose) for name, (k, pose) in self.links.items()}
+        return replace(self, frames=tuple(frames), links=links)
+
     def about_z(self) -> Tree:
         """The same with frames turned so that scalars turn them about z or shift them along it."""
         turns = [_turn_to(frame.axis) if frame.moves in SCALAR else pin.SE3.Identity() for frame in self.frames]

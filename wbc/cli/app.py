@@ -163,7 +163,6 @@ class CommandGroup(TyperGroup):
         return f"{name} {mode}".strip(), chosen, rest
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the chosen command."""
         try:
             return self._run(ctx)
         except WbcError as error:

@@ -34,7 +34,6 @@ class _WholeLines(Console):
     """A line that is printed with ``soft_wrap`` stays one line in a pipe; a terminal gets whole words a row."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """As rich does; see above."""
         if options.get("soft_wrap") and self.is_terminal:
             # Words longer than a row, such as paths and joint positions, stay whole, too
             options |= {"soft_wrap": False, "overflow": "ignore"}
@@ -45,7 +44,6 @@ class _Data(Console):
     """Keeps lines as texts; a table as a title and one object a row, or one of names and texts; numbers as numbers."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Nothing; see above."""
         for each in objects if isinstance(_kept[0], dict) else ():
             if isinstance(each, Table):
                 _kept[0].setdefault("tables", []).append({"title": _plain(each.title or ""), "rows": _rows(each)})

@@ -39,10 +39,12 @@ class PlanPath(SceneOptions):
         from wbc.cli.console import data, say, tell
         from wbc.cli.reading import numbers
         from wbc.cli.scene import configuration
-        from wbc.errors import ShapeError
+        from wbc.errors import RangeError, ShapeError
         from wbc.multibody import pin
         from wbc.plan import NoPathError
 
+        if not self.target and self.to is None:
+            raise RangeError("target", None, "expected --target or --to")
         check_output(self.out, self.force)
         setup = self.planned()
         stack = setup.stack()

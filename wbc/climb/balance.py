@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from wbc import validation
@@ -16,19 +15,14 @@ from wbc.climb.stance import FREE_LIMB
 from wbc.climb.world import ClimbWorld, held_pose
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
-from wbc.support.region import Region, across, projected
 from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
-#: Greatest force by which contacts are thought to squeeze what is between them, in weights; as in ``native/balance.h``
-ROOM = 1e3
 #: What a share of the weight that contacts cannot balance costs, beside one of a motor's effort
 UNBALANCED = 100.0
 #: What lacks less than this counts as rounding [N m; N; weights]
 COUNTS = 1e-6
-#: Area by which the two polygons of a region may differ [m^2]
-AREA = 1e-5
 
 
 class Equilibrium:
@@ -53,7 +47,6 @@ class Equilibrium:
         self.scene = validation.instance("scene", scene, ClimbScene, "a ClimbScene")
         share = validation.scalar("friction", friction, low=0.0, high=1.0)
         self.world = ClimbWorld(climber, scene, friction=share)
-        self._regions: dict[tuple[int, ...], Region] = {}
 
     def margin(self, contacts: Sequence[int], q: Array, *, motors: bool = False, effort: float = 1.0) -> float:
         """Slack t [1] of contacts at a configuration; below 0 they do not bear the robot, and by -t of its weight each
@@ -72,8 +65,7 @@ class Equilibrium:
         poses = self._poses(held, at)
         if motors:
             return self._with_motors(held, at, poses, effort, np.inf)
-        places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
-        return self.world.slack(places, self.climber.center_of_mass(at), poses)[0]
+        return self.world.slack(self.world.places_of(held), self.climber.center_of_mass(at), poses)[0]
 
     def driven(self, contacts: Sequence[int], q: Array, least: float, effort: float = 1.0) -> bool:
         """Whether :meth:`margin` with motors is at least ``least``: without a program where the least forces show it.
@@ -126,41 +118,7 @@ class Equilibrium:
             ShapeError, RangeError: contacts that are none.
         """
         held = self._checked(contacts)
-        places = [int(self._first[row]) if row >= 0 else FREE_LIMB for row in held]
-        return self.world.wrench_slacks(places, self._poses(held, q), point, wrenches)
-
-    def region(self, contacts: Sequence[int]) -> Region:
-        """Where the centre of mass may be, across gravity, for t >= 0; kept for each set of contacts.
-
-        Hands and feet that fix their turn about the normal are taken as their footholds are turned.
-
-        Raises:
-            ShapeError: contacts that are none. RangeError: nothing weighs.
-        """
-        held = self._checked(contacts)
-        gravity = np.asarray(self.scene.gravity)
-        strength = float(np.linalg.norm(gravity))
-        if strength == 0.0:
-            raise RangeError("scene.gravity", gravity, "without gravity the centre of mass may be anywhere")
-        if held not in self._regions:
-            axes = across(gravity / strength)
-            rows = [row for row in held if row >= 0]
-            middle = self.scene.positions[rows].mean(axis=0) if rows else np.zeros(3)
-            poses = np.array([place(self.scene.footholds[max(row, 0)].pose) for row in held])
-            G, r, A, _, b = self._program(held, poses, middle)
-            shifts = np.array([np.concatenate([np.zeros(3), -np.cross(axis, gravity / strength)]) for axis in axes])
-
-            def farthest(direction: Array) -> Array | None:
-                cost = np.concatenate([np.zeros(G.shape[1]), -direction])
-                wide = np.hstack([A, np.zeros((len(A), 2))])
-                free = [(None, None)] * G.shape[1] + [(-ROOM, ROOM)] * 2
-                answer = linprog(cost, wide, b, np.hstack([G, -shifts.T]), r, free, method="highs")
-                return None if answer.status != 0 else np.array(answer.x[-2:])
-
-            corners, outer = projected(farthest, AREA)
-            here = axes @ middle
-            self._regions[held] = Region(middle, axes, corners + here, outer + here, torque=False)
-        return self._regions[held]
+        return self.world.wrench_slacks(self.world.places_of(held), self._poses(held, q), point, wrenches)
 
     @cached_property
     def moving_model(self) -> pin.Model:
@@ -173,18 +131,14 @@ class Equilibrium:
         held = tuple(int(row) for row in contacts)
         if len(held) != len(self.climber.limbs):
             raise ShapeError("contacts", contacts, f"expected {len(self.climber.limbs)}, one for each limb")
-        for limb, row in enumerate(held):
+        for row in held:
             if not FREE_LIMB <= row < len(self.scene.footholds):
                 raise RangeError("contacts", row, f"expected rows from 0 to {len(self.scene.footholds) - 1}, or -1")
-            if row >= 0 and self.world.cone_of[limb, self._first[row]] < 0:
+        for limb, (row, at) in enumerate(zip(held, self.world.places_of(held), strict=True)):
+            if row >= 0 and self.world.cone_of[limb, at] < 0:
                 name, hold = self.climber.limbs[limb].name, self.scene.footholds[row]
                 raise RangeError("contacts", row, f"foothold {hold.id} is for {', '.join(hold.limbs)}, not for {name}")
         return held
-
-    @property
-    def _first(self) -> NDArray[np.intp]:
-        """The first place of each foothold."""
-        return np.searchsorted(self.world.hold, np.arange(len(self.scene.footholds)))
 
     def _poses(self, held: tuple[int, ...], q: Array) -> Array:
         """Poses of the contacts ``(limbs, 12)``: those of the footholds, turned about the normal as the limbs are."""
@@ -195,10 +149,10 @@ class Equilibrium:
         """G, r, A, s and b of G x = r and A x + s t <= b, in weights; moments about the centre."""
         weight, gravity = self.world.weight, np.asarray(self.scene.gravity)
         maps, blocks, slacks, sides = [], [], [], []
-        for limb, row in enumerate(held):
-            if row < 0:
+        for limb, at in enumerate(self.world.places_of(held)):
+            if at < 0:
                 continue
-            cone = self.world.cone(limb, int(self._first[row]))
+            cone = self.world.cone(limb, at)
             turn, arm = poses[limb, :9].reshape(3, 3), poses[limb, 9:] - center
             force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
             maps.append(np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
@@ -244,9 +198,9 @@ class Equilibrium:
             -(self.climber.mass * pin.jacobianCenterOfMass(model, data, q)).T @ np.asarray(self.scene.gravity) / weight
         )
         pulled = [np.zeros((model.nv, 0))]
-        for limb, row in enumerate(held):
-            if row >= 0:
-                cone, turn = self.world.cone(limb, int(self._first[row])), poses[limb, :9].reshape(3, 3)
+        for limb, at in enumerate(self.world.places_of(held)):
+            if at >= 0:
+                cone, turn = self.world.cone(limb, at), poses[limb, :9].reshape(3, 3)
                 frame = frame_index(model, self.climber.limbs[limb].frame)
                 pin.updateFramePlacement(model, data, frame)
                 J = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)

@@ -117,6 +117,13 @@ class Clearances:
         near = swept.nearest
         return near and replace(near, first=_plain_name(near.first), second=_plain_name(near.second))
 
+    def blur(self, times: Array, q: Array, v: Array) -> float:
+        """How far links may be between knots from where :meth:`moving` measures them, as the base goes evenly there and
+        not on its cubic [m]: what lacks less may be clear with more knots.
+        """
+        ahead, turned = self._motion(times, q, v).free_slack[0]
+        return float(ahead + turned * self._size)
+
     def _motion(self, times: Array, q: Array, v: Array | None) -> Motion:
         values, tree = joint_values(self.climber.robot, q), self._sweeper.scene.tree
         if v is None:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from wbc import pickling, validation
 from wbc.climb.contacts import ContactKind, Fixed, PointFoot
+from wbc.climb.joint_values import joint_values, with_joint_values
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnsupportedJointError
 from wbc.multibody import pin
 from wbc.robot import Robot
+from wbc.rotations import matrices
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
@@ -155,20 +157,36 @@ class Climber:
 
     def angles(self, q: Array, limb: int) -> Array:
         """A limb's angles ``(k)`` [m, rad] in a configuration; of joints without end within (-pi, pi]."""
-        out = np.empty(len(self._dofs[limb]))
-        for k, (row, ends) in enumerate(self._places[limb]):
-            out[k] = q[row] if ends else np.arctan2(q[row + 1], q[row])
-        return out
+        return np.asarray(joint_values(self.robot, np.asarray(q)[None])[0, self._dofs[limb] - 6])
 
     def with_limb(self, q: Array, limb: int, angles: Array) -> Array:
-        """A configuration with a limb's angles, and those of its followers."""
-        out = np.array(q, dtype=np.float64)
-        for (row, ends), angle in zip(self._places[limb], angles, strict=True):
-            out[row : row + (1 if ends else 2)] = angle if ends else (np.cos(angle), np.sin(angle))
+        """A configuration with a limb's angles, and those of its followers; or ``(n, nq)`` with ``(n, k)``."""
+        rows = np.atleast_2d(q)
+        values = joint_values(self.robot, rows)
+        values[:, self._dofs[limb] - 6] = angles
+        return self.with_values(rows, values).reshape(np.shape(q))
+
+    def with_values(self, q: Array, values: Array) -> Array:
+        """Configurations ``(n, nq)`` with other numbers of joints ``(n, nv - 6)``, followers with their leaders."""
         for coupling in self.robot.couplings:
-            if coupling.leader in self._dofs[limb]:
-                rows = self.robot.position_index[[coupling.follower, coupling.leader]]
-                out[rows[0]] = coupling.ratio * out[rows[1]] + coupling.offset
+            values[:, coupling.follower - 6] = coupling.ratio * values[:, coupling.leader - 6] + coupling.offset
+        return with_joint_values(self.robot, q, values)
+
+    def states(self, q: Array) -> Array:
+        """Poses of the body, rotation row by row, then position, and angles of all limbs ``(n, 12 + k)`` of
+        configurations ``(n, nq)`` that follow each other.
+        """
+        rotation, values = (self._root.rotation @ matrices(q[:, 3:7])).reshape(-1, 9), joint_values(self.robot, q)
+        angles = [values[:, dofs - 6] for dofs in self._dofs]
+        return np.hstack([rotation, q[:, :3] @ self._root.rotation.T + self._root.translation, *angles])
+
+    def with_states(self, q: Array, states: Array, body: bool = True) -> Array:
+        """Configurations ``(n, nq)`` with the angles of some :meth:`states`, and their bodies or not."""
+        values = joint_values(self.robot, q)
+        values[:, np.concatenate(self._dofs) - 6] = states[:, 12:]
+        out = self.with_values(q, values)
+        for row, at in zip(out, states if body else (), strict=body):
+            row[:7] = pin.SE3ToXYZQUAT(self._root.actInv(pin.SE3(at[:9].reshape(3, 3), at[9:12])))
         return out
 
     def contact_pose(self, q: Array, limb: int) -> pin.SE3:
@@ -199,17 +217,6 @@ class Climber:
             dofs = [int(model.idx_vs[j]) + k for j in chain for k in range(int(model.nvs[j]))]
             own = [dof for dof in dofs if dof not in followers]
             out.append(np.array(list(dict.fromkeys(own)), dtype=np.intp))
-        return tuple(out)
-
-    @cached_property
-    def _places(self) -> tuple[tuple[tuple[int, bool], ...], ...]:
-        """Of each angle its first row in q, and whether its joint ends somewhere."""
-        model = self.robot.model
-        joint_of = {int(model.idx_vs[j]) + k: j for j in range(1, model.njoints) for k in range(int(model.nvs[j]))}
-        out = []
-        for dofs in self._dofs:
-            rows = [(int(self.robot.position_index[dof]), int(model.idx_qs[joint_of[int(dof)]])) for dof in dofs]
-            out.append(tuple((row, True) if row >= 0 else (first, False) for row, first in rows))
         return tuple(out)
 
     def _check_chain(self, limb: int) -> None:

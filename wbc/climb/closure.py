@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from wbc.climb.chain import ROWS, address_of as _at, library
 from wbc.climb.climber import Climber
-from wbc.climb.joint_values import climb_states, joint_values, with_joint_values
 from wbc.climb.reach import LimbReach
 from wbc.multibody import pin
-from wbc.rotations import matrices
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
@@ -73,27 +71,15 @@ class Closure:
             return left
         which = np.array(list(poses), dtype=np.int32)
         wanted = np.ascontiguousarray(np.stack(list(poses.values()), axis=1))
-        state = climb_states(self.climber, q)
+        state = self.climber.states(q)
         library().wbc_close(
             ctypes.byref(self._reach.table.numbers), _at(self._offsets), state.shape[1], len(which), _at(which),
             _at(wanted), int(turned), ctypes.c_double(body), ctypes.c_double(CLOSED), steps, ctypes.c_long(len(q)),
             _at(state), _at(left),
         )  # fmt: skip
         if steps:
-            self.with_states(q, state, bool(body))
+            q[:] = self.climber.with_states(q, state, bool(body))
         return left
-
-    def with_states(self, q: Array, states: Array, body: bool = True) -> None:
-        """Gives configurations ``(n, nq)`` the angles of states of :func:`climb_states`, and their bodies or not, in
-        place.
-        """
-        values = joint_values(self.climber.robot, q)
-        values[:, self._rows] = states[:, 12:]
-        q[:] = self._with_values(q, values)
-        if body:
-            root = self.climber.robot.model.jointPlacements[1]
-            for row, at in zip(q, states, strict=True):
-                row[:7] = pin.SE3ToXYZQUAT(root.actInv(pin.SE3(at[:9].reshape(3, 3), at[9:12])))
 
     def followed(self, limb: int, q: Array, poses: Array, turned: bool = True) -> int:
         """Brings a limb's contact to poses in the world ``(n, 12)``, in some configurations ``(n, nq)`` and in place,
@@ -104,22 +90,15 @@ class Closure:
         """
         if limb in self.short and turned:
             return 0
-        root, wanted = self.climber.robot.model.jointPlacements[1], np.empty_like(poses)
-        rotation = np.swapaxes(root.rotation @ matrices(q[:, 3:7]), 1, 2)
+        states, wanted = self.climber.states(q), np.empty_like(poses)
+        rotation = np.swapaxes(states[:, :9].reshape(-1, 3, 3), 1, 2)
         wanted[:, :9] = (rotation @ poses[:, :9].reshape(-1, 3, 3)).reshape(-1, 9)
-        away = poses[:, 9:] - q[:, :3] @ root.rotation.T - root.translation
-        wanted[:, 9:] = np.einsum("nij,nj->ni", rotation, away)
-        seeds = joint_values(self.climber.robot, q)[:, self.climber.joints(limb) - 6]
+        wanted[:, 9:] = np.einsum("nij,nj->ni", rotation, poses[:, 9:] - states[:, 9:12])
+        seeds = states[:, 12 + self._offsets[limb] : 12 + self._offsets[limb + 1]]
         angles, count = self._reach.brought(limb, wanted, seeds, turned)
         if count == len(q):
-            self.put(limb, q, angles)
+            q[:] = self.climber.with_limb(q, limb, angles)
         return count
-
-    def put(self, limb: int, q: Array, angles: Array) -> None:
-        """Gives a limb angles ``(n, k)``, and its followers theirs, in configurations ``(n, nq)``, in place."""
-        values = joint_values(self.climber.robot, q)
-        values[:, self.climber.joints(limb) - 6] = angles
-        q[:] = self._with_values(q, values)
 
     @cached_property
     def short(self) -> frozenset[int]:
@@ -134,17 +113,6 @@ class Closure:
     def poses(self, q: Array) -> tuple[pin.SE3, ...]:
         """Pose in the world of every limb's contact frame."""
         return tuple(self.climber.contact_pose(q, limb) for limb in range(len(self.climber.limbs)))
-
-    def _with_values(self, q: Array, values: Array) -> Array:
-        """Configurations with other numbers of joints, followers with their leaders."""
-        for coupling in self.climber.robot.couplings:
-            values[:, coupling.follower - 6] = coupling.ratio * values[:, coupling.leader - 6] + coupling.offset
-        return with_joint_values(self.climber.robot, q, values)
-
-    @cached_property
-    def _rows(self) -> NDArray[np.intp]:
-        """Of all limbs' angles their places among the numbers of joints."""
-        return np.concatenate([self.climber.joints(limb) for limb in range(len(self.climber.limbs))]) - 6
 
     @cached_property
     def _offsets(self) -> NDArray[np.int32]:

@@ -59,7 +59,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         if tried > STANCES or outcomes[PostureOutcome.STANDS] == CHOSEN:
             break
         contacts = world.contacts(places)
-        how, found, slack, _ = world.stand(contacts, contacts, given.margin, state, followed=False)
+        how, found, slack = world.stand(contacts, contacts, given.margin, state, followed=False)
         outcomes[how] += 1
         if how == PostureOutcome.STANDS and (stuck := world.stuck(contacts, found)) < least:
             rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)

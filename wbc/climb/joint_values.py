@@ -7,9 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.climb.climber import Climber
 from wbc.robot import Robot
-from wbc.rotations import matrices
 from wbc.validation import Array
 
 #: How far beyond a limit counts as within it, as files round their numbers [m, rad]
@@ -35,16 +33,6 @@ def with_joint_values(robot: Robot, q: Array, values: Array) -> Array:
     if len(endless):
         out[:, rows[endless]], out[:, rows[endless] + 1] = np.cos(values[:, endless]), np.sin(values[:, endless])
     return out
-
-
-def climb_states(climber: Climber, q: Array) -> Array:
-    """Poses of the body, rotation row by row, then position, and angles of all limbs ``(n, 12 + k)`` of configurations
-    ``(n, nq)`` that follow each other.
-    """
-    root, values = climber.robot.model.jointPlacements[1], joint_values(climber.robot, q)
-    rotation = (root.rotation @ matrices(q[:, 3:7])).reshape(-1, 9)
-    angles = [values[:, climber.joints(limb) - 6] for limb in range(len(climber.limbs))]
-    return np.hstack([rotation, q[:, :3] @ root.rotation.T + root.translation, *angles])
 
 
 def beyond_limits(robot: Robot, q: Array) -> tuple[str, float] | None:

@@ -26,7 +26,7 @@ from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.climb.watch import PlanWatch
-from wbc.climb.world import ClimbWorld, CloseLinks
+from wbc.climb.world import ClimbWorld
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
 from wbc.validation import Array
 
@@ -62,31 +62,6 @@ class MoveError(InfeasibleError):
     nearest: Nearest | None = None
     standing: bool = False
     limbs: frozenset[int] = frozenset()
-
-
-class _TouchError(InfeasibleError):
-    """Links are nearer than they may be on the way.
-
-    Attributes:
-        limbs: rows of limbs whose links these are.
-    """
-
-    limbs: frozenset[int] = frozenset()
-
-
-def _touch_error(touch: CloseLinks, part: float) -> _TouchError:
-    """Of links at a part of the way."""
-    reason = f"are {1e3 * touch.lacks:.3f} mm nearer than they may be at {100.0 * part:.0f} % of the way"
-    error = _TouchError(touch.names, touch.lacks, reason)
-    error.limbs = touch.limbs
-    return error
-
-
-def _touched(touch: _TouchError, move: int) -> MoveError:
-    """The refusal of a move for links that are nearer than they may be."""
-    error = _passed_on(move, touch)
-    error.limbs = touch.limbs
-    return error
 
 
 def _passed_on(move: int, error: WbcError) -> MoveError:
@@ -206,12 +181,12 @@ class Mover:
                 self._check(stance, which, row)
                 self.checked.add(stance)
         refusals = list[tuple[float, float, MoveError]]()
-        look = None if self.closure.short else functools.partial(self._look, one, other)
+        look = None if self.closure.short else functools.partial(self._look, one, other, row)
         for shape in self._shapes(one, other, row, refusals):
             try:
                 path = move_path(self.closure, one, other, shape, self._normals, look=look)
-            except _TouchError as error:
-                refusals.append((1.0, -float(error.value), _touched(error, row)))
+            except MoveError as error:
+                refusals.append((1.0, -float(error.value), error))
                 continue
             except InfeasibleError as error:
                 refusals.append((0.0, 0.0, _passed_on(row, error)))
@@ -245,7 +220,7 @@ class Mover:
         bodies = [self.climber.body_pose(stance.q) for stance in (one, other)]
         stays = not short and bodies[0].isApprox(bodies[1], ONE_PLACE)
         for still in (True, False) if stays else (False,):
-            for height, lean in CURVES:
+            for height, lean in CURVES if swings else CURVES[:1]:
                 if still or not stays:
                     yield SwingShape(height * self.lift, lean)
                 if not still and not short:
@@ -266,18 +241,16 @@ class Mover:
         # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
         return max(LEAST, (SHIFTED if one.contacts == other.contacts else 1.0) * self.options.margin)
 
-    def _touch(self, one: Stance, other: Stance, q: Array) -> CloseLinks | None:
-        """The first of configurations in which links are nearer than they may be on any way through these; None: in
-        none.
-        """
+    def _look(self, one: Stance, other: Stance, row: int, s: Array, q: Array) -> None:
+        """Refuses a path in whose samples links are nearer than they may be, before more is spent on it."""
         places = [self._world.places_of(stance.contacts) for stance in (one, other)]
         contacts = np.repeat(places, [len(q) // 2, len(q) - len(q) // 2], axis=0)
-        return self._world.first_touch(contacts, self._world.states_of(q))
-
-    def _look(self, one: Stance, other: Stance, s: Array, q: Array) -> None:
-        """Refuses a path on which links touch at samples, before more is spent on it."""
-        if (touch := self._touch(one, other, q)) is not None:
-            raise _touch_error(touch, float(s[touch.row]))
+        if (touch := self._world.first_touch(contacts, self.climber.states(q))) is not None:
+            part = 100.0 * float(s[touch.row])
+            text = f"{touch.names}: are {1e3 * touch.lacks:.3f} mm nearer than they may be at {part:.0f} % of the way"
+            error = _refused(row, touch.lacks, text, None)
+            error.limbs = touch.limbs
+            raise error
 
     @cached_property
     def _world(self) -> ClimbWorld:
@@ -316,10 +289,10 @@ class Mover:
         for parts in PARTS:
             s = np.interp(np.arange(parts * (len(path.s) - 1) + 1) / parts, np.arange(len(path.s)), path.s)
             at = path.at(s)
-            velocities = path.velocities(at, path.at(s, 1))
-            nearest = self.clearances.moving(contacts, s, path.configurations(at), velocities)
+            knots = s, path.configurations(at), path.velocities(at, path.at(s, 1))
+            nearest = self.clearances.moving(contacts, *knots)
             # The body's cubic is not known better than between the instants given: more of them decide what is open
-            if nearest is None or nearest.distance < nearest.required:
+            if nearest is None or nearest.distance < nearest.required - self.clearances.blur(*knots):
                 break
         if nearest is not None:
             text = f"{_told(nearest)} at {100.0 * nearest.time:.0f} % of the way"

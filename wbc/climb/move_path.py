@@ -189,7 +189,8 @@ def band_path(
     contacts = [band.world.places_of(stance.contacts) for stance in (one, other)]
     near = np.repeat(contacts, [len(s) // 2, len(s) - len(s) // 2], axis=0)
     bears = np.where(contacts[0] == contacts[1], contacts[0], FREE_LIMB).astype(np.int32)
-    closure.with_states(q, band.relaxed(band.world.states_of(q), BandRows(near, poses, closed, at_first, bears)))
+    rows = BandRows(near, poses, closed, at_first, bears)
+    q = closure.climber.with_states(q, band.relaxed(closure.climber.states(q), rows))
     moving.close_ends(s, q)
     q[0], q[-1] = one.q, other.q
     # Contacts go on their curves up to where these end: a spline through few samples would have a kink there
@@ -270,7 +271,8 @@ class _Moving:
             for limb in curves:
                 first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
                 slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
-                self.closure.put(limb, q[up : down + 1], _cubic(x, first[1], last[0], *slopes))
+                free = q[up : down + 1]
+                free[:] = self.climber.with_limb(free, limb, _cubic(x, first[1], last[0], *slopes))
             self.even = self._steps(q)
             self.even[:up], self.even[down:] = 0.0, 0.0
             for limb in self.held:

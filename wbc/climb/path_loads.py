@@ -9,7 +9,6 @@ import numpy as np
 from wbc.climb.balance import Equilibrium
 from wbc.climb.move_path import MovePath
 from wbc.multibody import pin
-from wbc.rotations import matrices
 from wbc.validation import Array
 
 #: Path step over which velocities are differentiated [1]
@@ -83,7 +82,7 @@ class PathLoads:
 
     def _wrenches(self, path: MovePath, s: Array) -> tuple[Array, Array, Array]:
         """C, A, B."""
-        model, root = self._balance.moving_model, self._balance.climber.robot.model.jointPlacements[1]
+        model, climber = self._balance.moving_model, self._balance.climber
         data, zero, weight = model.createData(), np.zeros(model.nv), self._balance.world.weight
 
         def velocities(s: Array) -> Array:
@@ -97,8 +96,8 @@ class PathLoads:
             own[1, k] = pin.rnea(model, data, q[k], zero, first[k])[:6]
             own[2, k] = pin.rnea(model, data, q[k], first[k], second[k])[:6]
         own[1:] -= own[0]
-        turns = root.rotation @ matrices(q[:, 3:7])
-        arms = root.translation + q[:, :3] @ root.rotation.T - self._center
+        states = climber.states(q)
+        turns, arms = states[:, :9].reshape(-1, 3, 3), states[:, 9:12] - self._center
         force, moment = (np.einsum("nij,cnj->cni", turns, part) for part in (own[..., :3], own[..., 3:]))
         still, pull, speed = np.concatenate([force, moment + np.cross(arms, force)], axis=2) / weight
         return still, pull, speed

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.climb.chain import ROWS, address_of as _at, library, limb_table
 from wbc.climb.climber import Climber
-from wbc.errors import RotationError, ShapeError
-from wbc.rotations import matrices
 from wbc.validation import Array
 
 #: How far postures stay from limits of joints [m, rad]; at most a tenth of a joint's range
@@ -48,8 +46,7 @@ class LimbReach:
 
         Args:
             limb: its row.
-            poses: of the contact frame in the body's frame ``(n, 7)``: position [m], quaternion x, y, z, w; or
-                ``(n, 12)``: rotation row by row, then position.
+            poses: of the contact frame in the body's frame ``(n, 12)``: rotation row by row, then position [m].
             seeds: angles ``(n, k)`` [m, rad] from which the first posture is sought, None: the table alone.
             count: postures apart from each other that are wanted of each pose.
 
@@ -58,12 +55,12 @@ class LimbReach:
             seed and a posture near it, that comes first.
 
         Raises:
-            RangeError, ShapeError, NotFiniteError, RotationError: no such limb, poses, seeds or count.
+            RangeError, ShapeError, NotFiniteError: no such limb, poses, seeds or count.
         """
         row = validation.integer("limb", limb, 0, len(self.climber.limbs) - 1)
         most = validation.integer("count", count, 1, 64)
-        wanted = poses_of("poses", poses)
-        n, k = len(wanted), len(self.table.rest[row])
+        n, k = np.shape(poses)[0] if np.ndim(poses) else 0, len(self.table.rest[row])
+        wanted = validation.real_array("poses", poses, (n, 12))
         start = None if seeds is None else np.ascontiguousarray(validation.real_array("seeds", seeds, (n, k)))
         angles, counts = np.zeros((n, most, k)), np.zeros(n, dtype=np.int32)
         library().wbc_postures(
@@ -88,20 +85,3 @@ class LimbReach:
             ctypes.byref(self.table.numbers[limb]), ctypes.c_long(len(wanted)), _at(wanted), rows, _at(angles)
         )
         return angles, int(count)
-
-
-def poses_of(field: str, poses: Any) -> Array:
-    """Rows of a rotation row by row, then a position ``(n, 12)``, of poses in either form.
-
-    Raises:
-        ShapeError, NotFiniteError, RotationError: neither.
-    """
-    given = np.atleast_2d(validation.real_array(field, poses))
-    if given.ndim != 2 or given.shape[1] not in (7, 12):
-        raise ShapeError(field, poses, "expected poses of 7 or 12 numbers each")
-    if given.shape[1] == 12:
-        return np.ascontiguousarray(given)
-    lengths = np.linalg.norm(given[:, 3:], axis=1, keepdims=True)
-    if (np.abs(lengths - 1.0) > validation.ROTATION_TOLERANCE).any():
-        raise RotationError(field, poses, "expected quaternions of unit length")
-    return np.ascontiguousarray(np.hstack([matrices(given[:, 3:] / lengths).reshape(-1, 9), given[:, :3]]))

@@ -140,10 +140,6 @@ class StanceOptions:
         validation.integer("StanceOptions.moves", self.moves, 1)
 
 
-#: What :meth:`ClimbWorld.lift` says
-_Lift = tuple[PostureOutcome, Array, float, NDArray[np.int32], bool]
-
-
 @dataclass(frozen=True, eq=False)
 class _Node:
     """A stance that was found, and the move that led to it; lifts that were looked at, by the contacts that stay, with
@@ -157,9 +153,7 @@ class _Node:
     before: _Node | None = None
     cost: float = 0.0
     lift: Array | None = None
-    lifts: dict[bytes, tuple[tuple[PostureOutcome, Array, float, NDArray[np.int32], bool], int]] = field(
-        default_factory=dict
-    )
+    lifts: dict[bytes, tuple[tuple[PostureOutcome, Array, float, bool], int]] = field(default_factory=dict)
     stuck: set[int] = field(default_factory=set)
 
 
@@ -387,13 +381,13 @@ class StanceSearch:
                 lifted = PostureOutcome.NOT_BORNE, *lifted[1:]
             node.lifts[key] = lifted, attempt
             self.tried[lifted[0]] += lifted[0] != PostureOutcome.STANDS
-        how, lift, before, _, moves = node.lifts[key][0]
+        how, lift, before, moves = node.lifts[key][0]
         if how != PostureOutcome.STANDS:
             moved = np.flatnonzero(node.contacts != after)
             node.stuck.update(moved.tolist() if len(moved) == 1 else [])
             return None
         node.stuck.difference_update(np.flatnonzero(node.contacts != after).tolist())
-        how, land, slack, _ = self.world.land(after, kept, margin, lift, attempt)
+        how, land, slack = self.world.land(after, kept, margin, lift, attempt)
         if how == PostureOutcome.STANDS and not self._driven(kept, land):
             how = PostureOutcome.NOT_BORNE
         self.tried[how] += 1
@@ -564,7 +558,7 @@ class StanceSearch:
         if near <= goal.within and not turned:
             return self._path(node, None)
         body = self._goal_body if turned else np.concatenate([node.state[:9], self._goal_body[9:]])
-        how, state, _, _ = self.world.stand(
+        how, state, _ = self.world.stand(
             node.contacts, node.contacts, self.options.margin, node.state, body=body,
             weights=(DRAWN, DRAWN if turned else 0.0),
         )  # fmt: skip

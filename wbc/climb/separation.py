@@ -113,7 +113,7 @@ class Separation:
         two, world = len(self._names) == 2, self._world
         for limb in np.flatnonzero(contacts >= 0).tolist():
             alone = np.where(np.arange(len(contacts)) == limb, contacts, FREE_LIMB).astype(np.int32)
-            how, end, slack, _ = world.stand(contacts, alone if two else contacts, margin, begun, followed=False)
+            how, end, slack = world.stand(contacts, alone if two else contacts, margin, begun, followed=False)
             on = f"with the weight on {world.scene.footholds[world.hold[contacts[limb]]].id} " if two else ""
             if how == PostureOutcome.NOT_REACHED:
                 off, turned = self._off(contacts, end)

@@ -17,7 +17,6 @@ from wbc.climb.chain import address_of as _at, library, limb_table
 from wbc.climb.clear import SINK, climber_bodies, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
-from wbc.climb.joint_values import climb_states
 from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance
@@ -228,20 +227,12 @@ class ClimbWorld:
         return {self._slack_cones[k].N.shape[1] for k in np.unique(self.cone_of[limb]) if k >= 0}
 
     def state_of(self, q: Array) -> Array:
-        """Pose of the body and angles of all limbs, as one row."""
-        return np.asarray(self.states_of(np.asarray(q)[None])[0])
-
-    def states_of(self, q: Array) -> Array:
-        """Of configurations ``(n, nq)`` that follow each other, a row each."""
-        return climb_states(self.climber, q)
+        """Pose of the body and angles of all limbs, as of :meth:`Climber.states`."""
+        return np.asarray(self.climber.states(np.asarray(q)[None])[0])
 
     def q_of(self, state: Array) -> Array:
         """The configuration of such a row; joints of no limb are at rest."""
-        climber = self.climber
-        q = climber.with_body(climber.rest, pin.SE3(state[:9].reshape(3, 3), state[9:12]))
-        for limb in range(len(climber.limbs)):
-            q = climber.with_limb(q, limb, state[12 + self.offsets[limb] : 12 + self.offsets[limb + 1]])
-        return q
+        return np.asarray(self.climber.with_states(self.climber.rest[None], state[None])[0])
 
     def center(self, state: Array) -> Array:
         """The robot's centre of mass ``(3)`` [m]."""
@@ -249,7 +240,9 @@ class ClimbWorld:
         self._code.wbc_center(self._world, _at(state), _at(out))
         return out
 
-    def slack(self, contacts: Sequence[int], center: Array, poses: Array | None = None) -> tuple[float, Array]:
+    def slack(
+        self, contacts: Sequence[int] | NDArray[np.int32], center: Array, poses: Array | None = None
+    ) -> tuple[float, Array]:
         """Slack in shares of weight, and its bound (offset, gradient over the centre of mass) ``(4)``; infinite where
         nothing weighs and contacts hold.
 
@@ -264,7 +257,7 @@ class ClimbWorld:
         return slack, bound
 
     def wrench_slacks(
-        self, contacts: Sequence[int], poses: Array, point: Array, wrenches: Array
+        self, contacts: Sequence[int] | NDArray[np.int32], poses: Array, point: Array, wrenches: Array
     ) -> tuple[Array, Array]:  # fmt: skip
         """Slacks ``(n)`` in shares of weight for wrenches that the contacts have to give, and bounds ``(n, 7)``:
 
@@ -300,22 +293,16 @@ class ClimbWorld:
         body: Array | None = None,
         weights: tuple[float, float] = (0.0, 0.0),
         followed: bool = True,
-    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32]]:
-        """A posture on contacts that ``bears`` of them bear with a slack: outcome, state, slack, what touches.
+    ) -> tuple[PostureOutcome, Array, float]:
+        """A posture on contacts that ``bears`` of them bear with a slack: outcome, state, slack.
 
         Args:
             body: pose to which the body is drawn, 12 numbers, by ``weights`` of its place and turn.
             followed: whether limbs are followed from ``state`` on.
-        """  # fmt: skip
-        wish = np.zeros(14)
-        wish[:2] = weights
-        wish[2:] = state[:12] if body is None else body
-        out, slack, which = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32)
-        how = self._code.wbc_stand(
-            self._world, _at(contacts), _at(bears), ctypes.c_double(wanted), _at(wish), int(followed), _at(out),
-            _at(slack), _at(which),
-        )  # fmt: skip
-        return PostureOutcome(how), out, float(slack[0]), which
+        """
+        wish = np.concatenate([weights, state[:12] if body is None else body])
+        given = _at(contacts), _at(bears), ctypes.c_double(wanted), _at(wish), int(followed)
+        return self._sought(self._code.wbc_stand, state, *given)
 
     def stuck(self, contacts: NDArray[np.int32], state: Array) -> int:
         """How many limbs cannot lift off where they hold without links that touch, the body as it is."""
@@ -323,27 +310,26 @@ class ClimbWorld:
 
     def lift(
         self, contacts: NDArray[np.int32], kept: NDArray[np.int32], wanted: float, state: Array, attempt: int = 0
-    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32], bool]:
-        """The state from which all limbs but those kept let go: outcome, state, slack, what touches, and whether it is
-        another state than the one given. Each ``attempt`` from 1 to 3 begins elsewhere.
+    ) -> tuple[PostureOutcome, Array, float, bool]:
+        """The state from which all limbs but those kept let go: outcome, state, slack, and whether it is another state
+        than the one given. Each ``attempt`` from 1 to 3 begins elsewhere.
         """
-        out, slack, which, moves = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32), ctypes.c_int()
-        how = self._code.wbc_lift(
-            self._world, _at(contacts), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt, _at(out),
-            _at(slack), _at(which), ctypes.byref(moves),
-        )  # fmt: skip
-        return PostureOutcome(how), out, float(slack[0]), which, bool(moves.value)
+        moves = ctypes.c_int()
+        given = _at(contacts), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt, ctypes.byref(moves)
+        return *self._sought(self._code.wbc_lift, state, *given), bool(moves.value)
 
     def land(
         self, after: NDArray[np.int32], kept: NDArray[np.int32], wanted: float, state: Array, attempt: int = 0
-    ) -> tuple[PostureOutcome, Array, float, NDArray[np.int32]]:
-        """The state from there on in which limbs hold again: outcome, state, slack, what touches."""
-        out, slack, which = state.copy(), np.zeros(1), np.zeros(4, dtype=np.int32)
-        how = self._code.wbc_land(
-            self._world, _at(after), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt, _at(out),
-            _at(slack), _at(which),
-        )  # fmt: skip
-        return PostureOutcome(how), out, float(slack[0]), which
+    ) -> tuple[PostureOutcome, Array, float]:
+        """The state from there on in which limbs hold again: outcome, state, slack."""
+        given = _at(after), _at(kept), ctypes.c_double(wanted), _at(self.touch), attempt
+        return self._sought(self._code.wbc_land, state, *given)
+
+    def _sought(self, call: Any, state: Array, *given: Any) -> tuple[PostureOutcome, Array, float]:
+        """What a call makes of a state: outcome, state, slack."""
+        out, slack = state.copy(), np.zeros(1)
+        how = call(self._world, *given, _at(out), _at(slack))
+        return PostureOutcome(how), out, float(slack[0])
 
     def first_touch(self, contacts: NDArray[np.int32], states: Array) -> CloseLinks | None:
         """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may
@@ -400,11 +386,11 @@ class ClimbWorld:
         self._code.wbc_stretch.restype = ctypes.c_double
         return float(self._code.wbc_stretch(self._world, _at(contacts), _at(self.touch), _at(state)))
 
-    def contacts(self, contacts: Sequence[int]) -> NDArray[np.int32]:
+    def contacts(self, contacts: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
         """A row for the other calls."""
         return np.array(contacts, dtype=np.int32)
 
-    def places_of(self, contacts: Sequence[int]) -> NDArray[np.int32]:
+    def places_of(self, contacts: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
         """The first place of each foothold, of rows of these."""
         rows = np.asarray(contacts)
         return np.where(rows >= 0, np.searchsorted(self.hold, rows), rows).astype(np.int32)

@@ -149,7 +149,6 @@ class Core:
 
     @property
     def waits(self) -> bool:
-        """See the class."""
         return bool(self.gate[0])
 
     @waits.setter
@@ -158,7 +157,6 @@ class Core:
 
     @property
     def call(self) -> Callable[[], int]:
-        """See the class."""
         return self._call
 
     @call.setter
@@ -168,7 +166,6 @@ class Core:
 
     @property
     def plain_call(self) -> Callable[[], int] | None:
-        """See the class."""
         return self._plain_call
 
     @plain_call.setter
@@ -267,7 +264,6 @@ class Core:
         self.waiting.pop(slot, None)
 
     def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
-        """See :meth:`Handle.ramp`."""
         self.ramps.start(handle, weight, seconds)
         self.waits = True
 

@@ -417,7 +417,8 @@ class InputGroup:
             columns, then positions.
 
     Attributes:
-        size: how many numbers it has. written: the last ones, None before the first.
+        size: how many numbers it has. places: where they are in the buffer. written: the last ones, None before the
+            first.
     """
 
     def __init__(self, owner: Owner, inputs: Sequence[tuple[str, str, slice | None]]) -> None:
@@ -425,7 +426,7 @@ class InputGroup:
         self._slots = [owner.layout.blocks[item].slots[name] for item, name, _ in inputs]
         self._field = ", ".join(f"{item}.{name}" for item, name, _ in inputs)
         spans = [np.arange(slot.span.start, slot.span.stop) for slot in self._slots]
-        index = np.concatenate(
+        self.places = index = np.concatenate(
             [span if part is None else span[part] for span, (*_, part) in zip(spans, inputs, strict=True)]
         )
         self.size = len(index)

@@ -9,7 +9,7 @@ from wbc.analysis.rows import JointRows, PitchPlaneRows
 from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rows import Coordinate, PlaneAngleRows
 from wbc.robot import Robot
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import joint_of
 
 
 def chains(robot: Robot) -> tuple[int, ...]:
@@ -28,7 +28,7 @@ def carrying_joint(robot: Robot, one: Coordinate) -> int:
     if isinstance(one, JointRows):
         return int(robot.model.getJointId(one.joint))
     frame = one.wrist if isinstance(one, (PitchPlaneRows, PlaneAngleRows)) else one.frame
-    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
+    return joint_of(robot.model, frame)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from wbc.coordinates.rows import KINDS, AxisRows, Coordinate, PlaneAngleRows, Po
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.symbolic import rotations as rot
-from wbc.symbolic.kinematics import WORLD, Kinematics, frame_index
+from wbc.symbolic.kinematics import WORLD, Kinematics, joint_of
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._stereographic import unit
 from wbc.tasks.base import Input, Row, require_motion
@@ -150,13 +150,9 @@ def here(robot: Robot, rows: Coordinate, q: Array) -> Any:
 
 def _corrected(robot: Robot, rows: BodyRows) -> tuple[bool, bool]:
     """Whether the position rows, and the rotation rows, are derivatives of something."""
-    rigid = _carrier(robot, rows.expressed or WORLD) == _carrier(robot, rows.base)
+    rigid = joint_of(robot.model, rows.expressed or WORLD) == joint_of(robot.model, rows.base)
     count = len(rows.translation)
     return count == 3 or (count > 0 and rigid), len(rows.rotation) == 3
-
-
-def _carrier(robot: Robot, frame: str) -> int:
-    return 0 if frame == WORLD else int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
 
 
 def rate_function(robot: Robot, rows: tuple[Coordinate, ...]) -> ca.Function:

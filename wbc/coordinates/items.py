@@ -59,7 +59,6 @@ class FollowRows(Task):
             object.__setattr__(self, field, value)
 
     def validate(self, robot: Robot) -> None:
-        """See :func:`expressions.check`."""
         for one in self.coordinates:
             expressions.check(robot, "task", one)
 
@@ -87,7 +86,6 @@ class FollowRows(Task):
         return ca.SX(-self.spread(robot, kin) @ inputs["offset"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """A(q)."""
         matrices = (expressions.matrix(robot, kin, one) for one in self.coordinates)
         return self.spread(robot, kin) @ ca.vertcat(*matrices)
 
@@ -146,7 +144,6 @@ class KeepRows(Constraint):
         object.__setattr__(self, "fastest_return", fastest)
 
     def validate(self, robot: Robot) -> None:
-        """See :func:`expressions.check`."""
         expressions.check(robot, "constraint", self.coordinate)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
@@ -164,17 +161,14 @@ class KeepRows(Constraint):
         return own if held is None else (*own, held)
 
     def initial(self, robot: Robot, q: Array) -> dict[str, Any]:
-        """The reference at ``q``."""
         if expressions.reference(robot, self.coordinate) is None:
             return {}
         return {REFERENCE: expressions.here(robot, self.coordinate, q)}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """The coordinates' rows."""
         return tuple(Row(r.label, f"{r.unit}/s") for r in expressions.labels(robot, self.coordinate))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """See the class."""
         off = expressions.drift(robot, kin, self.coordinate, inputs.get(REFERENCE))
         off = ca.SX(0) if off is None else off
         if DRIFT in inputs:

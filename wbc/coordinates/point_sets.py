@@ -10,8 +10,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
+from wbc.tasks._stereographic import Triple, triple
 
-Triple = tuple[float, float, float]
 #: Squared lengths below this are not divided by [m^2]
 TINY = 1e-24
 
@@ -27,33 +27,35 @@ class PointSet(Protocol):
         """f(x) [m], a column of ``count`` rows, zero on the set."""
 
 
-def _column(x: Any) -> ca.SX:
-    """Three expressions, or numbers, as a column."""
-    if isinstance(x, ca.SX):
+@dataclass(frozen=True)
+class _SetAbout:
+    """What the sets below share: a ``point`` p, and directions and a radius that are checked by their names."""
+
+    point: Triple
+
+    def __post_init__(self) -> None:
+        for name, value in list(vars(self).items()):
+            field, checked = f"{type(self).__name__}.{name}", value
+            if name == "radius":
+                checked = validation.scalar(field, value, low=0.0, open_low=True, unit="m")
+            elif name == "point":
+                checked = triple(validation.real_array(field, value, (3,)))
+            else:
+                checked = triple(validation.unit_vector(field, value))
+            object.__setattr__(self, name, checked)
+
+    def _off(self, x: Any) -> ca.SX:
+        """x - p of three expressions, or of numbers."""
+        if not isinstance(x, ca.SX):
+            x = _constant(validation.ordinary_array("x", x, (3,)))
         if x.shape != (3, 1):
             raise ShapeError("x", x, "expected a column of three")
-        return x
-    return ca.SX(ca.DM(validation.ordinary_array("x", x, (3,)).tolist()))
+        offset: ca.SX = x - _constant(self.point)
+        return offset
 
 
-def _point(owner: object, name: str) -> None:
-    field = f"{type(owner).__name__}.{name}"
-    x, y, z = (float(c) for c in validation.real_array(field, getattr(owner, name), (3,)))
-    object.__setattr__(owner, name, (x, y, z))
-
-
-def _direction(owner: object, name: str) -> None:
-    x, y, z = (float(c) for c in validation.unit_vector(f"{type(owner).__name__}.{name}", getattr(owner, name)))
-    object.__setattr__(owner, name, (x, y, z))
-
-
-def _radius(owner: Any) -> None:
-    field = f"{type(owner).__name__}.radius"
-    object.__setattr__(owner, "radius", validation.scalar(field, owner.radius, low=0.0, open_low=True, unit="m"))
-
-
-def _constant(vector: Triple) -> ca.SX:
-    return ca.SX(ca.DM(list(vector)))
+def _constant(vector: Any) -> ca.SX:
+    return ca.SX(ca.DM(np.asarray(vector)))
 
 
 def _length(vector: ca.SX) -> ca.SX:
@@ -65,101 +67,64 @@ def _across(direction: Triple) -> tuple[ca.SX, ca.SX]:
     along = np.array(direction)
     side = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
     side /= np.linalg.norm(side)
-    return ca.SX(ca.DM(side)), ca.SX(ca.DM(np.cross(along, side)))
+    return _constant(side), _constant(np.cross(along, side))
 
 
 @dataclass(frozen=True)
-class OnPlane:
+class OnPlane(_SetAbout):
     """f = n.(x - p): a plane through ``point`` p with ``normal`` n."""
 
-    point: Triple
     normal: Triple
     count = 1
 
-    def __post_init__(self) -> None:
-        _point(self, "point")
-        _direction(self, "normal")
-
     def values(self, x: ca.SX) -> ca.SX:
-        """See the class."""
-        x = _column(x)
-        return ca.dot(_constant(self.normal), x - _constant(self.point))
+        return ca.dot(_constant(self.normal), self._off(x))
 
 
 @dataclass(frozen=True)
-class OnSphere:
+class OnSphere(_SetAbout):
     """f = |x - p| - radius: a sphere about ``point`` p. The centre has no derivative."""
 
-    point: Triple
     radius: float
     count = 1
 
-    def __post_init__(self) -> None:
-        _point(self, "point")
-        _radius(self)
-
     def values(self, x: ca.SX) -> ca.SX:
-        """See the class."""
-        x = _column(x)
-        return _length(x - _constant(self.point)) - self.radius
+        return _length(self._off(x)) - self.radius
 
 
 @dataclass(frozen=True)
-class OnCylinder:
+class OnCylinder(_SetAbout):
     """f = |d - a (a.d)| - radius, d = x - p: a cylinder about the line through ``point`` p along ``axis`` a."""
 
-    point: Triple
     axis: Triple
     radius: float
     count = 1
 
-    def __post_init__(self) -> None:
-        _point(self, "point")
-        _direction(self, "axis")
-        _radius(self)
-
     def values(self, x: ca.SX) -> ca.SX:
-        """See the class."""
-        x = _column(x)
-        off, along = x - _constant(self.point), _constant(self.axis)
+        off, along = self._off(x), _constant(self.axis)
         return _length(off - along * ca.dot(along, off)) - self.radius
 
 
 @dataclass(frozen=True)
-class OnLine:
+class OnLine(_SetAbout):
     """f = (b.(x - p), c.(x - p)), b and c across ``axis``: the line through ``point`` p along ``axis``."""
 
-    point: Triple
     axis: Triple
     count = 2
 
-    def __post_init__(self) -> None:
-        _point(self, "point")
-        _direction(self, "axis")
-
     def values(self, x: ca.SX) -> ca.SX:
-        """See the class."""
-        x = _column(x)
-        off = x - _constant(self.point)
+        off = self._off(x)
         return ca.vertcat(*[ca.dot(side, off) for side in _across(self.axis)])
 
 
 @dataclass(frozen=True)
-class OnCircle:
+class OnCircle(_SetAbout):
     """f = (n.d, |d| - radius), d = x - p: a circle about ``point`` p, ``normal`` n. Its centre has no derivative."""
 
-    point: Triple
     normal: Triple
     radius: float
     count = 2
 
-    def __post_init__(self) -> None:
-        _point(self, "point")
-        _direction(self, "normal")
-        _radius(self)
-
     def values(self, x: ca.SX) -> ca.SX:
-        """See the class."""
-        x = _column(x)
-        off = x - _constant(self.point)
+        off = self._off(x)
         return ca.vertcat(ca.dot(_constant(self.normal), off), _length(off) - self.radius)

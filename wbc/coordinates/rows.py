@@ -9,10 +9,11 @@ from typing import Any, TypeAlias
 from wbc import validation
 from wbc.analysis.kept_hash import keeps_hash
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows
-from wbc.coordinates.point_sets import PointSet, Triple
+from wbc.coordinates.point_sets import PointSet
 from wbc.errors import ShapeError
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import PitchPlane, PlaneReference
+from wbc.tasks._stereographic import Triple, triple
 
 #: The reference of a plane's angle where none is given
 UPRIGHT = PlaneReference()
@@ -37,8 +38,7 @@ class AxisRows:
     name: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        x, y, z = (float(c) for c in validation.unit_vector("AxisRows.axis", self.axis))
-        object.__setattr__(self, "axis", (x, y, z))
+        object.__setattr__(self, "axis", triple(validation.unit_vector("AxisRows.axis", self.axis)))
 
     def __str__(self) -> str:
         return self.name or f"{self.frame} about an axis"

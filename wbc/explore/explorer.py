@@ -13,7 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError, ShapeError
 from wbc.explore.rows import StackRows
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix
 from wbc.resolvers.fsp import Criterion, SolutionSpace, best, orthogonal
 from wbc.stack.declaration import Declaration
 from wbc.trajectory import Law, time_optimal
@@ -151,8 +151,7 @@ class Explorer:
         space = orthogonal(J, x, free=True)
         if criteria is None:
             criteria = {"least norm": Criterion()}
-            inertia = pin.crba(self.robot.model, self.robot.model.createData(), q)
-            inertia = np.triu(inertia) + np.triu(inertia, 1).T
+            inertia = mass_matrix(self.robot.model, self.robot.model.createData(), q)
             if np.linalg.eigvalsh(inertia)[0] > 1e-9:
                 criteria["least energy"] = Criterion(inertia)
         optima = {name: best(space, c).v for name, c in criteria.items()}

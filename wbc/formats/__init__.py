@@ -1,19 +1,11 @@
 """Runs in the formats of other tools, and motions from these (floor 13). See docs/logs.md."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.formats.conversion import (
-        FORMATS as FORMATS,
-        RunCopy as RunCopy,
-        convert as convert,
-        follow as follow,
-        recorded as recorded,
-    )
+    from wbc.formats.conversion import FORMATS as FORMATS, convert as convert, follow as follow, recorded as recorded
     from wbc.formats.errors import FormatError as FormatError
     from wbc.formats.motion import PlayedPlant as PlayedPlant, RecordedMotion as RecordedMotion, answered as answered
     from wbc.formats.motion_file import read_motion as read_motion

@@ -10,27 +10,28 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 
 from wbc import extras, validation
 from wbc.api import Controller
 from wbc.errors import WbcError
 from wbc.formats.errors import FormatError
-from wbc.formats.files import CsvSink, LeRobotSink, McapSink, NpzSink, RerunSink
-from wbc.formats.live import FoxgloveSink
-from wbc.formats.run import RATE, Run, Sink, run_of
+from wbc.formats.run import RATE, Piece, Run, Wait
+from wbc.formats.writers import serve, write_csv, write_lerobot, write_mcap, write_npz, write_rerun
 from wbc.record.recorder import Recorder
 
 #: Time between two looks at a file that is still written [s]
 LOOK = 0.02
-#: Format -> what writes it; names of files end with it, but those of ``lerobot`` (a folder) and ``foxglove`` (none)
-FORMATS: dict[str, type[Sink]] = {
-    "mcap": McapSink,
-    "rrd": RerunSink,
-    "csv": CsvSink,
-    "npz": NpzSink,
-    "lerobot": LeRobotSink,
-    "foxglove": FoxgloveSink,
+#: Format -> what writes it, and the extra that it needs, and for what; names of files end with the format, but those of
+#: ``lerobot`` (a folder) and ``foxglove`` (none)
+FORMATS = {
+    "mcap": (write_mcap, ("formats", "MCAP")),
+    "rrd": (write_rerun, ("rerun", "a recording of Rerun")),
+    "csv": (write_csv, ()),
+    "npz": (write_npz, ()),
+    "lerobot": (write_lerobot, ("recordings", "a dataset of LeRobot")),
+    "foxglove": (serve, ("foxglove", "a connection for Foxglove")),
 }
 
 
@@ -41,12 +42,10 @@ def convert(
     *,
     rate: float = RATE,
     trust: bool = False,
-    wait: Callable[[], bool] | None = None,
+    wait: Wait | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[pathlib.Path, list[str]]:
     """Write a run, whole or as far as it came, in another format; returns the file, and what is not in it, in words.
-
-        wbc.formats.convert("runs/demo", "mcap")                # beside the recording
 
     Args:
         run: its folder, recording or log. to: one of :data:`FORMATS`.
@@ -60,35 +59,26 @@ def convert(
         FormatError: there is such a file, or it cannot be written. LogFileError: no run, or damaged.
         RangeError: a rate that is none.
     """
-    kind = _format_of(to)
-    rate = validation.scalar("rate", rate, low=1e-3, high=1e4, unit="1/s")
-    source = run if isinstance(run, Run) else run_of(run, trust)
-    place, count = _place_of(source.path, to, out), 0
-    with validation.writing("out", place, FormatError), contextlib.ExitStack() as cleaning:
-        # Beside its place, which then has all or nothing; what is to be seen meanwhile is written there at once
-        file, at_once = place, to == "foxglove" or wait is not None
-        if not at_once:
-            file = place.with_name(f".{place.name}")
-            _remove(file)
-            cleaning.callback(_remove, file)
-        sink = kind(file)
-        sink.begin(source)
-        for log, seen in source.pieces(wait, rate):
-            sink.write(log, seen)
-            count += len(log)
-            if progress is not None:
-                progress(count)
-        sink.close()
-        if not at_once:
-            file.replace(place)
+    write, rate = _writer_of(to), validation.scalar("rate", rate, low=1e-3, high=1e4, unit="1/s")
+    source = run if isinstance(run, Run) else Run(run, trust)
+    place, pieces = _place_of(source.path, to, out), source.pieces(wait, rate, progress)
+    with validation.writing("out", place, FormatError):
+        if to == "foxglove" or wait is not None:
+            # What is to be seen meanwhile
+            write(source, pieces, place)
+        else:
+            # Beside its place, which then has all or nothing
+            with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as folder:
+                write(source, pieces, pathlib.Path(folder, place.name))
+                pathlib.Path(folder, place.name).replace(place)
     return place, source.remarks
 
 
-def _format_of(to: str) -> type[Sink]:
-    kind = FORMATS[validation.one_of("to", to, FORMATS)]
-    if kind.needs:
-        extras.require(*kind.needs)
-    return kind
+def _writer_of(to: str) -> Callable[[Run, Iterable[Piece], pathlib.Path], None]:
+    write, needs = FORMATS[validation.one_of("to", to, FORMATS)]
+    if needs:
+        extras.require(*needs)
+    return write
 
 
 def _place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, overwrite: bool = False) -> pathlib.Path:
@@ -97,28 +87,28 @@ def _place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, ov
         return pathlib.Path(out or "")
     place = pathlib.Path(out or run.with_suffix(f".{to}" if run.suffix != f".{to}" else f".converted.{to}"))
     if overwrite:
-        _remove(place)
+        shutil.rmtree(place, ignore_errors=True)
+        place.unlink(missing_ok=True)
     if place.exists():
         raise FormatError("out", str(place), "there is such a file; choose another")
     return place
 
 
-def _remove(place: pathlib.Path) -> None:
-    """A file or folder, or nothing."""
-    shutil.rmtree(place, ignore_errors=True)
-    place.unlink(missing_ok=True)
+class follow(contextlib.AbstractContextManager["follow"]):
+    """Copies a run into another format while it is recorded, in a process of its own: the loop is not slowed.
 
-
-class RunCopy(contextlib.AbstractContextManager["RunCopy"]):
-    """A process that copies a run into another format while it is written; made by :func:`follow`.
+    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed.
+    Arguments and errors are those of :func:`convert`; the recorder's file may begin later.
 
     Attributes:
         path: where the copy goes.
     """
 
-    def __init__(self, run: pathlib.Path, to: str, out: pathlib.Path) -> None:
-        self.path = out
-        command = [sys.executable, "-m", __name__, str(run), to, str(out)]
+    def __init__(self, run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> None:
+        _writer_of(to)
+        source = validation.file_path("run", run)
+        self.path = _place_of(source, to, out)
+        command = [sys.executable, "-m", __name__, str(source), to, str(self.path)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
     @property
@@ -136,38 +126,19 @@ class RunCopy(contextlib.AbstractContextManager["RunCopy"]):
         self.close()
 
 
-def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> RunCopy:
-    """Copy a run into another format while it is recorded, in a process of its own: the loop is not slowed.
-
-        with wbc.formats.follow("ticks.npz", "mcap"), controller.record("ticks.npz"):
-            ...                                             # step as usual
-
-    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed.
-    Arguments and errors are those of :func:`convert`; the recorder's file may begin later.
-    """
-    _format_of(to)
-    path = validation.file_path("run", run)
-    return RunCopy(path, to, _place_of(path, to, out))
-
-
 @contextlib.contextmanager
 def recorded(
     controller: Controller, run: str | os.PathLike[str], to: str = "mcap", *, overwrite: bool = False
 ) -> Iterator[Recorder]:
     """Record every tick of a controller, and beside the recording the same in another format while the loop runs.
 
-        with wbc.formats.recorded(controller, "ticks.npz"):         # and ticks.mcap
-            ...                                                     # step as usual: a loop, a program, a plant
-
     Arguments and errors are those of :meth:`wbc.Controller.record` and :func:`convert`.
     """
-    _format_of(to)
+    _writer_of(to)
     copy = _place_of(validation.file_path("run", run), to, None, overwrite)
-    with controller.record(run, overwrite=overwrite) as recorder, follow(recorder.path, to, copy):
-        try:
-            yield recorder
-        finally:
-            recorder.close()
+    # Closed before its copy is
+    with controller.record(run, overwrite=overwrite) as recorder, follow(recorder.path, to, copy), recorder:
+        yield recorder
 
 
 def main(run: str, to: str, out: str) -> None:
@@ -184,7 +155,7 @@ def main(run: str, to: str, out: str) -> None:
 
     while True:
         try:
-            source = run_of(run)
+            source = Run(run)
             break
         except WbcError:
             if not wait():

@@ -1,7 +1,5 @@
 """What is raised of files and connections in other formats."""
 
-from __future__ import annotations
-
 from wbc.errors import WbcError
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from wbc.formats.run import Run, SeenTick, Sink
+from wbc.formats.run import Piece, Run, SeenTick
 from wbc.log import Log
 from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
@@ -16,8 +16,6 @@ from wbc.viewer.bodies import DrawnMesh
 
 #: Nanoseconds of a second
 NANO = 1_000_000_000
-#: Levels of foxglove.Log: all rows hold, and rows gave way
-LEVELS = {True: 2, False: 3}
 #: Group of columns -> field of a joint's state
 JOINT_PARTS = {"q": "position", "v": "velocity", "a": "acceleration"}
 #: Pose of a frame in itself
@@ -35,44 +33,34 @@ Message = tuple[str, int, dict[str, Any]]
 
 
 class TickTree:
-    """A run's columns ``group.member`` as nested objects.
-
-    Where more than :data:`NAMED` members stand alone beside each other they are an array, as names would take a third
-    of a file.
+    """A run's columns ``group.member``, but those ``apart``, as nested objects; where more than :data:`NAMED` members
+    stand alone beside each other they are an array, as names would take a third of a file.
 
     Attributes:
         names: columns in the order of the numbers of a tick. schema: of its messages.
-
-    Args:
-        columns: of the run. apart: those that are left out.
     """
 
     def __init__(self, columns: Iterable[str], apart: Collection[str] = ()) -> None:
         self.names = list[str]()
         groups = by_first({name: name for name in columns if name not in apart})
-        self._shape = {key: self._laid_out(members) for key, members in groups.items()}
+        self._groups = {key: self._laid_out(members) for key, members in groups.items()}
         self.schema = schema_of(self.tick([0.0] * len(self.names)) | {"status": ""}, "wbc.Tick")
-
-    def _laid_out(self, members: dict[str, str]) -> Any:
-        """Where the numbers of columns are, by the rests of their names: a place, a slice, or these by key."""
-        begin, parts = len(self.names), by_first(members)
-        if members.keys() == {""}:
-            self.names.append(members[""])
-            return begin
-        if len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
-            self.names += members.values()
-            return slice(begin, len(self.names))
-        return {key: self._laid_out(below) for key, below in parts.items()}
 
     def tick(self, numbers: list[float]) -> dict[str, Any]:
         """The message of a tick, from its numbers in the order of :attr:`names`."""
-        return {key: _filled(shape, numbers) for key, shape in self._shape.items()}
+        return {key: group(numbers) for key, group in self._groups.items()}
 
-
-def _filled(shape: Any, numbers: list[float]) -> Any:
-    if isinstance(shape, dict):
-        return {key: _filled(below, numbers) for key, below in shape.items()}
-    return numbers[shape]
+    def _laid_out(self, members: dict[str, str]) -> Callable[[list[float]], Any]:
+        """What takes columns, given by the rests of their names, out of a tick's numbers."""
+        begin, parts = len(self.names), by_first(members)
+        if members.keys() == {""}:
+            self.names.append(members[""])
+            return itemgetter(begin)
+        if len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
+            self.names += members.values()
+            return itemgetter(slice(begin, len(self.names)))
+        each = {key: self._laid_out(below) for key, below in parts.items()}
+        return lambda numbers: {key: part(numbers) for key, part in each.items()}
 
 
 def by_first(members: dict[str, str]) -> dict[str, dict[str, str]]:
@@ -92,6 +80,31 @@ def schema_of(example: Any, title: str = "") -> dict[str, Any]:
     if isinstance(example, list):
         return {"type": "array", "items": schema_of(example[0]) if example else {}}
     return {"type": {bool: "boolean", int: "integer", float: "number", str: "string"}[type(example)]}
+
+
+class RunMessages:
+    """What a run says.
+
+    Attributes:
+        tree: of its ticks. scene: what is drawn, said once. schemas: topic -> of its messages.
+    """
+
+    def __init__(self, run: Run) -> None:
+        joints, self.scene = single_joints(run.units), of_bodies(run.bodies)
+        self.tree = TickTree(run.units, {f"{group}.{name}" for name in joints for group in JOINT_PARTS})
+        # Schemas are those of examples, made as messages are
+        corner = DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=np.uint32), (0, 0, 0))
+        state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
+        examples = {"/joint_states": _stamped(0.0, joints=[state]), SCENE: of_bodies({"link": [corner]})}
+        examples |= {topic: data for topic, _, data in of_seen(SeenTick(0.0, {"link": IDENTITY}, why="why"))}
+        self.schemas = {topic: schema_of(examples[topic], f"foxglove.{kind}") for topic, kind in KINDS.items()}
+        self.schemas[TICK] = self.tree.schema
+
+    def of(self, piece: Piece) -> list[Message]:
+        """The messages of some ticks by their times."""
+        log, seen = piece
+        messages = [*of_ticks(log, self.tree), *(message for tick in seen for message in of_seen(tick))]
+        return sorted(messages, key=itemgetter(1))
 
 
 def of_ticks(log: Log, tree: TickTree) -> Iterator[Message]:
@@ -126,48 +139,40 @@ def _joints(log: Log) -> dict[str, dict[str, list[Any]]]:
 
 def _plain(numbers: Array) -> Any:
     """Numbers as JSON has them: what is not finite is None."""
-    finite = np.isfinite(numbers)
-    if finite.all():
+    if (finite := np.isfinite(numbers)).all():
         return numbers.tolist()
-    plain = numbers.astype(object)
-    plain[~finite] = None
-    return plain.tolist()
+    return np.where(finite, numbers, np.array(None)).tolist()
 
 
-def of_bodies(bodies: Mapping[str, list[DrawnMesh]]) -> Message:
+def of_bodies(bodies: Mapping[str, list[DrawnMesh]]) -> dict[str, Any]:
     """What is drawn in each frame, which stays as it is."""
     entities = []
     for frame, meshes in bodies.items():
-        surfaces = [
-            {
-                "pose": {"position": _named(IDENTITY[:3]), "orientation": _named(IDENTITY[3:])},
-                "points": [_named(point) for point in mesh.corners.round(5).astype(float)],
-                "color": _named(np.array([*mesh.colour, 255]) / 255.0, "rgba"),
-                "indices": mesh.triangles.ravel().tolist(),
-            }
-            for mesh in meshes
-        ]
+        surfaces, pose = [], {"position": _named(IDENTITY[:3]), "orientation": _named(IDENTITY[3:])}
+        for corners, triangles, colour in meshes:
+            points = [_named(point) for point in corners.round(5).astype(float)]
+            surface = {"pose": pose, "points": points, "color": _named(np.array([*colour, 255]) / 255.0, "rgba")}
+            surfaces.append(surface | {"indices": triangles.ravel().tolist()})
         kept = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True, "triangles": surfaces}
         entities.append(_stamped(0.0, frame_id=frame.removeprefix("robot/"), id=f"body/{frame}") | kept)
-    return SCENE, 0, {"deletions": [], "entities": entities}
+    return {"deletions": [], "entities": entities}
 
 
 def of_seen(seen: SeenTick) -> Iterator[Message]:
     """The messages of what is seen of a tick."""
-    placed, now = _stamped(seen.t, parent_frame_id="world"), round(seen.t * NANO)
-    transforms = [
-        placed
-        | {"child_frame_id": frame.removeprefix("robot/")}
-        | {"translation": _named(pose[:3]), "rotation": _named(pose[3:])}
-        for frame, pose in seen.poses.items()
-        if frame != "robot/world"
-    ]
+    transforms, now = [], round(seen.t * NANO)
+    for frame, pose in seen.poses.items():
+        if frame != "robot/world":
+            place = {"translation": _named(pose[:3]), "rotation": _named(pose[3:])}
+            frames = {"parent_frame_id": "world", "child_frame_id": frame.removeprefix("robot/")}
+            transforms.append(_stamped(seen.t, **frames, **place))
     if transforms:
         yield "/tf", now, {"transforms": transforms}
     if seen.why:
         rows = f"binding: {', '.join(seen.binding)}" if seen.binding else "nothing binds"
-        level = LEVELS[seen.status == "solved"]
-        yield "/why", now, _stamped(seen.t, level=level, message=f"{seen.why} ({rows})", name=seen.status)
+        # Levels of foxglove.Log: information, and a warning
+        said = {"level": 2 if seen.status == "solved" else 3, "message": f"{seen.why} ({rows})", "name": seen.status}
+        yield "/why", now, _stamped(seen.t, **said)
 
 
 def _stamped(seconds: float, **data: Any) -> dict[str, Any]:
@@ -177,35 +182,3 @@ def _stamped(seconds: float, **data: Any) -> dict[str, Any]:
 
 def _named(numbers: Array, names: str = "xyzw") -> dict[str, float]:
     return dict(zip(names, numbers.tolist(), strict=False))
-
-
-class MessageSink(Sink):
-    """A sink of messages by their times; who inherits has channels to put them in."""
-
-    def begin(self, run: Run) -> None:
-        super().begin(run)
-        self._still, joints = of_bodies(run.bodies), single_joints(run.units)
-        self._tree = TickTree(run.units, {f"{group}.{name}" for name in joints for group in JOINT_PARTS})
-        self._open(TICK, self._tree.schema)
-        # Schemas are those of examples, made as messages are
-        corner = DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=np.uint32), (0, 0, 0))
-        state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
-        examples = {"/joint_states": _stamped(0.0, joints=[state]), SCENE: of_bodies({"link": [corner]})[2]}
-        examples |= {topic: data for topic, _, data in of_seen(SeenTick(0.0, {"link": IDENTITY}, why="why"))}
-        for topic, kind in KINDS.items():
-            self._open(topic, schema_of(examples[topic], f"foxglove.{kind}"))
-        if run.bodies:
-            self._put(*self._still)
-
-    def write(self, log: Log, seen: list[SeenTick]) -> None:
-        messages = [*of_ticks(log, self._tree), *(message for tick in seen for message in of_seen(tick))]
-        for message in sorted(messages, key=lambda message: message[1]):
-            self._put(*message)
-
-    @abstractmethod
-    def _open(self, topic: str, schema: dict[str, Any]) -> None:
-        """A channel."""
-
-    @abstractmethod
-    def _put(self, topic: str, when: int, data: dict[str, Any]) -> None:
-        """A message into its channel."""

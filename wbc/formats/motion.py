@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import logging
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,9 +12,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.api import Controller
-from wbc.errors import UnknownNameError
 from wbc.formats.errors import FormatError
-from wbc.log import Log
+from wbc.log import Log, TickRecorder
 from wbc.multibody import pin
 from wbc.record.recorder import names
 from wbc.robot.robot import Robot, checked_robot
@@ -37,11 +37,9 @@ class Path6:
 
     def at(self, time: float) -> pin.SE3:
         """The pose at a time [s], along the screw between its neighbours; before and after them theirs."""
-        k = int(np.clip(np.searchsorted(self.t, time, side="right") - 1, 0, len(self.t) - 1))
-        if k + 1 == len(self.t) or time <= self.t[k]:
-            return pin.XYZQUATToSE3(self.poses[k])
-        share = (time - self.t[k]) / (self.t[k + 1] - self.t[k])
-        return pin.SE3.Interpolate(*map(pin.XYZQUATToSE3, self.poses[k : k + 2]), share)
+        place = float(np.interp(time, self.t, np.arange(len(self.t))))
+        around = (pin.XYZQUATToSE3(self.poses[k]) for k in (math.floor(place), math.ceil(place)))
+        return pin.SE3.Interpolate(*around, place % 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,20 +91,16 @@ class RecordedMotion:
         Raises:
             UnknownNameError: a recorded joint that the robot has not. FormatError: one with several coordinates.
         """
-        robot = checked_robot(robot)
-        model, out = robot.model, np.tile(robot.neutral, (len(self.t), 1))
+        model, out = checked_robot(robot).model, np.tile(robot.neutral, (len(self.t), 1))
         for name, values in zip(self.joints, self.q.T, strict=True):
-            if not model.existJointName(name):
-                if any(fnmatch.fnmatch(name, pattern) for pattern in ignored):
-                    continue
-                raise UnknownNameError("joint", name, robot.joint_names)
-            number = model.getJointId(name)
-            first, numbers = int(model.idx_qs[number]), int(model.nqs[number])
-            if model.nvs[number] != 1:
+            if name not in robot.joint_names and any(fnmatch.fnmatch(name, pattern) for pattern in ignored):
+                continue
+            dofs, number = robot.dofs(name), model.getJointId(name)
+            if dofs.stop - dofs.start != 1:
                 raise FormatError("joint", name, "has several degrees of freedom; its state is no one number")
             # A joint without end has a cosine and a sine
-            columns = [values] if numbers == 1 else [np.cos(values), np.sin(values)]
-            out[:, first : first + numbers] = np.column_stack(columns)
+            columns = [values] if model.nqs[number] == 1 else [np.cos(values), np.sin(values)]
+            out[:, model.idx_qs[number] : model.idx_qs[number] + len(columns)] = np.column_stack(columns)
         if still := [name for name in robot.joint_names if name not in self.joints]:
             log.warning("nothing is recorded of these joints, which stand as in neutral: %s", ", ".join(still))
         return out
@@ -163,9 +157,6 @@ def answered(
 ) -> Log:
     """What a stack would have commanded at every state of a recorded motion.
 
-        log = wbc.formats.answered(controller, motion, lambda c, t: c["hand"].set(target=motion.pose("tool0", t)))
-        log.array("command") - log.array("v")               # what it would have done otherwise
-
     The log has ``t``, ``q.*``, ``v.*`` (as recorded), ``command.*``, and ``status``, a place in ``list(wbc.Status)``.
 
     Args:
@@ -176,21 +167,19 @@ def answered(
         FormatError, UnknownNameError: as of :class:`PlayedPlant`. WbcError: as of :meth:`wbc.Controller.step`.
     """
     validation.instance("controller", controller, Controller, "a wbc Controller")
-    robot, dt = controller.stack.robot, controller.stack.dt
-    plant, statuses, rows = PlayedPlant(robot, motion, ignored), list(Status), list[Array]()
+    robot, dt, said = controller.stack.robot, controller.stack.dt, names(controller)
+    plant, statuses = PlayedPlant(robot, motion, ignored), list(Status)
+    rates = [(name, f"{unit}/s") for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)]
+    groups, columns = {"q": said["q"], "v": rates, "command": said["v"]}, {"t": ("s", "f8"), "status": ("", "i8")}
+    columns |= {f"{group}.{name}": (unit, "f8") for group, members in groups.items() for name, unit in members}
+    recorder = TickRecorder(columns, {"robot": robot.name, "dt": dt})
+    plant.reset(robot.neutral, float(motion.t[0]))
     controller.reset(plant.read().q)
     while (state := plant.read()).valid:
         if aim is not None:
             aim(controller, state.time)
         step = controller.step(state.q, state.v)
-        rows.append(np.concatenate([[state.time, statuses.index(step.status)], state.q, state.v, step.command]))
+        numbers = [state.time], [statuses.index(step.status)], state.q, state.v, step.command
+        recorder.extend(np.concatenate(numbers)[None])
         plant.advance(dt)
-    said, rates = (
-        names(controller),
-        [(name, f"{unit}/s") for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)],
-    )
-    units = {"t": "s", "status": ""}
-    for group, members in {"q": said["q"], "v": rates, "command": said["v"]}.items():
-        units |= {f"{group}.{name}": unit for name, unit in members}
-    columns = dict(zip(units, np.array(rows).T, strict=True))
-    return Log(columns | {"status": columns["status"].astype(int)}, units, {"robot": robot.name, "dt": dt})
+    return recorder.log()

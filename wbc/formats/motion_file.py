@@ -9,8 +9,8 @@ import math
 import os
 import pathlib
 import struct
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,12 +25,10 @@ from wbc.validation import Array
 
 #: Largest difference of a quaternion's length from 1
 UNIT = 1e-3
-#: Message types of joints that are read, without the package's folder "msg"
+#: Message types of joints, without the package's folder "msg"
 JOINTS = ("sensor_msgs/JointState", "foxglove.JointStates")
-#: Of one transform
-SINGLE = ("geometry_msgs/TransformStamped", "foxglove.FrameTransform")
-#: All that are read
-KINDS_READ = (*JOINTS, *SINGLE, "tf2_msgs/TFMessage", "foxglove.FrameTransforms")
+#: Of one transform, and of several
+FRAMES = ("geometry_msgs/TransformStamped", "foxglove.FrameTransform", "tf2_msgs/TFMessage", "foxglove.FrameTransforms")
 #: A message of a file: its topic, type, time of recording [s], and fields by attribute
 FoundMessage = tuple[str, str, float, Any]
 #: A joint, or a frame and its parent
@@ -38,13 +36,10 @@ Way = tuple[str, str | None]
 
 
 def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> RecordedMotion:
-    """Joint states and transforms of an MCAP file or a ROS bag (1 or 2), without ROS.
-
-        motion = wbc.formats.read_motion("bag")             # a folder of ROS 2, a .bag, or a .mcap
-        controller["hand"].target = motion.pose("tool0", t)
+    """Joint states and transforms of an MCAP file, or a ROS bag (1 or 2: a ``.bag``, or a folder), without ROS.
 
     Args:
-        topics: those that are read; default: all of :data:`KINDS_READ`.
+        topics: those that are read; default: all of the types :data:`JOINTS` and :data:`FRAMES`.
 
     Raises:
         MissingPackageError: the packages of the extra are not installed.
@@ -52,9 +47,7 @@ def read_motion(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Rec
             parents, a joint with two states at once.
     """
     extras.require("formats", "a recording of another program")
-    place = validation.file_path("path", path)
-    if not validation.exists("path", place):
-        raise FormatError("path", str(place), validation.no_such(place, "there is no such file or folder"))
+    place = validation.existing("path", path, FormatError)
     # Files of a folder whose recorder was killed, which has no metadata, can be read
     loose = [] if (place / "metadata.yaml").exists() else sorted(place.glob("*.mcap")) or sorted(place.glob("*.db3"))
     files, others = loose or [place], dict[str, str]()
@@ -76,14 +69,14 @@ def _mcap(path: pathlib.Path, topics: Sequence[str], others: dict[str, str]) -> 
     # A file whose writer was killed gives its whole chunks
     with path.open("rb") as file, contextlib.suppress(EndOfFile, struct.error):
         for schema, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False):
-            kind, encoding = schema.name.replace("/msg/", "/") if schema else "", channel.message_encoding
+            topic, kind = channel.topic, schema.name.replace("/msg/", "/") if schema else "no schema"
             if channel.id not in decoders:
-                wanted = _wanted(kind, channel.topic, topics)
-                decoders[channel.id] = _decoder(schema, encoding) if wanted else None
+                wanted = _wanted(kind, topic, topics)
+                decoders[channel.id] = _decoder(schema, channel.message_encoding) if wanted else None
             if (decoder := decoders[channel.id]) is not None:
-                yield channel.topic, kind, message.log_time / NANO, decoder(message.data)
+                yield topic, kind, message.log_time / NANO, decoder(message.data)
             else:
-                others[channel.topic] = f"{kind or 'no schema'} in {encoding or 'no encoding'}"
+                others[topic] = f"{kind} in {channel.message_encoding or 'no encoding'}"
 
 
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
@@ -109,9 +102,8 @@ def _bag(paths: Sequence[pathlib.Path], topics: Sequence[str], others: dict[str,
         kinds = {connection.id: connection.msgtype.replace("/msg/", "/") for connection in reader.connections}
         chosen = [each for each in reader.connections if _wanted(kinds[each.id], each.topic, topics)]
         others |= {each.topic: kinds[each.id] for each in reader.connections if each not in chosen}
-        for connection, time, data in reader.messages(chosen) if chosen else ():
-            fields = reader.deserialize(data, connection.msgtype)
-            yield connection.topic, kinds[connection.id], time / NANO, fields
+        for each, time, data in reader.messages(chosen) if chosen else ():
+            yield each.topic, kinds[each.id], time / NANO, reader.deserialize(data, each.msgtype)
 
 
 def ros2_types() -> Any:
@@ -122,119 +114,113 @@ def ros2_types() -> Any:
 
 
 def _wanted(kind: str, topic: str, topics: Sequence[str]) -> bool:
-    return kind in KINDS_READ and (not topics or topic in topics)
+    return kind in JOINTS + FRAMES and (not topics or topic in topics)
 
 
 def _gathered(
-    messages: Iterator[FoundMessage], path: pathlib.Path, others: dict[str, str], topics: Sequence[str]
+    messages: Iterable[FoundMessage], path: pathlib.Path, others: Mapping[str, str], topics: Sequence[str]
 ) -> RecordedMotion:
-    # A moment is a clock, of a topic's joints or of one frame, the time that a message says, and that of the recording;
-    # a row is the number of its moment, and where a joint or frame was
-    clocks, moments = dict[tuple[str, str], int](), list[tuple[int, float, float]]()
-    ways, seen = defaultdict[Way, list[tuple[float, ...]]](list), set[str]()
+    # A row is the number of a joint or frame, that of its clock (a topic's joints, or one frame), the time that its
+    # message says, that of the recording, and a pose, or a position and a velocity
+    numbers, ways, clocks, seen = array("d"), dict[Way, int](), dict[tuple[str, str], int](), set[str]()
     for topic, kind, recorded, fields in messages:
         seen.add(topic)
         try:
-            for frame, stamped, rows in _parts(fields, topic, kind):
-                for way, row in rows.items():
-                    ways[way].append((len(moments), *row))
-                clock = clocks.setdefault((topic, frame), len(clocks))
-                moments.append((clock, _stamp(stamped), recorded))
+            for name, parent, stamp, state in _states(fields, kind) if kind in JOINTS else _poses(fields):
+                way = ways.setdefault((name, parent), len(ways))
+                clock = clocks.setdefault((topic, "" if parent is None else name), len(clocks))
+                numbers.extend((way, clock, stamp, recorded, *state))
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise FormatError(topic, f"message at {recorded:.9g} s", f"is no {kind}: {error}") from error
     if missing := [topic for topic in topics if topic not in seen]:
         raise FormatError("topics", missing[0], "no messages of a type that is read", sorted(seen | others.keys()))
-    if not moments:
+    if not ways:
         said = "; ".join(f"{topic} ({kind})" for topic, kind in others.items()) or "no messages at all"
         raise FormatError("path", str(path), f"has neither joint states nor transforms, but {said}")
-    numbers, own, recordings = np.array(moments).T
+    rows = np.array(numbers).reshape(-1, 11)
+    of_way, of_clock, stamps, recordings = rows[:, :4].T
     # Those of the recording where no message of a clock says one; a simulation's first one may say 0
-    times = np.where(np.isin(numbers, numbers[own != 0.0]), own, recordings)
+    times = np.where(np.isin(of_clock, of_clock[stamps != 0.0]), stamps, recordings)
     remarks = [f"not read: {topic} ({kind})" for topic, kind in sorted(others.items())]
-    remarks += _odd_times({" ".join(key).strip(): times[numbers == number] for key, number in clocks.items()})
-    ways_by_time = {way: (times[[int(k) for k, *_ in rows]], np.array(rows)[:, 1:]) for way, rows in ways.items()}
-    return _motion(ways_by_time, remarks)
+    remarks += _odd_times({" ".join(key).strip(): times[of_clock == clock] for key, clock in clocks.items()})
+    return _motion({way: (times[of_way == k], rows[of_way == k, 4:]) for way, k in ways.items()}, remarks)
 
 
-def _motion(ways: dict[Way, tuple[Array, Array]], remarks: list[str]) -> RecordedMotion:
+def _motion(ways: Mapping[Way, tuple[Array, Array]], remarks: list[str]) -> RecordedMotion:
     """A motion of the times and numbers of joints and frames."""
     # What stands may have been said long before the recording began
     begin = min(t.min() for t in [t for t, _ in ways.values() if len(t) > 1] or [t for t, _ in ways.values()])
     joints, frames, twice = dict[str, tuple[Array, Array]](), dict[str, Path6](), list[str]()
-    for (name, parent), (stamps, numbers) in ways.items():
-        order = np.argsort(stamps, kind="stable")
-        t, numbers = stamps[order] - begin, numbers[order]
-        again = np.diff(t) == 0.0
-        if not np.array_equal(numbers[:-1][again], numbers[1:][again], equal_nan=True):
+    for (name, parent), (stamps, said) in ways.items():
+        t, last = np.unique(stamps[::-1], return_index=True)
+        states = said[::-1][last]
+        if not np.array_equal(said, states[np.searchsorted(t, stamps)], equal_nan=True):
             twice.append(name)
-        t, numbers = t[np.append(~again, True)], numbers[np.append(~again, True)]
         if parent is None:
-            joints[name] = t, numbers
+            joints[name] = t - begin, states[:, :2]
         elif name in frames:
             reason = f"is a second parent of {name!r}, which {frames[name].parent!r} places as well"
             raise FormatError("path", parent, reason)
         else:
-            numbers[:, 3:] /= np.linalg.norm(numbers[:, 3:], axis=1, keepdims=True)
-            frames[name] = Path6(parent, t, numbers)
+            states[:, 3:] /= np.linalg.norm(states[:, 3:], axis=1, keepdims=True)
+            frames[name] = Path6(parent, t - begin, states)
     if twice:
         remarks.append(f"several states at one time, of which the last is taken: {', '.join(twice)}")
     # A row whenever a joint is named, from when all are known
     t = np.unique(np.concatenate([np.zeros(0), *(own for own, _ in joints.values())]))
     t = t[t >= max((own[0] for own, _ in joints.values()), default=0.0)]
-    held = [numbers[np.searchsorted(own, t, side="right") - 1] for own, numbers in joints.values()]
+    held = [states[np.searchsorted(own, t, side="right") - 1] for own, states in joints.values()]
     q, v = np.array(held).reshape(len(joints), len(t), 2).T.copy()
-    known = len(t) > 0 and not np.isnan(v).any()
-    return RecordedMotion(tuple(joints), t, q, v if known else None, frames, tuple(remarks))
+    rates = None if len(t) == 0 or np.isnan(v).any() else v
+    return RecordedMotion(tuple(joints), t, q, rates, frames, tuple(remarks))
 
 
-def _odd_times(clocks: dict[str, Array]) -> Iterator[str]:
+def _odd_times(clocks: Mapping[str, Array]) -> Iterator[str]:
     for name, t in clocks.items():
         if (back := -np.diff(t).min(initial=0.0)) > 0.0:
             yield f"{name}: time goes back, by {back:.3g} s at most; messages are taken in the order of their times"
-    if spans := [(t.min(), t.max(), name) for name, t in clocks.items() if len(t) > 1]:
+    if spans := [(t.min(), t.max(), name) for name, t in clocks.items() if np.ptp(t) > 0.0]:
         (_, ended, first), (began, _, last) = min(spans, key=lambda span: span[1]), max(spans)
         if began - ended > max(end - start for start, end, _ in spans):
             yield f"{last} begins {began - ended:.6g} s after {first} ends: are they of one clock?"
 
 
-def _parts(fields: Any, topic: str, kind: str) -> Iterator[tuple[str, Any, dict[Way, tuple[float, ...]]]]:
-    """Frame, "" of joints, what has its stamp, and numbers: q, v, or x, y, z [m], quaternion x, y, z, w."""
-    if kind in JOINTS:
-        if state := _state(fields, topic, kind):
-            yield "", fields, {(name, None): row for name, row in state.items()}
-        return
-    for placed in [fields] if kind in SINGLE else fields.transforms:
-        # What Foxglove has flat, ROS has in parts
-        place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
-        child, parent = str(placed.child_frame_id), str(placed.header.frame_id if parent is None else parent)
-        row = [float(getattr(place.translation, x)) for x in "xyz"]
-        row += [float(getattr(place.rotation, x)) for x in "xyzw"]
-        if not np.isfinite(row).all() or abs(np.linalg.norm(row[3:]) - 1.0) > UNIT:
-            raise FormatError(topic, row, f"the pose of {child!r} is none: a position and a unit quaternion")
-        yield child, placed, {(child, parent): tuple(row)}
+#: A joint, or a frame and its parent, the time that a message says [s], and seven numbers: position and velocity, NaN
+#: where it is not given, and zeros, or x, y, z [m], quaternion x, y, z, w
+State = tuple[str, str | None, float, Sequence[float]]
 
 
-def _state(fields: Any, topic: str, kind: str) -> dict[str, tuple[float, float]]:
-    """Joint -> its position, and its velocity, NaN where it is not given."""
-    if kind.startswith("foxglove"):
-        parts = [(each.name, _optional(each, "position"), _optional(each, "velocity")) for each in fields.joints]
+def _states(fields: Any, kind: str) -> Iterator[State]:
+    if kind == "foxglove.JointStates":
+        parts: Any = ((each.name, _optional(each, "position"), _optional(each, "velocity")) for each in fields.joints)
+    elif sizes := {len(fields.position), len(fields.velocity)} - {0, len(fields.name)}:
+        raise ValueError(f"{sizes} numbers for {len(fields.name)} joints")
     else:
-        if sizes := {len(fields.position), len(fields.velocity)} - {0, len(fields.name)}:
-            raise FormatError(topic, sizes, f"numbers for {len(fields.name)} joints were due")
-        parts = list(itertools.zip_longest(fields.name, fields.position, fields.velocity))
-    out: dict[str, tuple[float, float]] = {}
+        parts = itertools.zip_longest(fields.name, fields.position, fields.velocity)
+    stamp, named = _stamp(fields), set[str]()
     for name, position, velocity in parts:
         if position is None:
             continue
-        if not isinstance(name, str):
-            raise FormatError(topic, name, "is no name of a joint")
-        if name in out:
-            raise FormatError(topic, name, "has two states in one message")
+        if not isinstance(name, str) or name in named:
+            raise ValueError(f"{name!r} " + ("has two states" if name in named else "is no name of a joint"))
+        named.add(name)
         # NaN is also what ros2_control writes for what it does not measure
-        out[name] = float(position), math.nan if velocity is None else float(velocity)
-        if not math.isfinite(out[name][0]) or math.isinf(out[name][1]):
-            raise FormatError(topic, out[name], f"the state of {name!r} is no finite number")
-    return out
+        state = float(position), math.nan if velocity is None else float(velocity)
+        if not math.isfinite(state[0]) or math.isinf(state[1]):
+            raise ValueError(f"the state {state} of {name!r} is no finite number")
+        yield name, None, stamp, (*state, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _poses(fields: Any) -> Iterator[State]:
+    for placed in getattr(fields, "transforms", [fields]):
+        # What Foxglove has flat, ROS has in parts
+        place, parent = getattr(placed, "transform", placed), getattr(placed, "parent_frame_id", None)
+        child, parent = str(placed.child_frame_id), str(placed.header.frame_id if parent is None else parent)
+        pose = [float(getattr(place.translation, x)) for x in "xyz"]
+        pose += [float(getattr(place.rotation, x)) for x in "xyzw"]
+        if not np.isfinite(pose).all() or abs(np.linalg.norm(pose[3:]) - 1.0) > UNIT:
+            raise ValueError(f"the pose {pose} of {child!r} is none: a position and a unit quaternion")
+        yield child, parent, _stamp(placed), pose
 
 
 def _optional(fields: Any, name: str) -> Any:
@@ -245,12 +231,9 @@ def _optional(fields: Any, name: str) -> Any:
 def _stamp(fields: Any) -> float:
     """The message's own time [s]; 0 where it has none."""
     own = getattr(getattr(fields, "header", None), "stamp", getattr(fields, "timestamp", None))
-    if own is None:
-        return 0.0
     # As JSON, ROS and protobuf call them
-    seconds, part = (
-        getattr(own, name) for name in ("sec", "seconds", "nsec", "nanosec", "nanos") if hasattr(own, name)
-    )
+    names = ("sec", "seconds", "nsec", "nanosec", "nanos")
+    seconds, part = [getattr(own, name) for name in names if hasattr(own, name)] or (0, 0)
     if not math.isfinite(value := float(seconds + part / NANO)):
-        raise FormatError("timestamp", value, "is no finite number")
+        raise ValueError(f"its timestamp {value} is no finite number")
     return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -29,8 +30,6 @@ SILENT = 0.5
 PATIENCE = 10.0
 #: Where a robot is taken to be where it is wanted [rad or m]
 THERE = 1e-2
-#: Most of DDS's domains
-DOMAINS = 232
 #: States that are kept until they are taken
 KEPT = 64
 STATE = "sensor_msgs/msg/JointState"
@@ -43,14 +42,11 @@ class Ros2Plant:
     """Reads ``sensor_msgs/JointState`` and commands ``trajectory_msgs/JointTrajectory``, one point a tick, as the
     joint_trajectory_controller of ros2_control takes them.
 
-        plant = wbc.formats.Ros2Plant(robot)
-        wbc.track.run(..., plant=plant)
-
     A command of velocities is the position to which it leads within the next tick. Times are of this machine's clock.
 
     Args:
         robot: with joints of one coordinate each; what messages say of other joints is not looked at.
-        states, commands: names of topics. domain: ``ROS_DOMAIN_ID``.
+        states, commands: names of topics. domain: ``ROS_DOMAIN_ID``, to 232.
         zenoh: in place of DDS over Zenoh as rmw_zenoh speaks it: the router or peer, such as ``tcp/127.0.0.1:7447``, or
             "" for peers that are found by multicast.
 
@@ -75,11 +71,11 @@ class Ros2Plant:
         if robot.nq != robot.nv:
             raise RangeError("robot", robot.name, "has joints with several coordinates, which JointState has not")
         self.nq, self.nv = robot.nq, robot.nv
-        topics, number = (states.strip("/"), commands.strip("/")), validation.integer("domain", domain, high=DOMAINS)
-        self._link = _DdsLink(topics, number) if zenoh is None else _ZenohLink(topics, number, zenoh)
+        topics = {STATE: states.strip("/"), TRAJECTORY: commands.strip("/")}
+        validation.integer("domain", domain, high=232)
+        self._link = _DdsLink(topics, domain) if zenoh is None else _ZenohLink(topics, domain, zenoh)
         self._q, self._v, self._heard = np.full(self.nq, math.nan), np.zeros(self.nv), -math.inf
-        self._now = self._due = 0.0
-        self._command = Command(CommandKind.VELOCITY, np.zeros(self.nv))
+        self._now, self._due, self._command = 0.0, 0.0, Command(CommandKind.VELOCITY, np.zeros(self.nv))
 
     def reset(self, q: Array, time: float) -> None:
         """Go to a configuration, and wait until the robot is there.
@@ -108,16 +104,15 @@ class Ros2Plant:
         for message in self._link.take():
             places = {name: k for k, name in enumerate(message.name)}
             if places.keys() >= set(self._robot.joint_names) and len(message.position) == len(places):
-                order = [places[name] for name in self._robot.joint_names]
-                full = len(message.velocity) == len(places)
+                order, self._heard = [places[name] for name in self._robot.joint_names], clock.monotonic()
                 self._q = np.array(message.position)[order]
+                full = len(message.velocity) == len(places)
                 self._v = np.array(message.velocity)[order] if full else np.zeros(self.nv)
-                self._heard = clock.monotonic()
         valid = clock.monotonic() - self._heard < SILENT and np.isfinite([*self._q, *self._v]).all()
         return PlantState(self._q.copy(), self._v.copy(), self._now, bool(valid))
 
     def apply(self, command: Command) -> None:
-        """Keep it: it is sent by :meth:`advance`, which knows for how long it is."""
+        # It is sent by advance, which knows for how long it is
         self._command = command
 
     def advance(self, dt: float) -> None:
@@ -143,7 +138,7 @@ class Ros2Plant:
 class _DdsLink:
     """Hears states and sends trajectories over Cyclone DDS as ROS 2 does by default: XCDR 1, topics under ``rt/``."""
 
-    def __init__(self, topics: tuple[str, str], domain: int) -> None:
+    def __init__(self, topics: dict[str, str], domain: int) -> None:
         extras.require("ros2", "a robot of ROS 2")
         from cyclonedds.core import DDSException
         from cyclonedds.domain import DomainParticipant
@@ -153,16 +148,15 @@ class _DdsLink:
         from cyclonedds.topic import Topic
 
         self.types, known = ros2_types(), dict[str, Any]()
-        states, commands = (f"rt/{topic}" for topic in topics)
-        state, self._order = (_idl(self.types, kind, known) for kind in (STATE, TRAJECTORY))
         plain = Policy.History.KeepLast(1), Policy.DataRepresentation(use_cdrv0_representation=True)
         heard, sent = Qos(Policy.Reliability.BestEffort, *plain), Qos(Policy.Reliability.Reliable(NANO), *plain)
         try:
-            self._participant = me = DomainParticipant(domain)
-            self._reader = DataReader(me, Topic(me, states, state), qos=heard)
-            self._writer = DataWriter(me, Topic(me, commands, self._order), qos=sent)
+            me = DomainParticipant(domain)
+            state, order = (Topic(me, f"rt/{name}", _idl(self.types, kind, known)) for kind, name in topics.items())
+            self._reader, self._writer = DataReader(me, state, qos=heard), DataWriter(me, order, qos=sent)
         except DDSException as error:
             raise FormatError("domain", domain, f"DDS does not connect: {error}") from error
+        self._order = known[TRAJECTORY]
 
     def take(self) -> Iterable[Any]:
         # What is said of an endpoint that is gone has no names
@@ -175,19 +169,16 @@ class _DdsLink:
 class _ZenohLink:
     """The same over Zenoh, with keys and attachments of rmw_zenoh, but not its tokens, of which it lists topics."""
 
-    def __init__(self, topics: tuple[str, str], domain: int, locator: str) -> None:
+    def __init__(self, topics: dict[str, str], domain: int, locator: str) -> None:
         extras.require("zenoh", "a robot of ROS 2 over Zenoh")
         import zenoh
 
-        self.types, config = ros2_types(), zenoh.Config()
+        self.types, config, came = ros2_types(), zenoh.Config(), deque[bytes](maxlen=KEPT)
         if locator:
             config.insert_json5("connect/endpoints", json.dumps([locator]))
-        came = self._came = deque[bytes](maxlen=KEPT)
-        self._sent, self._sender = 0, os.urandom(16)
-        states, commands = (
-            f"{domain}/{topic}/{_dds_name(kind)}/{self.types.hash_rihs01(kind)}"
-            for topic, kind in zip(topics, (STATE, TRAJECTORY), strict=True)
-        )
+        self._came, self._sent, self._sender = came, itertools.count(1), os.urandom(16)
+        hashes = {kind: self.types.hash_rihs01(kind) for kind in topics}
+        states, commands = (f"{domain}/{name}/{_dds_name(kind)}/{hashes[kind]}" for kind, name in topics.items())
         try:
             session = zenoh.open(config)
             # An open one keeps the program from ending
@@ -201,8 +192,8 @@ class _ZenohLink:
         return [self.types.deserialize_cdr(self._came.popleft(), STATE) for _ in range(len(self._came))]
 
     def put(self, data: bytes) -> None:
-        self._sent += 1
-        self._publisher.put(data, attachment=ATTACHMENT.pack(self._sent, clock.time_ns(), 16, self._sender))
+        attachment = ATTACHMENT.pack(next(self._sent), clock.time_ns(), 16, self._sender)
+        self._publisher.put(data, attachment=attachment)
 
 
 def _dds_name(kind: str) -> str:

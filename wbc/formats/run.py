@@ -1,12 +1,10 @@
-"""A run, piece by piece, whatever recorded it: its numbers, what there is to see of them, and where these go."""
+"""A run, piece by piece, whatever recorded it: its numbers, and what there is to see of them."""
 
 from __future__ import annotations
 
-import pathlib
-from abc import ABC, abstractmethod
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,9 +17,8 @@ from wbc.formats.errors import FormatError
 from wbc.log import Log, LogFile, load
 from wbc.log.log import FILES, log_of
 from wbc.multibody import pin
-from wbc.record.recorder import recorded_inputs
 from wbc.record.recording import Recording
-from wbc.replaying.ticks import compiled
+from wbc.replaying.ticks import compiled, redoing
 from wbc.robot import Robot
 from wbc.robots import load as load_robot, names
 from wbc.shapes import Box
@@ -40,17 +37,17 @@ RATE = 30.0
 EXPLAINED = 1.0
 #: Length and width of the axes that mark a target [m]
 AXIS = (0.1, 0.005)
+#: Says whether to look again for ticks where a file ends that is still written
+Wait = Callable[[], bool]
 
 
-@dataclass(frozen=True)
-class SeenTick:
+class SeenTick(NamedTuple):
     """What there is to see of a tick.
 
     Attributes:
         t: time [s]. poses: ``robot/LINK``, ``target/ITEM`` or ``obstacle/ITEM`` -> its pose in the world: x, y, z [m],
-            quaternion x, y, z, w.
-        status: how the tick ended. binding: rows that push against the optimum, and those that gave way.
-        why: why the command is what it is; "" where that was said already.
+            quaternion x, y, z, w. status: how the tick ended. binding: rows that push against the optimum, and those
+            that gave way. why: why the command is what it is; "" where that was said already.
     """
 
     t: float
@@ -58,6 +55,10 @@ class SeenTick:
     status: str = ""
     binding: tuple[str, ...] = ()
     why: str = ""
+
+
+#: Ticks as they were written together, and what there is to see of some of them
+Piece = tuple[Log, list[SeenTick]]
 
 
 class Run:
@@ -68,19 +69,17 @@ class Run:
             ``SeenTick.poses`` -> what is drawn there. remarks: what is not shown, and why.
 
     Raises:
-        LogFileError: no such run, or damaged.
+        FormatError: there is no such file or folder. LogFileError: no run, or damaged.
     """
 
-    def __init__(self, path: pathlib.Path, trust: bool = False) -> None:
-        self.path = recording_in(path) or path
+    def __init__(self, path: str | os.PathLike[str], trust: bool = False) -> None:
+        place, trust = validation.existing("run", path, FormatError), validation.flag("trust", trust)
+        self.path = recording_in(place) or place
         file = next((self.path / name for name in FILES if (self.path / name).is_file()), self.path)
         self.remarks, self.bodies = list[str](), dict[str, list[DrawnMesh]]()
-        self.about: Mapping[str, Any]
-        self.units: Mapping[str, str]
         self._controller: Controller | None = None
-        self._placed = dict[str, tuple[str, str]]()
-        self._due, self._said, self._said_at = -np.inf, tuple[str, ...](), -np.inf
-        self._chunks: Callable[[Callable[[], bool] | None], Iterable[tuple[Log, Array]]]
+        self._placed, self._said, self._said_at = dict[str, tuple[str, str]](), tuple[str, ...](), -np.inf
+        self._chunks: Callable[[Wait | None], Iterable[tuple[Log, Array]]]
         if file.suffix == ".parquet" or not is_recording(file):
             log = load(file)
             self.about, self.units, self._chunks = log.meta, log.units, lambda wait: [(log, log["t"])]
@@ -97,11 +96,12 @@ class Run:
 
     def _read_stack(self, recording: Recording, trust: bool) -> None:
         try:
-            self._controller, self._parts = compiled(recording, backend="auto", trust=trust), recording.parts
+            self._controller = controller = compiled(recording, backend="auto", trust=trust)
         except WbcError as error:
             self.remarks.append(f"targets, obstacles and reasons are not shown: {error}")
             return
-        for name, block in core_of(self._controller).layout.blocks.items():
+        self._again = redoing(recording, controller)
+        for name, block in core_of(controller).layout.blocks.items():
             item, target = block.entry.item, block.slots.get("target")
             if target is not None and is_place(target.input):
                 self._placed[f"target/{name}"], self.bodies[f"target/{name}"] = (name, "target"), _axes()
@@ -112,101 +112,55 @@ class Run:
     def _own_robot(self) -> Robot | None:
         """The robot of a run without a stack: by name, where the run has its whole configuration."""
         name, count = str(self.about.get("robot", "")), sum(column.startswith("q.") for column in self.units)
-        robot = load_robot(name) if name in names() else None
-        if robot is None or robot.nq != count:
-            self.remarks.append(f"the robot is not shown: no robot is {name!r} and has {count} coordinates")
-            return None
-        return robot
+        if name in names() and (robot := load_robot(name)).nq == count:
+            return robot
+        self.remarks.append(f"the robot is not shown: no robot is {name!r} and has {count} coordinates")
+        return None
 
     def pieces(
-        self, wait: Callable[[], bool] | None = None, rate: float = RATE
-    ) -> Iterator[tuple[Log, list[SeenTick]]]:
-        """Numbers of all ticks, and what is to be seen of ``rate`` a second, as they were written; ``wait``: as of
-        :meth:`wbc.log.LogFile.chunks`.
+        self, wait: Wait | None = None, rate: float = RATE, progress: Callable[[int], None] | None = None
+    ) -> Iterator[Piece]:
+        """All ticks as they were written, of which ``rate`` a second are seen; arguments are those of
+        :func:`wbc.formats.convert`.
         """
+        count, last = 0, -np.inf
         for log, rows in self._chunks(wait):
-            seen, configurations = list[SeenTick](), log.array("q")
-            for k, t in enumerate(log["t"].tolist()):
-                if t >= self._due - 1e-9:
-                    self._due = max(self._due + 1.0 / rate, t) if np.isfinite(self._due) else t + 1.0 / rate
-                    seen.append(self._seen(t, configurations[k], rows[k]))
-            yield log, seen
+            # The first tick of each period of the rate is seen
+            periods, q = np.floor(rate * log["t"] + 1e-6), log.array("q")
+            seen = np.flatnonzero(np.diff(periods, prepend=last) > 0.0).tolist()
+            yield log, [self._seen(float(log["t"][k]), q[k], rows[k]) for k in seen]
+            count, last = count + len(log), periods.max(initial=last)
+            if progress is not None:
+                progress(count)
 
     def _seen(self, t: float, q: Array, row: Array) -> SeenTick:
-        poses = {} if self._robot is None else _link_poses(self._robot, q)
+        poses = dict[str, Array]()
+        if self._robot is not None:
+            model, data, body = self._robot.model, self._robot.model.createData(), pin.FrameType.BODY
+            pin.framesForwardKinematics(model, data, q)
+            places = zip(model.frames, data.oMf, strict=True)
+            poses = {f"robot/{frame.name}": _seven(place) for frame, place in places if frame.type == body}
         if self._controller is None:
             return SeenTick(t, poses)
         # One tick alone: from no active set the answer is the same to rounding
-        core = core_of(self._controller)
-        for name in recorded_inputs(core.layout):
-            getattr(core.tick, name)[:] = row[self._parts[name]]
-        core.tick.reset()
-        tick = Tick(self._controller, SharedTick(0, t, state_of(core.again())))
-        step = tick.step
+        tick = Tick(self._controller, SharedTick(0, t, state_of(self._again(row, True))))
         placed = {frame: tick.world_pose(*value) for frame, value in self._placed.items()}
         poses |= {frame: _seven(pose) for frame, pose in placed.items() if pose is not None}
+        step, why = tick.step, ""
         binding = (*map(str, step.binding), *(f"gave way: {slack}" for slack in step.relaxed))
-        said, why = (str(step.status), *binding), ""
-        if said != self._said and t >= self._said_at + EXPLAINED:
-            self._said, self._said_at = said, t
-            why = " ".join(sentences(step.explain()))
+        if (said := (str(step.status), *binding)) != self._said and t >= self._said_at + EXPLAINED:
+            self._said, self._said_at, why = said, t, " ".join(sentences(step.explain()))
         return SeenTick(t, poses, str(step.status), binding, why)
-
-
-def _link_poses(robot: Robot, q: Array) -> dict[str, Array]:
-    model, data = robot.model, robot.model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    placed = zip(model.frames, data.oMf, strict=True)
-    return {f"robot/{frame.name}": _seven(pose) for frame, pose in placed if frame.type == pin.FrameType.BODY}
 
 
 def _axes() -> list[DrawnMesh]:
     """Bars along x, y and z, in red, green and blue."""
-    bars, length, width = list[DrawnMesh](), *AXIS
-    for along, colour in zip(np.eye(3), ((255, 0, 0), (0, 255, 0), (0, 0, 255)), strict=True):
-        x, y, z = (width + (length - width) * along).tolist()
-        bars.append(indexed(Box((x, y, z)).triangles() + 0.5 * length * along, colour))
+    bars, (length, width) = list[DrawnMesh](), AXIS
+    for along in np.eye(3):
+        (x, y, z), (red, green, blue) = (width + (length - width) * along).tolist(), (255 * along).astype(int).tolist()
+        bars.append(indexed(Box((x, y, z)).triangles() + 0.5 * length * along, (red, green, blue)))
     return bars
 
 
 def _seven(pose: pin.SE3) -> Array:
     return np.array(pin.SE3ToXYZQUAT(pose))
-
-
-def run_of(path: object, trust: bool = False) -> Run:
-    """A run by its folder or file; FormatError: there is no such thing, LogFileError: it is no run."""
-    place = validation.file_path("run", path)
-    if not validation.exists("run", place):
-        raise FormatError("run", str(place), validation.no_such(place, "there is no such file or folder"))
-    return Run(place, validation.flag("trust", trust))
-
-
-class Sink(ABC):
-    """A file, folder or connection into which a run is written; ticks are kept in memory where nothing else is done.
-
-    Attributes:
-        needs: the extra that brings its packages, and what needs them in words; empty: none.
-    """
-
-    needs: ClassVar[tuple[str, ...]] = ()
-
-    def __init__(self, path: pathlib.Path) -> None:
-        self._path, self._logs = path, list[Log]()
-
-    def begin(self, run: Run) -> None:
-        """Comes first."""
-        self._run = run
-
-    def write(self, log: Log, seen: list[SeenTick]) -> None:
-        """The next ticks, and what is to be seen of some of them."""
-        self._logs.append(log)
-
-    @abstractmethod
-    def close(self) -> None:
-        """Nothing more comes."""
-
-    def taken(self) -> Log:
-        """Ticks that were kept, and are so no longer."""
-        logs, self._logs = self._logs, []
-        columns = {name: np.concatenate([log[name] for log in logs] or [np.zeros(0)]) for name in self._run.units}
-        return Log(columns, self._run.units, self._run.about, logs[-1].tables if logs else {})

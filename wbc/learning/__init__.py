@@ -1,7 +1,5 @@
 """Stacks under what learns: gradients for PyTorch, actions of Gymnasium, robots of LeRobot (floor 13)."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from wbc import lazy

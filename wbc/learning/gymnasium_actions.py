@@ -26,8 +26,6 @@ def stack_actions(
 ) -> gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]:
     """Environments whose actions are what a stack is told: it turns them into commands that keep its constraints.
 
-        env = wbc.learning.stack_actions(env, controller.batch(64), Box(-0.1, 0.1, (3,)), aim, lambda seen: seen[:, :7])
-
     The ``info`` of a step has ``solved`` [n] and ``command`` [n, nv].
 
     Args:
@@ -49,27 +47,23 @@ def stack_actions(
         raise RangeError("batch", batch.count, f"expected as many robots as environments, {env.num_envs}")
 
     class StackActions(gymnasium.vector.VectorWrapper[Any, Any, Any, Any, Any]):
-        def __init__(self) -> None:
-            super().__init__(env)
-            self.single_action_space = space
-            self.action_space = gymnasium.vector.utils.batch_space(space, env.num_envs)
-            self._seen: Any = None
+        seen: Any = None
+        single_action_space, action_space = space, gymnasium.vector.utils.batch_space(space, batch.count)
 
         def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-            self._seen, info = self.env.reset(seed=seed, options=options)
-            batch.reset(np.asarray(configuration(self._seen), dtype=np.float64))
-            return self._seen, info
+            self.seen, info = self.env.reset(seed=seed, options=options)
+            batch.reset(np.asarray(configuration(self.seen), dtype=np.float64))
+            return self.seen, info
 
         def step(self, actions: Any) -> Any:
-            if self._seen is None:
+            if self.seen is None:
                 raise RangeError("step", None, "the environments have no state yet: call reset first")
             if len(actions) != batch.count:
                 raise RangeError("actions", len(actions), f"expected one for each of {batch.count} environments")
-            q = np.asarray(configuration(self._seen), dtype=np.float64)
+            q = np.asarray(configuration(self.seen), dtype=np.float64)
             aim(batch, np.asarray(actions, dtype=np.float64), q)
-            step = batch.step(q, None if velocity is None else np.asarray(velocity(self._seen), dtype=np.float64))
-            kind = self.env.single_action_space.dtype
-            self._seen, reward, ended, cut, info = self.env.step(step.v.astype(kind))
-            return self._seen, reward, ended, cut, info | {"solved": step.solved, "command": step.v}
+            step = batch.step(q, None if velocity is None else np.asarray(velocity(self.seen), dtype=np.float64))
+            self.seen, *ended, info = self.env.step(step.v.astype(env.single_action_space.dtype))
+            return self.seen, *ended, info | {"solved": step.solved, "command": step.v}
 
-    return StackActions()
+    return StackActions(env)

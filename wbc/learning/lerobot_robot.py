@@ -14,11 +14,7 @@ from wbc.simulation import Connection, Plant
 
 
 class LeRobotDevice:
-    """What LeRobot asks of robots and teleoperators alike; there is nothing to calibrate or to configure.
-
-    Attributes:
-        name, id: as LeRobot names it. joints: of actions. action_features: what an action has.
-    """
+    """What LeRobot asks of robots and teleoperators alike; there is nothing to calibrate or to configure."""
 
     name = "wbc"
     is_calibrated = True
@@ -49,13 +45,6 @@ class StackRobot(LeRobotDevice):
     It has the methods of ``lerobot.robots.Robot``, without inheriting from it, so that LeRobot need not be installed;
     observations and actions are ``{"JOINT.pos": position}`` [rad or m].
 
-        robot = wbc.learning.StackRobot(controller, "posture")
-        robot.connect()
-        robot.send_action({"panda_joint1.pos": 0.3})
-
-    Attributes:
-        controller: what commands.
-
     Args:
         controller: of a stack that commands velocities of joints with one coordinate each.
         posture: name of its task ``Posture``, whose target actions are.
@@ -67,14 +56,13 @@ class StackRobot(LeRobotDevice):
     """
 
     def __init__(self, controller: Controller, posture: str, plant: Plant | None = None) -> None:
-        validation.instance("controller", controller, Controller, "a wbc Controller")
-        robot = controller.stack.robot
+        robot = validation.instance("controller", controller, Controller, "a wbc Controller").stack.robot
         if robot.nq != robot.nv:
             raise RangeError("controller", robot.name, "has joints with several coordinates")
         validation.one_of("posture", posture, [entry.name for entry in controller.stack.entries])
         super().__init__(robot.name, robot.joint_names)
         self.observation_features = self.action_features
-        self.controller, self._posture, self._start = controller, posture, robot.neutral
+        self.controller, self._posture, self._start = controller, controller[posture], robot.neutral
         self._connection = Connection(plant, robot, controller.stack.dt)
 
     def connect(self, calibrate: bool = True) -> None:
@@ -84,35 +72,33 @@ class StackRobot(LeRobotDevice):
         self._target, self.is_connected = self._q.copy(), True
 
     def disconnect(self) -> None:
-        """Bring the robot to rest."""
         if self.is_connected:
             self._connection.rest()
         super().disconnect()
 
     def get_observation(self) -> dict[str, float]:
-        """Positions of the joints [rad or m]."""
         self._require()
         return self._named(self._q.tolist())
 
     def send_action(self, action: Mapping[str, Any]) -> dict[str, float]:
-        """Go towards positions for one tick, and say where the joints are after it, which a data set records as what
-        was done; joints that it does not name keep their last target.
-        """
+        """One tick towards positions; joints that it does not name keep their last target. Returns where they are."""
         self._require()
         places, target = self._named(range(len(self.joints))), self._target.copy()
         for key, value in action.items():
             target[places[validation.one_of("action", key, places)]] = validation.scalar(f"action.{key}", value)
-        self.controller[self._posture].target = self._target = target
+        self._posture.target = self._target = target
         self._q = self._connection.drive(self.controller.step(self._q).v).q
         return self.get_observation()
 
 
 class StackTeleoperator(LeRobotDevice):
-    """A recorded motion as what leads a robot, with the methods of ``lerobot.teleoperators.Teleoperator``; it feels
-    nothing.
+    """A recorded motion that leads a robot, with the methods of ``lerobot.teleoperators.Teleoperator``.
 
     Args:
         motion: from :func:`wbc.formats.read_motion`. clock: time since it began [s]; default: since :meth:`connect`.
+
+    Raises:
+        ShapeError: no motion. RangeError: ``get_action`` before ``connect``.
     """
 
     name = "wbc_motion"
@@ -121,17 +107,15 @@ class StackTeleoperator(LeRobotDevice):
     def __init__(self, motion: RecordedMotion, clock: Callable[[], float] | None = None) -> None:
         self._motion = validation.instance("motion", motion, RecordedMotion, "a RecordedMotion")
         super().__init__("motion", motion.joints)
-        self._clock = clock
+        self._clock = clock or (lambda: time.monotonic() - self._began)
 
     def connect(self, calibrate: bool = True) -> None:
         """Begin the motion."""
         self._began, self.is_connected = time.monotonic(), True
 
     def get_action(self) -> dict[str, float]:
-        """Positions of the recorded joints now [rad or m]; RangeError: it is not connected."""
         self._require()
-        now = time.monotonic() - self._began if self._clock is None else self._clock()
-        return self._named(self._motion.at(now).tolist())
+        return self._named(self._motion.at(self._clock()).tolist())
 
     def send_feedback(self, feedback: Mapping[str, Any]) -> None:
-        """It is not felt."""
+        """Feel nothing."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from wbc import extras, validation
 from wbc.batch.batch import Batch
-from wbc.batch.batch_step import Pulled
 from wbc.errors import RangeError
 from wbc.validation import Array
 
@@ -17,11 +16,8 @@ if TYPE_CHECKING:
 
 
 def command_layer(batch: Batch, *values: str) -> torch.nn.Module:
-    """A module that ticks a batch: configurations and values of items in, velocities out, gradients by all of these.
-
-        layer = wbc.learning.command_layer(controller.batch(4096), "hand.target")
-        v = layer(q, poses)                                 # [n, nq], [n, 4, 4] -> [n, nv]
-        v.square().sum().backward()
+    """A module that ticks a batch: configurations [n, nq] and values of items in, velocities [n, nv] out, gradients by
+    all of these.
 
     Gradients are those of :meth:`wbc.batch.BatchStep.pull`: by the numbers as they are, of poses by their matrices.
     Robots whose rows do not all hold have none; ``layer.solved`` says which do.
@@ -58,15 +54,13 @@ def command_layer(batch: Batch, *values: str) -> torch.nn.Module:
         @staticmethod
         @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
         def backward(ctx: Any, weights: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-            pulled = ctx.step.pull(weights.detach().cpu().double().numpy())
-
-            def gradient(place: tuple[str, str | None], shape: Any, kind: Any, device: Any) -> torch.Tensor:
-                numbers = torch.from_numpy(_shaped(pulled, *place, shape)).to(kind).to(device)
-                # One value for all robots moves with all of them
-                return numbers if numbers.shape == shape else numbers.sum(0)
-
+            pulled, out = ctx.step.pull(weights.detach().cpu().double().numpy()), list[torch.Tensor | None]()
             each = zip(ctx.needs_input_grad, [("q", None), *names], ctx.given, strict=True)
-            return tuple(gradient(place, *like) if asked else None for asked, place, like in each)
+            for asked, place, (shape, kind, device) in each:
+                numbers = torch.from_numpy(_shaped(pulled.by(*place), shape)).to(device, kind) if asked else None
+                # One value for all robots moves with all of them
+                out.append(numbers if numbers is None or numbers.shape == shape else numbers.sum(0))
+            return tuple(out)
 
     class CommandLayer(torch.nn.Module):  # type: ignore[misc]  # the same
         solved = torch.zeros(0, dtype=torch.bool)
@@ -81,12 +75,10 @@ def command_layer(batch: Batch, *values: str) -> torch.nn.Module:
     return module
 
 
-def _shaped(pulled: Pulled, name: str, value: str | None, shape: Any) -> Array:
-    """Gradients [n, ...] in the shape of a value."""
-    numbers = pulled.by(name, value)
+def _shaped(numbers: Array, shape: Any) -> Array:
+    """Gradients [n, ...] in the shape of a value: of poses and rotations by columns, as matrices."""
     if tuple(shape[-2:]) not in ((4, 4), (3, 3)) or numbers.shape[1] not in (9, 12):
         return numbers
-    out = np.zeros((len(numbers), *shape[-2:]))
-    columns = numbers.reshape(len(numbers), -1, 3).transpose(0, 2, 1)
+    out, columns = np.zeros((len(numbers), *shape[-2:])), numbers.reshape(len(numbers), -1, 3).transpose(0, 2, 1)
     out[:, :3, : columns.shape[2]] = columns
     return out

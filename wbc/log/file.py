@@ -104,7 +104,6 @@ class FileWriter:
         self._chunk = bytearray()
 
     def begin(self, about: Mapping[str, Any], attached: Mapping[str, bytes]) -> None:
-        """See :class:`LogWriter`."""
         self._width = sum(about["sizes"].values())
         try:
             for name, content in ({"about.json": json.dumps(dict(about)).encode()} | dict(attached)).items():
@@ -114,11 +113,9 @@ class FileWriter:
             raise self._error("path", str(self._path), f"cannot be written: {problem.strerror}") from problem
 
     def table(self, name: str, values: np.ndarray) -> None:
-        """See :class:`LogWriter`."""
         self._put(self._next(name), _header(values.dtype, values.shape) + values.tobytes())
 
     def write(self, numbers: bytes | memoryview) -> None:
-        """See :class:`LogWriter`."""
         rows = np.frombuffer(numbers).reshape(-1, self._width)
         count, bits = len(rows), rows.view(np.uint64)
         varying = np.flatnonzero((bits != bits[0]).any(axis=0))
@@ -147,7 +144,6 @@ class FileWriter:
         self._file.close()
 
     def abandon(self) -> None:
-        """See :class:`LogWriter`."""
         with contextlib.suppress(OSError):
             self._file.close()
 

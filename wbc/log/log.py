@@ -7,7 +7,7 @@ import os
 import pathlib
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -65,6 +65,12 @@ class Log:
         return np.column_stack(members) if members else np.zeros((len(self), 0))
 
 
+def joined(logs: Sequence[Log], units: Mapping[str, str], meta: Mapping[str, Any]) -> Log:
+    """Logs of one run after each other, with the tables of the last; none: no ticks."""
+    columns = {name: np.concatenate([log[name] for log in logs] or [np.zeros(0)]) for name in units}
+    return Log(columns, units, meta, logs[-1].tables if logs else {})
+
+
 def save(log: Log, folder: pathlib.Path, kind: str = "parquet", name: str = "log") -> pathlib.Path:
     """Write a log into a folder, which is made where it is not there, whole or not at all; returns the file.
 
@@ -119,9 +125,7 @@ def load(run: str | os.PathLike[str]) -> Log:
     Raises:
         LogFileError: there is no log, or it cannot be read.
     """
-    path = validation.file_path("run", run)
-    if not validation.exists("run", path):
-        raise LogFileError("run", str(path), validation.no_such(path, "there is no such file or folder"))
+    path = validation.existing("run", run, LogFileError)
     if path.is_dir():
         found = [path / name for name in FILES if (path / name).is_file()]
         if not found:

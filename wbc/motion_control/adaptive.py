@@ -28,8 +28,8 @@ from wbc import validation
 from wbc.errors import RangeError
 from wbc.identification.information import Information
 from wbc.identification.pseudo_inertia import model_parameters, nearest_body, parameters, pseudo_inertia
-from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
-from wbc.multibody import pin
+from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, measured
+from wbc.multibody import mass_matrix, pin
 from wbc.native.compiled_function import compiled
 from wbc.robot import Robot
 from wbc.symbolic import Kinematics, TwoVelocityDynamics

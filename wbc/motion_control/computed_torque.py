@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
-from wbc.multibody import pin
+from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, measured
+from wbc.multibody import mass_matrix, pin
 from wbc.robot import Robot
 from wbc.validation import Array
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, UnsupportedJointError
-from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, mass_matrix, measured
-from wbc.multibody import pin
+from wbc.motion_control.motion import Motion, checked_dynamics, checked_gains, checked_motion, measured
+from wbc.multibody import mass_matrix, pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array

@@ -15,7 +15,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RangeError, ShapeError, UnsupportedJointError
 from wbc.identification.pseudo_inertia import is_body
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix
 from wbc.robot import Robot
 from wbc.validation import Array
 
@@ -84,12 +84,6 @@ def checked_dynamics(robot: Robot, q: Array) -> Robot:
         name = robot.dof_names[int(np.abs(vectors[:, 0]).argmax())]
         raise RangeError("robot", name, f"the mass matrix is singular: nothing that weighs moves with {name}")
     return robot
-
-
-def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
-    """M ``[nv, nv]``, with both triangles."""
-    upper = np.triu(pin.crba(model, data, q))
-    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def checked_motion(robot: Robot, motion: Motion) -> Motion:

@@ -14,8 +14,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import SolverError, UnsupportedJointError
-from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion, mass_matrix, measured
-from wbc.multibody import pin
+from wbc.motion_control.motion import Motion, checked_dynamics, checked_motion, measured
+from wbc.multibody import mass_matrix, pin
 from wbc.qp import QP, make_solver
 from wbc.robot import Robot
 from wbc.validation import Array

@@ -104,7 +104,6 @@ class Tumble:
     state: Callable[[float], Array]
 
     def at(self, t: float) -> FrameMotion:
-        """Pose, twist and acceleration."""
         state = self.state(t)
         turn = pin.Quaternion(state[:4] / np.linalg.norm(state[:4])).toRotationMatrix()
         spin, arm = turn @ state[4:], turn @ self.arm

@@ -66,6 +66,12 @@ def algebra(model: Any) -> Any:
     return own if isinstance(model, own.Model) else pin
 
 
+def mass_matrix(model: Any, data: Any, q: Any) -> NDArray[np.float64]:
+    """M(q) [nv, nv]; Pinocchio fills its upper half alone."""
+    upper = np.triu(algebra(model).crba(model, data, q))
+    return np.asarray(upper + np.triu(upper, 1).T)
+
+
 def _is(value: Any, kind: str) -> bool:
     """Whether a value is an ``own`` one of a class, or Pinocchio's, which is not imported to see it."""
     theirs = getattr(sys.modules.get("pinocchio"), kind, None)

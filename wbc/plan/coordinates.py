@@ -11,81 +11,17 @@ import casadi as ca
 import numpy as np
 
 from wbc.clearance import Tree
-from wbc.clearance.tree import SCALAR, Moves
+from wbc.clearance.tree import Moves
 from wbc.errors import UnsupportedJointError
-from wbc.multibody import pin
 from wbc.plan.rolling import ANY_WAY, RollingBase
 from wbc.robot import Robot
-from wbc.rotations import exponential, matrices, quaternion_product
+from wbc.rotations import matrices
+from wbc.symbolic.ball_turns import BallTurns
 from wbc.symbolic.joint_steps import JointKind, joint_steps, turns_for_quaternions
 from wbc.validation import Array
 
 #: Joints of which one may follow another
 COUPLED = ("revolute", "prismatic", "helical")
-#: Axes of the three turns of a ball joint, the usual order first
-ORDERS = ((2, 1, 0), (0, 2, 1), (1, 0, 2), (0, 1, 2), (1, 2, 0), (2, 0, 1))
-#: Another order of axes is taken where the sine of the second turn would be larger: at 1 two turns are about one axis
-STEEP = 0.8
-
-
-@dataclass(frozen=True)
-class BallTurns:
-    """Three turns for a ball joint, or for the rotation of a floating base:
-
-        R = exp(a [e_i]) exp(b [e_j]) exp(c [e_k])
-
-    Attributes:
-        number: of a among the coordinates; b and c follow. place: of the quaternion in q. order: (i, j, k).
-        carries: the three coordinates before a are the position of a floating base.
-    """
-
-    number: int
-    place: int
-    order: tuple[int, int, int]
-    carries: bool
-
-    @property
-    def span(self) -> slice:
-        """The three coordinates."""
-        return slice(self.number, self.number + 3)
-
-    def steep(self, q: Array, order: tuple[int, int, int]) -> float:
-        """|sin b| of the three turns in an order."""
-        return float(abs(matrices(q[self.place : self.place + 4])[order[0], order[2]]))
-
-    def angles(self, q: Array, near: Array) -> Array:
-        """(a, b, c) of a configuration, those nearest to ``near`` of all that there are."""
-        axes = np.eye(3)[list(self.order)]
-        sign = np.linalg.det(axes)
-        turned = axes @ matrices(q[self.place : self.place + 4]) @ axes.T
-        level = np.hypot(turned[1, 2], turned[2, 2]) > 1e-9
-        first = np.arctan2(-turned[1, 2], turned[2, 2]) if level else sign * near[0]
-        found = []
-        for a in (first, first + np.pi):
-            rest = exponential(np.array([[-a, 0.0, 0.0]]))[0] @ turned
-            x = sign * np.array([a, np.arctan2(rest[0, 2], rest[2, 2]), np.arctan2(rest[1, 0], rest[1, 1])])
-            found.append(x + 2.0 * np.pi * np.round((near - x) / (2.0 * np.pi)))
-        return min(found, key=lambda x: float(np.linalg.norm(x - near)))
-
-    def quaternion(self, x: Any, math: ModuleType) -> list[Any]:
-        """(x, y, z, w) at coordinates [n, ...], in numpy or CasADi."""
-        first, second, third = (self._turn(k, x[self.number + k], math) for k in range(3))
-        return quaternion_product(quaternion_product(first, second), third)
-
-    def _turn(self, k: int, angle: Any, math: ModuleType) -> list[Any]:
-        out = [0.0 * angle] * 3 + [math.cos(0.5 * angle)]
-        out[self.order[k]] = math.sin(0.5 * angle)
-        return out
-
-    def angular_velocity(self, x: Array, rate: Array) -> Array:
-        """In the axes of what it carries [..., 3]; x and its rates are [n, ...]."""
-        i, j, k = self.order
-        second, third = (self._turn(m, x[self.number + m], np) for m in (1, 2))
-        after = [matrices(np.stack(turns, axis=-1)) for turns in (quaternion_product(second, third), third)]
-        a, b, c = rate[self.span]
-        return np.asarray(
-            a[..., None] * after[0][..., i, :] + b[..., None] * after[1][..., j, :] + c[..., None] * np.eye(3)[k]
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,16 +71,13 @@ class PlanningCoordinates:
             steps = joint_steps(model, joint)
             for step in (step for step in steps if step.kind == JointKind.QUATERNION):
                 floats = model.joints[joint].shortname() == "JointModelFreeFlyer"
-                ball = BallTurns(len(places) + 3 * floats, step.q, ORDERS[0], floats)
-                if q is not None and ball.steep(q, ball.order) > STEEP:
-                    ball = replace(ball, order=min(ORDERS, key=lambda order: ball.steep(q, order)))
-                balls.append(ball)
-                orders[step.q] = ball.order
+                ball = BallTurns(len(places) + 3 * floats, step.q, floats)
+                balls.append(ball if q is None else ball.suited(q))
+                orders[step.q] = balls[-1].order
             for step in turns_for_quaternions(steps, orders):
                 if step.kind != JointKind.PLACE and step.q not in places:
                     circles |= {len(places)} if step.kind == JointKind.CIRCLE else set()
                     places.append(step.q)
-        tree = Tree.of_model(model, orders=orders)
         # Places are in the order of the degrees of freedom
         for c in robot.couplings:
             if circles & {c.follower, c.leader}:
@@ -152,39 +85,34 @@ class PlanningCoordinates:
                 raise UnsupportedJointError(field, "continuous", "a planner couples none", COUPLED)
         own = sorted(set(range(len(places))) - {c.follower for c in robot.couplings})
         number = {dof: k for k, dof in enumerate(own)}
-        moved_by = {dof: (k, 1.0, 0.0) for dof, k in number.items()}
-        moved_by |= {c.follower: (number[c.leader], c.ratio, c.offset) for c in robot.couplings}
-        frames, links = list(tree.frames), tree.links
-        for f, frame in enumerate(frames):
-            if frame.moves in SCALAR:
-                k, ratio, offset = moved_by[frame.coordinate]
-                scale, offset = frame.scale * ratio, frame.scale * offset + frame.offset
-                frames[f] = replace(frame, coordinate=k, scale=scale, offset=offset)
-        if rolling is not None:
-            # What turns with the base does so about its axle
-            base = next(f for f, frame in enumerate(frames) if frame.moves == Moves.TURNING)
-            back = pin.SE3(np.eye(3), -np.array([*rolling.axle, 0.0]))
-            frames = [replace(f, place=back * f.place) if f.parent == base else f for f in frames]
-            links = {name: (k, back * pose if k == base else pose) for name, (k, pose) in links.items()}
+        followers = tuple((c.follower, number[c.leader], c.ratio, c.offset) for c in robot.couplings)
         labels = list(robot.dof_names)
         for ball in balls:
             owner = labels[ball.number].rpartition(".")[0]
             labels[ball.number : ball.number + 3] = [f"{owner}.r{'xyz'[axis]}" for axis in ball.order]
         names, units = tuple(labels[dof] for dof in own), tuple(robot.dof_units[dof] for dof in own)
-        counts_as = np.array([length if unit == "m" else 1.0 for unit in units])
-        counts_as[[number[dof] for dof in (rolling.wheels if rolling else ())]] = np.inf
+        moved_by = {dof: (k, 1.0, 0.0) for dof, k in number.items()} | {
+            f: (k, ratio, offset) for f, k, ratio, offset in followers
+        }
+        tree = Tree.of_model(model, orders=orders).moved_by(names, moved_by)
+        if rolling is not None:
+            # What turns with the base does so about its axle
+            base = next(f for f, frame in enumerate(tree.frames) if frame.moves == Moves.TURNING)
+            tree = tree.shifted(base, -np.array([*rolling.axle, 0.0]))
+        scale = np.array([length if unit == "m" else 1.0 for unit in units])
+        scale[[number[dof] for dof in (rolling.wheels if rolling else ())]] = np.inf
         return cls(
-            robot,
-            Tree(tuple(frames), names, (), links).about_z(),
-            names,
-            units,
-            tuple(own),
-            tuple(places[dof] for dof in own),
-            frozenset(number[dof] for dof in circles),
-            tuple(replace(ball, number=number[ball.number]) for ball in balls),
-            tuple((c.follower, *moved_by[c.follower]) for c in robot.couplings),
-            counts_as,
-            rolling,
+            robot=robot,
+            tree=tree.about_z(),
+            names=names,
+            units=units,
+            dofs=tuple(own),
+            places=tuple(places[dof] for dof in own),
+            circles=frozenset(number[dof] for dof in circles),
+            balls=tuple(replace(ball, number=number[ball.number]) for ball in balls),
+            followers=followers,
+            scale=scale,
+            rolling=rolling,
         )
 
     @property
@@ -194,7 +122,7 @@ class PlanningCoordinates:
 
     def suits(self, q: Array) -> bool:
         """Whether no turns of a ball joint are steep at a configuration."""
-        return all(ball.steep(q, ball.order) <= STEEP for ball in self.balls)
+        return all(ball.suits(q) for ball in self.balls)
 
     def of_configuration(self, q: Array, near: Array | None = None) -> Array:
         """x of a configuration [nq]; angles of joints without end are those nearest to ``near``."""
@@ -237,14 +165,16 @@ class PlanningCoordinates:
 
     def uncoupled(self, q: Array) -> tuple[float, str]:
         """How far the worst follower is from where its leader has it [rad or m], and what to say of it."""
-        robot, off = self.robot, q - self.configuration(self.of_configuration(q))
-        far = {float(off[robot.position_index[coupling.follower]]): coupling for coupling in robot.couplings}
-        if not far:
+        robot = self.robot
+        if not robot.couplings:
             return 0.0, ""
-        worst = max(far, key=abs)
-        row, leader = far[worst].follower, far[worst].leader
-        says = f"follows {robot.dof_names[leader]} and is {worst:.3g} {robot.dof_units[row]} from where it has to be"
-        return worst, f"{robot.dof_names[row]} {says}"
+        off = q - self.configuration(self.of_configuration(q))
+        worst = max(robot.couplings, key=lambda c: abs(off[robot.position_index[c.follower]]))
+        far, dof = float(off[robot.position_index[worst.follower]]), worst.follower
+        says = (
+            f"follows {robot.dof_names[worst.leader]} and is {far:.3g} {robot.dof_units[dof]} from where it has to be"
+        )
+        return far, f"{robot.dof_names[dof]} {says}"
 
     def velocity(self, x: Array, rate: Array) -> Array:
         """The velocity [nv] of the configuration at x, where x changes at ``rate``; or of several."""

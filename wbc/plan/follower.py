@@ -141,9 +141,7 @@ class PathFollower:
         first, end = float(path.knots[0]), float(path.knots[-1])
         here = max(self._timing(0), first)
         until = min(here + share * (end - here), end)
-        if until - here < 1e-9:
-            return None
-        return path.sliced(here, until)
+        return path.sliced(here, until) if until - here >= 1e-9 else None
 
     def _timing(self, order: int) -> float:
         """Place on the path, or its rate."""

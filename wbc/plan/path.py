@@ -78,7 +78,8 @@ class PlannedPath:
             return standing_path(self.points[0])
         rolling = self.coordinates.rolling
         runs = [self.points] if rolling is None else rolling.runs(self.points)
-        return _joined([self._spline(run) if self.native.path_rows.equalities else self._rounded(run) for run in runs])
+        smoothed = self._spline if self.native.path_rows.equalities else self._rounded
+        return PolynomialPath.joined([smoothed(run) for run in runs])
 
     def _rounded(self, points: Array) -> PolynomialPath:
         deviation = ROUNDED
@@ -179,9 +180,7 @@ class PlannedPath:
         limits = [e.item for e in self.stack.constraints if isinstance(e.item, FrameVelocityLimit)]
         if not limits:
             return 1.0
-        robot, state = self.stack.robot, law.at(np.linspace(0.0, law.duration, 500))
-        q = self.coordinates.configuration(state.position)
-        v = self.coordinates.velocity(state.position, state.velocity)
+        robot, (q, v) = self.stack.robot, self.configurations(law, np.linspace(0.0, law.duration, 500))
         most = 1.0
         for item in limits:
             for configuration, rate in zip(q, v, strict=True):
@@ -196,13 +195,3 @@ class PlannedPath:
         state = law.at(t)
         x = np.asarray(state.position)
         return self.coordinates.configuration(x), self.coordinates.velocity(x, np.asarray(state.velocity))
-
-
-def _joined(paths: list[PolynomialPath]) -> PolynomialPath:
-    """One path after the other; laws rest where the direction changes."""
-    degree = max(int(path.degree or 0) for path in paths)
-    knots, rows = paths[0].knots[:1], list[Array]()
-    for path in paths:
-        knots = np.concatenate([knots, knots[-1] - path.knots[0] + path.knots[1:]])
-        rows.append(np.pad(path.coefficients, ((degree - int(path.degree or 0), 0), (0, 0), (0, 0))))
-    return PolynomialPath(knots, np.concatenate(rows, axis=1))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import count
+from math import sqrt
 from time import perf_counter, process_time
 from typing import Any
 
@@ -44,11 +46,12 @@ RANGE = 0.2
 RANGES = (1.0, 0.5, 2.0)
 #: Descents to configurations that meet a target
 DESCENTS = 100
-#: Searches end when this times their number is no less than what the shortest path is longer than the straight line to
-#: its goal, as a share of it: the longer it is, the more others may be shorter
-DETOUR = 0.25
-#: Where the first of them took more samples than this, it is less by as much
-EASY = 200
+#: The first search is the last where its path is longer than the straight line to its goal by no more than this share
+DETOUR = 0.3
+#: and each one behind it where the shortest is by so much more: the longer it is, the more others may be shorter
+MORE_DETOUR = 0.1
+#: Where the first of them took more samples than this, both are less by as much
+EASY = 300
 #: Samples of searches for another path, against those of the first
 MORE = 2
 #: Rounds at most in which corners of a path are pulled in and cut off
@@ -97,6 +100,10 @@ class PlanningOptions:
                 object.__setattr__(self, name, validation.scalar(name, given, low=0.0, open_low=True, unit=unit))
 
 
+#: Options where none are given
+USUAL = PlanningOptions()
+
+
 class NoPathError(InfeasibleError):
     """No path was found in the time.
 
@@ -138,10 +145,8 @@ class MotionPlanner(Handles):
 
         declared = validation.instance("stack", stack, Declaration, "a wbc Stack").commanding("velocity")
         names = [entry.name for entry in declared.tasks]
-        self.kept = tuple(
-            validation.one_of("keep", name, names)
-            for name in ((keep,) if isinstance(keep, str) else validation.strings("keep", keep))
-        )
+        wanted = (keep,) if isinstance(keep, str) else validation.strings("keep", keep)
+        self.kept = tuple(validation.one_of("keep", name, names) for name in wanted)
         self.stack = declared
         light = without_distances(declared)
         self._controller = CompiledStack(light, compile_stack(light, "vm", __version__), "daqp")
@@ -149,8 +154,9 @@ class MotionPlanner(Handles):
         super().__init__(self._core.handles, light)
         self._idle = frozenset(names) - set(self.kept)
         self._stops = stops(declared, self._core.layout)[1:]
-        self._use(PlanningCoordinates.of(declared.robot, declared.length))
         self._places = PlanningScene.places_of(self._core)
+        self._scene: PlanningScene | None = None
+        self._use(PlanningCoordinates.of(declared.robot, declared.length))
 
     def plan(self, q0: Any, goal: Any, options: PlanningOptions | None = None, **changes: Any) -> PlannedPath:
         """A path from a configuration to a goal, on which every hard row of the stack holds.
@@ -168,17 +174,17 @@ class MotionPlanner(Handles):
                 configuration that meets the goal was found.
             NoPathError: none was found in the time; it has the nearest configuration that was reached.
         """
-        search, goals = self._search(q0, goal, options, changes)
+        search = self._search(q0, goal, options, changes)
         search.check_start()
-        search.find_goals(goals)
-        points = search.paths()
+        search.find_goals()
+        points, length = search.paths()
         rolling = self.coordinates.rolling
         path = PlannedPath(
             coordinates=self.coordinates,
             native=search.native,
             stack=self.stack,
             points=points if rolling is None else rolling.rolled(points, self._wheels),
-            length=search.native.length(points),
+            length=length,
             seconds=perf_counter() - search.begin,
             shortening=search.shortening,
             nodes=search.nodes,
@@ -197,8 +203,8 @@ class MotionPlanner(Handles):
         Raises:
             as :meth:`plan`; InfeasibleError: there is none.
         """
-        search, goals = self._search(q0, goal, options, changes)
-        search.find_goals(goals)
+        search = self._search(q0, goal, options, changes)
+        search.find_goals()
         return np.array(search.goals)
 
     def _use(self, coordinates: PlanningCoordinates) -> None:
@@ -207,7 +213,7 @@ class MotionPlanner(Handles):
         self._wheels = [k for k, scale in enumerate(coordinates.scale) if np.isinf(scale)]
         self._limits = coordinates.limits(*self._stops)
         self._builder = RowsBuilder(self._core, coordinates, self.kept)
-        self._rows: dict[tuple[Any, ...], PlanningRows] = {}
+        self._rows: dict[tuple[bytes, tuple[str, ...]], PlanningRows] = {}
         self._native: NativePlanner | None = None
         every, self._fixed = np.arange(self.stack.robot.nv), dict[str, list[int]]()
         for entry in self.stack.constraints:
@@ -215,25 +221,23 @@ class MotionPlanner(Handles):
                 dofs = [every[self.stack.robot.dofs(name)] for name in entry.item.joints]
                 self._fixed[entry.name] = np.flatnonzero(np.isin(coordinates.dofs, np.concatenate(dofs))).tolist()
 
-    def _search(
-        self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]
-    ) -> tuple[_Search, tuple[Goal, ...]]:
-        chosen = replace(PlanningOptions() if options is None else options, **changes)
+    def _search(self, q0: Any, goal: Any, options: PlanningOptions | None, changes: dict[str, Any]) -> _Search:
+        for name in changes:
+            validation.one_of("options", name, PlanningOptions.__dataclass_fields__)
+        given = validation.instance(
+            "options", USUAL if options is None else options, PlanningOptions, "PlanningOptions"
+        )
+        chosen = replace(given, **changes) if changes else given
         q = self.stack.robot.configuration("q0", q0)
         goals = goals_of(self._core, goal)
-        targets = [goal for goal in goals if isinstance(goal, TargetGoal)]
         # Of tasks that count for nothing no value is taken
-        idle = self._idle.difference(*(target.names for target in targets))
+        idle = self._idle.difference(*(goal.names for goal in goals if isinstance(goal, TargetGoal)))
         self._core.initialise({slot: name for slot, name in self._core.first.items() if name not in idle}, q)
         self._core.waiting = {}
-        rolling = self._builder.rolling()
+        rolling = self._builder.rolling(self._switches)
         if rolling != self.coordinates.rolling or not self.coordinates.suits(q):
             self._use(PlanningCoordinates.of(self.stack.robot, self.stack.length, q, rolling))
-        # What is compiled once for many queries is no part of the time of one
-        native = self.native(q)
-        for target in targets:
-            _ = self.rows(target.names).compiled
-        return _Search(self, q, chosen, native), goals
+        return _Search(self, q, goals, chosen)
 
     @property
     def values(self) -> Array:
@@ -242,21 +246,27 @@ class MotionPlanner(Handles):
 
     def scene(self, coordinates: PlanningCoordinates | None = None) -> PlanningScene:
         """The bodies that are kept apart, at the present run-time values; moved by other coordinates where given."""
-        return PlanningScene.of(self._core, coordinates or self.coordinates)
+        moved_by, key = coordinates or self.coordinates, self._core.tick.p[self._places].tobytes() + self._switches
+        if self._scene is None or self._scene.key != key or self._scene.coordinates is not moved_by:
+            self._scene = PlanningScene.of(self._core, moved_by, key)
+        return self._scene
 
     def rows(self, goals: tuple[str, ...] = ()) -> PlanningRows:
         """Rows of every configuration of a path, and of tasks that are met at its end besides."""
-        switches = tuple(handle.enabled for handle in self._core.handles.values())
-        key = (switches, goals)
+        key = (self._switches, goals)
         if key not in self._rows:
             self._rows[key] = self._builder.rows(goals)
         return self._rows[key]
 
+    @property
+    def _switches(self) -> bytes:
+        """What is enabled."""
+        return bytes([handle.enabled for handle in self._core.handles.values()])
+
     def native(self, q: Array) -> NativePlanner:
         """What is kept of the scene and the rows; made again where their run-time values have changed."""
-        key = PlanningScene.key_of(self._core, self._places)
-        if self._native is None or self._native.scene.key != key:
-            scene = PlanningScene.of(self._core, self.coordinates, key)
+        scene = self.scene()
+        if self._native is None or self._native.scene.key != scene.key:
             self._native = NativePlanner(scene, self.rows(), self._core.tick.p, self._limits)
         if self._fixed:
             low, high = (side.copy() for side in self._limits)
@@ -265,21 +275,17 @@ class MotionPlanner(Handles):
             self._native.limit(low, high)
         return self._native
 
-    def write(self, goal: TargetGoal) -> TargetGoal:
-        """Write the targets of a goal; those that were there before."""
-        before = tuple((slot, self._core.tick.p[slot.span].copy()) for slot, _ in goal.numbers)
-        for slot, numbers in goal.numbers:
-            self._core.tick.p[slot.span] = numbers
-        return TargetGoal(goal.names, before)
-
 
 class _Search:
     """One query."""
 
-    def __init__(self, planner: MotionPlanner, q: Array, options: PlanningOptions, native: NativePlanner) -> None:
-        self.planner, self.options, self.begin = planner, options, perf_counter()
+    def __init__(self, planner: MotionPlanner, q: Array, wanted: tuple[Goal, ...], options: PlanningOptions) -> None:
+        self.planner, self.wanted, self.options, self.native = planner, wanted, options, planner.native(q)
+        # What is compiled once for many queries is no part of the time of one
+        for goal in wanted:
+            _ = planner.rows(goal.names).compiled if isinstance(goal, TargetGoal) else None
+        self.rows, self.begin = self.native.path_rows, perf_counter()
         self.end = self.begin + options.seconds
-        self.native, self.rows = native, native.path_rows
         self.native.pad(LEAST_PAD)
         self.native.begin(options.seed)
         self.native.set(step=options.step)
@@ -303,12 +309,11 @@ class _Search:
             limit = native.low[worst] if x[worst] < native.low[worst] else native.high[worst]
             what = f"{coordinates.names[worst]} is beyond its limit of {limit:.4g} {coordinates.units[worst]}"
             return float(x[worst]), what
-        x[:] = np.clip(x, native.low, native.high)
+        np.minimum(np.maximum(x, native.low), native.high, out=x)
         if q is not None and abs((coupled := coordinates.uncoupled(q))[0]) > MET:
             return coupled
         if (rows := self.rows).count:
-            values = np.asarray(rows.function(x, self.planner._core.tick.p)[0]).ravel()
-            off = np.concatenate([np.abs(values[: rows.equalities]), -values[rows.equalities :]])
+            values, off = rows.off(x, self.planner.values)
             worst = int(np.argmax(off))
             if not off[worst] <= MET:
                 return float(values[worst]), f"{rows.labels[worst]} does not hold, off by {off[worst]:.3g}"
@@ -319,14 +324,14 @@ class _Search:
             return nearest.distance, f"{where}, {1e3 * nearest.required:.2f} mm required"
         return None
 
-    def find_goals(self, goals: tuple[Goal, ...]) -> None:
-        """Free configurations of all goals.
+    def find_goals(self) -> None:
+        """Free configurations of all goals that are wanted.
 
         Raises:
             InfeasibleError: there is none.
         """
         faults = list[tuple[float, str]]()
-        for goal in goals:
+        for goal in self.wanted:
             if isinstance(goal, TargetGoal):
                 self._widen(self.start)
                 faults += self._descend(goal)
@@ -356,55 +361,43 @@ class _Search:
         native.sample_high[:] = np.where(np.isfinite(native.high), native.high, high)
 
     def _descend(self, goal: TargetGoal) -> list[tuple[float, str]]:
-        native, planner = self.native, self.planner
-        before = planner.write(goal)
-        free, colliding, least = list[Array](), list[Array](), np.inf
-        rows = planner.rows(goal.names)
+        """Add free configurations that meet a goal; else what is wrong with it."""
+        native, values, rows = self.native, self.planner.values, self.planner.rows(goal.names)
+        before, names = values.copy(), ", ".join(goal.names)
+        missed, colliding, free = reached = (list[Array](), list[Array](), list[Array]())
         try:
+            for slot, numbers in goal.numbers:
+                values[slot.span] = numbers
             native.use("goal", rows)
             for k in range(DESCENTS):
                 if k % SLICE == SLICE - 1 and perf_counter() > self.end:
                     break
-                first = self.start.copy() if k == 0 else native.drawn()
-                found, x = native.reach(first)
-                for other in free:
-                    if found == 2 and self._distance(x, other) < APART:
-                        break
-                else:
-                    if found == 2:
-                        free.append(x)
-                    elif found == 1 and len(colliding) < BRANCHES:
-                        colliding.append(x)
-                    elif found == 0 and not free:
-                        values = np.asarray(rows.function(x, planner._core.tick.p)[0]).ravel()
-                        least = min(least, float(np.abs(values[: rows.equalities]).max()))
+                how, x = native.reach(None if k else self.start)
+                if how < 2 or all(native.distance(x, other) >= APART for other in free):
+                    reached[how].append(x)
+            off = [float(rows.off(x, values)[1][: rows.equalities].max()) for x in missed if not free]
         finally:
-            planner.write(before)
-        self.goals += sorted(free, key=lambda x: self._distance(x, self.start))[:BRANCHES]
+            values[:] = before
+        self.goals += sorted(free, key=lambda x: native.distance(x, self.start))[:BRANCHES]
         if free:
             return []
-        names = ", ".join(goal.names)
-        if colliding:
+        if colliding := colliding[:BRANCHES]:
             worst = [self.fault(x) for x in colliding]
-            off, what = max((w for w in worst if w is not None), default=(0.0, "not within limits"))
-            reason = f"none of {len(colliding)} configurations that meet {names} is free; of the best {what}"
-            return [(off, reason)]
-        at_best = f"at the nearest a row of the goal is off by {least:.3g}"
-        return [(least, f"no configuration that meets {names} was found in {DESCENTS} descents; {at_best}")]
+            least, what = max((w for w in worst if w is not None), default=(0.0, "not within limits"))
+            return [(least, f"none of {len(colliding)} configurations that meet {names} is free; of the best {what}")]
+        at_best = f"at the nearest a row of the goal is off by {min(off):.3g}"
+        return [(min(off), f"no configuration that meets {names} was found in {DESCENTS} descents; {at_best}")]
 
-    def _distance(self, x: Array, y: Array) -> float:
-        return float(np.linalg.norm((x - y) / self.planner.coordinates.scale))
-
-    def paths(self) -> Array:
-        """The shortest of some paths.
+    def paths(self) -> tuple[Array, float]:
+        """The shortest of some paths, and its length.
 
         Raises:
             NoPathError: none in the time.
         """
         native, options = self.native, self.options
         best: Array | None = None
-        shortest, samples, searched, detour = np.inf, FIRST, 0, DETOUR
-        for attempt in range(10**6):
+        shortest, samples, searched, ease = np.inf, FIRST, 0, 1.0
+        for attempt in count():
             if searched >= options.paths or (attempt and perf_counter() > self.end):
                 break
             points = self._one(attempt, samples, shortest)
@@ -416,30 +409,29 @@ class _Search:
                 samples *= 2
                 self.pad = max(LEAST_PAD, 0.25 * self.pad)
                 continue
-            if attempt == 0 and self.nodes == (0, 0) and points is not None:
-                return points
             searched += 1
-            if best is None:
-                samples, detour = MORE * self.drawn, DETOUR * min(1.0, EASY / self.drawn)
             if points is not None and (length := native.length(points)) < shortest:
+                if best is None and self.drawn:
+                    samples, ease = MORE * self.drawn, min(1.0, EASY / self.drawn)
                 best, shortest = points, length
             assert best is not None
-            if shortest <= (1.0 + detour * searched) * self._distance(best[0], best[-1]):
+            enough = 1.0 + ease * (DETOUR + MORE_DETOUR * (searched - 1))
+            if not self.drawn or shortest <= enough * native.distance(best[0], best[-1]):
                 break
         if best is None:
             raise self._nothing()
-        return best
+        return best, shortest
 
     def _one(self, attempt: int, samples: int, shortest: float) -> Array | None:
         """A path of one search, made shorter."""
         native, options = self.native, self.options
         native.pad(self.pad)
         native.begin(options.seed + 7919 * attempt)
-        span = float(np.linalg.norm((native.sample_high - native.sample_low) / self.planner.coordinates.scale))
-        reach = RANGE * span if options.range is None else options.range
+        reach = RANGE * native.distance(native.sample_low, native.sample_high)
+        longest_edge = reach if options.range is None else options.range
         # Of uniform samples about the same share is so near at any number of coordinates
-        domain = max(0.5, 2.0 - 2.7 / np.sqrt(len(native.low))) * RANGE * span
-        native.set(longest=shortest, range=reach * RANGES[attempt % len(RANGES)], near_enough=domain)
+        domain = reach * max(0.5, 2.0 - 2.7 / sqrt(len(native.low)))
+        native.set(longest=shortest, range=longest_edge * RANGES[attempt % len(RANGES)], near_enough=domain)
         native.root(0, self.first)
         roots = [k for k, x in enumerate(self.last) if native.free(x)]
         for k in roots:

@@ -2,39 +2,33 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from wbc.controller.core import Core
 from wbc.errors import CommandError
-from wbc.native.compiled_function import function_library
-from wbc.native.library import load_library
 from wbc.plan.coordinates import PlanningCoordinates
 from wbc.plan.rolling import SAME, RollingBase
 from wbc.plan.stand_in import MeasuredApart
 from wbc.stack.layout import Block
-from wbc.symbolic.evaluation import SingleState
+from wbc.symbolic.entry import CEntry
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.tracer import Carrier, Tracer
 from wbc.tasks import FrameVelocityLimit, MovingFrame
 from wbc.tasks._linkage_speed import LinkageSpeed
 from wbc.tasks.base import Constraint, Task, Values
 from wbc.tasks.inputs import as_value
+from wbc.validation import Array
 
 #: Constraints that say nothing of configurations: of speeds, or of what measured bodies do, which the scene has
 WITHOUT_CONFIGURATION = (MeasuredApart, FrameVelocityLimit, LinkageSpeed, MovingFrame)
 
 #: Configurations besides the neutral one at which rows on velocities are looked at
 LOOKS = 4
-
-_NUMBERS = ctypes.POINTER(ctypes.POINTER(ctypes.c_double))
-_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int, _NUMBERS, _NUMBERS, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +37,14 @@ class PlanningRows:
 
     Attributes:
         equalities, margins: how many.
-        labels: of all rows, "item.row". units: theirs.
+        labels: of all rows, "item.row".
         function: (x, p) -> (c, dc/dx).
     """
 
     equalities: int
     margins: int
     labels: tuple[str, ...]
-    units: tuple[str, ...]
     function: ca.Function
-    _kept: list[Any] = field(default_factory=list, repr=False)
 
     @property
     def count(self) -> int:
@@ -60,38 +52,14 @@ class PlanningRows:
         return self.equalities + self.margins
 
     @cached_property
-    def compiled(self) -> tuple[int, int, int]:
-        """(address of the C function, sizes of its integer and real memory); it lives as long as this.
+    def compiled(self) -> CEntry:
+        """The function as C calls it."""
+        return CEntry(self.function)
 
-        Without a compiler it is one that calls CasADi's virtual machine.
-        """
-        x, p = self.function.sx_in()
-        if (library := function_library(self.function)) is not None:
-            self._kept.append(load_library(library))
-            return _address(self._kept[0].rows), int(self.function.sz_iw()), int(self.function.sz_w())
-        joined = ca.Function("joined", [x, p], [ca.vertcat(*map(ca.vec, self.function(x, p)))])
-        self._kept.append(_FUNCTION(_on_machine(SingleState(joined), self.count)))
-        return _address(self._kept[0]), 1, 1
-
-
-def _address(function: Any) -> int:
-    return ctypes.cast(function, ctypes.c_void_p).value or 0
-
-
-def _on_machine(state: SingleState, count: int) -> Callable[..., int]:
-    parts = state.output[:count], state.output[count:]
-
-    def call(given: Any, out: Any, _iw: int, _w: int, _memory: int) -> int:
-        for k, array in enumerate(state.inputs):
-            array[:] = given[k][: len(array)]
-        state.run()
-        for k, part in enumerate(parts):
-            # Nobody asks for the derivatives where they are not needed
-            if out[k] and len(part):
-                np.ctypeslib.as_array(out[k], part.shape)[:] = part
-        return 0
-
-    return call
+    def off(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """(values, by how much each does not hold, or less than 0) [rows]."""
+        values = np.asarray(self.function(x, p)[0]).ravel()
+        return values, np.concatenate([np.abs(values[: self.equalities]), -values[self.equalities :]])
 
 
 class RowsBuilder:
@@ -105,7 +73,7 @@ class RowsBuilder:
         self._core, self._coordinates, self._kept = core, coordinates, kept
         self._kinematics = Kinematics(core.stack.robot.model)
         self._p = ca.SX.sym("p", core.layout.parameters)
-        self._slips: dict[tuple[Block, ...], tuple[list[str], ca.Function]] = {}
+        self._slips: dict[bytes, tuple[list[str], ca.Function]] = {}
 
     def rows(self, goals: Collection[str] = ()) -> PlanningRows:
         """Those of a path, and of the tasks in ``goals`` besides."""
@@ -130,7 +98,7 @@ class RowsBuilder:
     def _joined(self, equal: list[tuple[Block, ca.SX]], margins: list[tuple[Block, ca.SX]]) -> PlanningRows:
         x = ca.SX.sym("x", self._coordinates.count)
         q = self._coordinates.expression(x)
-        labels, units, values = list[str](), list[str](), list[ca.SX]()
+        labels, values = list[str](), list[ca.SX]()
         for block, expression in [*equal, *margins]:
             inside = ca.substitute(expression, self._kinematics.q, q)
             rows = [k for k in range(inside.numel()) if not inside[k].is_zero()]
@@ -138,11 +106,10 @@ class RowsBuilder:
             scale = [block.rows[k].scale(1.0) for k in rows]
             values.append(inside[rows] / ca.DM(scale))
             labels += [f"{block.entry.name}.{block.rows[k].label}" for k in rows]
-            units += [block.rows[k].unit.removesuffix("/s") for k in rows]
         count = sum(v.numel() for v in values[: len(equal)])
         whole = ca.densify(ca.vertcat(ca.SX(0, 1), *values))
         function = ca.Function("rows", [x, self._p], ca.cse([whole, ca.densify(ca.jacobian(whole, x))]))
-        return PlanningRows(count, whole.numel() - count, tuple(labels), tuple(units), function)
+        return PlanningRows(count, whole.numel() - count, tuple(labels), function)
 
     def _traced(self, block: Block) -> tuple[Tracer, Values]:
         def values(block: Block) -> Values:
@@ -160,16 +127,18 @@ class RowsBuilder:
         traced = expression(self._core.stack.robot, tracer, values)
         return ca.SX(0, 1) if traced is None else ca.SX(tracer.expanded(ca.SX(traced))[0])
 
-    def rolling(self) -> RollingBase | None:
+    def rolling(self, switches: bytes) -> RollingBase | None:
         """What hard rows on velocities, which no row on configurations stands for, leave of a base; None: none.
+
+        Args:
+            switches: which items are enabled.
 
         Raises:
             CommandError: other motions than a path can keep to.
         """
-        hard = {block: item for block, item in self._hard() if block.form == "rows"}
-        if (key := tuple(hard)) not in self._slips:
-            self._slips[key] = self._slip(hard)
-        names, rows_of = self._slips[key]
+        if switches not in self._slips:
+            self._slips[switches] = self._slip({block: item for block, item in self._hard() if block.form == "rows"})
+        names, rows_of = self._slips[switches]
         if not names:
             return None
         robot, p, text = self._core.stack.robot, self._core.tick.p, ", ".join(names)

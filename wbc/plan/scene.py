@@ -39,7 +39,7 @@ class PlanningScene:
     key: bytes
 
     @classmethod
-    def of(cls, core: Core, coordinates: PlanningCoordinates, key: bytes = b"") -> PlanningScene:
+    def of(cls, core: Core, coordinates: PlanningCoordinates, key: bytes) -> PlanningScene:
         """That of a stack's obstacles and self-collisions which are enabled, at their present run-time values."""
         bodies, pairs = dict[str, SweptBody](), list[Pair]()
 
@@ -72,13 +72,8 @@ class PlanningScene:
         return cls(coordinates, tuple(bodies.values()), tuple(pairs), key)
 
     @staticmethod
-    def key_of(core: Core, places: Array) -> bytes:
-        """The run-time values at ``places`` that a scene is made of, and what is enabled."""
-        return bytes(core.tick.p[places].tobytes()) + bytes(handle.enabled for handle in core.handles.values())
-
-    @staticmethod
     def places_of(core: Core) -> Array:
-        """Where these stand among all run-time values."""
+        """Where the run-time values that a scene is made of stand among all."""
         spans = [np.zeros(0, dtype=int)]
         for entry in core.stack.constraints:
             if isinstance(entry.item, MeasuredApart):
@@ -114,15 +109,6 @@ class PlanningScene:
         """
         if not self.pairs:
             return None
-        swept = self.sweeper.sweep(_motion(path), aim="any", tolerance=OPEN)
+        motion = Motion.polynomial(self.coordinates.tree, path.knots, path.hull())
+        swept = self.sweeper.sweep(motion, aim="any", tolerance=OPEN)
         return None if swept.clear else swept.nearest
-
-
-def _motion(path: PolynomialPath) -> Motion:
-    """A path as a motion of scalars, with s as its time."""
-    controls = path.hull()
-    if controls.shape[2] < 2:
-        controls = np.repeat(controls, 2, axis=2)
-    # Rounding may leave the pieces apart by a last digit
-    controls[1:, :, 0] = controls[:-1, :, -1]
-    return Motion(path.knots, controls, np.zeros((0, len(path.knots), 12)), np.zeros(path.dof), np.zeros((0, 2)))

@@ -12,7 +12,7 @@ from wbc.multibody import pin
 from wbc.shapes import Shape
 from wbc.shapes.names import names_of_shapes
 from wbc.shapes.solid import why_apart
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import WORLD, joint_of
 
 if TYPE_CHECKING:
     from wbc.robot import Robot
@@ -91,8 +91,6 @@ def checked_pairs(field: str, robot: Robot, pairs: Any, moving: frozenset[str]) 
     return out
 
 
-def joint_of(robot: Robot, body: Body, moving: frozenset[str]) -> int:
+def carrier_of(robot: Robot, body: Body, moving: frozenset[str]) -> int:
     """Number of the joint that carries the body; 0 for one that no joint of the robot moves."""
-    if body.frame == WORLD or body.frame in moving:
-        return 0
-    return int(robot.model.frames[frame_index(robot.model, body.frame)].parentJoint)
+    return 0 if body.frame in moving else joint_of(robot.model, body.frame)

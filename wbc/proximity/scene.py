@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.multibody import pin
-from wbc.proximity.body import Body, Pair, joint_of
+from wbc.proximity.body import Body, Pair, carrier_of
 from wbc.symbolic.kinematics import WORLD, frame_index
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class PairScene:
         self.first: Index = np.array([number[a] for a, _ in pairs], dtype=np.intp)
         self.second: Index = np.array([number[b] for _, b in pairs], dtype=np.intp)
         self.moving = np.array([body.frame in outside for body in self.bodies])
-        self.joints = [joint_of(robot, body, outside) for body in self.bodies]
+        self.joints = [carrier_of(robot, body, outside) for body in self.bodies]
         centers = [body.shape.center for body in self.bodies]
         self.places = [self._on_joint(k) * pin.SE3(np.eye(3), center) for k, center in enumerate(centers)]
         self.outward = self.moving[self.second].astype(float) - self.moving[self.first].astype(float)

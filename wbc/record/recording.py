@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from wbc.log import Log, LogFile, LogFileError
+from wbc.log.log import joined
 from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 
@@ -123,10 +124,8 @@ class Recording(LogFile):
         Raises:
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
-        pieces = [log for log, _ in self.logs()]
-        names = self.column_units
-        columns = {name: np.concatenate([np.zeros(0), *(log[name] for log in pieces)]) for name in names}
-        return Log(columns | {"flag": columns["flag"].astype(int)}, names, self.about)
+        log = joined([log for log, _ in self.logs()], self.column_units, self.about)
+        return Log({**log.columns, "flag": log["flag"].astype(int)}, log.units, log.meta)
 
     @property
     def column_units(self) -> dict[str, str]:

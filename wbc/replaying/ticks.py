@@ -215,19 +215,27 @@ def replayed(recording: Recording, controller: Controller | None = None) -> Iter
         controller: whose buffers are used, see :func:`compiled`; default: one of the stack in the recording.
     """
     controller = compiled(recording) if controller is None else controller
-    core, parts = core_of(controller), recording.parts
-    tick = core.tick
-    buffers = [(getattr(tick, name), parts[name]) for name in recorded_inputs(core.layout)]
+    again, parts, number = redoing(recording, controller), recording.parts, 0
     reset, v, flag = parts["reset"].start, parts["v"], parts["flag"].start
-    number = 0
     for rows in recording.chunks():
         for row in rows:
-            for buffer, part in buffers:
-                buffer[:] = row[part]
-            if row[reset]:
-                tick.reset()
-            yield ReplayedTick(number, row[v].copy(), STATUSES[int(row[flag])], core.again())
+            yield ReplayedTick(number, row[v].copy(), STATUSES[int(row[flag])], again(row, bool(row[reset])))
             number += 1
+
+
+def redoing(recording: Recording, controller: Controller) -> Callable[[Array, bool], Step]:
+    """What does a row of a recording again, from no active set or from that of the row before."""
+    core = core_of(controller)
+    buffers = [(getattr(core.tick, name), recording.parts[name]) for name in recorded_inputs(core.layout)]
+
+    def again(row: Array, cold: bool) -> Step:
+        for buffer, part in buffers:
+            buffer[:] = row[part]
+        if cold:
+            core.tick.reset()
+        return core.again()
+
+    return again
 
 
 def _own_stack(recording: Recording, trust: bool) -> Stack:

@@ -77,8 +77,12 @@ def ancestors(parents: Sequence[int], joint: int) -> list[int]:
 
 def intervals(marks: Marks) -> list[tuple[int, int]]:
     """First frame and the one after the last of every run of true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marks, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    if not len(marks):
+        return []
+    edges = (
+        [0] * bool(marks[0]) + (np.flatnonzero(marks[1:] != marks[:-1]) + 1).tolist() + [len(marks)] * bool(marks[-1])
+    )
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def listed(entries: Sequence[str], most: int, apart: str = ", ") -> str:

@@ -12,6 +12,7 @@ from wbc import robots, tasks
 from wbc.api import Controller, Stack
 from wbc.controller.compiled_stack import core_of
 from wbc.controller.handle import InputGroup
+from wbc.controller.row_ticks import RowTicks
 from wbc.multibody import pin
 from wbc.retarget.clip import Array
 from wbc.retarget.options import RetargetOptions
@@ -57,6 +58,9 @@ LINK_RATE = 0.1
 LANDING = 0.1
 #: After so many ticks it is tried again
 AGAIN = 3
+#: Iterations after which a tick with such a foot has no answer: those that have one take a quarter, and finding by how
+#: much rows give way takes ten times as long
+TRIED = 200
 #: Distance from a sole's middle at which its turns are counted [m]
 LEVER = 0.12
 #: A foot is held from where it is this near to its place [m]
@@ -147,6 +151,7 @@ class Engine:
         if options.clearance is not None:
             clear = tasks.SelfCollision(margin=options.clearance, closest=CLOSEST, method="sensed")
             stack.add(clear, name="clearance", soft=CLEARANCE_PRICE)
+        self._ground: list[str] = []
         if free:
             self._add_ground(stack)
         self.stack = stack
@@ -155,13 +160,16 @@ class Engine:
             for item in self._ground:
                 self.controller[item].rate = (LINK_RATE if item == ARMS else GROUND_RATE) / dt
         inputs = [(f.item, part, None) for f in followers for part in ("target", "feedforward")[: 1 if f.stands else 2]]
-        self._group = InputGroup(core_of(self.controller), inputs)
+        self._ticks = RowTicks(self.controller, inputs, ARMS if ARMS in self._ground else "")
         self._places = tuple(dict.fromkeys(("pelvis", *(f.place for f in followers if f.place))))
         self._turns = tuple(dict.fromkeys(("pelvis", "", *(f.turn for f in followers))))
         self._order = np.array([column for f in followers for column in self._columns_of(f)])
         self._held: dict[str, ContactGrip] = {}
         self._data = self.robot.model.createData()
-        self._tasks = [entry.name for entry in stack.entries if isinstance(entry.item, Task)]
+        self._ends = {name: int(self.robot.model.getFrameId(body.limbs[name].end)) for name in self._limbs}
+        tasks_there = [entry.name for entry in stack.entries if isinstance(entry.item, Task)]
+        self._gains = InputGroup(core_of(self.controller), [(item, "gain", None) for item in tasks_there])
+        self._own_gains = np.array([self.controller[item].gain for item in tasks_there])
 
     def _shaped(self, robot: Robot) -> Robot:
         """The robot with balls around what it may touch the ground with, and where clearances are asked for with shapes
@@ -307,33 +315,37 @@ class Engine:
             q[3:7] /= np.linalg.norm(q[3:7])
         first, second = (self.rows(places[[k]], turns[[k]])[0] for k in (0, min(1, len(places) - 1)))
         self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
-        gains = {item: self.controller[item].gain for item in self._tasks}
-        self._set_gains(dict.fromkeys(gains, GAIN / self.dt))
+        self._gains.write(np.full(len(self._own_gains), GAIN / self.dt))
         q = self._settled(q, first, SETTLING)
         # What is held jumps to its place, so it is brought there before
         self._hold(held)
         q = self._settled(q, first, SETTLING // 4)
         after = self._settled(q, second, SETTLING // 4)
-        self._set_gains(gains)
+        self._gains.write(self._own_gains)
         v = pin.difference(robot.model, q, after) / self.dt
         limit = robot.limits.velocity
         controller.reset(q, np.clip(v, -limit, limit))
         return q
 
-    def _set_gains(self, gains: dict[str, float]) -> None:
-        for item, gain in gains.items():
-            self.controller[item].gain = gain
-
     def _settled(self, q: Array, row: Array, most: int) -> Array:
-        controller, model = self.controller, self.robot.model
-        controller.reset(q)
-        for _ in range(most):
-            self._group.write(row)
-            v = controller.step(q).v
-            q = pin.integrate(model, q, v * self.dt)
-            if float(np.abs(v).max()) < SETTLED:
+        self.controller.reset(q)
+        self._ticks.most, self._ticks.rest = np.inf, SETTLED
+        rows, out = np.tile(row, (most, 1)), np.empty((most + 1, len(q)))
+        out[0] = q
+        done = self._ran(rows, out)
+        self._ticks.rest = 0.0
+        return np.asarray(out[done])
+
+    def _ran(self, rows: Array, q: Array) -> int:
+        """Ticks of some rows, whatever gives way; how many were done before all was at rest."""
+        done = 0
+        while done < len(rows):
+            count, step = self._ticks.run(rows[done:], q[done:])
+            done += count
+            if step is None:
                 break
-        return q
+            q[done + 1], done = step.q_next, done + 1
+        return done
 
     def _hold(self, wanted: Mapping[str, ContactGrip]) -> None:
         """Hold contacts, or let them go."""
@@ -360,9 +372,9 @@ class Engine:
         q = self.start(places, turns, {name: plan.limbs[name].grip(0) for name in self._limbs})
         out = np.empty((plan.ticks, self.robot.nq))
         out[0] = q
-        model, dt = self.robot.model, self.dt
-        held = np.array([plan.limbs[name].held for name in self._limbs]).T
-        changing = set(np.flatnonzero(np.concatenate([[True], (held[1:] != held[:-1]).any(axis=1)])).tolist())
+        limbs = [plan.limbs[name] for name in self._limbs]
+        marks = np.array([mark for limb in limbs for mark in (limb.held, limb.lies)]).T
+        changing = np.flatnonzero(np.concatenate([[True], (marks[1:] != marks[:-1]).any(axis=1)]))
         #: limb -> the first tick in which it may be held again
         not_before = dict.fromkeys(self._limbs, 0)
         #: limb -> the tick from which it is held
@@ -370,37 +382,45 @@ class Engine:
         waiting: list[str] = []
         risen: set[str] = set()
         gave: list[tuple[int, tuple[str, ...]]] = []
-        v = np.array(self.controller.last_command)
-        write, step_of, solved = self._group.write, self.controller.step, Status.SOLVED
-        for k in range(plan.ticks - 1):
-            if k in changing or waiting:
-                asked = [name for name, on in zip(self._limbs, held[k], strict=True) if on]
-                waiting = [name for name in asked if self._held.get(name, ContactGrip.FREE) is ContactGrip.FREE]
-                there = self._near(plan, [name for name in waiting if k >= not_before[name]], q, k)
-                kept = [name for name in asked if name in there or name not in waiting]
-                risen &= set(kept)
-                self._hold({n: self._grip(plan, n, k, risen) if n in kept else ContactGrip.FREE for n in self._limbs})
-                waiting = [name for name in waiting if name not in there]
-                since |= dict.fromkeys(there, k)
-            write(rows[k])
-            step = step_of(q)
-            if step.status is not solved and (landing := self._landing(plan, k, since)):
+        k, last, solved = 0, plan.ticks - 1, Status.SOLVED
+        while k < last:
+            asked = [name for name, limb in zip(self._limbs, limbs, strict=True) if limb.held[k]]
+            waiting = [name for name in asked if self._held.get(name, ContactGrip.FREE) is ContactGrip.FREE]
+            there = self._near(plan, [name for name in waiting if k >= not_before[name]], out[k], k)
+            kept = [name for name in asked if name in there or name not in waiting]
+            risen &= set(kept)
+            self._hold({n: self._grip(plan, n, k, risen) if n in kept else ContactGrip.FREE for n in self._limbs})
+            waiting = [name for name in waiting if name not in there]
+            since |= dict.fromkeys(there, k)
+            later = int(np.searchsorted(changing, k, side="right"))
+            stop = min(int(changing[later]) if later < len(changing) else last, last)
+            for name in waiting:
+                stop = min(stop, max(not_before[name], k + 1))
+            lying = [n for n, limb in plan.limbs.items() if limb.lies[k] and self._held.get(n) is ContactGrip.FIRM]
+            self._ticks.most = PUSHED if lying else np.inf
+            self.controller.iteration_cap = TRIED if self._landing(plan, k, since) else None
+            done, step = self._ticks.run(rows[k:stop], out[k : stop + 1])
+            self.controller.iteration_cap = None
+            k += done
+            if step is None:
+                continue
+            v = self._ticks.velocity_before
+            if step.status is not solved:
                 # Feet that come to stand give way before those that stand
+                landing = self._landing(plan, k, since)
                 self._hold(dict.fromkeys(landing, ContactGrip.FREE))
                 not_before |= dict.fromkeys(landing, k + AGAIN)
-                waiting += landing
-                step = step_of(q, v)
-            lying = [n for n, limb in plan.limbs.items() if limb.lies[k] and self._held.get(n) is ContactGrip.FIRM]
+                if landing or step.status is Status.CAPPED:
+                    step = self.controller.step(out[k], v)
+            lying = [name for name in lying if self._held[name] is ContactGrip.FIRM]
             if lying and any(slack.item == ARMS and slack.amount > PUSHED for slack in step.relaxed):
                 # Hands that lie on the ground rise where their links would sink
                 risen |= set(lying)
                 self._hold(dict.fromkeys(lying, ContactGrip.LEVEL))
-                step = step_of(q, v)
+                step = self.controller.step(out[k], v)
             if step.status is not solved:
                 gave.append((k, tuple(dict.fromkeys(slack.item for slack in step.relaxed)) or (str(step.status),)))
-            after = pin.integrate(model, q, step.v * dt)
-            v, q = step.v, after
-            out[k + 1] = q
+            out[k + 1], k = step.q_next, k + 1
         return out, gave
 
     def _grip(self, plan: MotionPlan, name: str, tick: int, risen: Set[str]) -> ContactGrip:
@@ -411,10 +431,11 @@ class Engine:
     def follow(self, places: Array, turns: Array, held: Mapping[str, ContactGrip], q: Array) -> Array:
         """Ticks from q along some of :meth:`targets`; the configuration after the last."""
         self._hold(held)
-        for row in self.rows(places, turns)[:-1]:
-            self._group.write(row)
-            q = pin.integrate(self.robot.model, q, self.controller.step(q).v * self.dt)
-        return q
+        self._ticks.most = np.inf
+        out = np.empty((len(places), len(q)))
+        out[0] = q
+        self._ran(self.rows(places, turns)[:-1], out)
+        return np.asarray(out[-1])
 
     def _near(self, plan: MotionPlan, names: list[str], q: Array, tick: int) -> list[str]:
         """Those of some limbs whose contacts are so near to their targets that they can be held from here on."""
@@ -423,7 +444,7 @@ class Engine:
             pin.forwardKinematics(model, data, q)
         for name in names:
             limb = plan.limbs[name]
-            pose = pin.updateFramePlacement(model, data, model.getFrameId(self.body.limbs[name].end))
+            pose = pin.updateFramePlacement(model, data, self._ends[name])
             away = pose.translation - limb.end[tick]
             off = float(np.linalg.norm(away[:2] if limb.grip(tick) is ContactGrip.LEVEL else away))
             if limb.rotation is not None and self.body.limbs[name].contact == "flat":

@@ -62,7 +62,7 @@ class Places:
 
 def normalised(vectors: Array, fallback: Array) -> Array:
     """Unit vectors; where one has no length, the fallback."""
-    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    sizes = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
     return np.asarray(np.where(sizes > SHORT, vectors / np.maximum(sizes, 1e-12), fallback))
 
 
@@ -256,5 +256,6 @@ def _headings(rotations: Array) -> Array:
     forward[steep] = -np.sign(forward[steep, 2])[:, None] * rotations[steep, :, 2]
     forward[:, 2] = 0.0
     x = normalised(forward, np.array([1.0, 0.0, 0.0]))
-    z = np.broadcast_to(np.array([0.0, 0.0, 1.0]), x.shape)
-    return np.stack([x, np.cross(z, x), z], axis=-1)
+    out = np.zeros_like(rotations)
+    out[:, :, 0], out[:, 0, 1], out[:, 1, 1], out[:, 2, 2] = x, -x[:, 1], x[:, 0], 1.0
+    return out

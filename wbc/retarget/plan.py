@@ -102,11 +102,15 @@ def _nearest(frames: int, rate: float, times: Array) -> NDArray[np.int_]:
 
 
 def turns_resampled(rotations: Array, rate: float, times: Array) -> Array:
-    """Rotations [frames, 3, 3] at other times."""
-    if len(rotations) == len(times):
-        return rotations
-    quaternions = continuous_quaternions(Rotation.from_matrix(rotations).as_quat())
-    return np.asarray(Rotation.from_quat(resampled(quaternions, rate, times)).as_matrix())
+    """Rotations [frames, n, 3, 3] at other times [n, times, 3, 3]."""
+    frames, count = rotations.shape[:2]
+    if frames == len(times):
+        return np.asarray(rotations.swapaxes(0, 1))
+    quaternions = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat().reshape(frames, count, 4)
+    for number in range(count):
+        quaternions[:, number] = continuous_quaternions(quaternions[:, number])
+    between = resampled(quaternions, rate, times).swapaxes(0, 1)
+    return np.asarray(Rotation.from_quat(between.reshape(-1, 4)).as_matrix().reshape(count, len(times), 3, 3))
 
 
 def logarithms(rotations: Array) -> Array:
@@ -134,20 +138,23 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
     """
     dt = float(times[1] - times[0]) if len(times) > 1 else 1.0 / rate
     at = _nearest(len(places.pelvis), rate, times)
+    names = sorted(places.limbs, key=LIMBS.index)
+    own = [places.limbs[name] for name in names]
+    points = [places.pelvis, *(values for limb in own for values in (limb.middle, limb.wrist, limb.end))]
+    given = [places.turn, places.chest, places.head, *(limb.rotation for limb in own)]
+    # All in one spline
+    pelvis, *points = np.ascontiguousarray(resampled(np.stack(points, axis=1), rate, times).swapaxes(0, 1))
+    known = iter(turns_resampled(np.stack([turns for turns in given if turns is not None], axis=1), rate, times))
+    turn, chest, head, *rotations = (None if turns is None else next(known) for turns in given)
     limbs: dict[str, LimbPlan] = {}
-    for name in sorted(places.limbs, key=LIMBS.index):
-        limb = places.limbs[name]
-        middle, wrist, end = (resampled(values, rate, times) for values in (limb.middle, limb.wrist, limb.end))
-        there = LimbPlaces(middle, wrist, end, _turns(limb.rotation, rate, times))
+    for number, name in enumerate(names):
+        middle, wrist, end = points[3 * number : 3 * number + 3]
+        there = LimbPlaces(middle, wrist, end, rotations[number])
         limbs[name] = _limb_plan(body.limbs[name], there, marks[name][at], dt, hand=not body.is_foot(name))
-    pelvis, turn = resampled(places.pelvis, rate, times), turns_resampled(places.turn, rate, times)
+    assert turn is not None
+    assert chest is not None
     pelvis = pelvis - np.array([0.0, 0.0, 1.0]) * lowering(body, pelvis, turn, limbs, dt)[:, None]
-    chest, head = turns_resampled(places.chest, rate, times), _turns(places.head, rate, times)
     return MotionPlan(pelvis, turn, chest, head, limbs, dt)
-
-
-def _turns(rotations: Array | None, rate: float, times: Array) -> Array | None:
-    return None if rotations is None else turns_resampled(rotations, rate, times)
 
 
 def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
@@ -191,7 +198,8 @@ def _lowest(robot: RobotLimb, end: Array, rotation: Array | None) -> Array:
     """Height of the lowest point of a foot, or of a hand's ball [ticks] [m]."""
     if rotation is None or robot.contact != "flat":
         return np.asarray(end[:, 2] - robot.radius)
-    return np.asarray((rotation[:, 2] @ robot.surface.T).min(axis=1) + end[:, 2])
+    # Not a product of matrices, which would start threads
+    return np.asarray(np.einsum("ti,ci->tc", rotation[:, 2], robot.surface).min(axis=1) + end[:, 2])
 
 
 def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[Array, Array | None]:
@@ -226,8 +234,9 @@ def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[
 
 
 def _median(values: Array) -> Array:
-    """Over the ticks; of a single one, as live, its own."""
-    return values[0].copy() if len(values) == 1 else np.asarray(np.median(values, axis=0))
+    """Over the ticks: as numpy's, which takes ten times as long of so few."""
+    ordered, count = np.sort(values, axis=0), len(values)
+    return np.asarray(0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]))
 
 
 def balanced(plan: MotionPlan) -> Array:

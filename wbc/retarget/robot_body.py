@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -92,7 +93,7 @@ class RobotLimb:
     pitch: tuple[float, float]
     guessed: bool
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[float, float]:
         """Base to middle, middle to wrist [m]."""
         upper, lower = np.linalg.norm(np.diff(self.places[:3], axis=0), axis=1)

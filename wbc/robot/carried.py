@@ -10,7 +10,7 @@ from wbc.multibody import pin
 from wbc.robot.pairs.collision_pairs import find_self_pairs
 from wbc.robot.robot import Robot, changed, checked_robot
 from wbc.shapes import PlacedShape, Solid
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import frame_index, joint_of
 
 
 def carry(
@@ -45,7 +45,7 @@ def carry(
             shape, placement or mass; an object on the world, which is an obstacle.
     """
     checked_robot(robot)
-    if robot.check_frame("frame", frame) == WORLD or frame_joint(robot, frame) == 0:
+    if joint_of(robot.tree, robot.check_frame("frame", frame)) == 0:
         raise RangeError("frame", frame, "it does not move: what stands there is an Obstacle")
     if name in robot.frame_names:
         raise DuplicateNameError("name", name, "a frame of this name exists")
@@ -62,14 +62,9 @@ def carry(
     if robot.self_pairs is None:
         return shaped
     found = find_self_pairs(shaped, samples=0).kept
-    fixed = {link for link in shaped.shapes if frame_joint(shaped, link) == joint}
+    fixed = {link for link in shaped.shapes if joint_of(shaped.tree, link) == joint}
     new = [pair for pair in found if name in pair and not set(pair) <= fixed]
     return changed(shaped, self_pairs=(*robot.self_pairs, *new))
-
-
-def frame_joint(robot: Robot, frame: str) -> int:
-    """The joint that moves a frame; 0: none."""
-    return int(robot.tree.frames[frame_index(robot.tree, frame)].parentJoint)
 
 
 def _inertia(shape: Solid, mass: float) -> pin.Inertia:

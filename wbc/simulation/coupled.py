@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from wbc.errors import RangeError
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix, pin
 from wbc.robot import Robot
 from wbc.simulation.dynamics import ConstrainedDynamics, Grip
 from wbc.simulation.plant import GripKind
@@ -83,14 +83,12 @@ class CoupledDynamics(ConstrainedDynamics):
         return error[:, 0], jacobian, bias[:, 0]
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
-        """Hold these frames, and no others."""
         self._grips = [(name, self.model.getFrameId(name), grip, list(ROWS[grip.kind])) for name, grip in grips.items()]
         self._forces = [np.zeros(len(rows)) for *_, rows in self._grips]
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        """a ``[nv]``."""
         model, data, G = self.model, self.data, self._G
-        mass = self.reduced(_mass(model, data, q))
+        mass = self.reduced(mass_matrix(model, data, q))
         force = G.T @ (tau - pin.nonLinearEffects(model, data, q, v))
         if not self._grips and self._loops is None:
             return np.asarray(G @ np.linalg.solve(mass, force))
@@ -105,7 +103,7 @@ class CoupledDynamics(ConstrainedDynamics):
         if not self._grips and self._loops is None:
             return v
         K = self._constraint(q, v)[0]
-        solved = np.linalg.solve(self.reduced(_mass(self.model, self.data, q)), K.T)
+        solved = np.linalg.solve(self.reduced(mass_matrix(self.model, self.data, q)), K.T)
         w = v[self.free]
         return np.asarray(self._G @ (w - solved @ np.linalg.lstsq(K @ solved, K @ w, rcond=SAME)[0]))
 
@@ -150,8 +148,3 @@ def _rows(robot: Robot, model: pin.Model) -> SingleState:
     bias = tracer.second(error, MotionExpressions(tracer.kinematics))[1]
     outputs = [ca.densify(part) for part in (*tracer.expanded(error, ca.densify(tracer.slope(error))), bias)]
     return SingleState(ca.Function("loops", [tracer.q, tracer.v], list(ca.cse(outputs))))
-
-
-def _mass(model: pin.Model, data: pin.Data, q: Array) -> Array:
-    upper = np.triu(pin.crba(model, data, q))
-    return np.asarray(upper + np.triu(upper, 1).T)

@@ -55,7 +55,6 @@ class VelocityDrive:
         self._q, self._v, self._next = np.array(q), np.zeros(self.nv), np.zeros(self.nv)
 
     def read(self) -> PlantState:
-        """The plant's."""
         return self.plant.read()
 
     def apply(self, command: Command) -> None:

@@ -84,7 +84,6 @@ class ConstrainedDynamics:
         return q, v
 
     def hold(self, grips: Mapping[str, Grip]) -> None:
-        """Hold these frames, and no others."""
         model = self.model
         self._models, self._datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         self._rows: dict[str, list[int]] = {}
@@ -109,7 +108,6 @@ class ConstrainedDynamics:
             pin.initConstraintDynamics(model, self.data, self._models, self._datas)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        """a ``[nv]``."""
         if not self._held:
             return np.asarray(pin.aba(self.model, self.data, q, v, tau))
         return np.asarray(

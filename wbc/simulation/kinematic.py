@@ -31,7 +31,6 @@ class KinematicPlant:
         self.reset(robot.neutral, 0.0)
 
     def reset(self, q: Array, time: float) -> None:
-        """At rest at a configuration."""
         self._q, self._v, self._time = np.array(q), np.zeros(self.nv), time
 
     def read(self) -> PlantState:
@@ -39,10 +38,8 @@ class KinematicPlant:
         return PlantState(self._q, self._v, self._time)
 
     def apply(self, command: Command) -> None:
-        """Take a velocity."""
         self._v = command.values.copy()
 
     def advance(self, dt: float) -> None:
-        """Integrate for dt [s]."""
         self._q = pin.integrate(self._model, self._q, self._v * dt)
         self._time += dt

@@ -111,7 +111,6 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         self._state.first = self.momentum
 
     def advance(self, dt: float) -> None:
-        """Whole time steps."""
         h, drive, state = self.time_step, self._drive, self._state
         for _ in range(round(dt / h)):
             # Motors whose torque does not depend on velocities need none

@@ -193,7 +193,6 @@ class PinocchioPlant(Gripping):
 
     @property
     def state(self) -> PlantState:
-        """The truth."""
         state = self._state
         return PlantState(state.q, state.v, state.time)
 

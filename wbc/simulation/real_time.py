@@ -35,15 +35,12 @@ class RealTime:
         self._begun, self.late = None, 0.0
 
     def read(self) -> PlantState:
-        """The plant's."""
         return self.plant.read()
 
     def apply(self, command: Command) -> None:
-        """To the plant."""
         self.plant.apply(command)
 
     def advance(self, dt: float) -> None:
-        """dt of the plant's time [s]."""
         if self._begun is None:
             self._begun = time.perf_counter(), self.plant.read().time
         self.plant.advance(dt)

@@ -358,7 +358,7 @@ _BLOCKS = """
 _MAIN = (
     """/* A tick of any stack whose rows CasADi computes */
 #include "tick.c"
-#include "builtins.h"
+#include "follow.h"
 #include "carried.h"
 
 #define EVALUATED(name) \\

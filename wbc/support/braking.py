@@ -30,7 +30,7 @@ from scipy.sparse.csgraph import connected_components
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import CommandError, RangeError
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix, pin
 from wbc.robot import Robot
 from wbc.support.statics import Statics, TorqueRows, least_lack
 from wbc.validation import Array
@@ -117,8 +117,7 @@ def braking(
             if place >= 0:
                 configuration[place] = random.uniform(low[i], high[i])
         v = rate * limits.velocity * _pace(random, robot.nv, k)
-        M = pin.crba(model, data, configuration)
-        M = np.triu(M) + np.triu(M, 1).T
+        M = mass_matrix(model, data, configuration)
         left = part * limits.effort - np.abs(pin.nonLinearEffects(model, data, configuration, v))
         motor = int(np.argmin(left / (np.abs(M) @ limits.acceleration)))
         if left[motor] <= 0.0:

@@ -66,6 +66,15 @@ def frame_index(model: own.Model, name: str) -> int:
     raise UnknownNameError("frame", name, [f.name for f in model.frames])
 
 
+def joint_of(model: own.Model, frame: str) -> int:
+    """Number of the joint that carries a frame; 0 for the world and for what no joint moves.
+
+    Raises:
+        UnknownNameError: no frame of that name.
+    """
+    return 0 if frame == WORLD else int(model.frames[frame_index(model, frame)].parentJoint)
+
+
 class Kinematics:
     """Expressions of one model in one configuration symbol ``q`` (nq) and velocity symbol ``v`` (nv)."""
 

@@ -19,6 +19,7 @@ from wbc.native.library import load_library
 from wbc.stack.layout import Layout
 from wbc.stack.memory import Memory
 from wbc.tick.buffers import INFINITE, OWN, REST_RATE, Buffers, TaskRows
+from wbc.tick.row_follower import RowFollower
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -133,6 +134,11 @@ class CompiledTick(Buffers, ABC):
         self._kept += [gate, table]
         about = (table.ctypes.data, method, finish)
         return builtin_like(method, "q, v=None, dt=None, **targets", self._library.wbc_python_steps, about), table
+
+    def follower(self, places: np.ndarray, rows: slice) -> RowFollower:
+        """What ticks along rows of inputs, where the layout has ``moves``; arguments as of :class:`RowFollower`."""
+        cycle = self._cycle(np.zeros(0), np.zeros((0, 3)), [], [])
+        return RowFollower(self._library.wbc_tick_follow, cycle, places, rows)
 
     def part(self, first: int, count: int) -> Callable[[bytes], Array]:
         """What makes an array of ``count`` numbers of :attr:`snapshot` from number ``first`` on, read-only, without a

@@ -22,6 +22,7 @@ from wbc.robot.robot import checked_robot
 from wbc.robot.sources.files import captured_stderr
 from wbc.shapes import Geometry
 from wbc.symbolic.joint_steps import place
+from wbc.symbolic.kinematics import joint_of
 from wbc.track.setup import MovingObstacle
 from wbc.validation import Array
 
@@ -43,7 +44,7 @@ def clearances(robot: Robot, q: Array, obstacles: Mapping[str, MovingObstacle], 
         raise ShapeError("t", t, f"expected {len(q)} times, one for each configuration")
     for name, one in validation.mapping("obstacles", obstacles, "names to Movings").items():
         validation.instance(f"obstacles[{name}]", one, MovingObstacle, "a MovingObstacle")
-    bodies = {link: _bodies(robot, link) for link in robot.shapes if _moves(robot, link)}
+    bodies = {link: _bodies(robot, link) for link in robot.shapes if joint_of(robot.model, link)}
     return _distances(robot, bodies, q, obstacles, t)
 
 
@@ -171,7 +172,3 @@ def _shape_of(geometry: Any) -> Geometry:
     """A body of a description as a shape."""
     raw = raw_of(geometry)
     return TriangleMesh(raw.vertices[raw.triangles]) if isinstance(raw, Mesh) else exact_shape(raw)
-
-
-def _moves(robot: Robot, link: str) -> bool:
-    return int(robot.model.frames[robot.model.getFrameId(link)].parentJoint) > 0

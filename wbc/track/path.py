@@ -145,7 +145,6 @@ class ApproachedPath:
         return self._first.duration + self._path.duration
 
     def sample(self, t: float) -> Sample:
-        """Pose and twist at time t [s]."""
         return self._first.sample(t) if t < self._first.duration else self._path.sample(t - self._first.duration)
 
 

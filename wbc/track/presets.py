@@ -32,11 +32,9 @@ class ClosedCurve:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
         return self._duration
 
     def sample(self, t: float) -> Sample:
-        """Pose and twist at time t [s]."""
         part, rate = smooth_step(t, self._duration)
         point, slope = self._curve(self._turns * part)
         linear = slope * (self._turns * rate)
@@ -90,11 +88,9 @@ class _There:
 
     @property
     def duration(self) -> float:
-        """Duration [s]."""
         return 2.0 * self._path.duration
 
     def sample(self, t: float) -> Sample:
-        """Pose and twist at time t [s]."""
         if t <= self._path.duration:
             return self._path.sample(t)
         back = self._path.sample(self.duration - t)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape, Shape
+from wbc.symbolic.kinematics import joint_of
 from wbc.track import render
 from wbc.track.scene import link_meshes, simplified
 from wbc.validation import Array
@@ -52,10 +53,10 @@ def robot_meshes(robot: Robot, detail: float = DETAIL, dress: Dress | None = Non
         parts.setdefault(link, []).append(triangles)
     model = robot.model
     hands = [f for name, f in robot.frames.items() if name == "tip" or name.endswith("hand")]
-    tips = {int(model.frames[model.getFrameId(hand)].parentJoint) for hand in hands} - {0}
+    tips = {joint_of(model, hand) for hand in hands} - {0}
     out = {}
     for link, groups in parts.items():
-        dark = int(model.frames[model.getFrameId(link)].parentJoint) in tips
+        dark = joint_of(model, link) in tips
         merged = np.concatenate(groups)
         if len(merged) > FEW:
             least = float(np.ptp(merged.reshape(-1, 3), axis=0).min())

@@ -16,6 +16,7 @@ from wbc.robot import Robot
 from wbc.rotations import TO_MUJOCO, quaternion
 from wbc.shapes import PlacedShape
 from wbc.symbolic.joint_steps import place
+from wbc.symbolic.kinematics import joint_of
 from wbc.tasks import CenterOfMass, EndEffector, Hold, Obstacle, PitchPlane, PitchPlaneLimit
 from wbc.tasks._contact import NOMINAL, Contact
 from wbc.tasks.base import Input, Task
@@ -193,7 +194,7 @@ class Drawing:
         if "reach" not in self._demanded or not frame:
             return [], []
         model = self._robot.model
-        joint = int(model.frames[model.getFrameId(frame)].parentJoint)
+        joint = joint_of(model, frame)
         chain = [k for k in model.supports[joint] if k and model.joints[k].nv == 1]
         if not chain:
             return [], []
@@ -348,10 +349,7 @@ class Drawing:
 
     def _shaped(self, item: Obstacle) -> tuple[list[tuple[str, PlacedShape]], ShapeTable]:
         """(link, shape) of those that keep clear, and these before the parts of the obstacle for the kernel."""
-        joint = {
-            link: int(self._robot.model.frames[self._robot.model.getFrameId(link)].parentJoint)
-            for link in self._robot.shapes
-        }
+        joint = {link: joint_of(self._robot.model, link) for link in self._robot.shapes}
         links = [link for link in joint if joint[link] and (item.links is None or link in item.links)]
         shaped = [(link, placed) for link in links for placed in self._robot.shapes[link]]
         return shaped, ShapeTable([*(placed.shape for _, placed in shaped), *item.parts])

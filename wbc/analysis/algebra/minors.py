@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import combinations
+from typing import Any
 
 from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
 
@@ -13,20 +14,29 @@ def transposed(matrix: Matrix) -> Matrix:
     return [list(column) for column in zip(*matrix, strict=True)]
 
 
-def eliminated(ring: TrigRing, matrix: Matrix, columns: int | None = None) -> tuple[Matrix, int]:
+def fill(matrix: Matrix, i: int, j: int) -> int:
+    """Terms that elimination with a pivot writes, at most."""
+    column = sum(len(row[j]) for k, row in enumerate(matrix) if k != i)
+    return column * sum(len(p) for k, p in enumerate(matrix[i]) if k != j)
+
+
+def eliminated(
+    ring: TrigRing, matrix: Matrix, columns: int | None = None, cost: Callable[[Matrix, int, int], Any] = fill
+) -> tuple[Matrix, int]:
     """Pivots that are numbers, eliminated: (what is left, how many). Those of the first ``columns``, or of all.
 
     The rank of the matrix is that of what is left plus the number of pivots, at every configuration, since a number
-    is never zero. Among the pivots of a step the one with the fewest other entries in its row and column is taken.
+    is never zero. Among the pivots of a step that of the least ``cost`` is taken, none whose cost is None.
     """
     left = [list(row) for row in matrix]
     count = 0
     while left and left[0]:
         first = None if columns is None else columns - count
         pivots = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row[:first]) if len(p) and p.is_constant()]
-        if not pivots:
+        costs = [(price, i, j) for i, j in pivots if (price := cost(left, i, j)) is not None]
+        if not costs:
             break
-        i, j = min(pivots, key=lambda pivot: _fill(left, *pivot))
+        _, i, j = min(costs)
         left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
         count += 1
     return left, count
@@ -44,12 +54,6 @@ def without(ring: TrigRing, matrix: Matrix, i: int, j: int) -> Matrix:
             other = [ring.normal(a - ratio * b) if len(b) else a for a, b in zip(other, row, strict=True)]
         rest.append(other[:j] + other[j + 1 :])
     return rest
-
-
-def _fill(matrix: Matrix, i: int, j: int) -> int:
-    """Terms that elimination with a pivot writes, at most."""
-    column = sum(len(row[j]) for k, row in enumerate(matrix) if k != i)
-    return column * sum(len(p) for k, p in enumerate(matrix[i]) if k != j)
 
 
 def determinant(ring: TrigRing, matrix: Matrix) -> Poly:

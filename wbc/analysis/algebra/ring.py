@@ -93,11 +93,9 @@ class TrigRing:
         return self.ctx.constant(rational(value if isinstance(value, Fraction) else written(value)))
 
     def cosine(self, k: int) -> Poly:
-        """cos of joint k."""
         return self._gens[f"c{self.coordinates[k].label}"]
 
     def sine(self, k: int) -> Poly:
-        """sin of joint k."""
         return self._gens[f"s{self.coordinates[k].label}"]
 
     def displacement(self, k: int) -> Poly:

@@ -19,8 +19,8 @@ from wbc.analysis.certificates.block_proofs import block_proofs
 from wbc.analysis.certificates.boxes import BoxSearch, Counts
 from wbc.analysis.certificates.pieces import BoxPieces
 from wbc.analysis.certificates.symmetry import Symmetry, fundamental_box, symmetries
-from wbc.analysis.certificates.weakest import NumericWitness, numeric_witness, peak, weakest
-from wbc.analysis.jacobians.jacobian import symbolic_jacobian
+from wbc.analysis.certificates.weakest import RankWitness, numeric_witness, peak, weakest
+from wbc.analysis.jacobians.jacobian import augmented_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.jacobians.numeric import check_task
 from wbc.analysis.jacobians.rank_matrix import rank_matrices
@@ -77,7 +77,7 @@ class RankCertificate:
     joints: tuple[int, ...]
     symmetries: int
     seconds: float
-    witness: NumericWitness | None = None
+    witness: RankWitness | None = None
 
 
 def certify(
@@ -179,7 +179,9 @@ class _Problem:
     ) -> RankCertificate:
         """The certificate; ``told`` gets what is known while boxes are looked at."""
         model, every_row, began = self.model, (*self.task, *self.constraints), time.monotonic()
-        J_T, J_R = _matrices(model, self.task, self.constraints)
+        J_T, augmented = augmented_jacobian(model, self.task, every_row)
+        if self.task:
+            check_task(model.robot, self.task)
         matrices = []
         for matrix in rank_matrices(model, every_row):
             if not matrix:
@@ -187,7 +189,7 @@ class _Problem:
             matrices.append(matrix)
             if time.monotonic() > times.ready:
                 break
-        own, every = trig_form(model.ring, J_T) if self.task else None, trig_form(model.ring, J_R)
+        own, every = trig_form(model.ring, J_T) if self.task else None, trig_form(model.ring, augmented.matrix)
         rng = np.random.default_rng(0)
         eps = self.part * (highest := 0.0 if own is None else peak(own, rng, times.last))
         nearest = functools.partial(numeric_witness, model, self.task, self.constraints, every, eps=eps)
@@ -199,7 +201,7 @@ class _Problem:
         found = symmetries(both, used_joints(both))
         pieces = _pieces((*proofs, (chosen,)), own, eps, found, self.file)
 
-        def known(verdict: str, witness: NumericWitness | None = None) -> RankCertificate:
+        def known(verdict: str, witness: RankWitness | None = None) -> RankCertificate:
             counts, complete = pieces.counts, verdict == COMPLETE
             left = 0.0 if complete else max(0.0, 1.0 - counts.regular_part - counts.tube_part)
             tubed = counts.tube > 0
@@ -227,23 +229,11 @@ def _means(workers: Any, state: Any, progress: Any, ended: Any) -> tuple[int, Pa
 
 
 def _without_boxes(
-    verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: NumericWitness | None = None
+    verdict: str, began: float, eps: float = 0.0, highest: float = 0.0, witness: RankWitness | None = None
 ) -> RankCertificate:
     """What is known before subdivision."""
     done, seconds = verdict == COMPLETE, time.monotonic() - began
     return RankCertificate(verdict, eps, highest, done, Counts(), 1.0 - done, (), 1, seconds, witness)
-
-
-def _matrices(model: ExactModel, task: tuple[Rows, ...], constraints: tuple[Rows, ...]) -> tuple[Matrix, Matrix]:
-    """J_T, of no rows where there is no task, and J_R."""
-    J_T = symbolic_jacobian(model, task).matrix if task else []
-    J_R = symbolic_jacobian(model, (*task, *constraints)).matrix
-    joints = model.robot.nv
-    if len(J_T) > joints or len(J_R) < joints:
-        raise RangeError("rows", len(J_R), f"expected at least {joints} in all and at most {joints} in the task")
-    if task:
-        check_task(model.robot, task)
-    return J_T, J_R
 
 
 def _checked(part: float, minutes: float) -> tuple[float, float]:

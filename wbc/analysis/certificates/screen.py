@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.analysis.algebra.trig_form import TrigForm, trig_form
-from wbc.analysis.certificates.weakest import NumericWitness, joint_values, least, numeric_witness, peak, weakest
+from wbc.analysis.certificates.weakest import RankWitness, joint_values, least, numeric_witness, peak, weakest
 from wbc.analysis.jacobians.jacobian import symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.rows import Rows, checked
@@ -99,7 +99,7 @@ def screen(
 
 def _witness(
     model: ExactModel, task: tuple[Rows, ...], rows: tuple[Rows, ...], starts: Array, eps: float
-) -> NumericWitness | None:
+) -> RankWitness | None:
     every = trig_form(model.ring, symbolic_jacobian(model, (*task, *rows)).matrix)
     return numeric_witness(model, task, rows, every, starts, eps)
 

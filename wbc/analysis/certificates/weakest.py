@@ -9,6 +9,7 @@ from math import inf
 
 import numpy as np
 
+from wbc.analysis.algebra.branches import LocusBranch
 from wbc.analysis.algebra.trig_form import TrigForm
 from wbc.analysis.jacobians.model import ExactModel
 from wbc.analysis.jacobians.numeric import NumericRows, rank, singular_values
@@ -28,16 +29,18 @@ CHUNK = 500
 
 
 @dataclass(frozen=True, eq=False)
-class NumericWitness:
+class RankWitness:
     """A configuration where the task keeps away from a loss of rank and task and constraints together have one.
 
     Attributes:
-        q: configuration of the robot [nq]. task, augmented: singular values there, by Pinocchio's Jacobians.
+        q: configuration of the robot [nq]. task, augmented: singular values of the Jacobians of the task, and of task
+            and constraints, there, by Pinocchio. branch: of the locus, on which it lies; None: it was found by numbers.
     """
 
     q: Array
     task: Array
     augmented: Array
+    branch: LocusBranch | None = None
 
 
 def least(matrices: Array) -> Array:
@@ -127,7 +130,7 @@ def numeric_witness(
     eps: float,
     *,
     until: float = inf,
-) -> NumericWitness | None:
+) -> RankWitness | None:
     """The first configuration, found from starts, where J_R v = 0 for some |v| = 1 and sigma_min(J_T) >= eps.
 
     Without a task the second does not count. Both are checked by Pinocchio's Jacobians.
@@ -138,7 +141,7 @@ def numeric_witness(
         J_R = numeric.value((*task, *constraints), q)
         sigma = singular_values(numeric.value(task, q)) if task else np.empty(0)
         if rank(J_R) < model.robot.nv and (not task or sigma[-1] >= eps):
-            return NumericWitness(q, sigma, singular_values(J_R))
+            return RankWitness(q, sigma, singular_values(J_R))
     return None
 
 

@@ -13,6 +13,7 @@ from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
 from wbc.analysis.algebra.transforms import cross, dot
 from wbc.analysis.jacobians.model import ExactModel, checked_model
 from wbc.analysis.rows import BodyRows, JointRows, PitchPlaneRows, Rows, checked
+from wbc.errors import RangeError
 from wbc.validation import Array
 
 
@@ -105,6 +106,25 @@ def symbolic_jacobian(model: ExactModel, rows: Sequence[Rows], *, axes: str | No
         chosen.append(frame)
         names += [str(declared) if len(block) == 1 else f"{declared}.{_label(declared, i)}" for i in range(len(block))]
     return SymbolicJacobian(model.ring, matrix, tuple(names), tuple(chosen))
+
+
+def augmented_jacobian(
+    model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows]
+) -> tuple[Matrix, SymbolicJacobian]:
+    """J_T, of no rows where there is no task, and the Jacobian of task and constraints.
+
+    Raises:
+        RangeError: fewer rows than joints, or more task rows than joints.
+    """
+    own, every, joints = (
+        symbolic_jacobian(model, task).matrix if task else [],
+        symbolic_jacobian(model, rows),
+        model.robot.nv,
+    )
+    if len(own) > joints or every.shape[0] < joints:
+        text = f"expected at least {joints} in all and at most {joints} in the task"
+        raise RangeError("rows", every.shape[0], text)
+    return own, every
 
 
 def _label(declared: Rows, i: int) -> str:

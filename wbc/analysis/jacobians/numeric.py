@@ -10,7 +10,7 @@ from wbc.analysis.rows import BodyRows, JointRows, Rows
 from wbc.errors import RangeError
 from wbc.multibody import pin
 from wbc.robot import Robot
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import WORLD, frame_index, joint_of
 from wbc.validation import Array
 
 #: Singular values below this part of the largest count as zero
@@ -45,7 +45,7 @@ class NumericRows:
         return self._pitch_plane(declared.shoulder, declared.wrist)
 
     def _pitch_plane(self, shoulder: str, wrist: str) -> Array:
-        joint = int(self.robot.model.frames[frame_index(self.robot.model, shoulder)].parentJoint)
+        joint = joint_of(self.robot.model, shoulder)
         axis = self._data.J[3:, int(self.robot.model.idx_vs[joint])]
         span = self._placement(wrist).translation - self._placement(shoulder).translation
         row: Array = (span - axis * (axis @ span)) @ self._jacobian(shoulder)[3:]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from wbc.analysis.algebra.minors import without
-from wbc.analysis.algebra.ring import Matrix, Poly, TrigRing
+from wbc.analysis.algebra.minors import eliminated
+from wbc.analysis.algebra.ring import Matrix, TrigRing
 from wbc.analysis.jacobians.equivalent_rows import split_twists, whole_twist
 from wbc.analysis.jacobians.jacobian import body_rows, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel
@@ -45,31 +45,16 @@ def reduced(ring: TrigRing, matrix: Matrix) -> Matrix:
     """What pivots that are numbers leave. Only those whose row or column has nothing but numbers are taken: no entry
     becomes a product of two others.
     """
-    left = [list(row) for row in matrix if any(len(p) for p in row)]
-    width = len(matrix[0])
-    while left:
-        pivots = [(i, j) for i, row in enumerate(left) for j, p in enumerate(row) if _pivot(left, i, j, p)]
-        if not pivots:
-            break
-        i, j = min(pivots, key=lambda pivot: _alone(left, *pivot))
-        left = [row for row in without(ring, left, i, j) if any(len(p) for p in row)]
-        width -= 1
+    left, count = eliminated(ring, [row for row in matrix if any(len(p) for p in row)], cost=_alone)
+    width = len(matrix[0]) - count
     # Columns without a row are a loss of rank, and no columns are none
     return left or [[ring.zero] * width for _ in range(width > 0)]
 
 
-def _number(p: Poly) -> bool:
-    return len(p) == 0 or bool(p.is_constant())
-
-
-def _pivot(matrix: Matrix, i: int, j: int, p: Poly) -> bool:
-    if not len(p) or not p.is_constant():
-        return False
-    return all(map(_number, matrix[i])) or all(_number(row[j]) for row in matrix)
-
-
-def _alone(matrix: Matrix, i: int, j: int) -> tuple[bool, float]:
-    """Pivots alone in their row or column first, then large ones."""
-    alone = sum(len(p) > 0 for p in matrix[i]) == 1 or sum(len(row[j]) > 0 for row in matrix) == 1
-    number = matrix[i][j].leading_coefficient()
-    return not alone, -abs(int(number.p) / int(number.q))
+def _alone(matrix: Matrix, i: int, j: int) -> tuple[bool, float] | None:
+    """Pivots alone in their row or column first, then large ones; None where neither has numbers alone."""
+    row, column = matrix[i], [other[j] for other in matrix]
+    if not any(all(len(p) == 0 or p.is_constant() for p in line) for line in (row, column)):
+        return None
+    number = row[j].leading_coefficient()
+    return min(sum(len(p) > 0 for p in line) for line in (row, column)) > 1, -abs(int(number.p) / int(number.q))

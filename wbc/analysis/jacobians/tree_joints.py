@@ -10,7 +10,7 @@ from wbc.analysis.rows import BodyRows, JointRows, Rows, checked
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import joint_of
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,7 @@ class TreeJoints:
 
     def carrier(self, frame: str) -> int:
         """The joint that moves a frame; 0: none."""
-        if frame == WORLD:
-            return 0
-        self.robot.check_frame("frame", frame)
-        return int(self._model.frames[frame_index(self._model, frame)].parentJoint)
+        return joint_of(self._model, self.robot.check_frame("frame", frame))
 
     def support(self, joint: int) -> frozenset[int]:
         """Joints between the world and a joint, itself included."""

@@ -14,14 +14,13 @@ from wbc.analysis.algebra.deficiency import Exact
 from wbc.analysis.algebra.locus import Locus
 from wbc.analysis.algebra.ring import Matrix
 from wbc.analysis.jacobians.equivalent_rows import split_twists
-from wbc.analysis.jacobians.jacobian import SymbolicJacobian, symbolic_jacobian
+from wbc.analysis.jacobians.jacobian import SymbolicJacobian, augmented_jacobian, symbolic_jacobian
 from wbc.analysis.jacobians.model import ExactModel
 from wbc.analysis.loci.budget import Budget
 from wbc.analysis.loci.child import Child, Report
 from wbc.analysis.loci.singular_vectors import singular_vector_locus
 from wbc.analysis.loci.sub_determinants import sub_determinant_locus
 from wbc.analysis.rows import Rows
-from wbc.errors import RangeError
 
 #: Given the part of a locus that is known after each step
 Told: TypeAlias = Callable[[Locus], None]
@@ -79,12 +78,8 @@ class LocusSearch:
         self, model: ExactModel, task: Sequence[Rows], rows: Sequence[Rows], algorithm: str, budget: Budget
     ) -> None:
         validation.one_of("algorithm", algorithm, ALGORITHMS)
-        self._exact, joints = Exact(model.ring), model.robot.nv
-        self._task = symbolic_jacobian(model, task).matrix if task else []
-        self.augmented = symbolic_jacobian(model, rows)
-        if len(self._task) > joints or self.augmented.shape[0] < joints:
-            text = f"expected at least {joints} in all and at most {joints} in the task"
-            raise RangeError("rows", self.augmented.shape[0], text)
+        self._exact = Exact(model.ring)
+        self._task, self.augmented = augmented_jacobian(model, task, rows)
         self._model, self._rows, self._budget = model, tuple(rows), budget
         self._algorithm = ALGORITHMS[algorithm]
         self._child = Child(self._work, budget.seconds)

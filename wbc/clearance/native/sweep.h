@@ -1,5 +1,5 @@
 /* What a sweep works on: all arrays are Python's, which keeps them as long as this is used; wbc/clearance/native.py fills it,
- * the order of the fields is the same there. */
+ * and reads its structure here. */
 #ifndef WBC_SWEEP_H
 #define WBC_SWEEP_H
 

@@ -121,7 +121,6 @@ class _Line:
             self._console.file.flush()
 
     def told(self, time: float, seen: Seen) -> None:
-        """News alone."""
         if text := self._teller.news(time, seen):
             tell(text)
 

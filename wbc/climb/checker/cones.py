@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 from scipy.optimize import linprog
 
@@ -57,10 +54,7 @@ def _instants(climbed: Climbed, every: float) -> list[int]:
 
 def cone_at(climbed: Climbed, limb: int, row: int) -> tuple[Array, Array]:
     """A and b of a limb at a foothold, of whose frictions the lower counts."""
-    kind, friction = climbed.climber.limbs[limb].contact, climbed.scene.footholds[row].friction
-    own: float | None = getattr(kind, "friction", None)
-    lower: dict[str, Any] = {} if own is None else {"friction": min(own, friction)}
-    return replace(kind, **lower).cone()
+    return climbed.climber.limbs[limb].contact.lower(climbed.scene.footholds[row].friction).cone()
 
 
 def _margin(climbed: Climbed, k: int, mass: float, gravity: Array) -> float:

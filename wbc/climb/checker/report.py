@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from wbc import validation
 from wbc.validation import Array
@@ -134,13 +134,8 @@ class RuleTally:
         k = int(values.argmin() if before.least else values.argmax())
         worst, count = float(values[k]), before.count + len(values)
         if worst < before.worst if before.least else worst > before.worst:
-            self._rules[rule] = RuleFinding(
-                rule, worst, before.limit, before.unit, before.least, float(times[k]), where, count
-            )
-        else:
-            self._rules[rule] = RuleFinding(
-                rule, before.worst, before.limit, before.unit, before.least, before.time, before.where, count
-            )
+            before = replace(before, worst=worst, time=float(times[k]), where=where)
+        self._rules[rule] = replace(before, count=count)
 
     def report(self) -> ClimbReport:
         """All rules."""

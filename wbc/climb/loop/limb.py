@@ -82,9 +82,10 @@ class LimbMachine:
         self._item: FootholdContact = parts.stack[f"{self.name} contact"].item
         fields = ("target", "feedforward", *(["acceleration"] * parts.torques))
         self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
+        self._glide = InputGroup(core_of(items), [(f"{self.name} contact", "feedforward", None)])
         self._loading, near = (parts.options.unload if parts.torques else 0.0), parts.options.latch_distance
         self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
-        self._seen, self._planned = parts.robot.model.createData(), parts.robot.model.createData()
+        self._data = parts.robot.model.createData()
         self.state, self.held, self._since = LimbState.FREE, FREE_LIMB, 0.0
         self._late, self._moves, self._target = 0.0, list[ContactMove](), pin.SE3.Identity()
         self._footholds: tuple[Foothold, ...] = ()
@@ -97,7 +98,6 @@ class LimbMachine:
         self._moves, self._footholds, self._reference = moves, tuple(plan.scene.footholds), reference
         self._gone, self._late, self.held = set[int](), 0.0, held
         self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
-        self._pose = self._planned_pose(0.0)
 
     def stand(self, foothold: int, q: Array, now: float) -> str:
         """Closed from the beginning; what keeps it from there, "" for nothing."""
@@ -210,7 +210,7 @@ class LimbMachine:
             f"off after {options.patience:g} s; {1e3 * self._near:g} mm and {options.latch_angle:g} rad are allowed"
         )
 
-    def change(self, cause: Cause, q: Array, q_planned: Array, now: float) -> LimbState:
+    def change(self, cause: Cause, q: Array, now: float) -> LimbState:
         """Its next state, as of the table; stack and plant are told."""
         before = self.state
         state = self.state = after(before, cause)
@@ -218,7 +218,7 @@ class LimbMachine:
         if state is LimbState.UNLOADING and self._force is not None:
             self._force.ramp(UNLOADED, self._loading)
         elif before in CLOSED and state not in CLOSED:
-            self._open(q_planned)
+            self._open()
         elif state is LimbState.LATCHING and move is not None:
             self._close(move.lands, q)
         elif cause is Cause.NEW_PLAN and state is LimbState.HELD and self._force is not None:
@@ -232,18 +232,27 @@ class LimbMachine:
     # ------------------------------------------------------------------ stack and plant
 
     def follow(self, planned: pin.Data) -> None:
-        """In the air: the contact frame follows the plan, whose kinematics at the next tick are known."""
-        parts = self._parts
-        now, then = self._pose, pin.updateFramePlacement(parts.robot.model, planned, self._number).copy()
-        self._pose = then
-        place, speed = now.translation, (then.translation - now.translation) / parts.dt
+        """In the air the contact frame follows the plan; a closed contact goes on over a tick as it does in the plan,
+        whose tips are where they are at its ends while J v is not 0.
+
+        Args:
+            planned: with the kinematics of the plan now, and of its velocity over the tick.
+        """
+        parts, model = self._parts, self._parts.robot.model
+        rate = pin.getFrameVelocity(model, planned, self._number, pin.LOCAL_WORLD_ALIGNED).vector
+        if self.held != FREE_LIMB:
+            self._glide.write(rate)
+            return
+        now = pin.updateFramePlacement(model, planned, self._number)
+        place = now.translation
         if self._late > 0.0 and parts.torques and not self._kind.pulls:
             normal, press = self._target.rotation[:, 2], parts.options.press
-            place, speed = place - press * self._late * normal, speed - press * normal
-        aim, rate = [place], speed
-        if self._kind.fixed != "position":
-            turn = now.rotation @ pin.log3(now.rotation.T @ then.rotation) / parts.dt
-            aim, rate = [now.rotation.T.ravel(), place], np.concatenate([speed, turn])
+            place, rate[:3] = place - press * self._late * normal, rate[:3] - press * normal
+        aim = [place]
+        if self._kind.fixed == "position":
+            rate = rate[:3]
+        else:
+            aim = [now.rotation.T.ravel(), place]
         aim.append(rate)
         if parts.torques:
             aim.append((rate - self._rate) / parts.dt)
@@ -252,7 +261,7 @@ class LimbMachine:
 
     def off(self, q: Array) -> tuple[float, float]:
         """How far it is from its foothold [m], and how far turned as far as its contact fixes that [rad]."""
-        pose, target = self._seen_pose(q), self._target
+        pose, target = self._pose(q), self._target
         off = float(np.linalg.norm(pose.translation - target.translation))
         if self._kind.fixed == "position":
             return off, 0.0
@@ -292,7 +301,7 @@ class LimbMachine:
         """Whether it is near enough to its foothold to close; a foot that touches, also a little beside it."""
         off, turned = self.off(q)
         if self._parts.torques and not self._kind.pulls:
-            away = self._target.actInv(self._seen_pose(q)).translation
+            away = self._target.actInv(self._pose(q)).translation
             off = max(ABOVE * float(away[2]), -float(away[2]), float(np.hypot(away[0], away[1])) / BESIDE)
         return off <= self._near and turned <= self._parts.options.latch_angle
 
@@ -302,7 +311,7 @@ class LimbMachine:
         if self._force is not None:
             if not self._kind.pulls:
                 # Where the foot is, which may be a little beside the plan's foothold; above the surface it goes on down
-                pose = self._seen_pose(q)
+                pose = self._pose(q)
                 normal = target.rotation[:, 2]
                 above = max(0.0, float(normal @ (pose.translation - target.translation)))
                 turn = target.rotation if self._kind.fixed == "position" else pose.rotation
@@ -317,11 +326,11 @@ class LimbMachine:
         self._contact.enabled, self._swing.enabled = True, False
         if self._parts.plant is not None and self._kind.pulls:
             self._parts.plant.grasp(self.frame, target, GripKind(self._kind.fixed))
-            place, self._gripping = self._seen_pose(q).translation, True
+            place, self._gripping = self._pose(q).translation, True
             self._closed_at = place, float(np.linalg.norm(place - target.translation))
         self.held, self._late = foothold, 0.0
 
-    def _open(self, q_planned: Array) -> None:
+    def _open(self) -> None:
         """It follows the plan through the air."""
         self._contact.enabled, self._swing.enabled = False, True
         if self._force is not None:
@@ -329,8 +338,6 @@ class LimbMachine:
         if self._parts.plant is not None and self._gripping:
             self._parts.plant.release(self.frame)
         self._gripping = False
-        pin.forwardKinematics(self._parts.robot.model, self._planned, q_planned)
-        self._pose = pin.updateFramePlacement(self._parts.robot.model, self._planned, self._number).copy()
         self.held, self._late = FREE_LIMB, 0.0
         self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
 
@@ -339,17 +346,13 @@ class LimbMachine:
         pose = self._footholds[foothold].pose
         if self._kind.fixed == "position":
             return pin.SE3(pose)
-        z, x = pose.rotation[:, 2], self._planned_pose(time).rotation[:, 0]
+        z, x = pose.rotation[:, 2], self._pose(self._reference.q(time)).rotation[:, 0]
         x = x - (x @ z) * z
         x /= np.linalg.norm(x)
         return pin.SE3(np.column_stack([x, np.cross(z, x), z]), pose.translation)
 
-    def _planned_pose(self, time: float) -> pin.SE3:
+    def _pose(self, q: Array) -> pin.SE3:
+        """Of the contact frame."""
         model = self._parts.robot.model
-        pin.forwardKinematics(model, self._planned, self._reference.q(time))
-        return pin.updateFramePlacement(model, self._planned, self._number).copy()
-
-    def _seen_pose(self, q: Array) -> pin.SE3:
-        model = self._parts.robot.model
-        pin.forwardKinematics(model, self._seen, q)
-        return pin.updateFramePlacement(model, self._seen, self._number).copy()
+        pin.forwardKinematics(model, self._data, q)
+        return pin.updateFramePlacement(model, self._data, self._number).copy()

@@ -525,11 +525,10 @@ class ClimbLoop:
             parts.append((rate - self._last_rate) / self.dt)
             self._last_rate = rate
         self._follow.write(np.concatenate(parts))
+        pin.forwardKinematics(model, self._planned, self._q, rate)
+        for limb in self._limbs:
+            limb.follow(self._planned)
         self._q = q_next
-        if self._aloft:
-            pin.forwardKinematics(model, self._planned, q_next)
-            for limb in self._aloft:
-                limb.follow(self._planned)
 
     def _wrenches(self, forces: Any) -> Array:
         """Of closed contacts, in the axes of their footholds ``[6 limbs]``."""
@@ -628,7 +627,7 @@ class ClimbLoop:
         self._due = -inf
 
     def _change(self, limb: LimbMachine, cause: Cause) -> None:
-        state = limb.change(cause, self._state.q, self._q, self.time)
+        state = limb.change(cause, self._state.q, self.time)
         self._changes.append((self.time, limb.name, state, cause))
         self._look()
 
@@ -637,7 +636,6 @@ class ClimbLoop:
         self._held = [limb.held for limb in self._limbs]
         self._aims = [limb.aim for limb in self._limbs]
         self._states = [int(limb.state) for limb in self._limbs]
-        self._aloft = [limb for limb in self._limbs if limb.state not in CLOSED]
 
     # ------------------------------------------------------------------ plans
 

@@ -32,7 +32,7 @@ COMPONENTS = {"position": (0, 1, 2), "axis": (0, 1, 2, 3, 4), "pose": (0, 1, 2, 
 class FootholdContact(Contact):
     """A contact frame does not move, as of ``Hold`` with the kind of :attr:`ContactKind.fixed`, and its wrench w keeps
 
-        A w <= b        of the contact's kind, in the axes of the foothold
+        J v = -gain e + t,      A w <= b        of the contact's kind, in the axes of the foothold
 
     so that friction counts from the surface's normal however a foot turns on it. Compiled for velocities it is the hold
     alone.
@@ -44,6 +44,7 @@ class FootholdContact(Contact):
     Inputs:
         target: pose of the contact frame at the foothold in the world [m, rad].
         gain: how fast drift decays [1/s].
+        feedforward: t, J v of a motion that keeps the frame where it is over a whole tick, world axes [m/s; rad/s].
         slopes: entries of A that are not zero in :meth:`ContactKind.cone`, by rows.
         bounds: b [N; N m].
     """
@@ -67,13 +68,14 @@ class FootholdContact(Contact):
     def _hold(self) -> tasks.Hold:
         return tasks.Hold(self.frame, kind=self.kind.fixed)
 
-    def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """Those of the hold."""
-        return self._hold.rows(robot)
-
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """Those of the hold."""
-        return self._hold.velocity_rows(robot, kin, inputs, dt)
+        """Those of the hold, with the feed-forward."""
+        held = self._hold.velocity_rows(robot, kin, inputs, dt)
+        side = held.lower + self.still(inputs, kin.pose(self.frame).rotation, inputs["feedforward"])
+        return Rows(held.matrix, side, side)
+
+    def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> None:
+        """None: how the frame's way bends within a tick is known before it, and in the feed-forward."""
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
         """The twist in the axes of the rows; the rate of R'w is R' dw/dt."""
@@ -87,9 +89,10 @@ class FootholdContact(Contact):
         return ca.SX(ca.diagcat(turn, turn)[list(self.axes), :])
 
     def limits(self) -> tuple[Input, ...]:
-        """``slopes`` and ``bounds`` of the kind."""
+        """``feedforward``, and ``slopes`` and ``bounds`` of the kind."""
         slopes, bounds = self.numbers(np.inf)
         return (
+            Input("feedforward", unit="m/s, rad/s", size=6, default=np.zeros(6)),
             Input("slopes", size=len(slopes), default=slopes),
             Input("bounds", unit="N, N m", size=len(bounds), default=bounds),
         )

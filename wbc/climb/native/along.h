@@ -93,10 +93,9 @@ typedef struct {
     double *work;
     long looked, why[WHYS];
     int furthest;
-    jmp_buf no_memory; /* where a call goes back to that lacks memory; nothing but forget_along may follow */
+    jmp_buf no_memory; /* where a call goes back to that lacks memory; nothing but wbc_along_forget may follow */
 } along_t;
 
-static const double AT_BODY[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
 
 /* Memory that was asked for, or none and the call ends */
 static void *got(const along_t *a, void *memory) {
@@ -752,7 +751,7 @@ static void begin_along(along_t *a, const double *step, const double *most, int 
     }
 }
 
-static void forget_along(along_t *a) {
+void wbc_along_forget(along_t *a) {
     drop_levels(a, 0);
     while (a->blocks) {
         block_t *next = a->blocks->next;

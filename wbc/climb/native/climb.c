@@ -8,10 +8,9 @@ long long wbc_limb_size(void) { return (long long)sizeof(limb_t); }
 
 /* Contact poses of n postures in the body's frame, 12 each */
 void wbc_touches(const limb_t *l, long n, const double *angle, double *out) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     placed_t placed;
     for (long k = 0; k < n; k++) {
-        place_steps(l, here, angle + k * l->angles, &placed);
+        place_steps(l, AT_BODY, angle + k * l->angles, &placed);
         memcpy(out + 12 * k, placed.tip, sizeof placed.tip);
     }
 }
@@ -20,10 +19,6 @@ void wbc_touches(const limb_t *l, long n, const double *angle, double *out) {
 void wbc_postures(const limb_t *l, long n, const double *wanted, const double *seed, int most, double *out, int *count) {
     for (long k = 0; k < n; k++)
         count[k] = postures(l, wanted + 12 * k, seed ? seed + k * l->angles : 0, most, out + (size_t)k * most * l->angles);
-}
-
-long wbc_reach_each(const limb_t *l, long n, const double *wanted, int rows, double *angle) {
-    return reach_each(l, n, wanted, rows, angle);
 }
 
 long long wbc_piece_size(void) { return (long long)sizeof(piece_t); }
@@ -52,21 +47,21 @@ static void padded(const climb_t *c, const int *contact, int *out) {
     for (int l = 0; l < MOST_LIMBS; l++) out[l] = l < c->limbs ? contact[l] : -1;
 }
 
-/* A posture on contacts that is borne by one set of them. `body`: place and turn weights, then a pose. `state`: pose of the body and
- * angles, in place; `followed`: whether the limbs that
- * hold are followed from the state given; `numbers`: the slack; `which`: what touches */
+/* A posture on contacts that is borne by one set of them. `body`: place and turn weights, then a pose; `followed`: whether the limbs
+ * that hold are followed from the state given. `state`: pose of the body and angles, in place; `slack`: its own */
 int wbc_stand(climb_t *c, const int *contact, const int *bears, double wanted, const double *body, int followed, double *state,
-              double *numbers, int *which) {
+              double *slack) {
     int all[MOST_LIMBS];
     padded(c, bears, all);
     wish_t wish = {1, {support_of(c, all)}, wanted, body[0], body[1], REST, {0}, 0, {{0}}};
     memcpy(wish.pose, body + 2, sizeof wish.pose);
     if (!wish.support[0]) return NOT_BORNE;
     double from[12 + MOST_LIMBS * MOST_ANGLES], far;
+    int which[2];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
-    int how = posture(c, contact, &wish, state, state + 12, numbers, which);
-    if (how == STANDS && followed) how = follow(c, contact, contact, &wish, 1, from, from + 12, state, state + 12, numbers, which, &far);
-    return how;
+    const int how = posture(c, contact, &wish, state, state + 12, slack, which);
+    if (how != STANDS || !followed) return how;
+    return follow(c, contact, contact, &wish, 1, from, from + 12, state, state + 12, slack, which, &far);
 }
 
 /* How many limbs cannot lift off a state without touching something, each by itself */
@@ -97,16 +92,16 @@ void wbc_look(climb_t *c, const int *contact, const double *state, double *numbe
     }
 }
 
-int wbc_lift(climb_t *c, const int *contact, const int *kept, double wanted, const double *touch, int attempt, double *state,
-             double *slack, int *which, int *moves) {
-    int all[MOST_LIMBS];
+int wbc_lift(climb_t *c, const int *contact, const int *kept, double wanted, const double *touch, int attempt, int *moves, double *state,
+             double *slack) {
+    int all[MOST_LIMBS], which[2];
     padded(c, kept, all);
     return lift_off(c, contact, all, wanted, (const double (*)[12])touch, attempt, state, slack, which, moves);
 }
 
 int wbc_land(climb_t *c, const int *next, const int *kept, double wanted, const double *touch, int attempt, double *state,
-             double *slack, int *which) {
-    int all[MOST_LIMBS];
+             double *slack) {
+    int all[MOST_LIMBS], which[2];
     padded(c, kept, all);
     return land_on(c, next, all, wanted, (const double (*)[12])touch, attempt, state, slack, which);
 }
@@ -171,7 +166,7 @@ along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, 
                    const double *most, int postures) {
     along_t *a = calloc(1, sizeof *a);
     if (!a) return 0;
-    if (setjmp(a->no_memory)) return forget_along(a), (along_t *)0;
+    if (setjmp(a->no_memory)) return wbc_along_forget(a), (along_t *)0;
     a->climb = c, a->rest = rest, a->end = end, a->body = body, a->every = every;
     a->samples = (end + INTERVAL - 1) / INTERVAL + 1;
     a->height = numbers[0], a->shortest = (int)numbers[1], a->margin = numbers[2];
@@ -180,8 +175,6 @@ along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, 
     begin_along(a, step, most, postures);
     return a;
 }
-
-void wbc_along_forget(along_t *a) { forget_along(a); }
 
 /* Adds a span that begins with some angles; its row, -1: there is none, or -2: no memory, as with those below */
 int wbc_along_begun(along_t *a, int limb, int place, const double *angle) {
@@ -239,10 +232,6 @@ int wbc_along_refuse(along_t *a, int level, int swings) {
     if (setjmp(a->no_memory)) return -2;
     refuse_found(a, level, swings);
     return 0;
-}
-
-int wbc_fastest(long n, int rows, int sided, const double *s, const double *a, const double *b, const double *squared, double *x) {
-    return fastest_law(n, rows, sided, s, a, b, squared, x);
 }
 
 /* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there, `lacks`: by

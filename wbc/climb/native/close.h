@@ -18,7 +18,7 @@ static double largest_error(const limb_t *limb, const double *r) {
 static double close_once(const limb_t *limbs, const int *offset, int contacts, const int *which, const double *wanted, int turned,
                          double body, double enough, double *state) {
     placed_t placed;
-    double r[MOST_ROWS], B[MOST_ROWS][6], A[MOST_ROWS][MOST_ANGLES], S[MOST_ROWS * MOST_ROWS], E[6][6], J[MOST_ANGLES][6];
+    double r[MOST_ROWS], B[MOST_ROWS][6], A[MOST_ROWS][MOST_ANGLES], S[MOST_ROWS * MOST_ROWS], E[6][6];
     double error = 0.0, trace = 0.0, twist[6] = {0}, step[MOST_LIMBS][MOST_ANGLES], longest = 0.0;
     int start[MOST_LIMBS + 1] = {0};
     for (int c = 0; c < contacts; c++) {
@@ -27,19 +27,13 @@ static double close_once(const limb_t *limbs, const int *offset, int contacts, c
         const int first = start[c];
         start[c + 1] = first + limb.rows;
         place_steps(&limb, state, state + 12 + offset[which[c]], &placed);
-        contact_error(&limb, placed.tip, wanted + 12 * c, r + first, E);
-        limb_jacobian(&limb, &placed, J);
+        contact_rows(&limb, &placed, wanted + 12 * c, r + first, E, A + first);
         error = fmax(error, largest_error(&limb, r + first));
         double arm[3];
         minus3(placed.tip + 9, state + 9, arm);
         for (int i = 0; i < limb.rows; i++) {
             cross3(arm, E[i], B[first + i] + 3);
             for (int k = 0; k < 3; k++) B[first + i][k] = body * E[i][k], B[first + i][3 + k] = body * (B[first + i][3 + k] + E[i][3 + k]);
-            for (int k = 0; k < limb.angles; k++) {
-                double sum = 0.0;
-                for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
-                A[first + i][k] = sum;
-            }
         }
     }
     if (!(error >= enough) || !(error < 1e3)) return error;

@@ -28,6 +28,9 @@ typedef struct {
     double tip[12], pose[MOST_STEPS][12], axis[MOST_STEPS][3], at[MOST_STEPS][3], mass[MOST_STEPS], moment[MOST_STEPS][3];
 } placed_t;
 
+/* A pose that is that of the body */
+static const double AT_BODY[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+
 /* Poses at some angles, along the axes of the frame in which the body is at `base` */
 static void place_steps(const limb_t *l, const double *base, const double *angle, placed_t *out) {
     double pose[12], next[12], R[9];
@@ -136,6 +139,19 @@ static void contact_error(const limb_t *l, const double *pose, const double *wan
     for (int i = 0; i < 3; i++) E[3][3 + i] = l->length * x[i], E[4][3 + i] = l->length * y[i];
 }
 
+/* The same errors, and how their rows change with the angles: A, rows x angles */
+static void contact_rows(const limb_t *l, const placed_t *p, const double *wanted, double *r, double E[][6], double A[][MOST_ANGLES]) {
+    double J[MOST_ANGLES][6];
+    contact_error(l, p->tip, wanted, r, E);
+    limb_jacobian(l, p, J);
+    for (int i = 0; i < l->rows; i++)
+        for (int k = 0; k < l->angles; k++) {
+            double sum = 0.0;
+            for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
+            A[i][k] = sum;
+        }
+}
+
 /* Solves H x = g, n x n and positive, in place by H = L L'; 0: it is not positive */
 static int solve_positive(int n, double *H, double *g) {
     for (int i = 0; i < n; i++) {
@@ -157,6 +173,37 @@ static int solve_positive(int n, double *H, double *g) {
         g[i] /= H[i * n + i];
     }
     return 1;
+}
+
+/* The step nearest to that from `angle` to `near` (0: to none) with A step = y, damped; its largest part, below 0 where there is none.
+ * Angles at a limit that it would cross take no part in it and are `out`, sought in so many rounds */
+static double damped_step(const limb_t *l, int rows, double A[][MOST_ANGLES], const double *y, double damping, const double *near,
+                          const double *angle, int rounds, double *step, char *out) {
+    const int n = l->angles;
+    double H[36], x[6], longest = 0.0;
+    memset(out, 0, (size_t)n);
+    for (int changed = 1; changed && rounds; rounds--) {
+        for (int i = 0; i < rows; i++) {
+            x[i] = y[i];
+            for (int k = 0; near && k < n; k++) x[i] -= out[k] ? 0.0 : A[i][k] * (near[k] - angle[k]);
+            for (int k = 0; k <= i; k++) {
+                double sum = i == k ? damping : 0.0;
+                for (int j = 0; j < n; j++)
+                    if (!out[j]) sum += A[i][j] * A[k][j];
+                H[i * rows + k] = sum;
+            }
+        }
+        if (!solve_positive(rows, H, x)) return -1.0;
+        changed = 0, longest = 0.0;
+        for (int k = 0; k < n; k++) {
+            step[k] = near && !out[k] ? near[k] - angle[k] : 0.0;
+            if (out[k]) continue;
+            for (int i = 0; i < rows; i++) step[k] += A[i][k] * x[i];
+            if ((angle[k] <= l->lower[k] && step[k] < 0.0) || (angle[k] >= l->upper[k] && step[k] > 0.0)) out[k] = 1, changed = 1;
+            longest = fmax(longest, fabs(step[k]));
+        }
+    }
+    return longest;
 }
 
 #endif

@@ -116,11 +116,10 @@ static double add_contact(const climb_t *c, int l, const placed_t *placed, const
                           double *H, double *g) {
     const limb_t *limb = c->limb + l;
     const int k0 = limb->angles;
-    double arm[3], J[MOST_ANGLES][6], E[6][6], r[6], value[6 + MOST_ANGLES], left = 0.0;
+    double arm[3], A[6][MOST_ANGLES], E[6][6], r[6], value[6 + MOST_ANGLES], left = 0.0;
     int column[6 + MOST_ANGLES];
     const double unit = 1.0 / (c->length * c->length);
-    contact_error(limb, placed->tip, goal, r, E);
-    limb_jacobian(limb, placed, J);
+    contact_rows(limb, placed, goal, r, E, A);
     minus3(placed->tip + 9, base + 9, arm);
     for (int i = 0; i < limb->rows; i++) {
         double lever[3];
@@ -129,11 +128,7 @@ static double add_contact(const climb_t *c, int l, const placed_t *placed, const
             value[k] = E[i][k], value[3 + k] = lever[k] + E[i][3 + k];
             column[k] = k, column[3 + k] = 3 + k;
         }
-        for (int k = 0; k < k0; k++) {
-            double sum = 0.0;
-            for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
-            value[6 + k] = sum, column[6 + k] = start + k;
-        }
+        for (int k = 0; k < k0; k++) value[6 + k] = A[i][k], column[6 + k] = start + k;
         add_row(n, H, g, column, value, 6 + k0, r[i], HOLDS * unit);
         left += unit * r[i] * r[i];
     }

@@ -20,45 +20,19 @@
 static int reach_from(const limb_t *l, const double *base, const double *wanted, double *angle) {
     const int n = l->angles, m = l->rows;
     placed_t placed;
-    double J[MOST_ANGLES][6], E[6][6], r[6], A[6][MOST_ANGLES], H[36], y[6], before = INFINITY;
+    double E[6][6], r[6], A[6][MOST_ANGLES], step[MOST_ANGLES], before = INFINITY;
+    char out[MOST_ANGLES];
     for (int k = 0; k < n; k++) angle[k] = fmin(fmax(angle[k], l->lower[k]), l->upper[k]);
     for (int iteration = 0; iteration < ITERATIONS; iteration++) {
         place_steps(l, base, angle, &placed);
-        contact_error(l, placed.tip, wanted, r, E);
+        contact_rows(l, &placed, wanted, r, E, A);
         double size = 0.0;
-        for (int i = 0; i < m; i++) size += r[i] * r[i];
+        for (int i = 0; i < m; i++) size += r[i] * r[i], r[i] = -r[i];
         if (size <= EXACT * EXACT * l->length * l->length) return 1;
         if (iteration > 12 && size > 0.25 * before) return 0;
         if (iteration % 6 == 0) before = size;
-        limb_jacobian(l, &placed, J);
-        for (int i = 0; i < m; i++)
-            for (int k = 0; k < n; k++) {
-                double sum = 0.0;
-                for (int j = 0; j < 6; j++) sum += E[i][j] * J[k][j];
-                A[i][k] = sum;
-            }
-        char out[MOST_ANGLES] = {0};
-        double step[MOST_ANGLES], longest = 0.0;
-        for (int round = 0, changed = 1; round < 4 && changed; round++) {
-            for (int i = 0; i < m; i++) {
-                for (int k = 0; k <= i; k++) {
-                    double sum = i == k ? 0.05 * size + 1e-14 * l->length * l->length : 0.0;
-                    for (int j = 0; j < n; j++)
-                        if (!out[j]) sum += A[i][j] * A[k][j];
-                    H[i * m + k] = sum;
-                }
-                y[i] = -r[i];
-            }
-            if (!solve_positive(m, H, y)) return 0;
-            changed = 0, longest = 0.0;
-            for (int k = 0; k < n; k++) {
-                step[k] = 0.0;
-                if (out[k]) continue;
-                for (int i = 0; i < m; i++) step[k] += A[i][k] * y[i];
-                if ((angle[k] <= l->lower[k] && step[k] < 0.0) || (angle[k] >= l->upper[k] && step[k] > 0.0)) out[k] = 1, changed = 1;
-                longest = fmax(longest, fabs(step[k]));
-            }
-        }
+        const double longest = damped_step(l, m, A, r, 0.05 * size + 1e-14 * l->length * l->length, 0, angle, 4, step, out);
+        if (longest < 0.0) return 0;
         const double by = longest > LONGEST_STEP ? LONGEST_STEP / longest : 1.0;
         double moved = 0.0;
         for (int k = 0; k < n; k++) {
@@ -72,8 +46,7 @@ static int reach_from(const limb_t *l, const double *base, const double *wanted,
 
 /* Brings a contact to each of n wanted poses in the body's frame, from the angles of each or else from those that the one before
  * came to, in place; `rows`: of the pose that count at most. How many were reached, the first ones */
-static long reach_each(const limb_t *l, long n, const double *wanted, int rows, double *angle) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+long wbc_reach_each(const limb_t *l, long n, const double *wanted, int rows, double *angle) {
     const size_t size = (size_t)l->angles * sizeof *angle;
     limb_t part = *l;
     double now[MOST_ANGLES];
@@ -81,10 +54,10 @@ static long reach_each(const limb_t *l, long n, const double *wanted, int rows, 
     for (long k = 0; k < n; k++) {
         double *at = angle + k * l->angles;
         memcpy(now, at, size);
-        if (!reach_from(&part, here, wanted + 12 * k, now)) {
+        if (!reach_from(&part, AT_BODY, wanted + 12 * k, now)) {
             if (!k) return 0;
             memcpy(now, at - l->angles, size);
-            if (!reach_from(&part, here, wanted + 12 * k, now)) return k;
+            if (!reach_from(&part, AT_BODY, wanted + 12 * k, now)) return k;
         }
         memcpy(at, now, size);
     }
@@ -112,9 +85,18 @@ static int nearest_samples(const limb_t *l, const double *wanted, int most, int 
     return count;
 }
 
+/* Whether a posture is apart from `count` known ones, `by` numbers from one to the next */
+static int is_new(const limb_t *l, int count, const double *known, long by, const double *angle) {
+    for (int j = 0; j < count; j++) {
+        double apart = 0.0;
+        for (int i = 0; i < l->angles; i++) apart = fmax(apart, fabs(known[j * by + i] - angle[i]));
+        if (!(apart > DISTINCT)) return 0;
+    }
+    return 1;
+}
+
 /* Postures at a wanted pose in the body's frame, `most` of them, apart from each other; how many. A seed comes first */
 static int postures(const limb_t *l, const double *wanted, const double *seed, int most, double *out) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     int nearest[TRIES], count = 0, first = seed ? -1 : 0, last = -1;
     double angle[MOST_ANGLES], by[3];
     const double at[3] = {l->step[0].place[9], l->step[0].place[10], l->step[0].place[11]};
@@ -124,14 +106,8 @@ static int postures(const limb_t *l, const double *wanted, const double *seed, i
         if (k == 0) last = nearest_samples(l, wanted, TRIES, nearest);
         if (k >= 0 && k >= last) break;
         memcpy(angle, k < 0 ? seed : l->sample + (size_t)nearest[k] * l->angles, (size_t)l->angles * sizeof *angle);
-        if (!reach_from(l, here, wanted, angle)) continue;
-        int fresh = 1;
-        for (int j = 0; j < count && fresh; j++) {
-            double apart = 0.0;
-            for (int i = 0; i < l->angles; i++) apart = fmax(apart, fabs(out[j * l->angles + i] - angle[i]));
-            fresh = apart > DISTINCT;
-        }
-        if (fresh) memcpy(out + (size_t)count++ * l->angles, angle, (size_t)l->angles * sizeof *angle);
+        if (!reach_from(l, AT_BODY, wanted, angle)) continue;
+        if (is_new(l, count, out, l->angles, angle)) memcpy(out + (size_t)count++ * l->angles, angle, (size_t)l->angles * sizeof *angle);
     }
     return count;
 }

@@ -12,12 +12,11 @@
 /* Follows a contact from one wanted pose to the next, `count` of them `by` apart in memory, from the posture in `angle`, which
  * is at the first one; writes a row of angles each. No joint may move by more than `step` between two. How many were reached */
 static int follow_contact(const limb_t *l, int count, const double *wanted, int by, const double *step, double *angle) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const int n = l->angles, way = by > 0 ? 1 : -1;
     for (int k = 1; k < count; k++) {
         double *last = angle + (long)way * (k - 1) * n, *next = angle + (long)way * k * n, now[MOST_ANGLES];
         for (int i = 0; i < n; i++) now[i] = k > 1 ? 2.0 * last[i] - (last - way * n)[i] : last[i];
-        if (!reach_from(l, here, wanted + (long)by * k, now)) return k;
+        if (!reach_from(l, AT_BODY, wanted + (long)by * k, now)) return k;
         for (int i = 0; i < n; i++)
             if (fabs(now[i] - last[i]) > step[i]) return k;
         memcpy(next, now, (size_t)n * sizeof *next);
@@ -29,32 +28,14 @@ static int follow_contact(const limb_t *l, int count, const double *wanted, int 
 static void ease_to_rest(const limb_t *l, const double *base, const double *wanted, double *angle) {
     const int n = l->angles, m = l->rows;
     placed_t placed;
-    double J[MOST_ANGLES][6], E[6][6], r[6], A[6][MOST_ANGLES], H[36], y[6], next[MOST_ANGLES];
+    const double none[6] = {0};
+    double E[6][6], r[6], A[6][MOST_ANGLES], next[MOST_ANGLES];
+    char out[MOST_ANGLES];
     for (int round = 0; round < EASED && n > m; round++) {
         place_steps(l, base, angle, &placed);
-        contact_error(l, placed.tip, wanted, r, E);
-        limb_jacobian(l, &placed, J);
-        for (int i = 0; i < m; i++)
-            for (int k = 0; k < n; k++) {
-                A[i][k] = 0.0;
-                for (int j = 0; j < 6; j++) A[i][k] += E[i][j] * J[k][j];
-            }
-        for (int i = 0; i < m; i++) {
-            for (int k = 0; k <= i; k++) {
-                double sum = i == k ? 1e-9 * l->length * l->length : 0.0;
-                for (int j = 0; j < n; j++) sum += A[i][j] * A[k][j];
-                H[i * m + k] = sum;
-            }
-            y[i] = 0.0;
-            for (int k = 0; k < n; k++) y[i] += A[i][k] * (l->rest[k] - angle[k]);
-        }
-        if (!solve_positive(m, H, y)) return;
-        double longest = 0.0;
-        for (int k = 0; k < n; k++) {
-            next[k] = l->rest[k] - angle[k];
-            for (int i = 0; i < m; i++) next[k] -= A[i][k] * y[i];
-            longest = fmax(longest, fabs(next[k]));
-        }
+        contact_rows(l, &placed, wanted, r, E, A);
+        const double longest = damped_step(l, m, A, none, 1e-9 * l->length * l->length, l->rest, angle, 1, next, out);
+        if (longest < 0.0) return;
         if (longest < 1e-3) return;
         for (int k = 0; k < n; k++) next[k] = angle[k] + fmin(1.0, LONGEST_STEP / longest) * next[k];
         if (!reach_from(l, base, wanted, next)) return;
@@ -66,7 +47,6 @@ static void ease_to_rest(const limb_t *l, const double *base, const double *want
  * last that were reached. `start`: a posture to begin with, or 0 for rest and `tries` of the table. How many, `most` at most */
 static int hold_spans(const limb_t *l, int count, const double *wanted, int at, const double *start, int tries, int most,
                       const double *step, double *angles, int *first, int *last) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const int n = l->angles;
     int nearest[TRIES], known = 0, spans = 0, reached = 0;
     double angle[MOST_ANGLES];
@@ -75,16 +55,10 @@ static int hold_spans(const limb_t *l, int count, const double *wanted, int at, 
         if (k >= 0 && k >= known) break;
         memcpy(angle, k == -2 ? start : k < 0 ? l->rest : l->sample + (size_t)nearest[k] * n, (size_t)n * sizeof *angle);
         if (k >= HOPELESS && !reached) break;
-        if (!reach_from(l, here, wanted + 12 * at, angle)) continue;
+        if (!reach_from(l, AT_BODY, wanted + 12 * at, angle)) continue;
         reached = 1;
-        if (k > -2) ease_to_rest(l, here, wanted + 12 * at, angle);
-        int fresh = 1;
-        for (int j = 0; j < spans && fresh; j++) {
-            double apart = 0.0;
-            for (int i = 0; i < n; i++) apart = fmax(apart, fabs(angles[((long)j * count + at) * n + i] - angle[i]));
-            fresh = apart > DISTINCT;
-        }
-        if (!fresh) continue;
+        if (k > -2) ease_to_rest(l, AT_BODY, wanted + 12 * at, angle);
+        if (!is_new(l, spans, angles + (long)at * n, (long)count * n, angle)) continue;
         double *row = angles + ((long)spans * count + at) * n;
         memcpy(row, angle, (size_t)n * sizeof *angle);
         last[spans] = at + follow_contact(l, count - at, wanted + 12 * at, 12, step, row) - 1;

@@ -27,16 +27,15 @@ static double risen(double x) {
  * `angle` on; whether there are any */
 static int reach_place(const limb_t *l, const double *wanted, int rows, const double (*along)[3], double off, const double *near,
                        double *angle) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     const int n = l->angles;
     const double size = l->length * l->length;
     placed_t placed;
     double J[MOST_ANGLES][6], A[3][MOST_ANGLES];
     for (int k = 0; k < n; k++) angle[k] = fmin(fmax(angle[k], l->lower[k]), l->upper[k]);
     for (int round = 0; round < SWING_ITERATIONS; round++) {
-        double by[3], r[3], away = 0.0, step[MOST_ANGLES], longest = 0.0;
-        char out[MOST_ANGLES] = {0};
-        place_steps(l, here, angle, &placed);
+        double by[3], r[3], away = 0.0, step[MOST_ANGLES];
+        char out[MOST_ANGLES];
+        place_steps(l, AT_BODY, angle, &placed);
         minus3(wanted, placed.tip + 9, by);
         limb_jacobian(l, &placed, J);
         for (int i = 0; i < rows; i++) {
@@ -44,27 +43,8 @@ static int reach_place(const limb_t *l, const double *wanted, int rows, const do
             away += r[i] * r[i];
             for (int k = 0; k < n; k++) A[i][k] = dot3(along[i], J[k]);
         }
-        for (int changed = 1; changed;) { /* angles at a limit that a step would cross take no part in it */
-            double H[9], y[3];
-            for (int i = 0; i < rows; i++) {
-                y[i] = r[i];
-                for (int k = 0; k < n; k++) y[i] -= out[k] ? 0.0 : A[i][k] * (near[k] - angle[k]);
-                for (int k = 0; k <= i; k++) {
-                    double sum = i == k ? SWING_DAMPED * size : 0.0;
-                    for (int j = 0; j < n; j++) sum += out[j] ? 0.0 : A[i][j] * A[k][j];
-                    H[rows * i + k] = sum;
-                }
-            }
-            if (!solve_positive(rows, H, y)) return 0;
-            changed = 0, longest = 0.0;
-            for (int k = 0; k < n; k++) {
-                step[k] = out[k] ? 0.0 : near[k] - angle[k];
-                for (int i = 0; i < rows; i++) step[k] += out[k] ? 0.0 : A[i][k] * y[i];
-                const int low = angle[k] <= l->lower[k] && step[k] < 0.0, high = angle[k] >= l->upper[k] && step[k] > 0.0;
-                if (low || high) out[k] = 1, changed = 1;
-                longest = fmax(longest, fabs(step[k]));
-            }
-        }
+        const double longest = damped_step(l, rows, A, r, SWING_DAMPED * size, near, angle, -1, step, out);
+        if (longest < 0.0) return 0;
         away = sqrt(away);
         if (away < SWING_NEAR * l->length && longest < SWING_SETTLED) return 1;
         if (round == SWING_ITERATIONS - 1) return away < off;

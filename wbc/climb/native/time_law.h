@@ -8,7 +8,7 @@
 typedef struct { double lean, above, below; } law_row_t;
 
 /* x of n points of the grid s; a and b: n x rows, of which the last `sided` bind above alone. 0: no memory */
-static int fastest_law(long n, int rows, int sided, const double *s, const double *a, const double *b, const double *squared,
+int wbc_fastest(long n, int rows, int sided, const double *s, const double *a, const double *b, const double *squared,
                        double *x) {
     const int both = rows - sided, all = 2 * rows;
     law_row_t *row = malloc(((size_t)(n - 1) * all + 1) * sizeof *row);

@@ -4,14 +4,6 @@
 
 #include "stand.h"
 
-/* No point of a shape has gone farther from one pose to another */
-static double gone(const shape_t *shape, const double *one, const double *other) {
-    double by[3], turned = 0.0;
-    minus3(one + 9, other + 9, by);
-    for (int i = 0; i < 9; i++) turned += (one[i] - other[i]) * (one[i] - other[i]);
-    return sqrt(dot3(by, by)) + shape->size[5] * sqrt(turned);
-}
-
 /* Marks the instants at which two shapes are nearer than `keep` (of instant k: kept[kept_by * k]); their poses are `a_by` and `b_by`
  * numbers apart, 0: it stands */
 static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A, long a_by, const shape_t *b, const double *B,
@@ -23,7 +15,7 @@ static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A
         const double *one = A + k * a_by, *other = B + k * b_by, keep = kept[kept_by * k];
         if (mark[k]) continue;
         if (gap > keep) {
-            const double moved = (a_by ? gone(a, one, A + last * a_by) : 0.0) + (b_by ? gone(b, other, B + last * b_by) : 0.0);
+            const double moved = (a_by ? moved_within(one, A + last * a_by, a->size[5]) : 0.0) + (b_by ? moved_within(other, B + last * b_by, b->size[5]) : 0.0);
             if (gap - moved > keep) continue;
         }
         last = k;
@@ -45,15 +37,14 @@ static void mark_touch(const tolerance_t *how, const shape_t *a, const double *A
 /* Poses of the centres of a limb's pieces (-1: of the body's) in the body's frame at n postures, 12 each, posture by posture; how
  * many pieces it has. `out` 0: that alone */
 static int pieces_of(const climb_t *c, int limb, long n, const double *angle, double *out) {
-    static const double here[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     int count = 0;
     for (int k = 0; k < c->pieces; k++) count += c->piece[k].limb == limb;
     placed_t placed;
     for (long j = 0; out && j < n; j++) {
-        if (limb >= 0) place_steps(c->limb + limb, here, angle + j * c->limb[limb].angles, &placed);
+        if (limb >= 0) place_steps(c->limb + limb, AT_BODY, angle + j * c->limb[limb].angles, &placed);
         for (int k = 0; k < c->pieces; k++) {
             if (c->piece[k].limb != limb) continue;
-            compose(limb < 0 ? here : placed.pose[c->piece[k].step], c->piece[k].place, out);
+            compose(limb < 0 ? AT_BODY : placed.pose[c->piece[k].step], c->piece[k].place, out);
             out += 12;
         }
     }

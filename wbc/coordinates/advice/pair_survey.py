@@ -11,9 +11,9 @@ import numpy as np
 from wbc import validation
 from wbc.coordinates.advice.adviser import Adviser
 from wbc.coordinates.pair import CoordinatePair
+from wbc.coordinates.samples import states_of
 from wbc.errors import RangeError
 from wbc.robot import Robot
-from wbc.robot.sampling import configuration, draw
 from wbc.validation import Array
 
 #: Ticks that a time is the median of
@@ -58,7 +58,7 @@ def survey_pairs(robot: Robot, pairs: Sequence[CoordinatePair], count: int, *, s
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise RangeError("count", count, "expected a whole number of at least 1")
     adviser = Adviser(robot, pairs, exact=False)
-    states = _states(robot, count, seed)
+    states = states_of(robot, count, validation.integer("seed", seed))
     names = list(adviser.pairs)
     ratios, tasks, best = np.empty(count), np.empty(count), []
     for k, q in enumerate(states):
@@ -78,13 +78,8 @@ def advice_time(adviser: Adviser, *, seed: int = 0) -> float:
     """Median time of :meth:`Adviser.sigmas`, what a control loop asks for in a tick [s]."""
     validation.instance("adviser", adviser, Adviser, "an Adviser")
     spent = []
-    for q in _states(adviser.robot, TICKS, seed):
+    for q in states_of(adviser.robot, TICKS, validation.integer("seed", seed)):
         began = perf_counter()
         adviser.sigmas(q)
         spent.append(perf_counter() - began)
     return float(np.median(spent))
-
-
-def _states(robot: Robot, count: int, seed: int) -> Array:
-    seed = validation.integer("seed", seed)
-    return np.array([configuration(robot, step) for step in draw(robot, count, np.random.default_rng(seed))])

@@ -17,6 +17,7 @@ from wbc.errors import WbcError
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.tasks._stereographic import triple
 from wbc.validation import Array
 
 #: Configurations at which ranks are looked at
@@ -161,10 +162,10 @@ class _PartFinder:
             held: list[Coordinate] = []
             if i >= 2:
                 upper = self._frame(f"{prefix}shoulder_body", joints[i - 1], pin.SE3.Identity())
-                held.append(AxisRows(upper, _triple(one), shoulder, name=f"{prefix}beta"))
+                held.append(AxisRows(upper, triple(one), shoulder, name=f"{prefix}beta"))
             if i + 3 < len(joints):
                 hand = self._frame(f"{prefix}wrist_body", joints[i + 3], pin.SE3.Identity())
-                held.append(AxisRows(hand, _triple(three), wrist, name=f"{prefix}gamma"))
+                held.append(AxisRows(hand, triple(three), wrist, name=f"{prefix}gamma"))
             return PitchPlaneRows(shoulder, wrist, name=f"{prefix}alpha"), tuple(held)
         return None, ()
 
@@ -293,8 +294,3 @@ def _axis(robot: Robot, joint: int) -> Array | None:
     ]
     size = float(np.linalg.norm(column))
     return None if size < ROUNDING else np.asarray(column / size)
-
-
-def _triple(axis: Array) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in axis)
-    return x, y, z

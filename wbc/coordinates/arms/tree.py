@@ -9,7 +9,7 @@ import numpy as np
 
 from wbc.coordinates.arms.arm_parts import MissingPartError
 from wbc.robot import Robot
-from wbc.symbolic.kinematics import frame_index
+from wbc.symbolic.kinematics import joint_of
 
 #: A branch of fewer joints is a finger or a head, not an arm
 SHORTEST = 3
@@ -96,7 +96,7 @@ def _named_ends(robot: Robot) -> dict[tuple[str, str], int]:
     for k, role in enumerate(roles, start=1):
         prefix = role.removesuffix("hand") if role.endswith("_hand") else f"arm{k}_"
         frame = robot.frames[role]
-        joint = int(robot.model.frames[frame_index(robot.model, frame)].parentJoint)
+        joint = joint_of(robot.model, frame)
         if joint > 0:
             out[prefix if len(roles) > 1 else "", frame] = joint
     return out

@@ -21,7 +21,7 @@ from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
 from wbc.symbolic.evaluation import SingleState
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import WORLD, joint_of
 from wbc.validation import Array
 
 #: Sets of rows whose rank is looked at together
@@ -41,16 +41,11 @@ def system_coordinates(robot: Robot) -> tuple[BodyRows, ...]:
     model, out = checked_robot(robot).model, []
     for j in range(1, model.njoints):
         names = [(f.type != pin.FrameType.BODY, str(f.name)) for f in model.frames if int(f.parentJoint) == j]
-        own = [name for _, name in sorted(names, key=lambda item: item[0]) if _leads_to(robot, name, j)]
+        own = [name for _, name in sorted(names, key=lambda item: item[0]) if joint_of(model, name) == j]
         if not own:
             raise MissingPartError.of("robot", robot.name, f"frame on the body behind joint {model.names[j]!r}")
         out.append(BodyRows(own[0], expressed=WORLD))
     return tuple(out)
-
-
-def _leads_to(robot: Robot, name: str, joint: int) -> bool:
-    """Whether a name means a frame of this joint's body, should several frames have it."""
-    return int(robot.model.frames[frame_index(robot.model, name)].parentJoint) == joint
 
 
 @dataclass(frozen=True)

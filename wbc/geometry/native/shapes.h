@@ -4,6 +4,10 @@
 
 #include "vectors.h"
 
+#ifdef __AVX512DQ__
+#include <immintrin.h>
+#endif
+
 /* What a shape is, see wbc/shapes/solid.py: a box, a disc across z and a ball added up (spheres, capsules, boxes, cylinders);
  * a hull; an ellipsoid; a half-space z <= 0; the wall round an endless cylinder about z, and that cylinder; a surface of
  * triangles; a map of heights */
@@ -15,6 +19,17 @@ enum { SUM, HULL, ELLIPSOID, PLANE, TUBE, ROD, MESH, FIELD };
 #define LANES 8
 typedef double lanes_t __attribute__((vector_size(64), aligned(8), may_alias));
 typedef long long mask_t __attribute__((vector_size(64), aligned(8), may_alias));
+
+/* Bits of a lane each */
+static inline unsigned bits(mask_t mask) {
+#ifdef __AVX512DQ__
+    return _mm512_movepi64_mask((__m512i)mask);
+#else
+    unsigned out = 0;
+    for (int l = 0; l < LANES; l++) out |= (unsigned)(mask[l] & 1) << l;
+    return out;
+#endif
+}
 
 typedef struct {
     int kind;
@@ -38,13 +53,19 @@ typedef struct {
     int doubtful;
 } answer_t;
 
+/* How far LANES points of a hull, from number k on, reach along d */
+static inline lanes_t heights(const shape_t *a, const double *d, int k) {
+    const double *x = a->points + k, *y = x + a->count, *z = y + a->count;
+    return d[0] * *(const lanes_t *)x + d[1] * *(const lanes_t *)y + d[2] * *(const lanes_t *)z;
+}
+
 /* The first of a hull's points that reach farthest along d; LANES points at a time */
 static inline void farthest(const shape_t *a, const double *d, double *out) {
     const double *x = a->points, *y = x + a->count, *z = y + a->count;
     lanes_t most = {0}, at = {0};
     most -= INFINITY;
     for (int k = 0; k < a->count; k += LANES) {
-        const lanes_t height = d[0] * *(const lanes_t *)(x + k) + d[1] * *(const lanes_t *)(y + k) + d[2] * *(const lanes_t *)(z + k);
+        const lanes_t height = heights(a, d, k);
         const mask_t higher = height > most;
         most = (lanes_t)((higher & (mask_t)height) | (~higher & (mask_t)most));
         at = (lanes_t)((higher & (mask_t)(at * 0.0 + k)) | (~higher & (mask_t)at));
@@ -103,11 +124,15 @@ static void middle(const shape_t *a, const double *d, double *out) {
         const double *x = a->points, *y = x + a->count, *z = y + a->count, most = reach(a, d);
         double sum[3] = {0.0, 0.0, 0.0};
         int count = 0;
-        for (int k = 0; k < a->count; k++) {
-            const int again = k > 0 && x[k] == x[k - 1] && y[k] == y[k - 1] && z[k] == z[k - 1];
-            if (again || d[0] * x[k] + d[1] * y[k] + d[2] * z[k] < most - FLAT * a->size[5]) continue;
-            sum[0] += x[k], sum[1] += y[k], sum[2] += z[k];
-            count++;
+        for (int first = 0; first < a->count; first += LANES) {
+            /* Most are far from it: they are not looked at one by one */
+            if (!bits(heights(a, d, first) >= most - 2.0 * FLAT * a->size[5])) continue;
+            for (int k = first; k < first + LANES; k++) {
+                const int again = k > 0 && x[k] == x[k - 1] && y[k] == y[k - 1] && z[k] == z[k - 1];
+                if (again || d[0] * x[k] + d[1] * y[k] + d[2] * z[k] < most - FLAT * a->size[5]) continue;
+                sum[0] += x[k], sum[1] += y[k], sum[2] += z[k];
+                count++;
+            }
         }
         for (int k = 0; k < 3; k++) out[k] = sum[k] / count;
         return;

@@ -4,29 +4,26 @@
 
 #include "shapes.h"
 
-#ifdef __AVX512DQ__
-#include <immintrin.h>
-#endif
-
 /* Newton steps towards the point of a segment that is nearest to a box, from its middle on */
 #define NEARER 3
 
-/* Bits of a lane each */
-static unsigned bits(mask_t mask) {
+static lanes_t chosen(mask_t mask, lanes_t one, lanes_t other) { return (lanes_t)((mask & (mask_t)one) | (~mask & (mask_t)other)); }
+
+static lanes_t min_lanes(lanes_t a, lanes_t b) {
 #ifdef __AVX512DQ__
-    return _mm512_movepi64_mask((__m512i)mask);
+    return (lanes_t)_mm512_min_pd((__m512d)a, (__m512d)b);
 #else
-    unsigned out = 0;
-    for (int l = 0; l < LANES; l++) out |= (unsigned)(mask[l] & 1) << l;
-    return out;
+    return chosen(a < b, a, b);
 #endif
 }
 
-static lanes_t chosen(mask_t mask, lanes_t one, lanes_t other) { return (lanes_t)((mask & (mask_t)one) | (~mask & (mask_t)other)); }
-
-static lanes_t min_lanes(lanes_t a, lanes_t b) { return chosen(a < b, a, b); }
-
-static lanes_t max_lanes(lanes_t a, lanes_t b) { return chosen(a > b, a, b); }
+static lanes_t max_lanes(lanes_t a, lanes_t b) {
+#ifdef __AVX512DQ__
+    return (lanes_t)_mm512_max_pd((__m512d)a, (__m512d)b);
+#else
+    return chosen(a > b, a, b);
+#endif
+}
 
 static lanes_t abs_lanes(lanes_t a) { return (lanes_t)((mask_t)a & 0x7fffffffffffffffLL); }
 

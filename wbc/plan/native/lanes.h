@@ -6,6 +6,9 @@
 
 #include "places.h"
 
+/* Blocks of no more pairs are not looked at as such */
+#define FEW 3
+
 /* Along a direction: how far a body reaches at the place itself, and within the piece */
 typedef struct {
     lanes_t here, within;
@@ -103,7 +106,8 @@ static unsigned undecided(plan_t *p, int k, unsigned near) {
     const unsigned hit = pair->exact ? near & bits(distance < pair->core + required) : 0;
     if (hit) strike(p, k, hit);
     if (s->stopped >= 0 || !(near &= p->alive)) return 0;
-    for (int m = 0; m < 3; m++) n[m] /= distance;
+    const lanes_t inverse = 1.0 / distance;
+    for (int m = 0; m < 3; m++) n[m] *= inverse;
     const extent_t gap = apart_along(p, pair, n);
     const int one = __builtin_ctz(near);
     for (int m = 0; m < 3; m++) known[m] = sign * n[m][one];
@@ -111,10 +115,12 @@ static unsigned undecided(plan_t *p, int k, unsigned near) {
     return near & ~bits(apart);
 }
 
-/* Lanes at which a pair is not proven to be far enough apart */
-static unsigned near_pair(plan_t *p, int k) {
+/* Those of some lanes at which the balls about a pair, or a block of pairs, are not far enough apart */
+static unsigned near_balls(plan_t *p, int k, unsigned lanes) {
     const outline_t *pair = p->outlines + k;
-    if (pair->form == UNSEEN) return p->alive;
+    if (pair->form == UNSEEN) return lanes;
+    ball_lanes(p, pair->ball);
+    ball_lanes(p, pair->other);
     const lanes_t *offs = (const lanes_t *)p->offs, reached = p->sweep->required[k] + pair->radii + offs[pair->ball_off] + offs[pair->other_off];
     const lanes_t *ball = (const lanes_t *)p->lane_centre + 3 * pair->ball, *other = (const lanes_t *)p->lane_centre + 3 * pair->other;
     const double *box = p->boxes + 15 * pair->other;
@@ -125,18 +131,30 @@ static unsigned near_pair(plan_t *p, int k) {
         const lanes_t x = ball[0] - box[9], y = ball[1] - box[10], z = ball[2] - box[11];
         for (int m = 0; m < 3; m++) d[m] = max_lanes(abs_lanes(box[m] * x + box[3 + m] * y + box[6 + m] * z) - box[12 + m], (lanes_t){0});
     }
-    const unsigned near = p->alive & bits((dot_lanes(d, d) < reached * reached) & (reached > 0.0));
-    return near && pair->round ? undecided(p, k, near) : near;
+    return lanes & bits(dot_lanes(d, d) < reached * abs_lanes(reached));
+}
+
+/* A pair behind `left` others, with its lanes, where it is not proven to be far enough apart at all of some; how many they are then */
+static int look_at(plan_t *p, int k, unsigned lanes, int *near, int left) {
+    lanes = near_balls(p, k, lanes & p->alive);
+    if (lanes && p->outlines[k].round) lanes = undecided(p, k, lanes);
+    if (!lanes) return left;
+    near[2 * left] = k, near[2 * left + 1] = (int)lanes;
+    return left + 1;
 }
 
 /* Those of some pairs, 0: of all, that are not proven so, and at which lanes, one behind the other; how many. It ends with one that is too near */
 static int near_pairs(plan_t *p, const int *pairs, int count, int *near) {
+    const int *recent = p->recent;
     int left = 0;
-    for (int m = pairs ? 0 : -RECENT; m < count && p->sweep->stopped < 0; m++) {
-        const int k = m < 0 ? p->recent[m + RECENT] : pairs ? pairs[m] : m;
-        if (k < 0 || (!pairs && m >= 0 && (k == p->recent[0] || k == p->recent[1] || k == p->recent[2]))) continue;
-        const unsigned lanes = near_pair(p, k);
-        if (lanes) near[2 * left] = k, near[2 * left++ + 1] = (int)lanes;
+    for (int m = 0; m < (pairs ? count : RECENT) && p->sweep->stopped < 0; m++) {
+        const int k = pairs ? pairs[m] : recent[m];
+        if (k >= 0) left = look_at(p, k, ~0u, near, left);
+    }
+    for (int block = 0, k = 0; !pairs && block < p->blocks; k = p->block_end[block++]) {
+        const unsigned lanes = p->block_end[block] - k > FEW ? near_balls(p, p->pairs + block, p->alive) : p->alive;
+        for (; lanes && k < p->block_end[block] && p->sweep->stopped < 0; k++)
+            if (k != recent[0] && k != recent[1] && k != recent[2]) left = look_at(p, k, lanes, near, left);
     }
     return left;
 }

@@ -46,7 +46,7 @@ void wbc_plan_prepare(plan_t *p) {
             box[12 + m] = 0.5 * (up + down);
         }
     }
-    for (int k = 0; k < p->pairs; k++) {
+    for (int k = 0; k < p->pairs + p->blocks; k++) {
         const int i = s->first[k], j = s->second[k], swap = s->body_frame[i] < 0, ball = swap ? j : i, other = swap ? i : j;
         const int one = (s->depth + 1) * i + s->stop_first[k], two = (s->depth + 1) * j + s->stop_second[k];
         const int moves = s->body_frame[other] >= 0, seen = radius[i] < INFINITY && radius[j] < INFINITY;
@@ -58,8 +58,7 @@ void wbc_plan_prepare(plan_t *p) {
     }
 }
 
-/* All joints, and the balls about bodies that move, in the middles of some stretches, LANES at most; how far joints go until their
- * ends, and points of bodies at most: what their first joints do, summed up */
+/* All joints in the middles of some stretches, LANES at most, and how far they go until their ends */
 static void place_lanes(plan_t *p, const stretch_t *all, int count) {
     const sweep_t *s = p->sweep;
     p->lane_node++;
@@ -94,21 +93,24 @@ static void place_lanes(plan_t *p, const stretch_t *all, int count) {
             for (int i = 0; i < 3; i++) pose[9 + i] += q * pose[3 * i + 2];
         }
     }
-    for (int b = 0; b < s->bodies; b++) {
-        if (s->body_frame[b] < 0) continue;
-        lanes_t *centre = (lanes_t *)p->lane_centre + 3 * b;
-        const lanes_t *pose = (const lanes_t *)p->lane_pose + 12 * s->body_frame[b];
-        const double *line = s->line + 8 * b;
-        for (int i = 0; i < 3; i++) {
-            centre[i] = pose[9 + i];
-            for (int m = 0; m < 3; m++) centre[i] += 0.5 * (line[m] + line[3 + m]) * pose[3 * i + m];
-        }
-        lanes_t *off = (lanes_t *)p->offs + (s->depth + 1) * b;
-        for (int k = 0; k < s->chain_length[b]; k++) {
-            const int f = s->chain[s->depth * b + k];
-            const lanes_t way = abs_lanes(((const lanes_t *)p->gone)[f]), most = s->kind[f] == TURNING ? min_lanes(way, (lanes_t){0} + 2.0) : way;
-            off[k + 1] = off[k] + chosen(way > 0.0, most * p->reaches[s->depth * b + k], (lanes_t){0});
-        }
+}
+
+/* The ball about a body that moves, there, and how far points of it may be off at most: what its first joints do, summed up */
+static void ball_lanes(plan_t *p, int b) {
+    const sweep_t *s = p->sweep;
+    if (s->body_frame[b] < 0 || p->ball_stamp[b] == p->lane_node) return;
+    p->ball_stamp[b] = p->lane_node;
+    lanes_t *centre = (lanes_t *)p->lane_centre + 3 * b, *off = (lanes_t *)p->offs + (s->depth + 1) * b;
+    const lanes_t *pose = (const lanes_t *)p->lane_pose + 12 * s->body_frame[b];
+    const double *line = s->line + 8 * b;
+    for (int i = 0; i < 3; i++) {
+        centre[i] = pose[9 + i];
+        for (int m = 0; m < 3; m++) centre[i] += 0.5 * (line[m] + line[3 + m]) * pose[3 * i + m];
+    }
+    for (int k = 0; k < s->chain_length[b]; k++) {
+        const int f = s->chain[s->depth * b + k];
+        const lanes_t way = abs_lanes(((const lanes_t *)p->gone)[f]), most = s->kind[f] == TURNING ? min_lanes(way, (lanes_t){0} + 2.0) : way;
+        off[k + 1] = off[k] + chosen(way > 0.0, most * p->reaches[s->depth * b + k], (lanes_t){0});
     }
 }
 

@@ -1,5 +1,5 @@
 /* What a planner works on: all arrays are Python's, which keeps them as long as this is used; wbc/plan/native.py fills it,
- * the order of the fields is the same there. Configurations are n coordinates x; distances |x - y| are weighted. */
+ * and reads its structures here. Configurations are n coordinates x; distances |x - y| are weighted. */
 #pragma once
 
 #include "sweep.c"
@@ -57,12 +57,14 @@ typedef struct {
     double *lane_ends;   /* bodies x 6 x LANES: of the cores of bodies there */
     double *lane_ways;   /* bodies x (depth + 1) x WAYS x LANES: what joints do to these within half a piece: see lanes.h */
     int *lane_stamp;     /* bodies: whether both are of the places at hand */
-    outline_t *outlines; /* pairs */
+    int *ball_stamp;     /* bodies: whether centre and offs are */
+    outline_t *outlines; /* pairs, then the blocks that they are in */
+    int *block_end;      /* blocks: the pair behind the last one of each */
     int recent[RECENT];
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
     const double *weight, *scale;           /* n: what a coordinate counts, its square and itself */
-    int n, pairs, capacity, seeds, count[2];
+    int n, pairs, blocks, capacity, seeds, count[2];
     double range;     /* an edge is no longer */
     double step;      /* of edges with rows: between two projections */
     double tolerance; /* of equalities at a configuration */

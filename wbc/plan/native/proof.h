@@ -13,8 +13,6 @@
 
 /* Edges are proven in pieces that are no longer [rad, or characteristic lengths] */
 #define PIECE 0.3
-/* and of LANES places one after so many others */
-#define STRIDE 5
 /* Pieces are not split into LANES parts more often */
 #define PARTS 13
 
@@ -80,9 +78,7 @@ static unsigned look_along(plan_t *p, const stretch_t *all, int count, const int
     place_lanes(p, all, count);
     const int near = near_pairs(p, pairs, many, room);
     int *halved = room + 2 * near;
-    /* Lanes far from each other first: what is in a body is so seen soonest */
-    for (int k = 0; k < count && s->stopped < 0; k++) {
-        const int l = counts || count < LANES ? k : STRIDE * k % LANES;
+    for (int l = 0; l < count && s->stopped < 0; l++) {
         for (int m = 0, stood = 0; m < near && s->stopped < 0 && p->alive >> l & 1; m++) {
             if (!(room[2 * m + 1] >> l & 1)) continue;
             if (!stood++) stand_at(p, l);
@@ -119,15 +115,6 @@ static double proven(plan_t *p, const double *const *point, int count, int count
     if (!p->pairs) return 1.0;
     p->counts = counts, p->struck = s->stopped = -1;
     for (int k = 0; k < count - 1; k++) pieces += number[k] = pieces_of(metric(p, point[k], point[k + 1]));
-    if (pieces > LANES && !counts) {
-        for (int l = 0, k = 0, before = 0; l < LANES; l++) {
-            const double at = (l + 1.0) * pieces / (LANES + 1.0);
-            while (at > before + number[k]) before += number[k++];
-            const double t = (at - before) / number[k];
-            all[l] = (stretch_t){point[k], point[k + 1], t, t};
-        }
-        look_along(p, all, LANES, 0, p->pairs, 0, s->list);
-    }
     for (int k = 0, i = 0; k < count - 1 && p->struck < 0;) {
         int lanes = 0, now;
         for (; lanes < LANES && k < count - 1; lanes++) {

@@ -74,30 +74,52 @@ static int extend(plan_t *p, int tree, int from, const double *target, double ra
     return from;
 }
 
-/* A sample within limits that lies on a path no longer than the best one, as far as that can be told */
-void wbc_plan_draw(plan_t *p, double *x) {
-    for (int again = 0; again < INFORMED; again++) {
-        for (int k = 0; k < p->n; k++) x[k] = p->sample_low[k] + uniform(p) * (p->sample_high[k] - p->sample_low[k]);
-        if (p->longest == INFINITY) return;
-        double goal = INFINITY;
-        for (int k = 0; k < p->seeds; k++) goal = fmin(goal, metric(p, x, p->node[1] + k * p->n));
-        if (metric(p, x, p->node[0]) + goal < p->longest) return;
+/* The box about the places on paths no longer than the best one, within limits */
+static void box_of_samples(const plan_t *p, double *low, double *high) {
+    const int n = p->n;
+    const double *start = p->node[0];
+    copy_x(p, p->sample_low, low);
+    copy_x(p, p->sample_high, high);
+    for (int k = 0; k < n && p->longest < INFINITY; k++) {
+        if (p->weight[k] <= 0.0) continue;
+        double least = INFINITY, most = -INFINITY;
+        for (const double *goal = p->node[1]; goal < p->node[1] + p->seeds * n; goal += n) {
+            const double way = metric(p, start, goal), middle = 0.5 * (start[k] + goal[k]), off = middle - start[k];
+            const double half = sqrt(0.25 * fmax(p->longest * p->longest - way * way, 0.0) / p->weight[k] + off * off);
+            least = fmin(least, middle - half), most = fmax(most, middle + half);
+        }
+        low[k] = fmax(low[k], least), high[k] = fmin(high[k], most);
     }
 }
+
+/* A sample of that box, where there is one on no longer path such (Gammell et al., Informed RRT*, 2014) */
+static void draw_of(plan_t *p, const double *low, const double *high, double *x) {
+    const int n = p->n;
+    for (int again = 0; again < INFORMED; again++) {
+        for (int k = 0; k < n; k++) x[k] = low[k] + uniform(p) * (high[k] - low[k]);
+        if (p->longest == INFINITY) return;
+        const double gone = metric(p, x, p->node[0]);
+        for (int g = 0; g < p->seeds && gone < p->longest; g++)
+            if (gone + metric(p, x, p->node[1] + g * n) < p->longest) return;
+    }
+}
+
+void wbc_plan_draw(plan_t *p, double *x) { draw_of(p, p->sample_low, p->sample_high, x); }
 
 /* `samples` more, or until the trees meet: 1. The first pieces of edges to some of them are looked at together. A node from which an edge was
  * not free is drawn by near samples only (Yershova, Jaillet, Simeon and LaValle, Dynamic-domain RRTs, 2005). -1: a tree is full */
 int wbc_plan_grow(plan_t *p, int samples) {
     const int n = p->n, single = has_rows(p) || p->rolls || !p->pairs;
-    double x[LANES * n], ends[LANES * n];
+    double x[LANES * n], ends[LANES * n], low[n], high[n];
     stretch_t parts[LANES];
+    box_of_samples(p, low, high);
     for (int k = 0; k < samples;) {
         const int tree = p->count[0] > p->count[1];
         int reached, from[LANES], count = 0;
         for (int again = 0; count < (single ? 1 : LANES) && k < samples; again = 0, k++) {
             double *to = x + count * n, off;
             do {
-                wbc_plan_draw(p, to);
+                draw_of(p, low, high, to);
                 from[count] = nearest_node(p, tree, to);
                 off = metric(p, p->node[tree] + n * from[count], to);
             } while (off > p->domain[tree][from[count]] && ++again < DRAWN);

@@ -87,7 +87,6 @@ class _StepLog:
     steps: list[tuple[Any, ...]] = field(default_factory=list)
 
     def run(self, stop: Stop, message: str = "", loops: int = 0) -> CourseRun:
-        """All of it."""
         columns: list[tuple[Any, ...]] = list(zip(*self.steps, strict=True)) or [()] * 6
         norms, errors, clearance, seconds = (np.array(column, dtype=float) for column in columns[:4])
         acted, given_up = columns[4:]

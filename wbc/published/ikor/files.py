@@ -43,7 +43,6 @@ class _FileLines:
         self.last = self.left[-1][0] if self.left else 0
 
     def words(self, count: int, what: str) -> tuple[int, list[str]]:
-        """The next line, of so many words."""
         if not self.left:
             raise IkorFileError(f"{self.path.name}:{self.last + 1}", "", f"the file ends where {what} should be")
         number, words = self.left.pop(0)

@@ -15,6 +15,7 @@ from wbc import robots, validation
 from wbc.errors import ShapeError
 from wbc.multibody import pin
 from wbc.robot import Robot
+from wbc.tasks._stereographic import triple
 from wbc.validation import Array
 
 #: Platforms: none, x and y and turn as they please, rolling without slip, or steered in front as well
@@ -95,7 +96,6 @@ class ArmMachine:
         return validation.ordinary_array(field, q, (self.joints,))
 
     def of_robot(self, q: Array) -> Array:
-        """The robot's configuration."""
         return np.asarray(self.spread @ q)
 
     def place(self, q: Array) -> tuple[Array, Array]:
@@ -228,7 +228,7 @@ def machine_of(robot: Robot, tip: str) -> ArmMachine:
     chain = [int(k) for k in model.supports[frame.parentJoint]][1:]
     places = [(0, model.jointPlacements[chain[0]].translation)]
     places += [(a, model.jointPlacements[b].translation) for a, b in pairwise(chain)]
-    ends = tuple((j, _triple(p)) for j, p in [*places, (chain[-1], frame.placement.translation)])
+    ends = tuple((j, triple(p)) for j, p in [*places, (chain[-1], frame.placement.translation)])
     bounds = robot.limits.position_lower, robot.limits.position_upper
     low, high = (np.where(np.isfinite(x), x, np.sign(x) * 1e3) for x in bounds)
     still = tuple(unit == "m" for unit in robot.dof_units)
@@ -254,11 +254,6 @@ def without_platform(machine: ArmMachine) -> ArmMachine:
     keep = slice(0, machine.joints - 3)
     parts = {k: getattr(machine, k)[keep] for k in ("home", "lower", "upper", "weights", "prismatic")}
     return replace(machine, spread=machine.spread[:, keep], base="none", **parts)
-
-
-def _triple(place: Any) -> tuple[float, float, float]:
-    x, y, z = (float(c) for c in place)
-    return x, y, z
 
 
 def _lengths(links: Sequence[float], count: int) -> list[float]:
@@ -299,10 +294,10 @@ def _machine(
     free = [100.0, 100.0, 2.0 * math.pi][:first]
     upper = np.concatenate((most, free))
     sliding = tuple(k in prismatic or arm <= k < arm + 2 for k in range(model.nv))
-    ends = tuple((j + first if j else 0, _triple(p)) for j, p in ends)
+    ends = tuple((j + first if j else 0, triple(p)) for j, p in ends)
     if first:
         # The arm's base rides on the platform
-        ends = ((first, _triple(model.jointPlacements[first + 1].translation)), *ends[1:])
+        ends = ((first, triple(model.jointPlacements[first + 1].translation)), *ends[1:])
     limits = whole @ upper, whole @ -upper
     bounds = {"position_lower": np.minimum(*limits), "position_upper": np.maximum(*limits)}
     robot = robots.load(model, name=name, **bounds)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix, pin
 from wbc.published.ikor.machines import ArmMachine
 from wbc.resolvers.fsp import Criterion, least_acceleration, least_power, least_torque
 from wbc.validation import Array
@@ -161,8 +161,7 @@ def step_criterion(machine: ArmMachine, name: str, q: Array, last: Array) -> Cri
     if name == "acceleration":
         return least_acceleration(last, weight)
     model, data, at = machine.robot.model, machine.robot.model.createData(), machine.of_robot(q)
-    upper = np.triu(pin.crba(model, data, at))
-    inertia = machine.spread.T @ (upper + np.triu(upper, 1).T) @ machine.spread
+    inertia = machine.spread.T @ mass_matrix(model, data, at) @ machine.spread
     if np.linalg.eigvalsh(inertia)[0] <= 0.0:
         raise RangeError("criterion", name, f"a joint of {machine.name} moves no mass; take norm or acceleration")
     if name == "energy":

@@ -31,11 +31,9 @@ class _FixedAxle(Constraint):
     order: ClassVar[SacrificeOrder] = SacrificeOrder.HOLD
 
     def rows(self, robot: Any) -> tuple[Row, ...]:
-        """One."""
         return (Row("sideways", "m/s"),)
 
     def velocity_rows(self, robot: Any, kin: Any, inputs: Any, dt: ca.SX) -> Rows:
-        """See the class."""
         turn = kin.joint("turn")
         row = ca.SX(1, robot.nv)
         row[0, 0], row[0, 1] = -ca.sin(turn), ca.cos(turn)

@@ -71,7 +71,6 @@ class Nominal:
         self.arm, self.motion = dynamics_of(arm), motion
 
     def command(self, time: float, q: Array, v: Array) -> Array:
-        """Torques [n]."""
         measured(self.arm, q, v)
         qd, vd, ad = self.motion(time)
         return self.arm.equations(qd, vd).torque(ad)
@@ -98,7 +97,6 @@ class Linearised:
         self.limits = None if limits is None else validation.ordinary_array("limits", limits, (self.arm.n,))
 
     def command(self, time: float, q: Array, v: Array) -> Array:
-        """Torques [n]."""
         q, v = measured(self.arm, q, v)
         qd, vd, ad = self.motion(time)
         model = self.arm.linear_model(qd, vd, ad)
@@ -168,7 +166,6 @@ class Adaptive:
         self._last: Array | None = None
 
     def command(self, time: float, q: Array, v: Array) -> Array:
-        """Torques [n]."""
         q, v = measured(self.arm, q, v)
         qd, vd, _ = self.motion(time)
         x, n = np.concatenate([self.arm.error(q, qd), v - vd]), self.arm.n

@@ -98,7 +98,6 @@ class DecoupledArm:
         self.a = characteristic("poles", poles, 2)
 
     def command(self, time: float, q: Array, v: Array) -> Array:
-        """Torques [n]."""
         q, v = measured(self.arm, q, v)
         qd, vd, ad = self.motion(time + self.preview)
         wanted = -self.a[0] * self.arm.error(q, qd) - self.a[1] * v

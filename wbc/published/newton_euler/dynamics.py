@@ -7,8 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from wbc import validation
-from wbc.motion_control.motion import mass_matrix
-from wbc.multibody import pin
+from wbc.multibody import mass_matrix, pin
 from wbc.published.newton_euler.links import SerialChain
 from wbc.published.newton_euler.recursion import Equations, LinearModel, equations, linear_model
 from wbc.validation import Array
@@ -37,7 +36,6 @@ class ByRecursion:
         self.arm, self.n, self.nq = arm, arm.n, arm.n
 
     def equations(self, q: Array, v: Array) -> Equations:
-        """H and h."""
         return equations(self.arm, q, v)
 
     def linear_model(self, q: Array, v: Array, a: Array) -> LinearModel:
@@ -45,7 +43,6 @@ class ByRecursion:
         return linear_model(self.arm, q, v, a)
 
     def error(self, q: Array, wanted: Array) -> Array:
-        """q - wanted [n]."""
         return np.asarray(q - wanted)
 
 
@@ -56,7 +53,6 @@ class Rigid:
         self.model, self._data, self.n, self.nq = model, model.createData(), model.nv, model.nq
 
     def equations(self, q: Array, v: Array) -> Equations:
-        """H and h."""
         model, data = self.model, self._data
         return Equations(mass_matrix(model, data, q), np.array(pin.nonLinearEffects(model, data, q, v)))
 
@@ -67,7 +63,6 @@ class Rigid:
         return LinearModel(found.H, found.h, by_v, by_q)
 
     def error(self, q: Array, wanted: Array) -> Array:
-        """q (-) wanted [n]."""
         return np.asarray(pin.difference(self.model, wanted, q))
 
 

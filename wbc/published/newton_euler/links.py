@@ -96,12 +96,6 @@ class SerialChain:
         link = self.links[i - 1]
         return link.next_axis, link.next_lever, link.next_reference
 
-    def joint_class(self, i: int) -> int:
-        """Type of joint i in the text: 1 no lever along the axis, 2 that of the link before, 3 its own, 4 both."""
-        axis, lever, _ = self.before(i)
-        own = self.links[i]
-        return 1 + _collinear(lever, axis) + 2 * _collinear(own.lever, own.axis)
-
     @cached_property
     def assembled(self) -> list[Array]:
         """A_i at q = 0, n times [3, 3]: where -r_i-1,i and r_ii agree on the plane across the axis (A.62 to A.67)."""

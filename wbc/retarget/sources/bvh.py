@@ -10,6 +10,7 @@ import numpy as np
 
 from wbc.retarget.clip import Array
 from wbc.retarget.sources.recorded import Recorded, in_the_world, no_clip, text_of, unlike
+from wbc.rotations import exponential
 
 #: Axes of channels, by their first letter
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -59,7 +60,7 @@ def read_bvh(path: pathlib.Path) -> Recorded:
     moves: dict[int, Array] = {}
     for column, (joint, turning, axis) in enumerate(tree.channels):
         if turning:
-            own[:, joint] = own[:, joint] @ _turn(axis, np.radians(table[:, column]))
+            own[:, joint] = own[:, joint] @ exponential(np.outer(np.radians(table[:, column]), np.eye(3)[axis]))
         else:
             moves.setdefault(joint, np.tile(offsets[joint], (len(table), 1)))[:, axis] = table[:, column]
     for joint, move in moves.items():
@@ -148,15 +149,4 @@ def _numbers(path: pathlib.Path, row: int, words: Sequence[str], expected: str, 
         raise no_clip(path, f"line {row + 1}: {error}") from error
     if len(out) != count:
         raise no_clip(path, f"line {row + 1} has {len(out)} numbers, {expected}")
-    return out
-
-
-def _turn(axis: int, angles: Array) -> Array:
-    """Rotations about a coordinate axis [frames, 3, 3]."""
-    out = np.zeros((len(angles), 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    out[:, axis, axis] = 1.0
-    out[:, i, i] = out[:, j, j] = np.cos(angles)
-    out[:, j, i] = np.sin(angles)
-    out[:, i, j] = -out[:, j, i]
     return out

@@ -122,15 +122,16 @@ def cover(mesh: Mesh, kind: str, count: int, tolerance: float) -> tuple[PlacedSh
     how, hull = KINDS[kind], Hull(mesh.vertices)
     best: tuple[PlacedShape, ...] = (how.fit(hull.vertices, hull),)
     for number in range(2, count + 1):
-        if _worst(best) <= tolerance or _flat(hull):
+        if largest_excess(best) <= tolerance or _flat(hull):
             break
         found = tuple(how.fit(points, hull) for points in _slabs(mesh, number, how, hull))
-        if _worst(found) < (1.0 - GAIN) * _worst(best):
+        if largest_excess(found) < (1.0 - GAIN) * largest_excess(best):
             best = found
     return best
 
 
-def _worst(shapes: tuple[PlacedShape, ...]) -> float:
+def largest_excess(shapes: tuple[PlacedShape, ...]) -> float:
+    """How far the shapes stand out at most [m]."""
     return max(shape.excess for shape in shapes)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.robot.geometry.hull import Hull
+from wbc.robot.geometry.meshes import spread_directions
 from wbc.robot.recipe import segment_shape
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.shapes.around import distance_to_segment, shortest
@@ -50,15 +51,6 @@ def fit_capsule(points: Array) -> PlacedShape:
     return replace(line, shape=shape, excess=hull.excess(*line.ends(), radius))
 
 
-def _spread_directions(n: int) -> Array:
-    """n unit vectors, evenly spread (Fibonacci lattice)."""
-    i = np.arange(n) + 0.5
-    z = 1 - 2 * i / n
-    turn = np.pi * (1 + np.sqrt(5.0)) * i
-    flat = np.sqrt(1 - z**2)
-    return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
-
-
 def _starts(points: Array) -> list[tuple[Array, Array]]:
     """Segments to start from: along the three principal axes, half as long as the points reach, and a short one."""
     center = points.mean(axis=0)
@@ -80,7 +72,7 @@ def _volume(x: Array) -> float:
 
 def _cutting_planes(points: Array, a: Array, b: Array) -> Array:
     """:func:`_least_volume` of few points, those that stick out added until none do: hulls may have thousands."""
-    chosen = np.unique((_spread_directions(60) @ points.T).argmax(axis=1))
+    chosen = np.unique((spread_directions(60) @ points.T).argmax(axis=1))
     capsule = np.concatenate([a, b, [0.0]])
     for _ in range(8):
         capsule = _least_volume(points[chosen], a, b)

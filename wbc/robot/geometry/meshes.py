@@ -139,14 +139,20 @@ def cylinder_mesh(radius: float, half: float) -> tuple[Mesh, float]:
     return Mesh(np.vstack([ring - [0.0, 0.0, half], ring + [0.0, 0.0, half]]), triangles), outer - radius
 
 
+def spread_directions(n: int) -> Array:
+    """n unit vectors, evenly spread (Fibonacci lattice)."""
+    i = np.arange(n) + 0.5
+    z = 1 - 2 * i / n
+    turn = np.pi * (1 + np.sqrt(5.0)) * i
+    flat = np.sqrt(1 - z**2)
+    return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+
+
 def ellipsoid_mesh(radii: Array) -> tuple[Mesh, float]:
     """(a polyhedron around an ellipsoid, a bound of how far it stands out of it [m])."""
     from scipy.spatial import ConvexHull
 
-    count = 400
-    i = np.arange(count) + 0.5
-    z, turn = 1 - 2 * i / count, np.pi * (1 + np.sqrt(5.0)) * i
-    unit = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
+    unit = spread_directions(400)
     hull = ConvexHull(unit)
     # Scaled so that the nearest facet touches the unit ball; an affine map keeps the polyhedron around the ellipsoid
     scale = 1.0 / float((-hull.equations[:, 3]).min())

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wbc import validation
-from wbc.errors import RangeError, ShapeError
+from wbc.errors import RangeError
 from wbc.multibody import own
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid
 from wbc.robot.geometry.convex_parts import parts_of
-from wbc.robot.geometry.covering import cover
+from wbc.robot.geometry.covering import cover, largest_excess
 from wbc.robot.geometry.meshes import Mesh, box_mesh, cylinder_mesh, ellipsoid_mesh
 from wbc.shapes import Box, Capsule, Cylinder, Ellipsoid, HeightMap, PlacedShape, Solid, Sphere
 from wbc.shapes.around import around_cylinder, around_ellipsoid
@@ -45,10 +45,7 @@ class Style:
     def __post_init__(self) -> None:
         validation.one_of("kind", self.kind, COUNTS)
         if self.count is not None:
-            if isinstance(self.count, bool) or not isinstance(self.count, int):
-                raise ShapeError("count", self.count, "expected a whole number")
-            if not 1 <= self.count <= MOST:
-                raise RangeError("count", self.count, f"expected 1 to {MOST}")
+            validation.integer("count", self.count, 1, MOST)
             if self.kind == "convex":
                 raise RangeError("count", self.count, "convex parts are as many as the mesh has")
         validation.scalar("tolerance", self.tolerance, low=0.0, unit="m")
@@ -78,13 +75,9 @@ class Style:
         if self.kind == "spheres":
             return _covered(raw, placement, self, count)
         one = (_capsule(raw, placement),)
-        if count == 1 or _worst(one) <= self.tolerance:
+        if count == 1 or largest_excess(one) <= self.tolerance:
             return one
-        return min(one, _covered(raw, placement, self, count), key=_worst)
-
-
-def _worst(shapes: tuple[PlacedShape, ...]) -> float:
-    return max(shape.excess for shape in shapes)
+        return min(one, _covered(raw, placement, self, count), key=largest_excess)
 
 
 def _covered(

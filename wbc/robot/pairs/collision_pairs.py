@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wbc import validation
-from wbc.errors import MissingShapeError, RangeError, ShapeError
+from wbc.errors import MissingShapeError, ShapeError
 from wbc.robot.pairs.distances import Links
 from wbc.robot.pairs.link_pairs import link_pairs, neighbours
 from wbc.robot.pairs.search import PairFinding, Progress, search
@@ -121,7 +121,7 @@ def find_self_pairs(
     validation.instance("robot", robot, Robot, "a wbc Robot, see wbc.robots.load")
     if progress is not None and not callable(progress):
         raise ShapeError("progress", progress, "expected a function of (steps done, steps in all)")
-    samples, seed = _whole("samples", samples), _whole("seed", seed)
+    samples, seed = validation.integer("samples", samples), validation.integer("seed", seed)
     clearance = validation.scalar("clearance", clearance, unit="m")
     rules = (
         read_srdf(validation.file_path("srdf", srdf)).collisions()
@@ -177,14 +177,6 @@ def _judged(
         return LinkPair(pair, True, "unsampled")
     touches = found.distance <= clearance
     return LinkPair(pair, touches, "touches" if touches else "never", distance)
-
-
-def _whole(field: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ShapeError(field, value, "expected a whole number")
-    if value < 0:
-        raise RangeError(field, value, "expected 0 or more")
-    return value
 
 
 def _silent(done: int, total: int) -> None:

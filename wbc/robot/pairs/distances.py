@@ -17,11 +17,10 @@ import numpy as np
 from wbc.errors import NotFiniteError
 from wbc.geometry import ShapeTable, distances, segment_distances
 from wbc.multibody import own
-from wbc.robot.pairs.link_pairs import joint_of
 from wbc.robot.sampling import joint_poses
 from wbc.shapes import PlacedShape, Solid
 from wbc.symbolic.joint_steps import place
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import WORLD, frame_index, joint_of
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -160,4 +159,4 @@ def _part(robot: Robot, link: str, placed: PlacedShape) -> LinkPart:
     shape, here = placed.shape, above * placed.place
     a, b, radius = shape.capsule()
     at = here * own.SE3(np.eye(3), shape.center)
-    return LinkPart(joint_of(robot, link), shape, at, (here * a, here * b), radius, shape.is_round)
+    return LinkPart(joint_of(robot.tree, link), shape, at, (here * a, here * b), radius, shape.is_round)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.symbolic.kinematics import WORLD, frame_index
+from wbc.symbolic.kinematics import joint_of
 
 if TYPE_CHECKING:
     from wbc.robot.robot import Robot
@@ -26,18 +26,13 @@ def link_pairs(robot: Robot) -> tuple[tuple[str, str], ...]:
     return tuple(itertools.combinations(shaped_links(robot), 2))
 
 
-def joint_of(robot: Robot, link: str) -> int:
-    """Number of the joint that carries a link; links welded to each other have the same."""
-    return 0 if link == WORLD else int(robot.tree.frames[frame_index(robot.tree, link)].parentJoint)
-
-
 def neighbours(robot: Robot) -> dict[tuple[str, str], str]:
     """Pair of :func:`link_pairs` -> ``same body`` (welded, or joints between them locked) or ``adjacent``.
 
     Adjacent are the bodies on the two sides of one joint. Joints whose origins coincide and between which no link
     carries a shape count as one: universal and spherical joints are often drawn so.
     """
-    carriers = {link: joint_of(robot, link) for link in shaped_links(robot)}
+    carriers = {link: joint_of(robot.tree, link) for link in shaped_links(robot)}
     above = {joint: _body_above(robot, joint, set(carriers.values())) for joint in set(carriers.values())}
     out = {}
     for first, second in link_pairs(robot):

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from wbc import validation
-from wbc.errors import DuplicateNameError, RangeError, RobotFileError, ShapeError
+from wbc.errors import DuplicateNameError, RobotFileError, ShapeError
 from wbc.robot.pairs.collision_pairs import REASONS, LinkPair, SelfPairs
 from wbc.robot.pairs.link_pairs import link_pairs, shaped_links
 from wbc.robot.robot import Robot
@@ -95,12 +95,7 @@ def _read_head(where: str, tree: Mapping[str, Any]) -> dict[str, Any]:
         raise ShapeError(f"{where} robot", tree["robot"], "expected a name")
     out: dict[str, Any] = {}
     for key in ("samples", "seed"):
-        value = tree.get(key, 0)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise ShapeError(f"{where} {key}", value, "expected a whole number")
-        if value < 0:
-            raise RangeError(f"{where} {key}", value, "expected 0 or more")
-        out[key] = value
+        out[key] = validation.integer(f"{where} {key}", tree.get(key, 0))
     out["clearance"] = validation.scalar(f"{where} clearance", tree.get("clearance", 0.0), unit="m")
     return out
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wbc.multibody import own
+from wbc.multibody import mass_matrix, own
 from wbc.robot.sources.mjnames import FREE, HINGE, SIZES, MjNames, coordinates, held_bodies
 from wbc.rotations import TO_PINOCCHIO
 from wbc.validation import Array
@@ -98,8 +98,7 @@ class MjCompared:
             gap = np.abs(pose.homogeneous[:3] - np.column_stack([turn[index].reshape(3, 3), place[index]])).max()
             if gap > NEAR * max(far, float(np.abs(place[index]).max())):
                 return f"{frame.name} is {gap:.3g} m or rad from where MuJoCo has it"
-        inertia = np.triu(own.crba(whole, here, q))
-        ours, theirs = axes @ (inertia + np.triu(inertia, 1).T) @ axes.T, np.zeros((whole.nv, whole.nv))
+        ours, theirs = axes @ mass_matrix(whole, here, q) @ axes.T, np.zeros((whole.nv, whole.nv))
         for row, dof in zip(theirs, dofs.tolist(), strict=True):
             pushed = np.zeros(model.nv)
             mujoco.mj_mulM(model, data, pushed, np.eye(model.nv)[dof])

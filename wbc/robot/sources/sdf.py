@@ -94,7 +94,6 @@ class _Reader:
         self._joints = [self._joint(joint) for joint in self._model.findall("joint")]
 
     def read(self, base: str | None) -> Description:
-        """See :func:`read_sdf`."""
         hangs = self._tree()
         tied = any(joint.parent == WORLD for joint in self._joints)
         roots = [link for link in self._links if link not in hangs]

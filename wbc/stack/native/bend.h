@@ -150,6 +150,8 @@ static int same_rows(const wbc_tick *t) {
     }
     for (int i = 0; i < M_ALL; i++) {
         if (t->sense[i] & ACTIVE || (i >= NV && (t->idle[i - NV] || HELD(t, i - NV)))) continue;
+        /* Rows that are taken out hold by what follows from them */
+        if (REDUCES && t->reduced && t->low[i] == t->high[i]) continue;
         const double value = i < NV ? t->x[i] : row_at(t, i - NV, t->x);
         const double rounding = TOLERANCE * (i < NV ? dof_scale[i] : row_scale[i - NV]);
         if (value < t->low[i] - rounding || value > t->high[i] + rounding) return 0;

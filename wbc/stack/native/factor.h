@@ -424,7 +424,8 @@ static void image(wbc_tick *t) {
         }
         double row[WIDE] = {0};
         for (int e = a_start[k]; e < a_end[k]; e++)
-            axpy(row, t->inverse + a_col[e] * WIDE, t->at[e], a_col[e]);
+            /* Rows of sensed pairs have places for all joints */
+            if (t->at[e] != 0.0) axpy(row, t->inverse + a_col[e] * WIDE, t->at[e], a_col[e]);
         const double square = dot(row, row, 0);
         const double scale = square > DEAD ? 1.0 / sqrt(square) : 0.0;
         t->scaling[NV + k] = scale;

@@ -23,7 +23,8 @@ static int find_equalities(wbc_tick *t) {
 
 /* The first `count` of them, of length one, as columns of WIDE numbers; 0 where one has no length */
 static int unit_rows(wbc_tick *t, int count) {
-    for (int i = 0; i < NV * WIDE; i += 4) FOUR(t->equal + i) = (four){0};
+    for (int j = 0; j < NV; j++)
+        for (int i = 0; i < count; i += 4) FOUR(t->equal + j * WIDE + i) = (four){0};
     for (int n = 0; n < count; n++) {
         const int k = t->equal_row[n];
         double even = 0.0, odd = 0.0;

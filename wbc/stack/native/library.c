@@ -1,7 +1,7 @@
 /* What a process loads: the tick, values from Python, and many ticks in one call */
 #include "tick.c"
 
-#include "builtins.h"
+#include "follow.h"
 #include "many.h"
 
 /* Ticks go on here that other code of the same stack has done on the same fields of memory.h */

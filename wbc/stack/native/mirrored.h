@@ -134,14 +134,19 @@ static int give_mirrored(wbc_tick *t, int count) {
     return 1;
 }
 
+/* Loops over the rows of loops, in groups of four */
+#define EACH_FORCE_GROUP(i) for (int i = 0; i < FORCES; i += 4)
+
 /* x = P e, see by_rows; with `sizes` no |P e| is larger where |e| are at most these */
 INLINE void by_rows_mirrored(const wbc_tick *t, const double *e, double *x, int sizes) {
 #define SIGNED(number) (sizes ? fabs(number) : (number))
-    double moved[FORCES + 1], push[WIDE] = {0}, gap[FORCES + 1];
+#define SIGNED_FOUR(numbers) (sizes ? SIZE_OF_FOUR(numbers) : (numbers))
+    double moved[WIDE] = {0}, push[WIDE] = {0}, gap[WIDE];
     for (int i = 0; i < WIDE; i++) x[i] = 0.0;
-    for (int i = 0; i < FORCES; i++) moved[i] = 0.0;
-    for (int k = 0; k < FORCES; k++)
-        for (int i = 0; i < FORCES; i++) moved[i] += SIGNED(COLUMN(t, k)[i]) * (e[k] * t->equal_scale[k]);
+    for (int k = 0; k < FORCES; k++) {
+        const four each = EACH(e[k] * t->equal_scale[k]);
+        EACH_FORCE_GROUP(i) FOUR(moved + i) = MADD(SIGNED_FOUR(GIVEN_FOUR(COLUMN(t, k) + i)), each, GIVEN_FOUR(moved + i));
+    }
     for (int i = 0; i < FORCES; i++) x[t->given[i]] = moved[i] * dof_scale[t->given[i]];
     for (int n = FORCES; n < t->reduced; n++) {
         const int k = t->equal_row[n];
@@ -150,9 +155,9 @@ INLINE void by_rows_mirrored(const wbc_tick *t, const double *e, double *x, int 
     }
     for (int i = 0; i < FORCES; i++) push[i] = gap[t->torque_slot[t->given[i]] - FORCES] * dof_scale[t->given[i]];
     for (int k = 0; k < FORCES; k++) {
-        double sum = 0.0;
-        for (int i = 0; i < FORCES; i++) sum += SIGNED(COLUMN(t, k)[i]) * push[i];
-        x[FORCE_FIRST + k] = sum * t->equal_scale[k];
+        four sum = {0};
+        EACH_FORCE_GROUP(i) sum = MADD(SIGNED_FOUR(GIVEN_FOUR(COLUMN(t, k) + i)), GIVEN_FOUR(push + i), sum);
+        x[FORCE_FIRST + k] = SUM_OF_FOUR(sum) * t->equal_scale[k];
     }
     for (int s = 0; s < t->rest; s++) {
         const int n = t->rest_slot[s], k = t->equal_row[n];
@@ -163,9 +168,11 @@ INLINE void by_rows_mirrored(const wbc_tick *t, const double *e, double *x, int 
     for (int i = 0; i < t->rest; i++) {
         double sum = 0.0;
         for (int s = 0; s < t->rest; s++) sum += SIGNED(t->second[t->moved[s] * WIDE + i]) * push[s];
-        for (int j = 0; j < NV; j++) x[j] += (sizes ? sum : -sum) * SIGNED(t->lifted[i * WIDE + j]);
+        const four each = EACH(sizes ? sum : -sum);
+        for (int at = 0; at < WIDE; at += 4) FOUR(x + at) = MADD(SIGNED_FOUR(GIVEN_FOUR(t->lifted + i * WIDE + at)), each, GIVEN_FOUR(x + at));
     }
 #undef SIGNED
+#undef SIGNED_FOUR
 }
 
 /* r += f row k */
@@ -175,14 +182,15 @@ INLINE void add_row(const wbc_tick *t, int k, double f, double *r) {
 
 /* Multipliers that leave nothing of r on the variables that were given, see multipliers_of */
 static void multipliers_mirrored(const wbc_tick *t, const double *r, double *lambda) {
-    double rest[WIDE], push[WIDE], along[FORCES + 1];
+    double rest[WIDE], push[WIDE] = {0}, along[WIDE] = {0};
     for (int i = 0; i < WIDE; i++) {
         rest[i] = i < NV ? r[i] : 0.0;
         lambda[i] = 0.0;
     }
     for (int s = 0; s < t->rest; s++) {
-        push[s] = 0.0;
-        for (int i = 0; i < NV; i++) push[s] -= t->lifted[s * WIDE + i] * r[i];
+        four sum = {0};
+        for (int at = 0; at < WIDE; at += 4) sum = MADD(GIVEN_FOUR(t->lifted + s * WIDE + at), GIVEN_FOUR(rest + at), sum);
+        push[s] = -SUM_OF_FOUR(sum);
     }
     for (int s = 0; s < t->rest; s++) {
         const int n = t->rest_slot[s];
@@ -190,17 +198,20 @@ static void multipliers_mirrored(const wbc_tick *t, const double *r, double *lam
         lambda[n] *= t->equal_scale[n];
         add_row(t, t->equal_row[n], lambda[n], rest);
     }
-    for (int i = 0; i < FORCES; i++) along[i] = 0.0;
-    for (int k = 0; k < FORCES; k++)
-        for (int i = 0; i < FORCES; i++) along[i] += COLUMN(t, k)[i] * (t->equal_scale[k] * rest[FORCE_FIRST + k]);
+    for (int k = 0; k < FORCES; k++) {
+        const four each = EACH(t->equal_scale[k] * rest[FORCE_FIRST + k]);
+        EACH_FORCE_GROUP(i) FOUR(along + i) = MADD(GIVEN_FOUR(COLUMN(t, k) + i), each, GIVEN_FOUR(along + i));
+    }
     for (int i = 0; i < FORCES; i++) {
         const int n = t->torque_slot[t->given[i]];
         lambda[n] = along[i] * dof_scale[t->given[i]];
         add_row(t, t->equal_row[n], lambda[n], rest);
     }
+    for (int i = 0; i < WIDE; i++) push[i] = i < FORCES ? rest[t->given[i]] * dof_scale[t->given[i]] : 0.0;
     for (int k = 0; k < FORCES; k++) {
-        for (int i = 0; i < FORCES; i++) lambda[k] -= COLUMN(t, k)[i] * (rest[t->given[i]] * dof_scale[t->given[i]]);
-        lambda[k] *= t->equal_scale[k];
+        four sum = {0};
+        EACH_FORCE_GROUP(i) sum = MADD(GIVEN_FOUR(COLUMN(t, k) + i), GIVEN_FOUR(push + i), sum);
+        lambda[k] = -SUM_OF_FOUR(sum) * t->equal_scale[k];
     }
 }
 

@@ -145,7 +145,7 @@ static int refactor(wbc_tick *t) { return REDUCES && t->reduced ? factor_reduced
 /* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
 static int cut_off(wbc_tick *t, const double *free, double more) {
     if (REDUCES && t->reduced) {
-        const int ok = more == 0.0 ? factor_reduced(t) : stiffen_reduced(t, more);
+        const int ok = more == 0.0 ? factor_reduced(t) : stiffen_reduced(t, more, 0);
         t->prepared = ok && more == 0.0;
         return ok;
     }
@@ -308,7 +308,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     if (length <= TRUSTED) return 1;
     const double more = held_short(slope, length);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
-    t->prepared = REDUCES && t->reduced ? stiffen_reduced(t, more) : factor(t);
+    t->prepared = REDUCES && t->reduced ? stiffen_reduced(t, more, 1) : factor(t);
     return 1;
 }
 

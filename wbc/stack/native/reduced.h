@@ -176,24 +176,43 @@ INLINE void some_products(wbc_tick *t, int i, int count, int at) {
 /* R^-1 of R'R = `gram`, and the squares of R's pivots; 0 where it is not positive definite. Rows wait for reciprocals of pivots only,
  * not for their roots. */
 static int invert_gram(wbc_tick *t) {
-    double *inverse = t->reduced_inverse, roots[WIDE] = {0};
-    memcpy(t->reduced_R, t->gram, t->width * WIDE * sizeof(double));
+    double *inverse = t->reduced_inverse, row[WIDE] = {0}, roots[WIDE] = {0};
+    for (int a = 0; a < t->width; a++)
+        for (int at = 0; at < THIN; at += 4) {
+            FOUR(t->reduced_R + a * WIDE + at) = GIVEN_FOUR(t->gram + a * WIDE + at);
+            FOUR(inverse + a * WIDE + at) = (four){0};
+        }
     for (int a = 0; a < t->width; a++) {
-        double *row = t->reduced_R + a * WIDE, *own = inverse + a * WIDE;
-        const double pivot = t->reduced_pivot[a] = row[a], reciprocal = 1.0 / pivot;
+        const double *own = t->reduced_R + a * WIDE, pivot = t->reduced_pivot[a] = own[a], reciprocal = 1.0 / pivot;
         if (!(pivot > 0.0)) return 0;
         roots[a] = 1.0 / sqrt(pivot);
-        for (int at = 0; at < THIN; at += 4) {
-            FOUR(row + at) = BEHIND(GIVEN_FOUR(row + at), at, a);
-            FOUR(own + at) = (four){0};
+        inverse[a * WIDE + a] = 1.0;
+        /* Groups that have entries right of the pivot */
+        for (int at = (a + 1) & ~3; at < THIN; at += 4) {
+            FOUR(row + at) = BEHIND(GIVEN_FOUR(own + at), at, a) * EACH(-reciprocal);
+            for (int b = a + 1; b < t->width; b++) {
+                double *other = t->reduced_R + b * WIDE + at;
+                FOUR(other) = MADD(EACH(own[b]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
+            }
+            for (int c = 0; c <= a; c++) {
+                double *other = inverse + c * WIDE + at;
+                FOUR(other) = MADD(EACH(inverse[c * WIDE + a]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
+            }
         }
-        for (int b = a + 1; b < t->width; b++) thin_add(t->reduced_R + b * WIDE, row, -row[b] * reciprocal);
-        own[a] = 1.0;
-        for (int c = 0; c <= a; c++) thin_add(inverse + c * WIDE, row, -inverse[c * WIDE + a] * reciprocal);
     }
     for (int a = 0; a < t->width; a++)
         for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
     return 1;
+}
+
+/* Columns a to a + 3 of the rows of Z that are given times those of `other`, columns from `at` on, added to `sum` */
+INLINE void given_products(const wbc_tick *t, int a, const double *other, int at, four *sum) {
+    for (int n = 0; n < t->reduced; n++) {
+        const int i = t->given[n] * WIDE;
+        const double *own = t->basis + i + a;
+        const four there = GIVEN_FOUR(other + i + at);
+        for (int r = 0; r < 4; r++) sum[r] = MADD(EACH(own[r]), there, sum[r]);
+    }
 }
 
 /* The factor of Z'HZ = R'R, as its inverse; 0 where it is not positive definite */
@@ -201,33 +220,33 @@ static int factor_reduced(wbc_tick *t) {
     for (int at = 0; at < THIN; at += 4) {
         for (int i = 0; i + 4 <= NV; i += 4) some_products(t, i, 4, at);
         if (NV % 4) some_products(t, NV / 4 * 4, NV % 4, at);
-        /* The variable that is left is itself */
-        for (int a = 0; a < t->width; a++) {
-            four sum = EACH(dof_scale[t->left[a]]) * GIVEN_FOUR(t->product_of_basis + t->left[a] * WIDE + at), other = {0};
-            for (int n = 0; n < t->reduced; n++) {
-                const int i = t->given[n] * WIDE;
-                other = MADD(EACH(t->basis[i + a]), GIVEN_FOUR(t->product_of_basis + i + at), other);
-            }
-            FOUR(t->gram + a * WIDE + at) = sum + other;
+        for (int a = 0; a < t->width; a += 4) {
+            four sum[4] = {{0}};
+            given_products(t, a, t->product_of_basis, at, sum);
+            /* The variable that is left is itself */
+            for (int b = a; b < a + 4 && b < t->width; b++)
+                FOUR(t->gram + b * WIDE + at) = MADD(EACH(dof_scale[t->left[b]]), GIVEN_FOUR(t->product_of_basis + t->left[b] * WIDE + at), sum[b - a]);
         }
     }
     return invert_gram(t);
 }
 
-/* The same of H + more / dof_scale^2, from that of H */
-static int stiffen_reduced(wbc_tick *t, double more) {
-    for (int at = 0; at < THIN; at += 4) {
-        for (int i = 0; i < NV; i++)
-            FOUR(t->product_of_basis + i * WIDE + at) += EACH(more / (dof_scale[i] * dof_scale[i])) * GIVEN_FOUR(t->basis + i * WIDE + at);
-        for (int a = 0; a < t->width; a++) {
-            four sum = {0};
-            for (int n = 0; n < t->reduced; n++) {
-                const int i = t->given[n];
-                sum = MADD(EACH(t->basis[i * WIDE + a] / (dof_scale[i] * dof_scale[i])), GIVEN_FOUR(t->basis + i * WIDE + at), sum);
-            }
-            FOUR(t->gram + a * WIDE + at) += EACH(more) * sum;
+/* The same of H + more / dof_scale^2, from that of H, for solve_reduced; `stays`: H Z follows, as for all that comes later */
+static int stiffen_reduced(wbc_tick *t, double more, int stays) {
+    double stiff[REDUCED_NV * WIDE + 1];
+    for (int i = 0; i < NV; i++) {
+        const double each = more / (dof_scale[i] * dof_scale[i]);
+        for (int at = 0; at < THIN; at += 4) {
+            FOUR(stiff + i * WIDE + at) = EACH(each) * GIVEN_FOUR(t->basis + i * WIDE + at);
+            if (stays) FOUR(t->product_of_basis + i * WIDE + at) += GIVEN_FOUR(stiff + i * WIDE + at);
         }
     }
+    for (int at = 0; at < THIN; at += 4)
+        for (int a = 0; a < t->width; a += 4) {
+            four sum[4] = {{0}};
+            given_products(t, a, stiff, at, sum);
+            for (int b = a; b < a + 4 && b < t->width; b++) FOUR(t->gram + b * WIDE + at) += sum[b - a];
+        }
     for (int a = 0; a < t->width; a++) t->gram[a * WIDE + a] += more;
     return invert_gram(t);
 }
@@ -277,17 +296,26 @@ static void solve_reduced(const wbc_tick *t, const double *b, double *x) {
     for (int i = 0; i < WIDE; i++) x[i] = i < NV ? thin_dot(t->basis + i * WIDE, z) : 0.0;
 }
 
+/* `count` rows of T from the n-th variable that was given on, at most four, columns from `at` on */
+INLINE void some_seen(wbc_tick *t, int n, int count, int at) {
+    const double *own[4];
+    four sum[4] = {{0}};
+    for (int r = 0; r < count; r++) own[r] = t->basis + t->given[n + r] * WIDE;
+    for (int a = 0; a < t->width; a++) {
+        const four inverse = GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
+        for (int r = 0; r < count; r++) sum[r] = MADD(EACH(own[r][a]), inverse, sum[r]);
+    }
+    for (int r = 0; r < count; r++) FOUR(t->through + t->given[n + r] * WIDE + at) = sum[r];
+}
+
 /* T = Z R^-1, through which bounds and rows are seen: v = s + T y */
 static void see_basis(wbc_tick *t) {
     for (int at = 0; at < THIN; at += 4) {
         for (int a = 0; a < t->width; a++)
             FOUR(t->through + t->left[a] * WIDE + at) = EACH(dof_scale[t->left[a]]) * GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
-        for (int n = 0; n < t->reduced; n++) {
-            const double *own = t->basis + t->given[n] * WIDE;
-            four sum = {0};
-            for (int a = 0; a < t->width; a++) sum = MADD(EACH(own[a]), GIVEN_FOUR(t->reduced_inverse + a * WIDE + at), sum);
-            FOUR(t->through + t->given[n] * WIDE + at) = sum;
-        }
+        int n = 0;
+        for (; n + 4 <= t->reduced; n += 4) some_seen(t, n, 4, at);
+        for (; n < t->reduced; n++) some_seen(t, n, 1, at);
     }
 }
 

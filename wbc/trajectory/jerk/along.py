@@ -14,6 +14,7 @@ from wbc.trajectory.jerk.joined_courses import STILL
 from wbc.trajectory.jerk.path_speed import Stretch, fastest
 from wbc.trajectory.laws.certificate import TOLERANCE
 from wbc.trajectory.laws.law import Law
+from wbc.trajectory.laws.limits import MotionLimits
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.paths.path import Path
 from wbc.validation import Array
@@ -101,8 +102,6 @@ def _part(path: Path, start: float, end: float, sizes: tuple[Array, Array, Array
 def _slower(law: Law, sizes: tuple[Array, Array, Array] | None = None) -> float:
     """The factor of time at which the limits are just satisfied, at least 1."""
     if sizes is not None:
-        from wbc.trajectory.laws.limits import MotionLimits
-
         law = law.with_limits(MotionLimits(velocity=sizes[0], acceleration=sizes[1], jerk=sizes[2]))
     worst = law.certificate.worst
     factor = 1.0

@@ -12,7 +12,7 @@ from wbc.trajectory.jerk.course import Course
 from wbc.trajectory.jerk.joined_courses import along_line, law_of, standing
 from wbc.trajectory.jerk.state_to_state import StateTask, by_ruckig, by_stops, others, plan
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import MotionLimits
+from wbc.trajectory.laws.limits import MotionLimits, for_all
 from wbc.validation import Array, bound_text
 
 Synchronisation = Literal["time", "phase", "none"]
@@ -89,14 +89,11 @@ def limits_of(dof: int, velocity: Any, acceleration: Any, jerk: Any, lower: Any,
     """
     sizes = {}
     for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)):
-        sizes[name] = _for_all(f"limits.{name}", value, dof, finite=True)
-    if (lower is None) != (upper is None):
-        lower = -np.inf if lower is None else lower
-        upper = np.inf if upper is None else upper
-    positions = {} if lower is None else {"lower": _for_all("limits.lower", lower, dof)}
-    if upper is not None:
-        positions["upper"] = _for_all("limits.upper", upper, dof)
-    return MotionLimits(**sizes, **positions)
+        sizes[name] = for_all(f"limits.{name}", value, dof, finite=True)
+    if lower is None and upper is None:
+        return MotionLimits(**sizes)
+    low, high = (none if x is None else x for x, none in ((lower, -np.inf), (upper, np.inf)))
+    return MotionLimits(for_all("limits.lower", low, dof), for_all("limits.upper", high, dof), **sizes)
 
 
 def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
@@ -105,11 +102,6 @@ def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
     assert limits.acceleration is not None
     assert limits.jerk is not None
     return limits.velocity, limits.acceleration, limits.jerk
-
-
-def _for_all(name: str, value: Any, dof: int, finite: bool = False) -> Array:
-    raw = validation.ordinary_array(name, value, finite=finite)
-    return np.full(dof, float(raw)) if raw.ndim == 0 else validation.ordinary_array(name, value, (dof,), finite=finite)
 
 
 def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int | None) -> Array:

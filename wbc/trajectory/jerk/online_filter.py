@@ -53,13 +53,18 @@ def online(
     """
     dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
     validation.one_of("synchronisation", synchronisation, ("time", "phase", "none"))
-    given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "lower": lower, "upper": upper}
-    if isinstance(dof, MotionLimits):
-        given = {k: getattr(dof, k) if v is None else v for k, v in given.items()}
-        count = dof.dof or 0
-    else:
-        count = int(validation.scalar("dof", dof, low=1.0))
-    return Online(limits_of(count, **given), dt, synchronisation)
+    before = dof if isinstance(dof, MotionLimits) else MotionLimits()
+    count = dof.dof or 0 if isinstance(dof, MotionLimits) else int(validation.scalar("dof", dof, low=1.0))
+    limits = _replaced(before, count, (velocity, acceleration, jerk, lower, upper))
+    return Online(limits, dt, synchronisation)
+
+
+def _replaced(before: MotionLimits, dof: int, given: tuple[Any, ...]) -> MotionLimits:
+    """Limits with what is given of velocity, acceleration, jerk, lower and upper in place of what was."""
+    names = ("velocity", "acceleration", "jerk", "lower", "upper")
+    return limits_of(
+        dof, *(getattr(before, name) if value is None else value for name, value in zip(names, given, strict=True))
+    )
 
 
 class Online:
@@ -166,8 +171,8 @@ class Online:
         Raises:
             ShapeError, NotFiniteError, RangeError, BoundsError: of arguments.
         """
-        given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "lower": lower, "upper": upper}
-        self._take(limits_of(self.dof, **{k: getattr(self._limits, k) if v is None else v for k, v in given.items()}))
+        sizes = (velocity, acceleration, jerk, lower, upper)
+        self._take(_replaced(self._limits, self.dof, sizes))
         self._aim()
 
     def step(self) -> State:

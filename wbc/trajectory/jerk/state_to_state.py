@@ -55,7 +55,6 @@ class StateTask:
 
     @property
     def dof(self) -> int:
-        """Number of joints."""
         return int(self.start.shape[1])
 
     @property

@@ -66,12 +66,7 @@ class Law:
         self.path = validation.instance("law.path", path, Path, "a Path")
         self.timing = validation.instance("law.timing", timing, Timing, "a Timing")
         self.checks, self.moving = all_checks(checks), _two_flags("law.moving", moving)
-        given = (
-            MotionLimits()
-            if limits is None
-            else validation.instance("limits", limits, MotionLimits, "trajectory.MotionLimits")
-        )
-        self.limits = given.for_dof(path.dof)
+        self.limits = MotionLimits.given(limits, path.dof)
         _check_within(path, timing)
 
     @property

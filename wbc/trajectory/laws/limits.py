@@ -71,6 +71,15 @@ class MotionLimits:
             raise ShapeError("limits", self.dof, f"expected limits of {dof} joints")
         return self
 
+    @classmethod
+    def given(cls, limits: MotionLimits | None, dof: int) -> MotionLimits:
+        """Limits that a user gave, None for none, if they are for so many joints.
+
+        Raises:
+            ShapeError: they are not.
+        """
+        return (cls() if limits is None else validation.instance("limits", limits, cls, "MotionLimits")).for_dof(dof)
+
     def scaled(self, factor: float) -> MotionLimits:
         """Velocities, accelerations and jerks times a factor, positions as they are.
 
@@ -80,6 +89,16 @@ class MotionLimits:
         factor = validation.scalar("factor", factor, low=0.0, open_low=True)
         parts = {name: getattr(self, name) for name in ("velocity", "acceleration", "jerk")}
         return MotionLimits(self.lower, self.upper, **{k: None if v is None else v * factor for k, v in parts.items()})
+
+
+def for_all(name: str, value: Any, dof: int, finite: bool = False) -> Array:
+    """A number for all joints, or one for each, as one for each; inf is no limit.
+
+    Raises:
+        ShapeError, NotFiniteError: of another shape, or not finite.
+    """
+    raw = validation.ordinary_array(name, value, finite=finite)
+    return np.full(dof, float(raw)) if raw.ndim == 0 else validation.ordinary_array(name, value, (dof,), finite=finite)
 
 
 def _vector(name: str, value: Any) -> Array:

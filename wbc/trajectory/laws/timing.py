@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
 from wbc.trajectory.paths import bernstein
-from wbc.trajectory.paths.path import Index, pieces_of
+from wbc.trajectory.paths.path import Index, PolynomialPath, pieces_of, row_of, shifted
 from wbc.validation import Array
 
 
@@ -56,7 +56,8 @@ class Timing:
         dt = 2 ds / (speed_i + speed_i+1), and d2s/dt2 = (speed_i+1 - speed_i) / dt.
 
         Raises:
-            ShapeError, NotFiniteError: not two vectors of one length. RangeError: s does not increase, or bad speeds.
+            ShapeError, NotFiniteError: not two vectors of one length. RangeError: s does not increase or by too little,
+                or bad speeds.
         """
         positions = validation.ordinary_array("timing.s", s)
         if positions.ndim != 1 or len(positions) < 2:
@@ -68,7 +69,11 @@ class Timing:
         if (speeds < 0.0).any() or (mean <= 0.0).any():
             raise RangeError("timing.speed", speed, "must not be negative, nor 0 at both ends of an interval")
         times = np.concatenate([[0.0], np.cumsum(np.diff(positions) / mean)])
-        return cls(times, [0.5 * np.diff(speeds) / np.diff(times), speeds[:-1], positions[:-1]])
+        with np.errstate(all="ignore"):
+            bends = 0.5 * np.diff(speeds) / np.diff(times)
+        if not np.isfinite(bends).all():
+            raise RangeError("timing.s", s, "steps are too small for these speeds")
+        return cls(times, [bends, speeds[:-1], positions[:-1]])
 
     @property
     def duration(self) -> float:
@@ -86,7 +91,7 @@ class Timing:
 
     def evaluate(self, t: Array, order: int = 0, piece: Index | None = None) -> Array:
         """s or a derivative of it along t, at m times; ``piece`` decides on what side of a break it is taken."""
-        t = times_row("t", t)
+        t = row_of("t", t)
         validation.integer("order", order, 0, 3)
         margin = self.duration
         if t.size and not (t.min() >= -margin and t.max() <= 2.0 * margin):
@@ -111,7 +116,7 @@ class Timing:
     def reversed(self) -> Timing:
         """Back from the end: s(duration - t)."""
         spans = np.diff(self.times)
-        moved = _shifted(self.coefficients, spans)
+        moved = shifted(self.coefficients, spans)
         signs = (-1.0) ** np.arange(self.degree, -1, -1)
         times = np.concatenate([[0.0], np.cumsum(spans[::-1])])
         times[-1] = self.times[-1]
@@ -134,7 +139,7 @@ class Timing:
         times = np.concatenate([[start], inner, [end]])
         shift = np.zeros(last - first + 1)
         shift[0] = start - self.times[first]
-        return Timing(times - start, _shifted(self.coefficients[:, first : last + 1], shift))
+        return Timing(times - start, shifted(self.coefficients[:, first : last + 1], shift))
 
     def then(self, other: Timing, shift: float) -> Timing:
         """This course, then another, whose s counts from ``shift``.
@@ -156,11 +161,7 @@ class Timing:
 
     def hull(self) -> Array:
         """Numbers that enclose s on each piece, pieces x coefficients of Bernstein's polynomials."""
-        spans = np.diff(self.times)
-        nodes = bernstein.nodes(self.degree)
-        at = np.repeat(np.arange(len(spans)), len(nodes))
-        values = self.evaluate((self.times[:-1, None] + spans[:, None] * nodes).ravel(), piece=at)
-        return bernstein.coefficients(values.reshape(len(spans), -1))
+        return PolynomialPath(self.times, self.coefficients[..., None]).hull()[:, 0]
 
     def ranges(self, enough: Callable[[Array, Array], NDArray[np.bool_]]) -> tuple[Array, Array]:
         """Lowest and highest s of each piece, or numbers beyond them that are good ``enough``, piece by piece."""
@@ -193,24 +194,3 @@ class Timing:
                 inside = real[(real > edge) & (real < 1.0 - edge)]
                 found.append(self.times[i] + spans[i] * inside)
         return np.unique(np.concatenate(found))
-
-
-def times_row(field: str, value: Any) -> Array:
-    """Finite numbers in one row; arrays of floats are taken as they are."""
-    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == 1
-    if ready and np.isfinite(value).all():
-        return np.asarray(value)
-    out = validation.ordinary_array(field, value)
-    if out.ndim != 1:
-        raise ShapeError(field, value, "expected numbers in one row")
-    return out
-
-
-def _shifted(coefficients: Array, by: Array) -> Array:
-    """Coefficients of p(x + by), a number for each column, by repeated synthetic division."""
-    out = coefficients.copy()
-    size = len(out)
-    for row in range(size - 1):
-        for k in range(1, size - row):
-            out[k] += by * out[k - 1]
-    return out

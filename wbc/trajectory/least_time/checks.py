@@ -58,7 +58,6 @@ class TorqueCheck:
 
     @property
     def columns(self) -> int:
-        """One a joint."""
         return self.robot.nv
 
     def unit(self, column: int) -> str:
@@ -109,11 +108,9 @@ class FrameSpeed:
 
     @property
     def columns(self) -> int:
-        """One a frame."""
         return len(self._frames)
 
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Speed over limit, m x frames."""
         model = self.robot.model
         data = model.createData()
         out = np.empty((len(position), self.columns))
@@ -143,11 +140,9 @@ class PoseSpeed:
 
     @property
     def columns(self) -> int:
-        """One a part."""
         return len(self.limits)
 
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Speed over limit, m x parts."""
         parts = {"linear": velocity[:, :3], "angular": velocity[:, 3:]}
         sizes = [np.linalg.norm(parts[part], axis=1) / limit for part, limit in self.limits.items()]
         return np.stack(sizes, axis=1)
@@ -180,7 +175,6 @@ class Inequality:
 
     @property
     def columns(self) -> int:
-        """One a row of F."""
         return len(self.matrix)
 
     def unit(self, column: int) -> str:
@@ -192,7 +186,6 @@ class Inequality:
         return np.where(self.bound == 0.0, 1.0, np.abs(self.bound))
 
     def ratios(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """m x k."""
         shape = (self.matrix.shape[1],)
         states = zip(position, velocity, acceleration, strict=True)
         field = f"{self.name}.function"

@@ -13,7 +13,7 @@ from wbc.errors import BoundsError, InfeasibleError, RangeError, ShapeError
 from wbc.robot.robot import Robot
 from wbc.trajectory.laws.certificate import TOLERANCE, Check, certify
 from wbc.trajectory.laws.law import Law
-from wbc.trajectory.laws.limits import MotionLimits
+from wbc.trajectory.laws.limits import MotionLimits, for_all
 from wbc.trajectory.laws.timing import Timing
 from wbc.trajectory.least_time.checks import Force, FrameSpeed, Inequality, PoseSpeed, TorqueCheck
 from wbc.trajectory.least_time.fastest import FastestTask
@@ -139,12 +139,7 @@ def _standing(task: FastestTask, duration: float | None) -> Law:
 
 def _limits(path: Path, limits: MotionLimits | None, velocity: Any, acceleration: Any) -> MotionLimits:
     """Limits with numbers spread over the joints."""
-    given = (
-        MotionLimits()
-        if limits is None
-        else validation.instance("limits", limits, MotionLimits, "trajectory.MotionLimits")
-    )
-    out = given.for_dof(path.dof)
+    out = MotionLimits.given(limits, path.dof)
     if out.jerk is not None and np.isfinite(out.jerk).any():
         raise RangeError("limits.jerk", out.jerk, "laws of least time step in acceleration, see jerk_limited")
     own = {"velocity": velocity, "acceleration": acceleration}
@@ -153,11 +148,7 @@ def _limits(path: Path, limits: MotionLimits | None, velocity: Any, acceleration
 
 def _spread(name: str, value: Any, count: int) -> Array:
     """A positive number, or one for each joint, as one for each joint; inf is no limit."""
-    out = validation.ordinary_array(name, value, finite=False)
-    if out.ndim == 0:
-        out = np.full(count, float(out))
-    if out.shape != (count,):
-        raise ShapeError(name, value, f"expected a number or {count} numbers")
+    out = for_all(name, value, count)
     if not (out >= validation.SMALLEST).all():
         raise RangeError(name, value, f"limits must be positive numbers, at least {validation.SMALLEST:g}")
     return out

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -58,11 +59,7 @@ class Path(ABC):
             ShapeError, NotFiniteError, RangeError: not numbers in one row, no order of 0 to 3, no pieces.
         """
         validation.integer("order", order, 0, 3)
-        ready = type(s) is np.ndarray and s.dtype == np.float64 and s.ndim == 1 and np.isfinite(s).all()
-        if not ready:
-            s = validation.ordinary_array("s", s)
-            if s.ndim != 1:
-                raise ShapeError("s", s.shape, "expected numbers in one row")
+        s = row_of("s", s)
         margin = self.length
         if s.size and not (s.min() >= self.knots[0] - margin and s.max() <= self.knots[-1] + margin):
             raise RangeError("s", s, f"expected coordinates of the path, {self.knots[0]:g} to {self.knots[-1]:g}")
@@ -108,6 +105,27 @@ def pieces_of(piece: Any, s: Array, count: int) -> Index:
     if piece.size and not (piece.min() >= 0 and piece.max() < count):
         raise RangeError("piece", piece, f"expected numbers of pieces, 0 to {count - 1}")
     return np.asarray(piece)
+
+
+def row_of(field: str, value: Any) -> Array:
+    """Finite numbers in one row; arrays of floats are taken as they are."""
+    ready = type(value) is np.ndarray and value.dtype == np.float64 and value.ndim == 1
+    if ready and np.isfinite(value).all():
+        return np.asarray(value)
+    out = validation.ordinary_array(field, value)
+    if out.ndim != 1:
+        raise ShapeError(field, value, "expected numbers in one row")
+    return out
+
+
+def shifted(coefficients: Array, by: Array) -> Array:
+    """Coefficients of p(x + by), a number for each piece [powers, pieces, ...], by repeated synthetic division."""
+    out = coefficients.copy()
+    size = len(out)
+    for row in range(size - 1):
+        for k in range(1, size - row):
+            out[k] += by * out[k - 1]
+    return out
 
 
 class PolynomialPath(Path):
@@ -156,6 +174,26 @@ class PolynomialPath(Path):
         shares = [[math.comb(i, k) / math.comb(degree, k) for k in range(i + 1)] for i in range(degree + 1)]
         return np.stack([sum(share * power[k] for k, share in enumerate(row)) for row in shares], axis=2)
 
+    @classmethod
+    def joined(cls, paths: Sequence[PolynomialPath]) -> PolynomialPath:
+        """One path after the other, each of which begins where the one before it ends; coordinates go on from the
+        first's.
+
+        Raises:
+            ShapeError: no polynomial paths, none at all, or of different numbers of coordinates.
+        """
+        paths = validation.items("paths", paths, "PolynomialPaths")
+        for k, path in enumerate(paths):
+            validation.instance(f"paths[{k}]", path, PolynomialPath, "a PolynomialPath")
+        if len({path.coefficients.shape[2] for path in paths}) != 1:
+            raise ShapeError("paths", len(paths), "expected one path or more, all of as many coordinates")
+        degree = max(int(path.degree or 0) for path in paths)
+        knots, rows = paths[0].knots[:1], list[Array]()
+        for path in paths:
+            knots = np.concatenate([knots, knots[-1] - path.knots[0] + path.knots[1:]])
+            rows.append(np.pad(path.coefficients, ((degree - int(path.degree or 0), 0), (0, 0), (0, 0))))
+        return cls(knots, np.concatenate(rows, axis=1))
+
     def sliced(self, start: float, end: float) -> PolynomialPath:
         """The part between two coordinates of the path, which keep their values.
 
@@ -167,12 +205,10 @@ class PolynomialPath(Path):
         inner = self.knots[(self.knots > start + 1e-12) & (self.knots < end - 1e-12)]
         knots = np.concatenate([[start], inner, [end]])
         pieces = self.pieces_at(knots[:-1])
-        rows = self.coefficients[:, pieces]
         # The first piece begins within one of the path's
-        shift, first, degree = start - self.knots[pieces[0]], rows[:, 0].copy(), len(rows) - 1
-        for k in range(degree + 1):
-            rows[k, 0] = sum(math.comb(degree - j, k - j) * shift ** (k - j) * first[j] for j in range(k + 1))
-        return PolynomialPath(knots, rows)
+        shift = np.zeros((len(pieces), 1))
+        shift[0] = start - self.knots[pieces[0]]
+        return PolynomialPath(knots, shifted(self.coefficients[:, pieces], shift))
 
 
 class JoinedPath(Path):

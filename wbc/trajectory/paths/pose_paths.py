@@ -20,7 +20,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.rotations import matrices, quaternion
+from wbc.rotations import continuous_quaternions, matrices, quaternion
 from wbc.trajectory.paths.corners import DEEPEST, RoundedCorners, rounded
 from wbc.trajectory.paths.joint_paths import standing_path
 from wbc.trajectory.paths.path import PolynomialPath
@@ -187,12 +187,8 @@ def pose_spline(poses: Sequence[Any], ends: Ends = "not-a-knot", radius: float =
     if len(known.points) == 2 and ends != "clamped":
         return geodesic_path(poses[0], poses[-1], radius)
     s = summed(known.lengths)
-    nearest = known.quaternions.copy()
-    for k in range(1, len(nearest)):
-        if nearest[k] @ nearest[k - 1] < 0.0:
-            nearest[k] = -nearest[k]
     position = PolynomialPath(s, cubic_spline(s, known.points, ends))
-    spline = PolynomialPath(s, cubic_spline(s, nearest, ends))
+    spline = PolynomialPath(s, cubic_spline(s, continuous_quaternions(known.quaternions), ends))
     return PosePath(position, QuaternionSpline(spline, "path.poses"))
 
 

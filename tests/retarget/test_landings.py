@@ -1,0 +1,64 @@
+"""A contact that comes late gives way to those that stand, and ticks that need no look are those of one at a time."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.retarget import clips, motions
+from wbc.multibody import pin
+from wbc.retarget import Retargeted, Retargeter, engine
+from wbc.retarget.engine import Engine
+from wbc.retarget.plan import MotionPlan
+
+
+@functools.cache
+def seated() -> tuple[Engine, Retargeted]:
+    """Who comes to sit with both feet on the ground, and the engine that made the motion."""
+    made = Retargeter("simple_humanoid")
+    motion = made.run(motions.part(clips.sit().clip, 0.0, 1.0))
+    return made.engine(tuple(motion.plan.limbs), motion.plan.dt, head=motion.plan.head is not None), motion
+
+
+def reaching(motion: Retargeted, away: float) -> MotionPlan:
+    """The left hand stands so far to the left of where it is, from the first tick on, and is held from the tenth on."""
+    plan, arm = motion.plan, motion.plan.limbs["left_arm"]
+    _, positions = motions.places(motion, motion.body.limbs["left_arm"].end)
+    place = positions[plan.ticks // 2] + np.array([0.0, away, 0.0])
+    ticks = np.arange(plan.ticks)
+    hand = replace(
+        arm, end=np.tile(place, (plan.ticks, 1)), stands=ticks >= 0, held=ticks >= 10, lies=np.zeros(plan.ticks, bool)
+    )
+    return replace(plan, limbs={**plan.limbs, "left_arm": hand})
+
+
+@pytest.mark.parametrize("away", [0.1, 0.2])
+def test_a_hand_that_is_held_late_gives_way_to_the_feet(away: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, motion = seated()
+    # It is held from farther away than a tick can bring it
+    monkeypatch.setattr(engine, "HAND_ENGAGED", 1.0)
+    q, gave = made.run(reaching(motion, away))
+    assert gave == []
+    for limb in ("left_leg", "right_leg"):
+        feet = motions.places(replace(motion, q=q), motion.body.limbs[limb].end)[1]
+        assert np.abs(feet - feet[0]).max() < 1e-6
+
+
+def test_ticks_of_a_plan_are_those_of_one_at_a_time() -> None:
+    made, motion = seated()
+    places, turns = made.targets(motion.plan)
+    rows = made.rows(places, turns)
+    held = {name: limb.grip(0) for name, limb in motion.plan.limbs.items()}
+    q = np.empty((21, made.robot.nq))
+    q[0] = made.start(places, turns, held)
+    v = made.controller.last_command
+    made._ticks.most = np.inf
+    assert made._ticks.run(rows[:20], q) == (20, None)
+    made.controller.reset(q[0], v)
+    for row, before, after in zip(rows[:20], q[:-1], q[1:], strict=True):
+        made._ticks._group.write(row)
+        v = made.controller.step(before).v
+        assert np.abs(pin.integrate(made.robot.model, before, v * made.dt) - after).max() < 1e-9
