@@ -2,36 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wbc.clearance.scene import Pair, SweptBody, SweptScene, Unbounded
+from wbc.clearance.tree import Tree
 from wbc.multibody import pin
 from wbc.shapes import Sphere
 from wbc.validation import Array
 
+#: Fewer pairs are not in blocks, which would take as long to make as they spare in some queries
+MANY = 200
 #: A ball is so much larger than what it holds, against rounding [m]
 WIDER = 1e-9
 
 
-def in_blocks(scene: SweptScene) -> tuple[SweptScene, Array]:
-    """The same scene with its pairs in blocks, and behind them one a block, of balls about all that a frame carries and
-    of bodies in the world; the number of the pair behind the last one of each block [blocks].
+def in_blocks(tree: Tree, bodies: Sequence[SweptBody], pairs: Sequence[Pair]) -> tuple[SweptScene, Array]:
+    """A scene whose pairs are in blocks, and behind them one a block, of balls about all that a frame carries and of
+    bodies in the world; the number of the pair behind the last one of each block [blocks].
     """
-    bodies, names = list(scene.bodies), [body.name for body in scene.bodies]
-    ending = np.array([not isinstance(body.shape, Unbounded) for body in bodies], dtype=bool)
+    if len(pairs) < MANY:
+        return SweptScene(tree, bodies, pairs), np.zeros(0, dtype=np.int32)
+    scene, holders = SweptScene(tree, bodies, ()), {body.name: body.name for body in bodies}
+    held = list(scene.bodies)
+    ending = np.array([not isinstance(body.shape, Unbounded) for body in held], dtype=bool)
     for frame in sorted(set(scene.frame.tolist()) - {-1}):
         carried = np.flatnonzero((scene.frame == frame) & ending).tolist()
         if len(carried) > 1:
-            bodies.append(_ball(scene, carried))
-            for k in carried:
-                names[k] = bodies[-1].name
+            held.append(_ball(scene, carried))
+            holders |= {scene.bodies[k].name: held[-1].name for k in carried}
     blocks = dict[tuple[str, str], list[Pair]]()
-    for pair in scene.pairs:
-        one, other = sorted(names[scene.number[name]] for name in (pair.first, pair.second))
-        blocks.setdefault((one, other), []).append(pair)
-    pairs = [pair for block in blocks.values() for pair in block]
-    pairs += [Pair(*ends, max(pair.required for pair in block)) for ends, block in blocks.items()]
-    return SweptScene(scene.tree, bodies, pairs), np.cumsum([len(block) for block in blocks.values()], dtype=np.int32)
+    for pair in pairs:
+        one, other = holders[pair.first], holders[pair.second]
+        blocks.setdefault((one, other) if one < other else (other, one), []).append(pair)
+    ordered = [pair for block in blocks.values() for pair in block]
+    ordered += [Pair(*ends, max(pair.required for pair in block)) for ends, block in blocks.items()]
+    return SweptScene(tree, held, ordered), np.cumsum([len(block) for block in blocks.values()], dtype=np.int32)
 
 
 def _ball(scene: SweptScene, carried: list[int]) -> SweptBody:

@@ -59,7 +59,8 @@ class NativePlanner:
     """
 
     def __init__(self, scene: PlanningScene, rows: PlanningRows, p: Array, limits: tuple[Array, Array]) -> None:
-        coordinates, (swept, block_end) = scene.coordinates, in_blocks(scene.swept())
+        coordinates = scene.coordinates
+        swept, block_end = in_blocks(coordinates.tree, scene.bodies, scene.pairs)
         n, bodies, pairs, frames = coordinates.count, len(swept.bodies), len(scene.pairs), len(coordinates.tree.frames)
         self.scene, self.path_rows, self._p, self._call = scene, rows, p, library()
         self.low, self.high, self.sample_low, self.sample_high = (side.copy() for side in (*limits, *limits))

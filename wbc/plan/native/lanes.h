@@ -151,10 +151,12 @@ static int near_pairs(plan_t *p, const int *pairs, int count, int *near) {
         const int k = pairs ? pairs[m] : recent[m];
         if (k >= 0) left = look_at(p, k, ~0u, near, left);
     }
-    for (int block = 0, k = 0; !pairs && block < p->blocks; k = p->block_end[block++]) {
-        const unsigned lanes = p->block_end[block] - k > FEW ? near_balls(p, p->pairs + block, p->alive) : p->alive;
-        for (; lanes && k < p->block_end[block] && p->sweep->stopped < 0; k++)
+    for (int block = 0, k = 0; !pairs && k < p->pairs; block++) {
+        const int end = block < p->blocks ? p->block_end[block] : p->pairs;
+        const unsigned lanes = block < p->blocks && end - k > FEW ? near_balls(p, p->pairs + block, p->alive) : p->alive;
+        for (; lanes && k < end && p->sweep->stopped < 0; k++)
             if (k != recent[0] && k != recent[1] && k != recent[2]) left = look_at(p, k, lanes, near, left);
+        k = end;
     }
     return left;
 }
