@@ -82,14 +82,10 @@ class PlanningScene:
                 spans += [np.r_[core.layout.blocks[entry.frame].slots["pose"].span]] if entry.frame else []
         return np.concatenate(spans)
 
-    def swept(self) -> SweptScene:
-        """Its tree, bodies and pairs, with arrays of their own."""
-        return SweptScene(self.coordinates.tree, self.bodies, self.pairs)
-
     @cached_property
     def sweeper(self) -> Sweeper:
         """Proofs of motions, to :data:`OPEN`."""
-        return Sweeper(self.swept())
+        return Sweeper(SweptScene(self.coordinates.tree, self.bodies, self.pairs))
 
     def nearest(self, x: Array) -> Nearest | None:
         """The pair of the least margin at x; None where there is no pair."""
