@@ -110,7 +110,7 @@ def load(
     """
     recipe, source, made = _find(robot)
     more, own = _loops(loops)
-    changes: dict[str, Any] = {"loops": own, "actuated": actuated}
+    changes: dict[str, Any] = {"loops": own, "more_loops": more, "actuated": actuated}
     if arguments is not None:
         given = validation.mapping("arguments", arguments, "names to values")
         changes["arguments"] = {str(key): str(value) for key, value in given.items()}
@@ -131,7 +131,6 @@ def load(
     }
     try:
         built = build(source, replace(recipe, **changes), wanted, shapes, package_dirs, limits)
-        built = built.with_loops(*built.loops.loops, *more) if more else built
     except WbcError as error:
         if recipe.file or not isinstance(source, (str, os.PathLike)) or str(source) in str(error):
             raise

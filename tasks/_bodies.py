@@ -92,4 +92,10 @@ def check_shaped(robot: Robot, field: str, link: Any, available: Iterable[str]) 
     robot.check_frame(field, link)
     if not robot.shapes.get(link):
         reason = "this link has no collision shapes (give it some with robot.with_shapes)"
-        raise MissingShapeError(field, link, reason, nearest(link, available))
+        raise MissingShapeError(field, link, reason + meshes_instead(robot), nearest(link, available))
+
+
+def meshes_instead(robot: Robot) -> str:
+    """What to do where a description has meshes in place of shapes, as the end of a reason."""
+    unread = "meshes, not read" in robot.notes.get("shapes", "")
+    return "; its description has meshes: wbc.robots.load(..., shapes='fit') fits capsules to them" if unread else ""

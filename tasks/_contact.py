@@ -74,7 +74,6 @@ class Contact(Constraint):
         return len(self.axes)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target`` and ``gain`` of the motion, then :meth:`limits`."""
         return (
             Input("target", "pose", unit="m, rad", part=self.part),
             Input("gain", unit="1/s", default=10.0, low=0.0),
@@ -92,7 +91,6 @@ class Contact(Constraint):
         return self._hold.rows(robot)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
-        """Those of ``Hold``: J v = -gain e."""
         return self._hold.velocity_rows(robot, kin, inputs, dt)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
@@ -167,7 +165,6 @@ class ContactWrench(Constraint):
         return self.contact.cone_rows(robot)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: its rows are on forces."""
         return None
 
 
@@ -195,7 +192,6 @@ class ContactForce(Task):
     contact: Contact
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target``, ``measured`` and ``feedback``, see the class."""
         count, unit = self.contact.components, "N, N m" if max(self.contact.axes) >= 3 else "N"
         return (
             Input("target", unit=unit, size=count, default=np.zeros(count)),
@@ -216,11 +212,9 @@ class LoopForces(Task):
     asks: ClassVar[bool] = False
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """None but those of every task; ``gain`` has no meaning."""
         return (Input("gain", unit="1/s", default=0.0, low=0.0),)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One a row of the loops, of the force or moment along it."""
         return tuple(force_row(robot, label, "N" if unit == "m" else "N m") for label, unit in robot.loops.rows)
 
 
@@ -235,13 +229,11 @@ class Unactuated(Constraint):
     equality: ClassVar[bool] = True
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One a degree of freedom [N, N m], of a base along its own axes."""
         return tuple(
             force_row(robot, robot.dof_names[k], "N" if robot.dof_units[k] == "m" else "N m") for k in robot.unactuated
         )
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: its rows are on generalised forces."""
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:

@@ -39,15 +39,12 @@ class Direction(Constraint):
     task: Task
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """Those of the task, per second, and that of lambda."""
         own = self.task.rows(robot)
         rates = [Row(r.label, r.unit if r.unit.endswith("/s") else f"{r.unit or '1'}/s") for r in own]
         return (*rates, Row("scale", ""))
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Slowing a task down along its path is a matter of velocities."""
         return "" if command == "velocity" else "keeps the direction of a velocity; leave scaled=True out"
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: the rows are made from those that the task has in the same stack."""
         return None

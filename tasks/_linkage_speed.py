@@ -39,6 +39,8 @@ SLIGHT = 1e-3
 STEEP = 10.0
 #: Most of :attr:`Bend.missed` where a linkage is slowed
 MISSED = 1e-8
+#: What joints can accelerate by but for what closes loops that a tick finds open by rounding, as a part of it
+WITHOUT_ROUNDING = 1.0 - 1e-5
 #: A linkage is at rest below this part of the speed that its joints reach in a tick
 AT_REST = 1e-3
 
@@ -69,8 +71,10 @@ class LinkageSpeed(Constraint):
     the linkage stops no further on than it would have: what is within these rows stays so by braking, whatever the
     lengths of ticks, with accelerations of |c / A| + E < 1 at most. Joints that each brake in time on their own do not
     say so, as a slow one takes along others that cannot stop as soon. E leaves as much for bends that grow on the way.
-    The row of a joint is the line with s and c t^2 to first order about v0, over dt + t; no row asks for more than
-    braking by D does, or by what of it bends leave within A.
+    The row of a joint is the line over dt + t, with s and c t^2 to first order about the speed along v0 at which the
+    joint comes to its limit but for c, of those that A lets it reach; no row asks for more than braking by D does, or
+    by what of it bends leave within A. Where accelerations are commanded a tick moves by (v0 + v) dt / 2, and
+    q + v0 dt / 2 is in place of q: what brakes then stays within the line as before.
 
     Attributes:
         limits: whose limits they are.
@@ -79,7 +83,6 @@ class LinkageSpeed(Constraint):
     abstract: ClassVar[bool] = True
     stands_in_world: ClassVar[bool] = False
     order: ClassVar[SacrificeOrder] = SacrificeOrder.MARGIN
-    later: ClassVar[bool] = True
 
     limits: JointLimits
 
@@ -103,12 +106,21 @@ class LinkageSpeed(Constraint):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
         """See the class."""
-        parts = [self._rows_of(robot, kin, linkage, dt) for linkage in self._limited(robot)]
+        return self._rows(robot, kin, dt, 0.0)
+
+    def later_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
+        """The same, of joints that move at (v0 + v) / 2 until they have v."""
+        return self._rows(robot, kin, dt, 0.5)
+
+    def _rows(self, robot: Robot, kin: Tracer, dt: ca.SX, moved: float) -> Rows:
+        parts = [self._rows_of(robot, kin, linkage, dt, moved) for linkage in self._limited(robot)]
         matrix, lower, upper = (ca.vertcat(*ends) for ends in zip(*parts, strict=True))
         return Rows(matrix, lower, upper)
 
-    def _rows_of(self, robot: Robot, kin: Tracer, linkage: Linkage, dt: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Rows of a linkage, their lower and upper sides."""
+    def _rows_of(
+        self, robot: Robot, kin: Tracer, linkage: Linkage, dt: ca.SX, moved: float
+    ) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Rows of a linkage, their lower and upper sides; ``moved``: for which part of a tick joints go on at v0."""
         dofs, ended, kept = list(linkage.dofs), self._ended(robot, linkage), self.limits.limits(robot)
         known = kept.acceleration[dofs]
         limits = np.where(np.isfinite(known), known, UNLIMITED * known[np.isfinite(known)].max())
@@ -119,7 +131,7 @@ class LinkageSpeed(Constraint):
         speed, asked = _norm(v, rest), ca.if_else(regular, bend.asked, 0.0)
         along = (v / speed) ** 3 / weights
         # Joints that bend against their velocity have less left to brake by
-        braking = ca.mmin((1.0 + asked / weights * ca.sign(v)) / (ca.fabs(v) / speed + LEAST))
+        braking = ca.mmin((WITHOUT_ROUNDING + asked / weights * ca.sign(v)) / (ca.fabs(v) / speed + LEAST))
         braking = ca.fmin(ca.fmax(braking, 0.0), BRAKE) * dt
         # 1 over what is left of the way, and s / s_max
         near, ticks = ca.fmax(bend.rate, 0.0) / speed, TICKS * dt
@@ -129,12 +141,19 @@ class LinkageSpeed(Constraint):
         matrix = ca.SX(1 + len(ended), robot.nv)
         matrix[0, dofs] = unit * along.T
         lower, upper = [-ca.SX.inf(1)], [ca.if_else(ca.logic_and(size > SLIGHT, regular), unit * most, ca.inf)]
-        stops, braked = 0.5 / STOP * speed, (1.0 - braking / ca.fmax(speed, braking)) * kin.v[dofs] + dt * asked
+        braked = (1.0 - braking / ca.fmax(speed, braking)) * kin.v[dofs] + dt * asked
+        reach = len(dofs) ** 0.25 * dt
         for k, dof in enumerate(ended, 1):
-            place = dofs.index(dof)
-            curved = 0.5 * asked[place] * stops**2
-            row = (0.5 / STOP * kin.v[dof] + 4.0 * curved / speed) * along
-            ahead = ca.dot(row, kin.v[dofs]) - curved - kin.q[int(robot.position_index[dof])]
+            place, v_joint = dofs.index(dof), kin.v[dof]
+            begins = kin.q[int(robot.position_index[dof])] + moved * dt * v_joint
+            room = ca.if_else(
+                v_joint > 0.0, float(kept.position_upper[dof]) - begins, begins - kept.position_lower[dof]
+            )
+            fastest = ca.sqrt(dt**2 + 2.0 / STOP * ca.fmax(room, 0.0) / (ca.fabs(v_joint) / speed + LEAST)) - dt
+            about = ca.fmax(ca.fmin(ca.fmax(STOP * fastest, speed - reach), speed + reach), 0.0)
+            stops, bent = 0.5 / STOP * about, asked[place] * (about / speed) ** 2
+            row = (0.5 / STOP * v_joint / speed * about + bent * stops / STOP) * along
+            ahead = about / speed * ca.dot(row, kin.v[dofs]) - 0.5 * bent * stops**2 - begins
             row[place] += dt + stops
             row, ahead = row / (dt + stops), ahead / (dt + stops)
             least = ca.dot(row, braked)

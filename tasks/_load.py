@@ -22,7 +22,6 @@ class Load(Constraint):
     stands_in_world: ClassVar[bool] = False
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Only a stack of torques has forces."""
         return "" if command == "torque" else 'is a force: compile with command="torque"'
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -32,5 +31,4 @@ class Load(Constraint):
         return Rows(ca.SX(0, robot.nv), ca.SX(0, 1), ca.SX(0, 1))
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
-        """L, nv numbers."""
         raise TypeError(f"{type(self).__name__} declares no load")

@@ -79,16 +79,13 @@ class AxisAlign(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """r1 and r2 [rad], about b1 and b2."""
         return (Row("r1", "rad"), Row("r2", "rad"))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the axis points at ``q``."""
         turn = frame_pose(robot, self.relative_to, q).rotation.T @ frame_pose(robot, self.frame, q).rotation
         return {"target": turn @ np.array(self.axis)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, and terms of value zero whose rates are those of the rows."""
         rotation, target = kin.rotation(self.frame), inputs["target"]
         if self.relative_to != WORLD:
             rotation = kin.rotation(self.relative_to).T @ rotation
@@ -99,5 +96,4 @@ class AxisAlign(Task):
         return turn + kin.across(self.frame, self.relative_to, axes, turn) - swept
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """F' R' (w - w_b), the relative angular velocity across the axis."""
         return kin.jacobian(self.error(robot, kin, inputs))

@@ -72,7 +72,6 @@ class AxisCone(Constraint):
         object.__setattr__(self, "half_angle", checked_half_angle("AxisCone.half_angle", self.half_angle))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``direction`` and ``half_angle`` with their rates."""
         return (
             Input("direction", size=3, default=self.direction, rate="direction_rate", direction=True),
             Input("direction_rate", unit="1/s", size=3, default=np.zeros(3)),

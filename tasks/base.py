@@ -337,14 +337,10 @@ class Constraint(Item):
     #: What the rows keep at 0, :meth:`residual`, is 0 at q (+) v dt to rounding, whatever that costs
     exact: ClassVar[bool] = False
 
-    #: Rows are of the velocity at the end of a tick, v + a dt, where accelerations are commanded
-    later: ClassVar[bool] = False
-
     #: Default rate [1/s] of margins: h decays no faster than exp(-rate t)
     default_rate: ClassVar[float] = 20.0
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Distances that are measured are known with their first derivative only."""
         if command != "velocity" and self.sensed_rows(robot):
             return "measures distances of meshes, of which only the first derivative is known; give shapes of its own"
         return ""
@@ -403,6 +399,12 @@ class Constraint(Item):
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
         """lower <= A v <= upper, or None."""
+        return None
+
+    def later_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
+        """lower <= A (v + a dt) <= upper where accelerations are commanded, or None: what :meth:`velocity_rows` are off
+        by decays.
+        """
         return None
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:

@@ -56,7 +56,6 @@ class CenterOfMass(Task):
         object.__setattr__(self, "weights", checked_weights("CenterOfMass.weights", self.weights, 3))
 
     def validate(self, robot: Robot) -> None:
-        """Check axes and that the robot has mass, see :meth:`Item.validate`."""
         resolve_axes(robot, "CenterOfMass.axes", self.axes, None)
         mass = sum(float(inertia.mass) for inertia in list(robot.tree.inertias)[1:])
         if mass <= 0.0:
@@ -72,7 +71,6 @@ class CenterOfMass(Task):
         return point_rows()
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the centre of mass is at ``q``."""
         tree = robot.tree
         return {"target": np.array(algebra(tree).centerOfMass(tree, tree.createData(), q))}
 

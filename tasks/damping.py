@@ -50,15 +50,12 @@ class Damping(Task):
         object.__setattr__(self, "weights", checked_weights("Damping.weights", self.weights))
 
     def validate(self, robot: Robot) -> None:
-        """Check the number of weights, see :meth:`Item.validate`."""
         checked_weights("Damping.weights", self.weights, robot.nv)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a degree of freedom; the unit is that of its integral, as for every task."""
         return tuple(Row(n, u) for n, u in zip(robot.dof_names, robot.dof_units, strict=True))
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """Zero: there is nothing to correct."""
         return ca.SX.zeros(robot.nv)
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:

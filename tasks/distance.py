@@ -73,7 +73,6 @@ class Distance(Task):
             object.__setattr__(self, name, triple(given))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target``, ``feedforward``, ``point`` and ``point_velocity``, see the class."""
         return (
             Input("target", unit="m", rate="feedforward", low=0.0),
             Input("feedforward", unit="m/s", default=0.0),
@@ -85,12 +84,10 @@ class Distance(Task):
         return (Row("distance", "m"),)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The distance at ``q`` from the first value of ``point``."""
         relative = frame_pose(robot, self.other, q).actInv(frame_pose(robot, self.frame, q))
         return {"target": float(np.linalg.norm(relative.act(np.array(self.offset)) - np.array(self.point)))}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, in the axes of the other frame."""
         here = kin.pose(self.frame).point(rot.constant(self.offset))
         between = kin.pose(self.other).inverse_point(here) - inputs["point"]
         return ca.SX(distance(between) - inputs["target"])

@@ -70,13 +70,11 @@ class DivergentComponent(Task):
         CenterOfMass().validate(robot)
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """It has the velocity of the centre of mass in it."""
         return (
             'needs command="acceleration" or "torque"; for velocities use CenterOfMass' if command == "velocity" else ""
         )
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target``, ``feedforward``, ``gain`` and ``omega``, see the class."""
         return (
             Input("target", unit="m", size=3),
             Input("feedforward", unit="m/s", size=3, default=np.zeros(3)),
@@ -88,13 +86,11 @@ class DivergentComponent(Task):
         return point_rows()
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the centre of mass is at ``q``."""
         return CenterOfMass().initial(robot, q)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
         return ca.SX(kin.center_of_mass() - inputs["target"])
 
     def acceleration(self, inputs: Values, error: ca.SX, rate: ca.SX) -> ca.SX:
-        """See the class; the rate is dc/dt, as the target has none of its own."""
         omega, gain = inputs["omega"], inputs["gain"]
         return ca.SX(omega * (inputs["feedforward"] - gain * (error + rate / omega) - rate))

@@ -84,7 +84,6 @@ class DriveTorqueLimits(Constraint):
                 raise RangeError(field, name, "no motor drives this joint")
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Only a stack of torques has torques."""
         return "" if command == "torque" else 'limits torques: compile with command="torque"'
 
     def dofs(self, robot: Robot) -> tuple[int, ...]:
@@ -107,7 +106,6 @@ class DriveTorqueLimits(Constraint):
         return tuple(Row(name, "N m", float(size)) for name, size in drives)
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: its rows are on torques."""
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:

@@ -69,7 +69,6 @@ class Elbow(Task):
         object.__setattr__(self, "weights", checked_weights("Elbow.weights", self.weights, 3))
 
     def validate(self, robot: Robot) -> None:
-        """Check frame and axes, see :meth:`Item.validate`."""
         super().validate(robot)
         resolve_axes(robot, "Elbow.axes", self.axes, self.frame)
 
@@ -83,7 +82,6 @@ class Elbow(Task):
         return point_rows()
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the point is at ``q``."""
         return {"target": frame_pose(robot, self.frame, q).act(np.array(self.offset))}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:

@@ -102,12 +102,10 @@ class EndEffector(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [m] and rx, ry, rz [rad], or one of the two."""
         turning = tuple(Row(f"r{label}", "rad") for label in "xyz")
         return {"pose": point_rows() + turning, "position": point_rows(), "orientation": turning}[self.kind]
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the frame is at ``q``."""
         pose = frame_pose(robot, self.relative_to, q).actInv(frame_pose(robot, self.frame, q))
         return {"target": {"pose": pose, "position": pose.translation, "orientation": pose.rotation}[self.kind]}
 

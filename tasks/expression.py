@@ -113,7 +113,6 @@ class Expression(Task):
         return super().__getstate__() | {"function": by_name_or_value("Expression.function", self.function)}
 
     def validate(self, robot: Robot) -> None:
-        """Trace the function and evaluate it at the robot's neutral configuration, see the class."""
         run_time.check(robot, "Expression.inputs", self.declared)
         for d in self.declared:
             if d.default is None:
@@ -138,16 +137,13 @@ class Expression(Task):
         return self.declared
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row an entry of the result."""
         return self._rows(self._trace(robot))
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The user's function, its result checked and made a column."""
         given = _Named({d.name: inputs[d.name] for d in self.declared})
         return _column(validation.called("Expression.function", self.function, kin, given))
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
-        """What the function computes (not its source): a digest of the traced formula, with the inputs' layout."""
         trace = self._trace(robot)
         formula, known = trace.tracer.formula(trace.error)
         arguments = [*known.values(), trace.symbols.vector]

@@ -58,7 +58,6 @@ class Fixed(Constraint):
         joint_dofs(robot, "Fixed.joints", self.joints)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a degree of freedom of the robot, fixed or not."""
         return dof_rows(robot)
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds:

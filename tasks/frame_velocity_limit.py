@@ -76,7 +76,6 @@ class FrameVelocityLimit(Constraint):
         ]
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``linear`` and ``angular``, as far as limited."""
         out = []
         for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
             values = [limit for input_name, _, limit in self._limits() if input_name == name]
@@ -85,7 +84,6 @@ class FrameVelocityLimit(Constraint):
         return tuple(out)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z in m/s and rx, ry, rz in rad/s, as far as limited."""
         labels = {"linear": ("x", "y", "z"), "angular": ("rx", "ry", "rz")}
         units = {"linear": "m/s", "angular": "rad/s"}
         return tuple(Row(labels[name][axis], units[name]) for name, axis, _ in self._limits())

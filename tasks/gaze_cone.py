@@ -82,7 +82,6 @@ class GazeCone(Constraint):
         object.__setattr__(self, "half_angle", checked_half_angle("GazeCone.half_angle", self.half_angle))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``point`` and ``half_angle`` with their rates."""
         return (
             Input("point", unit="m", size=3, default=self.point, rate="point_velocity"),
             Input("point_velocity", unit="m/s", size=3, default=np.zeros(3)),

@@ -84,7 +84,6 @@ class Hold(Constraint):
         return {"target": frame_pose(robot, self.frame, q)}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z and rx, ry, rz, as far as held; those of ``axis`` about the frame's own x and y."""
         position = tuple(Row(axis, "m/s") for axis in ("x", "y", "z"))
         orientation = tuple(Row(axis, "rad/s") for axis in ("rx", "ry", "rz"))
         rows = {"pose": position + orientation, "position": position, "orientation": orientation}

@@ -111,11 +111,7 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
 
 
 def _whole_pose(field: str, declared: Input, value: Any) -> Any:
-    """A pose, where the part of it that counts is given; else what is given.
-
-    Raises:
-        ShapeError: numbers that are neither. NotFiniteError, RotationError: a part that is none.
-    """
+    """A pose, where the part of it that counts is given; else what is given."""
     if not declared.part or is_pose(value) or (isinstance(value, (tuple, list)) and len(value) == 2):
         return value
     shape = validation.dimensions(field, value)

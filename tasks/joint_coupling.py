@@ -107,14 +107,12 @@ class JointCoupling(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a relation, labelled ``a - 2 b``, in the unit of its first joint."""
         names = [_label(relation) for relation in self.coefficients]
         repeated = [f" ({k})" if names.count(name) > 1 else "" for k, name in enumerate(names)]
         units = [robot.dof_units[robot.dofs(relation[0][0]).start] for relation in self.coefficients]
         return tuple(Row(name + more, unit) for name, more, unit in zip(names, repeated, units, strict=True))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The sums at ``q``; an unbounded joint counts as its angle in (-pi, pi]."""
         sums = [sum(c * _coordinate(robot, joint, q) for joint, c in relation) for relation in self.coefficients]
         return {"target": np.array(sums)}
 

@@ -63,7 +63,6 @@ class JointFriction(Load):
         object.__setattr__(self, "slow", validation.scalar("JointFriction.slow", self.slow, low=0.0, open_low=True))
 
     def validate(self, robot: Robot) -> None:
-        """Check that there is one number or one a motor, see :meth:`Item.validate`."""
         count = len(self.dofs(robot))
         for name in ("viscous", "coulomb"):
             value = getattr(self, name)
@@ -76,7 +75,6 @@ class JointFriction(Load):
         return [i for i in range(6 if robot.base == "floating" else 0, robot.nv) if i not in followers]
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``viscous``, ``coulomb`` and ``slow``."""
         known = {"viscous": robot.model.damping, "coulomb": robot.model.friction}
         dofs, units = self.dofs(robot), {"viscous": "N m s/rad, N s/m", "coulomb": "N m, N"}
         out = []
@@ -88,7 +86,6 @@ class JointFriction(Load):
         return (*out, Input("slow", unit="rad/s, m/s", default=self.slow, low=1e-6))
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:
-        """What friction does to the joints."""
         dofs, total = self.dofs(robot), ca.SX(robot.nv, 1)
         v = kin.v[dofs]
         total[dofs] = -inputs["viscous"] * v - inputs["coulomb"] * ca.tanh(v / inputs["slow"])

@@ -111,14 +111,12 @@ class JointLimits(Constraint):
                 raise RangeError("JointLimits.margin", self.margin, reason)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``velocity_scale`` and ``return_rate``."""
         return (
             Input("velocity_scale", default=1.0, low=0.0, high=1.0),
             Input("return_rate", unit="1/s", default=self.return_rate, low=0.0),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a degree of freedom of the robot, limited or not."""
         return dof_rows(robot)
 
     def limits(self, robot: Robot) -> Limits:
@@ -136,15 +134,12 @@ class JointLimits(Constraint):
         return robot.coupled(Limits(kept["lower"], kept["upper"], kept["velocity"], kept["acceleration"], known.effort))
 
     def acceleration_limits(self, robot: Robot) -> NDArray[np.float64]:
-        """The description's, of the chosen joints and of what follows or leads them."""
         return self.limits(robot).acceleration
 
     def velocity_limits(self, robot: Robot) -> NDArray[np.float64]:
-        """The description's, of the chosen joints and of what follows or leads them."""
         return self.limits(robot).velocity
 
     def position_limits(self, robot: Robot) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The description's less the margin, of the chosen joints that have one coordinate."""
         limits = self.limits(robot)
         return limits.position_lower, limits.position_upper
 
@@ -160,7 +155,6 @@ class JointLimits(Constraint):
         longest: float,
         motors: Mapping[int, ca.SX] | None = None,
     ) -> Bounds:
-        """See :func:`wbc.tasks.stopping.allowed_accelerations`."""
         interval = partial(allowed_accelerations, dt=dt, longest=longest)
         return self._intervals(robot, kin, inputs, interval, motor=motors or {})
 

@@ -84,7 +84,6 @@ class Limit(Constraint):
             object.__setattr__(self, "only", selection("Limit.only", self.only))
 
     def validate(self, robot: Robot) -> None:
-        """Check the task, the rows, the numbers and the names of the inputs, see the class."""
         self.task.validate(robot)
         symbols = run_time.symbols(robot, self.task.inputs(robot))
         if self.task.jacobian(robot, Tracer(Kinematics(robot.tree)), symbols.values) is not None:
@@ -103,12 +102,10 @@ class Limit(Constraint):
                 raise DuplicateNameError("Limit.task", declared.name, "an input of the task has the name of a limit's")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """Those of the task, then both limits and their rates."""
         units = [row.unit for row in self._selected(robot)]
         return (*self.task.inputs(robot), *limit_inputs(self.lower, self.upper, units))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``label.lower`` and ``label.upper`` of the selected rows, in the units of the task."""
         return limit_rows(self.lower, self.upper, self._selected(robot))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
@@ -120,7 +117,6 @@ class Limit(Constraint):
         return limit_margins(error, inputs, None if factor is None else self._pick(robot, factor))
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """The task's factors of the selected rows, once a limit."""
         factor = self.task.row_factor(robot, kin, inputs)
         if factor is None:
             return None
@@ -128,7 +124,6 @@ class Limit(Constraint):
         return ca.vertcat(*[self._pick(robot, factor)] * sides)
 
     def declaration(self, robot: Robot) -> dict[str, Any]:
-        """The task's own declaration, the selected rows, and which limits there are."""
         return super().declaration(robot) | {"sides": [self.lower is not None, self.upper is not None]}
 
     def _numbers(self, robot: Robot) -> list[int]:

@@ -64,7 +64,6 @@ class LineContact(Pressing, Contact):
         super().__post_init__()
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z of the world and ry, rz of the frame."""
         return (*(Row(axis, "m/s") for axis in "xyz"), Row("ry", "rad/s"), Row("rz", "rad/s"))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
@@ -74,7 +73,6 @@ class LineContact(Pressing, Contact):
         return Rows(matrix, wanted, wanted)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """Drift of the position, then the shortest turn of the frame's x axis to the target's."""
         pose, target = kin.pose(self.frame), inputs["target"]
         # y, z, x in place of x, y, z: the turn is that of the third axis
         seen = (pose.rotation.T @ target.rotation[:, 0])[[1, 2, 0]]
@@ -85,13 +83,11 @@ class LineContact(Pressing, Contact):
         return ca.vertcat(twist[:3], (rotation.T @ twist[3:])[1:])
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``, ``friction +x`` and ``-x``, ``pressure -`` and ``+``, then ``end 1`` to ``end 4``."""
         plain = [force_row(robot, name) for name in ("normal", "friction +x", "friction -x")]
         moments = ["pressure -", "pressure +", *[f"end {k}" for k in range(1, 5)]]
         return (*plain, *[force_row(robot, name, "N m") for name in moments])
 
     def cone(self, inputs: Values) -> Cone:
-        """The rows of the class, each as a w >= 0 after the first."""
         mu, X = inputs["friction"] / math.sqrt(2.0), self.half_length
         rows = [ca.horzcat(0, 0, 1, 0, 0)]
         rows += [ca.horzcat(-s, 0, mu, 0, 0) for s in (1, -1)]

@@ -84,16 +84,13 @@ class LookAt(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """r1 and r2 [rad], about b1 and b2."""
         return (Row("r1", "rad"), Row("r2", "rad"))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target on the axis at ``q``."""
         ahead = np.array(self.offset) + robot.characteristic_length * np.array(self.axis)
         return {"target": frame_pose(robot, self.relative_to, q).actInv(frame_pose(robot, self.frame, q)).act(ahead)}
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """The formula of the class, and terms of value zero whose rates are those of the rows."""
         axes = kin.rotation(self.frame) @ rot.constant(row_axes(self.axis, self.around))
         away = self._away(kin, inputs["target"])
         here, sight = kin.held(axes), kin.held(away)
@@ -106,11 +103,9 @@ class LookAt(Task):
         return turn + kin.across(self.frame, WORLD, axes, turn) - swept[:2]
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """F' R' (w + d x dc/dt / r), with dc/dt as seen from the target."""
         return kin.jacobian(self.error(robot, kin, inputs))
 
     def row_factor(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """1 where the target is away from the camera, see the class."""
         away = self._away(kin, inputs["target"])
         return ca.repmat(fade(square(away), self.width * robot.characteristic_length), 2, 1)
 

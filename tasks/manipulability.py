@@ -106,7 +106,6 @@ class Manipulability(Task):
             object.__setattr__(self, "length", length)
 
     def validate(self, robot: Robot) -> None:
-        """Check the frames, and that the arm is not singular in every configuration, see :meth:`Item.validate`."""
         super().validate(robot)
         rng = np.random.default_rng(0)
         drawn = (pin.integrate(robot.model, robot.neutral, rng.uniform(-2.0, 2.0, robot.nv)) for _ in range(_TRIED))

@@ -51,11 +51,9 @@ class Mechanism(Constraint):
     exact: ClassVar[bool] = True
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``gain`` of the mimic rows."""
         return (Input("gain", unit="1/s", default=5.0, low=0.0),)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a coupling, named by its follower, one an undriven degree of freedom, then those of loops."""
         dofs = [c.follower for c in robot.couplings] + list(robot.locked_dofs)
         rows = [Row(robot.dof_names[i], f"{robot.dof_units[i]}/s") for i in dofs]
         return (*rows, *(Row(label, f"{unit}/s") for label, unit in robot.loops.rows))

@@ -83,7 +83,6 @@ class Momentum(Task):
             raise RangeError("Momentum", mass, f"the moving links of {robot.name!r} have no mass [kg]")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``lag`` and its rate ``target``, see the class."""
         first = {"both": "kg m, kg m^2", "linear": "kg m", "angular": "kg m^2"}[self.kind]
         rate = {"both": "kg m/s, kg m^2/s", "linear": "kg m/s", "angular": "kg m^2/s"}[self.kind]
         return (
@@ -92,12 +91,10 @@ class Momentum(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z and rx, ry, rz; the unit is that of the momentum's integral, as for every task."""
         every = [Row(label, "kg m") for label in "xyz"] + [Row(f"r{label}", "kg m^2") for label in "xyz"]
         return tuple(every[self._rows])
 
     def row_weights(self, robot: Robot) -> NDArray[np.float64]:
-        """The declared weights by the squares of m L and of I, see the class."""
         total, length = _inertia(robot), robot.characteristic_length
         # About the centre of mass, unlike the matrix that Inertia itself is in the world
         mean = max(float(np.trace(total.inertia)) / 3, SMALLEST_INERTIA * total.mass * length**2)
@@ -106,7 +103,6 @@ class Momentum(Task):
         return weights
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """-lag, whose rate is -target."""
         return ca.SX(-inputs["lag"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:

@@ -59,7 +59,6 @@ class MovingFrame(Constraint):
             object.__setattr__(self, "pose", validation.pose("MovingFrame.pose", self.pose))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``pose``, ``twist`` and ``acceleration``, see the class."""
         return (
             Input("pose", "pose", unit="m, rad", default=self.pose, rate="twist"),
             Input("twist", unit="m/s, rad/s", size=6, default=np.zeros(6), rate="acceleration"),

@@ -120,7 +120,8 @@ class Obstacle(Constraint):
         """
         available = _available(robot)
         if self.links is None and not available:
-            raise MissingShapeError("Obstacle.links", None, "no moving link of this robot has collision shapes")
+            reason = "no moving link of this robot has collision shapes"
+            raise MissingShapeError("Obstacle.links", None, reason + bodies.meshes_instead(robot))
         for link in self.links or ():
             bodies.check_shaped(robot, "Obstacle.links", link, available)
             if not joint_of(robot.tree, link):
@@ -130,7 +131,6 @@ class Obstacle(Constraint):
         bodies.check_sensed("Obstacle.shape", len(own) * len(self.parts))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``pose``, ``velocity`` and ``margin``."""
         start = pin.SE3.Identity() if self.pose is None else self.pose
         return (
             Input("pose", "pose", unit="m, rad", default=start, rate="velocity"),
@@ -154,11 +154,9 @@ class Obstacle(Constraint):
         return tuple(out)
 
     def sensed_rows(self, robot: Robot) -> int:
-        """Those of at most ``closest`` pairs: one each, then ``corners`` each."""
         return self._nearest(robot) * (1 + self.corners)
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
-        """Distances of the sensed pairs."""
         return PairSensor(robot, self.sensed_pairs(robot), self._nearest(robot), numbers, corners=self.corners)
 
     def _nearest(self, robot: Robot) -> int:
@@ -188,7 +186,6 @@ class Obstacle(Constraint):
         return ca.vertcat(own, bodies.sensed_margins(inputs, self.sensed_rows(robot)))
 
     def ball_rows(self, robot: Robot) -> tuple[BallRow, ...]:
-        """All of them, if a sphere keeps clear of spheres and capsules only."""
         ball, pairs = self.parts[0], self.pairs(robot)
         if not isinstance(gap.core(ball), Sphere) or not all(
             isinstance(p.shape, (Sphere, Capsule)) for _, _, p in pairs
@@ -207,11 +204,7 @@ def _available(robot: Robot) -> tuple[str, ...]:
 
 
 def _checked_shape(shape: object) -> Shape | tuple[Convex, ...]:
-    """A shape, or the parts of a mesh as a tuple.
-
-    Raises:
-        ShapeError: neither.
-    """
+    """A shape, or the parts of a mesh as a tuple."""
     if isinstance(shape, Shape):
         return shape
     if isinstance(shape, (list, tuple)) and shape and all(isinstance(part, Convex) for part in shape):

@@ -64,7 +64,6 @@ class PointContact(Pressing, Contact):
             raise RangeError("PointContact.edges", self.edges, "expected an integer >= 4")
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``, then ``friction 1`` and so on."""
         return (
             force_row(robot, "normal"),
             *[force_row(robot, f"friction {k}") for k in range(1, self.edges + 1)],

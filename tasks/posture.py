@@ -71,7 +71,6 @@ class Posture(Task):
         object.__setattr__(self, "weights", checked_weights("Posture.weights", self.weights))
 
     def validate(self, robot: Robot) -> None:
-        """Check joints and the number of weights, see :meth:`Item.validate`."""
         names = self._names(robot)
         for name in names:
             robot.dofs(name, "Posture.joints")
@@ -90,7 +89,6 @@ class Posture(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a degree of freedom of the chosen joints."""
         return tuple(Row(robot.dof_names[k], robot.dof_units[k]) for k in self._dofs(robot))
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:

@@ -103,7 +103,6 @@ class RelativePose(Task):
         validation.one_of("RelativePose.axes", self.axes, (MIDWAY, *robot.frame_names))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``target``, ``feedforward`` and ``at``, see the class."""
         return (
             Input("target", "pose", unit="m", rate="feedforward"),
             Input("feedforward", unit="m/s, rad/s", size=6, default=np.zeros(6)),
@@ -111,12 +110,10 @@ class RelativePose(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """x, y, z [m] and rx, ry, rz [rad], or one of the two."""
         turning = tuple(Row(f"r{label}", "rad") for label in "xyz")
         return {"pose": point_rows() + turning, "position": point_rows(), "orientation": turning}[self.kind]
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """The target where the frames are at ``q``, and the point in the middle between them."""
         pose = frame_pose(robot, self.frame_a, q).actInv(frame_pose(robot, self.frame_b, q))
         return {"target": pose, "at": pose.translation / 2 if self.at is None else np.array(self.at)}
 

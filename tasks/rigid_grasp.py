@@ -62,7 +62,6 @@ class RigidGrasp(Contact):
                 object.__setattr__(self, name, checked)
 
     def limits(self) -> tuple[Input, ...]:
-        """``force`` and ``torque``, as far as limited."""
         out = []
         for name, unit in (("force", "N"), ("torque", "N m")):
             value = getattr(self, name)

@@ -139,12 +139,10 @@ class Rolling(Constraint):
                 raise RangeError("Rolling.wheels", wheel.joint, "its axis is vertical: it steers, but does not roll")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``ground``, and ``gain`` with rows of contact."""
         gain = (Input("gain", unit="1/s", default=self.gain, low=0.0),) if self._touches(robot) else ()
         return (Input("ground", "pose", unit="m, rad"), *gain)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """Level ground under the first wheel at ``q``."""
         wheel = self.wheels[0]
         joint = int(robot.model.getJointId(wheel.joint))
         data = robot.model.createData()
@@ -156,7 +154,6 @@ class Rolling(Constraint):
         return {"ground": pin.SE3(np.eye(3), contact[2] * up)}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``joint rolling`` and ``joint sideways``, or ``joint roller``; then ``joint contact`` where there is one."""
         out = []
         for wheel in self.wheels:
             names = ["rolling", "sideways"] if wheel.roller is None else ["roller"]
@@ -184,7 +181,6 @@ class Rolling(Constraint):
         return Rows(ca.sparsify(ca.vertcat(*matrix)), ca.vertcat(*right), ca.vertcat(*right))
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """Heights of the points of contact over the ground, in rows of contact; slip has none."""
         if not self._touches(robot):
             return None
         ground: Pose = inputs["ground"]

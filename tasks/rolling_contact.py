@@ -85,7 +85,6 @@ class RollingContact(Pressing, Contact):
         super().__post_init__()
 
     def validate(self, robot: Robot) -> None:
-        """Check that the joint of the frame turns it about ``axis`` through its origin, see :meth:`Item.validate`."""
         super().validate(robot)
         joint = robot.model.frames[frame_index(robot.model, self.frame)].parentJoint
         column = _screw(robot, self.frame)
@@ -97,7 +96,6 @@ class RollingContact(Pressing, Contact):
             raise RangeError("RollingContact.axis", self.axis, reason)
 
     def initial(self, robot: Robot, q: NDArray[np.float64]) -> dict[str, Any]:
-        """Level ground under the wheel at ``q``."""
         pose = frame_pose(robot, self.frame, q)
         axis = pose.rotation @ np.array(self.axis)
         down = np.array([0.0, 0.0, 1.0]) - axis * axis[2]
@@ -106,7 +104,6 @@ class RollingContact(Pressing, Contact):
         return {"target": pose}
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``rolling``, ``sideways`` and ``contact``."""
         return tuple(Row(name, "m/s") for name in ("rolling", "sideways", "contact"))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows:
@@ -117,7 +114,6 @@ class RollingContact(Pressing, Contact):
         return Rows(directions.T @ point, wanted, wanted)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """Height of the point of contact over the ground; slip has none."""
         pose, target = kin.pose(self.frame), inputs["target"]
         point = pose.position + self._contact(inputs, pose.rotation)[0]
         return ca.SX(ca.vertcat(0, 0, ca.dot(target.rotation[:, 2], point - target.position)))
@@ -127,7 +123,6 @@ class RollingContact(Pressing, Contact):
         return None
 
     def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
-        """Forces along t, s and n at the point of contact."""
         arm, directions = self._contact(inputs, rotation)
         return ca.vertcat(rotation.T @ directions, rotation.T @ (ca.skew(arm) @ directions)).T
 
@@ -140,7 +135,6 @@ class RollingContact(Pressing, Contact):
         return -self.radius * upright, ca.horzcat(forwards, ca.cross(normal, forwards), normal)
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``, then ``friction`` along +x, -x, +y and -y."""
         return tuple(
             force_row(robot, name) for name in ("normal", *[f"friction {s}" for s in ("+x", "-x", "+y", "-y")])
         )

@@ -134,7 +134,7 @@ class SelfCollision(Constraint):
                 if self._most_apart(robot)
                 else "no pair of links with shapes to keep apart"
             )
-            raise MissingShapeError("SelfCollision.pairs", self.pairs, none)
+            raise MissingShapeError("SelfCollision.pairs", self.pairs, none + bodies.meshes_instead(robot))
         if self.method == "symbolic":
             self._check_symbolic(pairs)
         self._say_kept(robot)
@@ -184,11 +184,9 @@ class SelfCollision(Constraint):
         return tuple((body(a), body(b)) for a, b in self._split(robot)[1])
 
     def sensed_rows(self, robot: Robot) -> int:
-        """Those of at most ``closest`` pairs: one each, then ``corners`` each."""
         return self._nearest(robot) * (1 + self.corners)
 
     def sensor(self, robot: Robot, numbers: Numbers) -> Sensor:
-        """Distances of the sensed pairs."""
         most = self._kept(robot, self._split(robot)[1])
         pairs, count = self.sensed_pairs(robot), self._nearest(robot)
         return PairSensor(robot, pairs, count, numbers, corners=self.corners, most=most)
@@ -272,11 +270,7 @@ def _is_sensed(first: bodies.LinkShape, second: bodies.LinkShape) -> bool:
 
 
 def _checked_pairs(pairs: Any) -> tuple[tuple[str, str], ...]:
-    """Pairs of names as tuples.
-
-    Raises:
-        ShapeError: not pairs of two different names. DuplicateNameError: a pair given twice, in either order.
-    """
+    """Pairs of names as tuples."""
     if isinstance(pairs, str) or not isinstance(pairs, Iterable):
         raise ShapeError("SelfCollision.pairs", pairs, "expected pairs of link names")
     out: list[tuple[str, str]] = []

@@ -74,28 +74,23 @@ class SlidingContact(Pressing, Contact):
         return Rows(normal.T @ kin.frame_jacobian(self.frame)[:3, :], wanted, wanted)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """Height over the surface."""
         target = inputs["target"]
         return ca.SX(ca.dot(target.rotation[:, 2], kin.position(self.frame) - target.position))
 
     def still(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
-        """Along the normal."""
         return ca.dot(inputs["target"].rotation[:, 2], twist[:3])
 
     def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
-        """The normal and what friction adds to it."""
         normal = inputs["target"].rotation[:, 2]
         slip = twist[:3] - normal * ca.dot(normal, twist[:3])
         force = normal - inputs["friction"] * slip / ca.sqrt(ca.sumsqr(slip) + inputs["slow"] ** 2)
         return ca.horzcat((rotation.T @ force).T, ca.SX(1, 3))
 
     def limits(self) -> tuple[Input, ...]:
-        """``friction``, ``least``, ``most`` and ``slow``."""
         return (*super().limits(), Input("slow", unit="m/s", default=self.slow, low=1e-6))
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
         return (force_row(robot, "normal"),)
 
     def cone(self, inputs: Values) -> Cone:
-        """The limits of the normal force."""
         return Cone(ca.SX.ones(1, 1), inputs["least"], inputs["most"])

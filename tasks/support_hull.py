@@ -96,11 +96,7 @@ def support_planes(
 
 
 def _edges(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Inward normals and offsets of the edges of a hull.
-
-    Raises:
-        RangeError: the points lie on a line.
-    """
+    """Inward normals and offsets of the edges of a hull."""
     # Imported here: most processes make no hull, and scipy takes longer to import than all the rest
     from scipy.spatial import ConvexHull, QhullError
 

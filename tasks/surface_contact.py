@@ -71,14 +71,12 @@ class SurfaceContact(Pressing, Contact):
         super().__post_init__()
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:
-        """``normal``, ``friction``, ``pressure`` (centre of pressure) and ``yaw`` rows."""
         plain = [force_row(robot, name) for name in ("normal", *[f"friction {s}" for s in ("+x", "-x", "+y", "-y")])]
         pressure = [force_row(robot, f"pressure {s}", "N m") for s in ("+y", "-y", "+x", "-x")]
         yaw = [force_row(robot, f"yaw {k}", "N m") for k in range(1, 9)]
         return (*plain, *pressure, *yaw)
 
     def cone(self, inputs: Values) -> Cone:
-        """The rows of the class, each as a w >= 0 after the first."""
         mu, (X, Y) = inputs["friction"] / math.sqrt(2.0), self.half_lengths
         rows = [ca.horzcat(0, 0, 1, 0, 0, 0)]
         rows += [ca.horzcat(-s, 0, mu, 0, 0, 0) for s in (1, -1)]

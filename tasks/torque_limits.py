@@ -74,7 +74,6 @@ class TorqueLimits(Constraint):
             object.__setattr__(self, "joints", selection("TorqueLimits.joints", self.joints))
 
     def validate(self, robot: Robot) -> None:
-        """Check the joint names and that there is one slew rate a row, see :meth:`Item.validate`."""
         named = joint_dofs(robot, "TorqueLimits.joints", self.joints)
         if self.joints is not None and (passive := [i for i in named if i in robot.passive]):
             raise RangeError("TorqueLimits.joints", robot.dof_names[passive[0]], "no motor drives this joint")
@@ -82,11 +81,9 @@ class TorqueLimits(Constraint):
             validation.real_array("TorqueLimits.slew", self.slew, (len(self.dofs(robot)),))
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Only a stack of torques has torques."""
         return "" if command == "torque" else 'limits torques: compile with command="torque"'
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``scale``; ``slew`` and ``last`` with slew rates."""
         scale, count = Input("scale", default=1.0, low=0.0, high=1.0), len(self.dofs(robot))
         if self.slew is None or not count:
             return (scale,)
@@ -95,7 +92,6 @@ class TorqueLimits(Constraint):
         return (scale, Input("slew", unit="N m/s, N/s", size=count, default=rates, low=0.0), last)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One row a degree of freedom with a limit."""
         efforts = robot.limits.effort
         return tuple(
             Row(robot.dof_names[i], "N m" if robot.dof_units[i] == "rad" else "N", max(float(efforts[i]), 1e-3))
@@ -103,7 +99,6 @@ class TorqueLimits(Constraint):
         )
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: its rows are on torques."""
         return None
 
     def torque_rows(self, robot: Robot, inputs: Values, dt: ca.SX) -> Torques:

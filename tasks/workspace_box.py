@@ -73,7 +73,6 @@ class WorkspaceBox(Constraint):
         object.__setattr__(self, "offset", tuple(offset.tolist()))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """Both bounds and their rates, as far as they are not None."""
         return limit_inputs(self.lower, self.upper, ("m",) * 3)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

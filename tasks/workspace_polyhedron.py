@@ -90,7 +90,6 @@ class WorkspacePolyhedron(Constraint):
             object.__setattr__(self, "pose", validation.pose(f"{owner}.pose", self.pose))
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``offsets`` and ``pose`` with their rates."""
         count, start = len(self.normals), pin.SE3.Identity() if self.pose is None else self.pose
         return (
             Input("offsets", unit="m", size=count, default=self.offsets, rate="offsets_rate", infinite=-math.inf),

@@ -59,7 +59,6 @@ class WrenchSum(Constraint):
         object.__setattr__(self, "contacts", selection("WrenchSum.contacts", self.contacts))
 
     def refusal(self, robot: Robot, command: Command) -> str:
-        """Only a stack of torques has forces."""
         return "" if command == "torque" else 'is about forces: compile with command="torque"'
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
@@ -69,9 +68,7 @@ class WrenchSum(Constraint):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """fx, fy, fz [N] and mx, my, mz [N m]."""
         return tuple(force_row(robot, label, unit) for label, unit in zip(WRENCH_LABELS, WRENCH_UNITS, strict=True))
 
     def velocity_rows(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Rows | None:
-        """None: its rows are on forces."""
         return None

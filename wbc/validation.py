@@ -269,6 +269,28 @@ def writing(field: str, file: Any, refusal: type[WbcError], *also: type[Exceptio
         raise refusal(field, str(file), f"cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
+@contextlib.contextmanager
+def replacing(
+    field: str, file: pathlib.Path, refusal: type[WbcError], *also: type[Exception]
+) -> Iterator[pathlib.Path]:
+    """Where to write a file or folder that takes its place when it is whole: no reader meets half of it, and nothing
+    is left of what fails, as of :func:`writing`.
+    """
+    # The name's end is its format
+    fresh = file.with_name(f".{os.getpid()}.{file.name}")
+    with writing(field, file, refusal, *also):
+        try:
+            yield fresh
+            fresh.replace(file)
+        finally:
+            if fresh.is_dir():
+                import shutil
+
+                shutil.rmtree(fresh, ignore_errors=True)
+            with contextlib.suppress(OSError):
+                fresh.unlink(missing_ok=True)
+
+
 def text_of(field: str, file: Any, refusal: type[WbcError]) -> str:
     """What a text file holds; one that is missing, is no text or cannot be read is the caller's error."""
     path = file_path(field, file)

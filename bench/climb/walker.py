@@ -205,12 +205,12 @@ def driven() -> Record:
     """A body that is told other rates: until it goes so [s of the walk], and the longest ticks, which plan [ms]."""
     climber, scene = walker_with(3), cylinder_grid()
     start = first_stance(climber, scene, climber.with_body(climber.rest, grid_pose(13, 12, RADIUS)))
-    drive = ClimbDrive(climber, pin.SE3.Identity())
+    drive = ClimbDrive(climber)
     loop = ClimbLoop(standing_plan(climber, scene, start), replan=drive.following, onward=drive.onward)
     answers, costs = list[float](), list[float]()
     for along, round_ in TWISTS:
         twist = np.array([0.0, 0.0, along, 0.0, 0.0, round_])
-        drive.steer(twist, loop)
+        drive.steer(climber.body_pose(loop.stance.q).toActionMatrixInverse() @ twist, loop)
         begun, answer = loop.time, None
         while loop.time < begun + EACH and not loop.ended:
             cpu, before = time.process_time(), loop.stance.q[:3]

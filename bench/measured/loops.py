@@ -32,14 +32,16 @@ def parts() -> dict[str, Sheet | str]:
     for name in MOVED:
         robot = wbc.robots.load(NAMED[name], shapes="none").with_limits(velocity=SPEED)
         targets = [robot.random(seed) for seed in range(TICKS // EACH)]
-        own, gap = _ours(robot, MOVED[name], targets)
-        tree, _ = _ours(robot.with_loops(), MOVED[name], targets)
+        own, call, gap = _ours(robot, MOVED[name], targets)
+        tree, tree_call, _ = _ours(robot.with_loops(), MOVED[name], targets)
         found = [own, gap, *_mink(robot, name, targets), *_pinocchio(robot, targets)]
         shown = [us(value) if k % 2 == 0 else f"{value:.0e}" for k, value in enumerate(found)]
         size = f"{robot.nv}, {len(robot.loops.rows)}"
-        rows.append((name, size, us(tree), *(text.replace("nan", "not installed") for text in shown)))
+        beside = us(tree_call), us(call), f"{own / tree:.2f}, {call / tree_call:.2f}"
+        rows.append((name, size, us(tree), *(text.replace("nan", "not installed") for text in shown), *beside))
     head = ("mechanism", "dofs, loop rows", "tick of its tree [us]", "tick [us]", "open [m]", "mink [us]", "open [m]")
-    ticks = Sheet("", (*head, "Pinocchio and numpy [us]", "open [m]"), rows)
+    calls = ("`step(q)` of its tree [us]", "`step(q)` [us]", "ratios: tick, call")
+    ticks = Sheet("", (*head, "Pinocchio and numpy [us]", "open [m]", *calls), rows)
     return {"ticks": ticks, "torques": Sheet("", TORQUES, [_torques(name) for name in MOVED])}
 
 
@@ -150,29 +152,34 @@ def _by_mujoco(
     return _off(found, steps), 1e6 * float(np.median(spent))
 
 
-def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float]:
-    """(median time of a native tick [us], what the loops are open by at most [m])."""
+def _ours(robot: Robot, frame: str, targets: list[Array]) -> tuple[float, float, float]:
+    """(median time of a native tick [us], of ``controller.step(q)`` [us], what the loops are open by at most [m])."""
     stack = wbc.Stack(robot, DT).add(wbc.tasks.EndEffector(frame), name="hand")
     stack.add(wbc.tasks.Posture(), name="posture", weight=1e-3).add(wbc.tasks.JointLimits(acceleration=False))
     controller = stack.compile(backend="native")
     tick = core_of(controller).tick
     assert isinstance(tick, NativeTick)
-    spent, reached = np.full((ROUNDS, TICKS), np.inf), []
-    for turn in range(ROUNDS):
+    spent, reached = np.full((2 * ROUNDS, TICKS), np.inf), []
+    for turn in range(2 * ROUNDS):
         controller.reset(robot.neutral)
         q = robot.neutral
         for k in range(TICKS):
             if k % EACH == 0:
                 controller["hand"].target = robot.pose(targets[k // EACH], frame)
                 controller["posture"].target = targets[k // EACH]
-            tick.q[:] = q
-            began = perf_counter()
-            tick.step_function(tick.pointer)
+            if turn % 2:
+                began = perf_counter()
+                controller.step(q)
+            else:
+                tick.q[:] = q
+                began = perf_counter()
+                tick.step_function(tick.pointer)
             spent[turn, k] = perf_counter() - began
             q = pin.integrate(robot.model, q, controller.last_command * DT)
             reached.append(q)
     # Afterwards: between ticks it would empty the processor's cache, of a robot with loops alone
-    return 1e6 * float(np.median(spent.min(axis=0))), max(_gap(robot, q) for q in reached)
+    native, calls = (1e6 * float(np.median(spent[which::2].min(axis=0))) for which in (0, 1))
+    return native, calls, max(_gap(robot, q) for q in reached)
 
 
 def _gap(robot: Robot, q: Array) -> float:

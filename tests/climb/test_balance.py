@@ -83,21 +83,6 @@ def test_motors_that_are_too_weak_do_not_bear() -> None:
         assert part == pytest.approx(margin, abs=1e-6)
 
 
-def test_whether_motors_hold_a_posture_is_what_their_margin_says() -> None:
-    robot, said = climber("anymal_c"), set[bool]()
-    scene = around(robot, np.random.default_rng(3), np.array([0.0, 0.0, -9.81]))
-    balance = Equilibrium(robot, scene, 0.75)
-    for seed in range(24):
-        rng, q = np.random.default_rng(seed), robot.rest.copy()
-        q[:3] += rng.uniform(-0.1, 0.1, 3)
-        q[7:] += rng.uniform(-0.3, 0.3, len(q) - 7)
-        held, least, effort = [0, 1, 2, -1 if seed % 2 else 3], rng.uniform(0.0, 0.05), rng.uniform(0.2, 0.9)
-        enough = balance.margin(held, q, motors=True, effort=effort) >= least
-        assert balance.driven(held, q, least, effort) == enough
-        said.add(enough)
-    assert said == {True, False}
-
-
 def _least_torque(robot: Climber) -> float:
     """The least largest torque with which four feet bear the robot at rest, by a program of its own: any forces."""
     model, data = robot.robot.model, robot.robot.model.createData()

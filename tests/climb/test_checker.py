@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
 
 import coal
 import numpy as np
@@ -23,11 +22,7 @@ from wbc.climb.scene import Foothold
 from wbc.climb.session import climb
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import RangeError, ShapeError
-from wbc.log import Log
-from wbc.shapes import Box, PlacedShape, Sphere
-
-#: A tick in the first swing
-ALOFT = 50
+from wbc.shapes import Box, PlacedShape
 
 
 @functools.cache
@@ -36,79 +31,8 @@ def walked() -> tuple[ContactPlan, ClimbRun]:
     return plan, ClimbLoop(plan).run()
 
 
-#: Rule that a fault breaks -> columns, ticks, and what takes the place of their values
-Fault = tuple[tuple[str, ...], slice, Callable[[np.ndarray], object]]
-AT, FROM, ALL = slice(ALOFT, ALOFT + 1), slice(ALOFT, None), slice(None)
-KNEE = "q.8"
-IN_THE_AIR: Fault = (("contact.limb1",), AT, lambda foothold: 6)
-PLANTED: dict[str, Fault] = {
-    "step of time": (("t",), FROM, lambda t: t + 0.003),
-    "joint beyond its limit": ((KNEE,), ALL, lambda q: 2.5),
-    "joint's rate": (("q.7",), FROM, lambda q: q + 0.1),
-    "joint's acceleration": (("q.7",), FROM, lambda q: q + 0.02),
-    "closed contact slips": (("q.0",), ALL, lambda x: x + np.minimum(np.linspace(0.0, 0.006, len(x)), 0.0015)),
-    "closed contact off its foothold": (("q.1",), ALL, lambda y: y + 0.0025),
-    "contacts bear the robot at rest": (("contact.limb2", "contact.limb4", "contact.limb6"), AT, lambda foothold: -1),
-    "foothold that is another's": (("contact.limb1",), AT, lambda _: walked()[1].log.columns["contact.limb2"][ALOFT]),
-    "clearance of bodies": ((KNEE,), slice(ALOFT - 3, ALOFT + 3), lambda q: q + 0.4),
-    "contact's point in a body": ((KNEE,), slice(ALOFT - 3, ALOFT + 3), lambda q: q + 0.4),
-}
-
-
-def _changed(fault: Fault) -> Log:
-    log = walked()[1].log
-    columns = {name: values.copy() for name, values in log.columns.items()}
-    names, ticks, change = fault
-    for name in names:
-        columns[name][ticks] = change(columns[name][ticks])
-    return dataclasses.replace(log, columns=columns)
-
-
-def test_a_clean_climb_is_clean() -> None:
-    plan, run = walked()
-    report = check(run.log, plan.climber, plan.scene)
-    assert report.clean, str(report)
-    assert {finding.rule for finding in report.findings} >= set(PLANTED)
-    looked = {finding.rule: finding.count for finding in report.findings}
-    assert min(count for rule, count in looked.items() if rule != "closed contact turned") > 0
-
-
-@pytest.mark.parametrize("rule", PLANTED)
-def test_a_fault_is_noticed_by_its_rule(rule: str) -> None:
-    plan, _ = walked()
-    report = check(_changed(PLANTED[rule]), plan.climber, plan.scene)
-    assert rule in {finding.rule for finding in report.violations}, str(report)
-
-
-def test_a_contact_that_closes_in_the_air_is_off_its_foothold() -> None:
-    plan, _ = walked()
-    report = check(_changed(IN_THE_AIR), plan.climber, plan.scene)
-    worst = {finding.rule: finding for finding in report.violations}["closed contact off its foothold"]
-    assert worst.where == "limb1 on p6"
-    assert worst.worst > 0.03
-
-
 def _with(scene: ClimbScene, name: str, body: PlacedShape) -> ClimbScene:
     return dataclasses.replace(scene, bodies={**scene.bodies, name: body})
-
-
-def test_what_is_passed_between_two_ticks_is_found() -> None:
-    plan, run = walked()
-    # Every fifth tick of the swing: between two of them a foot goes on by some millimetres, past a grain of dust
-    log = dataclasses.replace(
-        run.log,
-        columns={k: v[::5] for k, v in run.log.columns.items()},
-        meta={**run.log.meta, "period": 0.05},
-    )
-    machine, q, t = plan.climber, log.array("q"), len(log) // 4
-    ends = [machine.contact_pose(q[k], 0).translation for k in (t, t + 1)]
-    middle = pin.integrate(machine.robot.model, q[t], 0.5 * pin.difference(machine.robot.model, q[t], q[t + 1]))
-    between = machine.contact_pose(middle, 0).translation
-    assert np.linalg.norm(ends[1] - ends[0]) > 0.005
-    grain = PlacedShape(Sphere(2e-4), pin.SE3(np.eye(3), between))
-    report = check(log, machine, _with(plan.scene, "grain", grain))
-    violated = {finding.rule: finding for finding in report.violations}
-    assert violated["clearance of bodies"].where == "limb1_link3 and grain"
 
 
 def test_a_point_that_ends_within_what_may_be_missed_is_not_said_to_be_deeper() -> None:
@@ -167,7 +91,8 @@ def test_without_weight_contacts_must_fix_the_body() -> None:
     plan, run = walked()
     scene = dataclasses.replace(plan.scene, gravity=np.zeros(3))
     assert check(run.log, plan.climber, scene).clean
-    log = _changed((tuple(f"contact.limb{limb}" for limb in (1, 3, 4, 5)), ALL, lambda foothold: -1))
+    opened = {f"contact.limb{limb}": np.full(len(run.log), FREE_LIMB) for limb in (1, 3, 4, 5)}
+    log = dataclasses.replace(run.log, columns={**run.log.columns, **opened})
     assert "contacts fix the body" in {f.rule for f in check(log, plan.climber, scene).violations}
 
 

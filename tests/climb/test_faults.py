@@ -107,6 +107,17 @@ def test_limbs_that_hold_plan_on_without_what_broke_off() -> None:
     assert broken(run, steps()) == []
 
 
+def test_a_limb_that_fails_as_it_comes_to_its_foothold_does_not_hold() -> None:
+    plan = steps()
+    loop = ClimbLoop(plan, climb_plant("pinocchio", plan.climber, plan.scene))
+    while loop.path_time < plan.moves[0].land - 0.03:
+        loop.tick()
+    loop.fail("limb1")
+    run = loop.run(10.0)
+    assert run.reason == "limb1 holds no more, and no planner was given"
+    assert run.log["contact.limb1"][-1] == -1
+
+
 @functools.cache
 def walk(gravity: float) -> ContactPlan:
     """The published walker goes on along its cylinder, gravity towards the holds."""

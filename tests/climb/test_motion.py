@@ -126,7 +126,7 @@ def test_a_swing_goes_over_what_is_in_the_way_or_is_refused_with_the_pair() -> N
         turn = np.column_stack([along, np.cross([0.0, 0.0, 1.0], along), [0.0, 0.0, 1.0]])
         wall = SceneBody(Box((0.01, 0.3, height)), pin.SE3(turn, middle))
         blocked = replace(scene, bodies={**scene.bodies, "wall": wall})
-        mover = Mover(robot, blocked, MotionOptions(tries=3))
+        mover = Mover(robot, blocked)
         if passes:
             assert mover.moved(one, other)[0].times[-1] > 0.0
         else:
@@ -140,7 +140,7 @@ def test_what_a_stance_lacks_is_said() -> None:
     robot = climber("hexapod")
     too_high = on_stones(robot, np.random.default_rng(1), 0.05)
     with pytest.raises(MoveError, match="move 1: contact of limb") as refused:
-        Mover(robot, too_high[0], MotionOptions(lift=9.0, tries=0)).moved(*too_high[1].stances[:2])
+        Mover(robot, too_high[0], MotionOptions(lift=9.0)).moved(*too_high[1].stances[:2])
     assert str(refused.value).count("(got") == 1
     scene, stances = on_stones(robot, np.random.default_rng(1), 0.05)
     one, other = stances.stances[:2]
@@ -171,7 +171,7 @@ def test_moves_that_nothing_bears_are_refused() -> None:
     robot = climber("hexapod")
     scene, stances = on_stones(robot, np.random.default_rng(1), 0.05)
     with pytest.raises(MoveError, match=r"do not bear the robot .* lack 0.25 of its weight"):
-        carry_out(robot, scene, stances, MotionOptions(tries=0), balance=_Never(robot, scene))
+        carry_out(robot, scene, stances, balance=_Never(robot, scene))
 
 
 def test_a_proof_that_stays_open_at_few_instants_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:

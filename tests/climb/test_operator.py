@@ -7,11 +7,11 @@ import functools
 import numpy as np
 import pytest
 
+from tests.climb.arriving import arrives
 from tests.climb.by_hand import TRIPODS, gait
 from tests.climb.walkers import over
 from wbc.climb import BodyPlace, ClimbScene, ContactMove, ContactPlan, Stance, machines, plan_climb
 from wbc.climb.along import BodyTrack, plan_along
-from wbc.climb.checker import check
 from wbc.climb.grids import cylinder_grid
 from wbc.climb.loop import ClimbLoop, ClimbOutcome, LimbState
 
@@ -53,9 +53,7 @@ def test_a_robot_stops_along_its_plan_and_goes_on(seed: int) -> None:
         assert len(aloft) == len(states)
         loop.carry_on()
     run = loop.run(most=60.0)
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, plan.climber, plan.scene)
-    assert report.clean, str(report)
+    arrives(run, plan.climber, plan.scene)
     assert len(run.plans) == 1
 
 
@@ -78,11 +76,9 @@ def test_a_lift_waits_for_a_yes() -> None:
         loop.tick()
         assert loop.time < 60.0
     run = loop.result()
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    arrives(run, plan.climber, plan.scene)
     assert waits > 30 * len(plan.moves)
     assert {id(move) for move in asked} == {id(move) for move in plan.moves}
-    report = check(run.log, plan.climber, plan.scene)
-    assert report.clean, str(report)
 
 
 def test_another_foothold_is_taken_where_the_limb_can_go_there() -> None:
@@ -115,7 +111,7 @@ def test_another_foothold_is_taken_where_the_limb_can_go_there() -> None:
     asked = list[str]()
     loop.approve = approve
     run = loop.run(most=60.0)
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    arrives(run, climber, scene)
     assert list(refused)[:3] == asked[:3]
     assert "no such hold" in refused["no such hold"]
     assert "out of reach" in refused["1,1"]
@@ -123,8 +119,6 @@ def test_another_foothold_is_taken_where_the_limb_can_go_there() -> None:
     assert [(move.limb, scene.footholds[move.lands].id) for move in chosen] == [(first.limb, asked[-1])]
     assert len(run.plans) == 3
     assert loop.refused == ""
-    report = check(run.log, climber, scene)
-    assert report.clean, str(report)
 
 
 def test_a_choice_without_a_planner_ends_the_run() -> None:

@@ -80,10 +80,7 @@ def _slack_in_motion(
     own = pin.rnea(model, data, q, (rates[0] + rates[1]) / 2, (rates[1] - rates[0]) / H)
     pin.forwardKinematics(model, data, q)
     wrench = data.oMi[1].act(pin.Force(own[:6]))
-    held = list(plan.start)
-    for move in sorted(plan.moves, key=lambda move: move.lift):
-        if move.lift <= time:
-            held[move.limb] = move.lands if move.land <= time else -1
+    held = plan.contacts_at(time)
     center, weight = robot.center_of_mass(q), robot.mass * 9.81
     needed = np.concatenate([wrench.linear, wrench.angular - np.cross(center, wrench.linear)]) / weight
     still = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])

@@ -9,9 +9,10 @@ import pytest
 from tests.climb.by_hand import climber
 from wbc.climb import BodyPlace, ClimbScene, first_stance, plan_climb
 from wbc.climb.contacts import FlatFoot, GripHand, PointFoot, SuctionPad
+from wbc.climb.planning import ClimbOptions
 from wbc.climb.scene import Foothold, SceneBody, size_of
-from wbc.climb.scenes import placed
-from wbc.climb.search import NoStancesError
+from wbc.climb.scenes import draw, placed
+from wbc.climb.search import NoStancesError, StanceOptions
 from wbc.climb.surfaces import FootholdRules, footholds_on, frame_on
 from wbc.shapes import Box
 
@@ -41,6 +42,17 @@ def test_the_step_that_was_not_found_over_a_gap_is_named(name: str) -> None:
         plan_climb(robot, scene, start, BodyPlace(goal))
     # What was tried of a gap is no proof: the search has gone on to its own limit
     assert refused.value.cause == "limit"
+
+
+def test_a_step_on_which_neither_foot_bears_the_robot_is_none() -> None:
+    robot = climber("talos")
+    course = draw("rubble", size_of(robot))
+    start, end = (placed(robot, frame) for frame in (course.start, course.goal))
+    goal = BodyPlace(robot.body_pose(end).translation)
+    options = ClimbOptions(StanceOptions(moves=1200))
+    # Feet a metre apart can hold, with the weight between them
+    with pytest.raises(NoStancesError, match=r"none of the 60 shortest steps .* with the weight on"):
+        plan_climb(robot, course.scene, first_stance(robot, course.scene, start), goal, options)
 
 
 @pytest.mark.parametrize(

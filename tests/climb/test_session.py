@@ -143,6 +143,20 @@ def test_a_run_that_was_killed_is_read_checked_and_gone_on_with(
     assert again.earlier.passed == onward.earlier.at
 
 
+def test_a_walk_that_arrived_stays_there(walked: tuple[pathlib.Path, ClimbDone]) -> None:
+    done = climb(resumed(walked[0]), backend="vm")
+    assert done.run.outcome is ClimbOutcome.ARRIVED, done.run.reason
+    assert done.plan.moves == []
+
+
+def test_a_drive_ends_with_a_limb_in_the_air_that_holds_no_more() -> None:
+    mode, plant = DriveRequest(rate=("0.04,0,0,0,0,0 for 2",)), PlantRequest(fail=("arm2 at 1",))
+    done = climb(ClimbRequest(mode, ClimberRequest(arms=5), plant=plant), backend="vm")
+    assert done.run.outcome is ClimbOutcome.ARRIVED, done.run.reason
+    assert done.report is not None
+    assert done.report.clean, str(done.report)
+
+
 def test_a_run_that_was_ended_before_it_moved_is_begun_again(tmp_path: pathlib.Path) -> None:
     def stop(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -206,6 +220,12 @@ def test_robots_that_cannot_be_are_refused(tmp_path: pathlib.Path) -> None:
             ClimbRequest(PathRequest(points=("nowhere",)), ClimberRequest("hexapod"), SceneRequest(scene="stairs"))
         )
     assert len(climber_of(ClimberRequest(str(file), limbs=("arm1, arm2",), hold="grip")).limbs) == 2
+
+
+def test_a_body_that_goes_where_its_limbs_take_it_is_not_driven() -> None:
+    mode = DriveRequest(rate=("0.02,0,0,0,0,0 for 2",))
+    with pytest.raises(RangeError, match="no rates of its own"):
+        climb(ClimbRequest(mode, ClimberRequest("two_ended"), SceneRequest(scene="row")))
 
 
 def test_feet_that_only_press_do_not_hold_what_does_not_weigh() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.climb.arriving import arrives
 from tests.climb.obstructed import OBSTRUCTED, obstructed
 from tests.climb.referee import between, body_speeds, fastest_share, least_distances, slipped
 from tests.climb.walkers import walker_with
@@ -24,8 +25,6 @@ from wbc.climb import (
     plan_climb,
 )
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
-from wbc.climb.checker import check
-from wbc.climb.loop import ClimbOutcome
 from wbc.climb.motion import MoveError
 from wbc.climb.places import body_over
 from wbc.climb.scene import size_of
@@ -62,9 +61,7 @@ def sound(plan: ContactPlan, speeds: MotionSpeeds) -> None:
 def carried_out(plan: ContactPlan) -> None:
     """It arrives, the checker finds nothing, and neither do Pinocchio and Coal, which look between ticks too."""
     run = ClimbLoop(plan, backend="vm").run()
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, plan.climber, run.scene)
-    assert report.clean, str(report)
+    arrives(run, plan.climber, run.scene)
     model, q, contacts = plan.climber.robot.model, run.log.array("q"), run.log.array("contact").astype(int)
     some = range(0, len(q) - 1, max(1, len(q) // INSTANTS))
     between_ticks = [pin.integrate(model, q[k], 0.5 * pin.difference(model, q[k], q[k + 1])) for k in some]

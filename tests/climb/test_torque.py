@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tests.climb.arriving import arrives
 from tests.climb.by_hand import TRIPODS, climber, gait
 from tests.repeats import ALL, MORE, repeats
 from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, Equilibrium, first_stance, plan_climb, scenes
-from wbc.climb.checker import CheckRules, check
-from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LimbState, LoopOptions, PlanReference
+from wbc.climb.checker import CheckRules
+from wbc.climb.loop import ClimbLoop, ClimbRun, LimbState, LoopOptions, PlanReference
 from wbc.climb.plants import ClimbPlant, PlantErrors
 from wbc.climb.scene import size_of
 
@@ -47,10 +48,7 @@ def _least_with_motors(plan: ContactPlan, effort: float) -> float:
     balance, reference = Equilibrium(plan.climber, plan.scene), PlanReference(plan, plan.climber.robot)
     margins, moves = [], sorted(plan.moves, key=lambda move: move.lift)
     for move in moves:
-        held = list(plan.start)
-        for other in moves:
-            if other.lift <= move.lift:
-                held[other.limb] = other.lands if other.land <= move.lift else -1
+        held = plan.contacts_at(move.lift)
         for time in np.linspace(move.lift, move.land, 3):
             margins.append(balance.margin(held, reference.q(time), motors=True, effort=effort))
     return min(margins)
@@ -60,10 +58,8 @@ def _least_with_motors(plan: ContactPlan, effort: float) -> float:
 def test_a_hexapod_walks_in_tripods(seed: int) -> None:
     plan = gait(TRIPODS, swing=0.5, rest=0.15)
     run, ratio = _carried_out(plan, PlantErrors(0.8, 0.05, 0.005, seed))
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    arrives(run, plan.climber, plan.scene, CheckRules.by_torques())
     assert run.log["kept"].all()
-    report = check(run.log, plan.climber, plan.scene, CheckRules.by_torques())
-    assert report.clean, str(report)
     # What slips is at the cone of the friction that there is
     assert ratio < 0.8 * 0.6
     weight = plan.climber.mass * 9.81
@@ -87,9 +83,7 @@ def test_courses_are_walked(name: str, scene: str, part: float, seed: int) -> No
     assert plan.moves
     assert _least_with_motors(plan, 0.75) > 0.0
     run, ratio = _carried_out(plan, PlantErrors(**UNKNOWN, seed=seed), 2.0 * plan.times[-1] + 10.0)
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, robot, course.scene, CheckRules.by_torques())
-    assert report.clean, str(report)
+    arrives(run, robot, course.scene, CheckRules.by_torques())
     assert ratio < 0.8 * 0.6 + 1e-6
 
 
@@ -99,8 +93,6 @@ def test_grips_hang_and_go_on() -> None:
     scene = dataclasses.replace(plan.scene, gravity=np.array([0.0, 0.0, 9.81]))
     plan = dataclasses.replace(plan, scene=scene)
     run, _ = _carried_out(plan, PlantErrors(delay=0.002, mass=0.05))
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, machine, scene, CheckRules.by_torques())
-    assert report.clean, str(report)
+    arrives(run, machine, scene, CheckRules.by_torques())
     pulled = sum(run.log[f"wrench.{limb.name}.fz"][-1] for limb in machine.limbs)
     assert abs(pulled + machine.mass * 9.81) < 0.02 * machine.mass * 9.81

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.climb.arriving import arrives
 from tests.climb.test_operator import walked
-from wbc.climb import BodyPlace, Stance, plan_climb
-from wbc.climb.checker import check
+from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, Stance, first_stance, machines, plan_climb, scenes
 from wbc.climb.drive import ClimbDrive
 from wbc.climb.let_go import joined
-from wbc.climb.loop import ClimbLoop, ClimbOutcome, LimbState
+from wbc.climb.loop import ClimbLoop, LimbState
 from wbc.climb.loop.reference import PlanReference
+from wbc.climb.motion import MoveError
 from wbc.climb.resume import coming_to_rest, stance_in
+from wbc.climb.scene import size_of
+from wbc.climb.time_law import MotionSpeeds
 from wbc.errors import RangeError
 
 
@@ -42,20 +46,16 @@ def test_a_body_goes_as_it_is_told_while_a_limb_lands() -> None:
         loop.tick()
         assert loop.time < told + 30.0
     run = loop.result()
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
+    arrives(run, plan.climber, plan.scene)
     assert run.log.array("contact")[-1].min() >= 0
-    report = check(run.log, plan.climber, plan.scene)
-    assert report.clean, str(report)
 
 
 def test_a_body_at_rest_goes_as_it_is_told_while_a_limb_lands() -> None:
     plan = walked()
     move = next(move for move in plan.moves if move.land > move.lift + 1.2)
-    held = list(plan.start)
-    for before in sorted(plan.moves, key=lambda move: move.lift):
-        if before.lift <= move.lift:
-            held[before.limb] = before.lands if before.land <= move.lift else -1
-    stance = Stance((*held,), PlanReference(plan, plan.climber.robot).q(0.5 * (move.lift + move.land)))
+    stance = Stance(
+        plan.contacts_at(move.lift), PlanReference(plan, plan.climber.robot).q(0.5 * (move.lift + move.land))
+    )
     drive, twist = ClimbDrive(plan.climber), np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.02])
     drive.command(twist)
     going = drive.following(plan.scene, stance)
@@ -63,6 +63,37 @@ def test_a_body_at_rest_goes_as_it_is_told_while_a_limb_lands() -> None:
     assert not going.v[0].any()
     assert not going.v[-1].any()
     assert np.abs(going.v[going.times.searchsorted(0.5), :6] - twist).max() < 1e-9
+
+
+def test_a_body_that_turns_fast_turns_the_way_it_is_told() -> None:
+    """What is planned ahead is more than half a turn."""
+    climber = machines.climber("hexapod")
+    course = scenes.draw("stepping_stones", size_of(climber), 0, density=1.0)
+    drive = ClimbDrive(climber)
+    drive.command([0.0, 0.0, 0.0, 0.0, 0.0, -0.6])
+    plan = drive.following(course.scene, first_stance(climber, course.scene, scenes.placed(climber, course.start)))
+    assert plan.moves
+    assert plan.v[:, 5].max() < 1e-9
+    assert plan.v[:, 5].min() < -0.5
+
+
+def test_limbs_land_at_last_no_faster_than_the_body_was_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, asked = walked(), list[MotionSpeeds]()
+    drive, move = ClimbDrive(plan.climber), plan.moves[0]
+
+    def refused(*given: Any) -> ContactPlan:
+        if isinstance(given[-1], ClimbOptions):
+            asked.append(given[-1].motion.speeds)
+        raise MoveError("targets[0]", 0.0, "links touch")
+
+    monkeypatch.setattr("wbc.climb.drive.plan_climb", refused)
+    monkeypatch.setattr("wbc.climb.drive.plan_limb_work", refused)
+    for speed in (0.02, 0.03, 0.025):
+        drive.command([speed, 0.0, 0.0, 0.0, 0.0, 0.04])
+    drive.finish(ClimbLoop(plan, backend="vm"))
+    middle = PlanReference(plan, plan.climber.robot).q(0.5 * (move.lift + move.land))
+    assert drive.onward(plan.scene, Stance(plan.contacts_at(move.lift), middle)) is None
+    assert {(speeds.speed, speeds.turn_rate) for speeds in asked} == {(0.03, 0.04)}
 
 
 def test_a_plan_that_does_not_begin_as_the_robot_goes_is_refused() -> None:
@@ -88,8 +119,6 @@ def test_a_robot_that_moved_comes_to_rest_and_goes_on(share: float) -> None:
     stance = dataclasses.replace(stance_in(log, climber, scene, at), q=rest.q[-1])
     goal = BodyPlace(climber.body_pose(stance.q).translation + [0.0, 0.0, -0.1])
     run = ClimbLoop(joined(rest, plan_climb(climber, scene, stance, goal)), backend="vm").run()
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, climber, scene)
-    assert report.clean, str(report)
+    arrives(run, climber, scene)
     # Where it stands there is nothing to do
     assert coming_to_rest(log, climber, scene, 0.0) is None

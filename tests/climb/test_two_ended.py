@@ -7,6 +7,7 @@ from itertools import pairwise, permutations, product
 import numpy as np
 import pytest
 
+from tests.climb.arriving import arrives
 from tests.repeats import repeats
 from wbc.climb import (
     FREE_LIMB,
@@ -21,8 +22,6 @@ from wbc.climb import (
     first_stance,
     plan_climb,
 )
-from wbc.climb.checker import check
-from wbc.climb.loop import ClimbOutcome
 from wbc.climb.machines import climber
 from wbc.climb.scene import SceneBody, size_of
 from wbc.climb.scenes import draw, placed
@@ -51,9 +50,7 @@ def test_it_goes_end_over_end_along_rows(seed: int) -> None:
     start = first_stance(arm, scene, placed(arm, pin.SE3(np.eye(3), scene.positions[:2].mean(axis=0))))
     plan = plan_climb(arm, scene, start, LimbAt("arm2", scene.footholds[-1].id))
     run = ClimbLoop(plan).run()
-    assert run.outcome is ClimbOutcome.ARRIVED, run.reason
-    report = check(run.log, arm, run.scene)
-    assert report.clean, str(report)
+    arrives(run, arm, run.scene)
     assert run.log["contact.arm2"][-1] == len(scene.footholds) - 1
 
 

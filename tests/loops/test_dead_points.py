@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import MOTORS, NAMED, random_linkage, with_motors, within
+from tests.loops.mechanisms import MOTORS, NAMED, SPECIAL, random_linkage, with_motors, within
 from tests.loops.test_torques import moving, rows_at
 from tests.repeats import covering, repeats
 from wbc.errors import RangeError
@@ -90,6 +90,19 @@ def test_a_linkage_at_rest_next_to_its_dead_point_sets_off_as_slowly_as_loops_st
         assert np.abs(step.v).max() > 0.05, "nothing moved"
 
 
+def test_a_last_correction_opens_no_loop_that_branches() -> None:
+    """At 1e-4 rad from the branch rows hardly say what it changes: it opened the loops by 2e-7."""
+    text = with_motors(SPECIAL["sarrus"], MOTORS["sarrus"])
+    robot = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=200.0)
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller = stack.compile(command="torque", backend="vm")
+    q = np.array([0.643517721921, -1.287035443842, 0.643517721921, 0.643517721911, -1.287035443823])
+    controller.reset(q)
+    controller["posture"].target = [0.83, -2.78, -1.2, -0.27, -0.85]
+    step = controller.step(q, [-0.024109683427, 0.048219366854, -0.024109683427, -0.02410969744, 0.048219394881])
+    assert max(robot.loop_gaps(step.q_next).values()) < 1e-9
+
+
 def test_a_dead_point_is_named_from_afar() -> None:
     """The distance falls as the crank turns, and from the threshold on steps and explanations say so."""
     robot = wbc.robots.load(NAMED["four_bar"], actuated=["heel"], velocity=3.0, acceleration=20.0)
@@ -109,6 +122,22 @@ def test_a_dead_point_is_named_from_afar() -> None:
     assert explanation.dead_points == step.dead_points
     assert f"{step.dead_points[0]}." in str(explanation)
     assert "rad from its dead point, where its motors do not move knee" in str(explanation)
+
+
+@pytest.mark.parametrize("angle", [0.64350069, 0.6435, 0.64349, 0.643502])
+def test_velocities_keep_loops_closed_next_to_where_they_branch(angle: float) -> None:
+    """Sarrus' linkage stretched out: its rows turn so fast there that those of a step before do not close it."""
+    fold = np.array([1.0, -2.0, 1.0, 1.0, -2.0])
+    robot = wbc.robots.load(with_motors(SPECIAL["sarrus"], MOTORS["sarrus"]), velocity=3.0, acceleration=200.0)
+    stack = wbc.Stack(robot, dt=0.005).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, q = stack.compile(command="torque", backend="vm"), robot.closed(angle * fold)
+    controller.reset(q)
+    controller["posture"].target = np.array([3.11, -1.47, 0.84, -0.43, -2.71])
+    v = 0.39 * fold
+    v -= np.linalg.pinv(rows_at(robot, q), 1e-9) @ rows_at(robot, q) @ v
+    step = controller.step(q, v)
+    assert step.status == "solved"
+    assert np.abs(rows_at(robot, step.q_next) @ step.v).max() < 1e-10
 
 
 def test_a_linkage_that_branches_is_named() -> None:

@@ -8,13 +8,12 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import random_linkage, within
-from tests.loops.test_torques import moving
+from tests.loops.mechanisms import NAMED, random_linkage, within
+from tests.loops.test_torques import moving, rows_at
 from wbc.robot import Robot
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
 from wbc.tasks._linkage_speed import STOP, LinkageSpeed, bend_of
-from wbc.tasks.base import Rows
 from wbc.validation import Array
 
 DT = 0.005
@@ -45,35 +44,87 @@ def test_joints_that_push_each_other_to_their_limits_brake_in_time() -> None:
         q, v = pin.integrate(robot.model, q, step.v * DT), np.array(step.v)
 
 
+@pytest.mark.parametrize("seed", [42, 53, 69])
+def test_a_joint_that_has_no_more_to_brake_by_gives_way_to_no_rounding(seed: int) -> None:
+    """The bend takes 0.95 of the limits, the row asks for the rest, and the loop is open by 1e-10."""
+    rng = np.random.default_rng(seed)
+    robot = wbc.robots.load(NAMED["four_bar"], shapes="none", velocity=3.0, acceleration=1.3)
+    (linkage,), kin = robot.loops.linkages, Tracer(Kinematics(robot.model))
+    look = ca.Function("bend", [kin.q, kin.v], [bend_of(robot, kin, linkage, robot.limits.acceleration).asked])
+    q, v = moving(robot, rng)
+    v *= np.sqrt(0.95 / np.linalg.norm(np.array(look(q, v)).ravel() / robot.limits.acceleration, 4))
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller = stack.compile(command="acceleration", backend="vm")
+    for opened in 1e-10 * rng.normal(size=(8, robot.nv)):
+        controller.reset(q)
+        controller["posture"].target = q + v
+        assert controller.step(q + opened, v).status == "solved"
+
+
+def test_a_joint_that_a_fast_one_takes_along_stops_before_its_limit() -> None:
+    """The heel has a fifth of the knee's velocity: where it alone would brake in time the knee cannot."""
+    robot = wbc.robots.load(NAMED["four_bar"], shapes="none", velocity=3.0, acceleration=2.3)
+    robot, rng = robot.with_limits(position_upper={"heel": 0.45}), np.random.default_rng(0)
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, end = stack.compile(command="acceleration", backend="vm"), robot.assemblies({"heel": 0.45})[0]
+    looked = 0
+    for far, fast in 10.0 ** rng.uniform((-7.0, -4.0), (-3.0, -1.0), size=(120, 2)):
+        q = robot.closed(end - far * way(robot, end))
+        v = fast * way(robot, q)
+        if v[2] * (DT + np.linalg.norm(v / 2.3, 4) / (2.0 * STOP)) > 0.45 - q[2]:
+            continue
+        looked += 1
+        controller.reset(q)
+        controller["posture"].target = end + way(robot, end)
+        for _ in range(8):
+            step = controller.step(q, v)
+            assert step.status == "solved"
+            q, v = np.array(step.q_next), np.array(step.v)
+    assert looked > 40
+
+
+def way(robot: Robot, q: Array) -> Array:
+    """The motion that the loop leaves, its fastest joint at 1."""
+    motion = np.linalg.svd(rows_at(robot, q))[2][-1]
+    return motion / np.abs(motion).max() * np.sign(motion[0])
+
+
 @pytest.mark.parametrize("seed", [1, 4, 5])
-def test_the_row_of_a_joint_says_where_it_stops(seed: int) -> None:
-    """Sides and slopes of q + v (dt + t) + c t^2 / 2, with t and c of a velocity by their definitions."""
+@pytest.mark.parametrize("later", [False, True])
+def test_the_row_of_a_joint_says_where_it_stops(seed: int, later: bool) -> None:
+    """At the speed about which the row is straight its side and slopes are those of q + v (dt + t) + c t^2 / 2."""
     robot, rng = limited(seed), np.random.default_rng(seed)
     kin = Tracer(Kinematics(robot.model))
     (linkage,) = robot.loops.linkages
-    rows = LinkageSpeed(wbc.tasks.JointLimits()).velocity_rows(robot, kin, {}, ca.SX(DT))
-    assert isinstance(rows, Rows)
+    item = LinkageSpeed(wbc.tasks.JointLimits())
+    rows = (item.later_rows if later else item.velocity_rows)(robot, kin, {}, ca.SX(DT))
     bend = bend_of(robot, kin, linkage, np.full(len(linkage.dofs), ACCELERATION)).asked
     look = ca.Function("rows", [kin.q, kin.v], [rows.matrix, rows.lower, rows.upper, bend])
     q, v = moving(robot, rng)
     v *= 0.1
     matrix, lower, upper, bent = (np.array(part) for part in look(q, v))
+    speed, begins, reach = size(v), q + (0.5 * DT * v if later else 0.0), robot.nv**0.25 * DT
 
-    def stop(velocity: Array, share: float) -> tuple[Array, float]:
+    def stop(velocity: Array) -> tuple[Array, float]:
         """Where joints stop whose bend is that of v, but for its speed, and the time that they count on."""
-        speed = float((np.abs(velocity / ACCELERATION) ** 4).sum()) ** 0.25
-        time = DT + 0.5 * speed / STOP
-        return q + velocity * time + 0.5 * share * bent.ravel() * (time - DT) ** 2, time
+        time = DT + 0.5 * size(velocity) / STOP
+        share = (size(velocity) / speed) ** 2
+        return begins + velocity * time + 0.5 * share * bent.ravel() * (time - DT) ** 2, time
 
-    reached, time = stop(v, 1.0)
-    kept = robot.limits
-    assert matrix[1:] @ v - upper[1:, 0] == pytest.approx((reached - kept.position_upper) / time, abs=1e-9)
-    assert matrix[1:] @ v - lower[1:, 0] == pytest.approx((reached - kept.position_lower) / time, abs=1e-9)
-    h = 1e-6
-    for unit in np.eye(robot.nv):
-        ends = []
-        for way in (h, -h):
-            other = v + way * unit
-            grown = float(((other**4).sum() / (v**4).sum()) ** 0.25)
-            ends.append(stop(other, grown**2)[0])
-        assert matrix[1:] @ unit == pytest.approx((ends[0] - ends[1]) / (2.0 * h * time), abs=1e-6)
+    kept, h = robot.limits, 1e-6
+    for k in range(robot.nv):
+        end, row = (kept.position_upper[k], upper) if v[k] > 0.0 else (kept.position_lower[k], lower)
+        # The speed at which it would stop at its limit but for the bend, of those that it may reach
+        about = STOP * (np.sqrt(DT**2 + 2.0 * abs(end - begins[k]) * speed / abs(v[k]) / STOP) - DT)
+        there = v / speed * min(max(about, speed - reach), speed + reach)
+        reached, time = stop(there)
+        assert matrix[k + 1] @ there - row[k + 1, 0] == pytest.approx((reached[k] - end) / time, abs=1e-9)
+        slopes = [
+            (stop(there + h * unit)[0][k] - stop(there - h * unit)[0][k]) / (2.0 * h) for unit in np.eye(robot.nv)
+        ]
+        assert matrix[k + 1] == pytest.approx(np.array(slopes) / time, abs=1e-6)
+
+
+def size(velocity: Array) -> float:
+    """s of a velocity."""
+    return float(np.linalg.norm(velocity / ACCELERATION, 4))

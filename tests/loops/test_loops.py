@@ -156,6 +156,17 @@ def test_rows_of_others_are_left_out() -> None:
     assert len(wbc.robots.load(NAMED["gripper"]).loops.rows) == 5
 
 
+def test_rows_that_mix_directions_have_names_of_their_own() -> None:
+    """Of a planar hinge whose frame is turned out of the plane both rows are mostly along one axis."""
+    tree = wbc.robots.load(four_bar()).with_loops()
+    turned = pin.SE3(pin.rpy.rpyToMatrix(-0.4, -0.9, -1.2), np.array([0.45, 0.0, 0.1]))
+    robot = tree.with_frame("turned", "coupler", turned).with_loops(Loop("pin", "turned", "pin:b"))
+    basis = np.abs(robot.loops.bases[0])
+    assert basis.argmax(axis=1).tolist() == [1, 1]
+    assert len({label for label, _ in robot.loops.rows}) == 2
+    assert followed(robot).compile().step(robot.neutral).status == "solved"
+
+
 def test_loops_in_python_are_those_of_a_file() -> None:
     robot = wbc.robots.load(four_bar())
     tree = robot.with_loops()
@@ -164,6 +175,14 @@ def test_loops_in_python_are_those_of_a_file() -> None:
     again = made.with_loops(Loop("pin", "pin a", "pin:b"))
     assert opened(again, four_bar(), [again.random(0)]) < OPEN
     assert pickle.loads(pickle.dumps(again)).fingerprint == again.fingerprint != made.fingerprint
+
+
+def test_a_loop_to_the_world_stays_where_the_world_was() -> None:
+    tree = wbc.robots.load(four_bar()).with_loops()
+    robot = tree.with_frame("peg", "crank").with_loops(Loop("pin", "peg", "world", "hinge"))
+    seen = robot.seen_from(pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([1.0, 2.0, 3.0])))
+    assert seen.loop_gaps(seen.neutral) == pytest.approx(robot.loop_gaps(robot.neutral))
+    assert seen.loop_gaps([0.1, 0.2, 0.3]) == pytest.approx(robot.loop_gaps([0.1, 0.2, 0.3]))
 
 
 def test_a_joint_follows_a_polynomial() -> None:

@@ -14,7 +14,7 @@ import pytest
 import wbc
 from tests.loops.mechanisms import body, four_bar, hinge, mjcf, numbers
 from tests.loops.test_loops import OPEN, opened
-from wbc.errors import RobotFileError, UnknownNameError
+from wbc.errors import RangeError, RobotFileError, UnknownNameError
 from wbc.robot import LoopError
 from wbc.robot.sources.files import example_data_folder
 from wbc.validation import Array
@@ -127,6 +127,8 @@ def test_loops_of_a_file_beside_a_urdf(tmp_path: Path) -> None:
         ("tip, top, hing", UnknownNameError, "hinge"),
         ("tip", RobotFileError, "line 1"),
         ("ground, top, weld", LoopError, "open by"),
+        ("tip, tip", RangeError, "with itself"),
+        ("# none", RobotFileError, "no row"),
     ):
         file.write_text(text)
         with pytest.raises(error, match=words):
@@ -205,3 +207,14 @@ def test_a_loop_that_closes_only_beyond_limits_says_whose(caplog: pytest.LogCapt
     text = four_bar().replace('name="heel"', 'name="heel" range="2.5 2.6"')
     with caplog.at_level(logging.WARNING), pytest.raises(LoopError, match=r"limits of .*heel"):
         wbc.robots.load(text)
+
+
+def test_neutral_is_where_it_is_asked_for_or_else_a_loop_that_is_open_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    given = wbc.robots.load(four_bar(), neutral={"motor": 0.3})
+    assert given.neutral[0] == pytest.approx(0.3, abs=1e-12)
+    assert opened(given, four_bar(), [given.neutral]) < OPEN
+    assert "knee by" in given.notes["neutral"]
+    assert not caplog.records
+    with caplog.at_level(logging.WARNING):
+        wbc.robots.load(four_bar(), neutral={"motor": 0.3, "knee": 0.0})
+    assert "pin is open by 0.12" in caplog.text

@@ -13,8 +13,8 @@ import pytest
 from tests.published.three_arms import INCH, along, driven, hold_offsets
 from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.published.three_arm_walker import PublishedWalker, WalkerCalibration
-from wbc.published.three_arm_walker.commands import DestinationCommand, Waypoints, joystick
 from wbc.published.three_arm_walker.machine.grid import frame
+from wbc.published.three_arm_walker.modes import DestinationCommand, Waypoints, joystick
 
 
 def hands_at(walker: PublishedWalker) -> list[Any]:
@@ -40,13 +40,13 @@ def test_19_destinations() -> None:
 
 def test_19_the_end_is_reached_within_a_tenth() -> None:
     command = DestinationCommand([(13.0, 12.0, 0.0)])
-    assert command.rates(0.0, np.array([13.0, 12.0, 0.0])) is None
-    assert command.rates(0.1, np.array([13.09, 12.0, -0.09])) is None
-    off = command.rates(0.2, np.array([13.11, 12.0, 0.0]))
+    assert command(0.0, np.array([13.0, 12.0, 0.0])) is None
+    assert command(0.1, np.array([13.09, 12.0, -0.09])) is None
+    off = command(0.2, np.array([13.11, 12.0, 0.0]))
     assert off == pytest.approx([-1.1, 0.0, 0.0])
     strict = DestinationCommand([(13.0, 12.0, 0.0)], end=0.1)
-    assert strict.rates(0.0, np.array([13.0, 12.0, 0.0])) is None
-    assert strict.rates(0.1, np.array([13.02, 12.0, 0.0])) is not None
+    assert strict(0.0, np.array([13.0, 12.0, 0.0])) is None
+    assert strict(0.1, np.array([13.02, 12.0, 0.0])) is not None
 
 
 def test_20_the_joystick() -> None:

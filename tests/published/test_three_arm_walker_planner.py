@@ -17,10 +17,9 @@ from wbc.published.three_arm_walker.gait.gait import Gait, swing_poses
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
 from wbc.published.three_arm_walker.machine import grid
-from wbc.published.three_arm_walker.machine.body import body_twist
 from wbc.published.three_arm_walker.machine.grid import Place, Terrain, frame
 from wbc.published.three_arm_walker.machine.motion import CYCLE, BodyMotion
-from wbc.published.three_arm_walker.machine.plant import IdealPlant
+from wbc.published.three_arm_walker.machine.plant import IdealPlant, body_twist
 from wbc.published.three_arm_walker.machine.reach import Shoulders, View, reach_radius
 
 SHOULDERS = Shoulders(12.0, 52.0)

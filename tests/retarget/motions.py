@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tests.retarget import clips
 from wbc.multibody import pin
 from wbc.retarget import Clip, Retargeted, Skeleton
+from wbc.retarget.solids import LinkBalls
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,11 @@ def places(motion: Retargeted, frame: str) -> tuple[Array, Array]:
         rotations.append(np.array(data.oMf[number].rotation))
         positions.append(np.array(data.oMf[number].translation))
     return np.array(rotations), np.array(positions)
+
+
+def lowest(balls: LinkBalls, pose: pin.SE3) -> float:
+    """Height of the lowest point of a link's balls where its joint has this pose [m]."""
+    return float((balls.centers @ pose.rotation[2] + pose.translation[2] - balls.radii).min())
 
 
 def largest_slide(motion: Retargeted, limb: str) -> float:

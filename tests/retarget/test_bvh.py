@@ -78,6 +78,12 @@ def test_files_of_other_encodings(tmp_path: Path, name: str, encoding: str) -> N
     np.testing.assert_allclose(load_clip(tmp_path / "a.bvh").points, WALK.points, atol=1e-7)
 
 
+def test_tabs_between_all_words_and_names_that_are_not_needed(tmp_path: Path) -> None:
+    clip = read(tmp_path, clips.bvh(WALK).replace(" ", "\t"), names="smpl")
+    np.testing.assert_allclose(clip.points, WALK.points, atol=1e-7)
+    assert "names= is for files without names" in " ".join(clip.notes)
+
+
 def test_an_axis_and_a_unit_that_are_given_are_taken(tmp_path: Path) -> None:
     text = clips.bvh(WALK, "z", 1.0)
     turned = read(tmp_path, text, up="y", unit="cm")
@@ -110,6 +116,7 @@ def test_a_file_that_is_cut_off_before_its_frames_is_refused(tmp_path: Path, sha
         ("Xrotation", "Wrotation", "unknown channel"),
         ("HIERARCHY", "HERARCHY", "no BVH"),
         ("OFFSET 0.0", "OFFSET zero", "could not convert"),
+        ("OFFSET 0.0", "OFFSET 1e40", "finite"),
         ("MOTION", "}", "not understood|not closed"),
     ],
 )

@@ -28,7 +28,7 @@ def retargeter(monkeypatch: pytest.MonkeyPatch) -> type[FakeRetargeter]:
     for name, members in modules.items():
         monkeypatch.setitem(sys.modules, f"wbc.retarget.{name}", SimpleNamespace(**members))
     FakeRetargeter.runs.clear()
-    folders._retargeter.cache_clear()
+    folders.retargeter_of.cache_clear()
     return FakeRetargeter
 
 

@@ -47,6 +47,20 @@ def test_a_hand_that_is_held_late_gives_way_to_the_feet(away: float, monkeypatch
         assert np.abs(feet - feet[0]).max() < 1e-6
 
 
+@pytest.mark.parametrize("away", [(0.0, 1.2, 0.0), (1.5, 0.0, 0.0)])
+def test_feet_stay_above_ground_where_they_cannot_all_stand(away: tuple[float, float, float]) -> None:
+    """The left foot stands farther from the right one than legs reach; held there, one sinks by 5 to 11 cm."""
+    made, motion = seated()
+    leg, always = motion.plan.limbs["left_leg"], np.ones(motion.plan.ticks, dtype=bool)
+    far = replace(leg, end=leg.end + np.array(away), stands=always, held=always)
+    q, gave = made.run(replace(motion.plan, limbs={**motion.plan.limbs, "left_leg": far}))
+    assert gave == []
+    for limb in ("left_leg", "right_leg"):
+        foot = motion.body.limbs[limb]
+        rotations, positions = motions.places(replace(motion, q=q), foot.end)
+        assert ((rotations[:, 2] @ foot.corners.T).min(axis=1) + positions[:, 2]).min() > -1e-3
+
+
 def test_ticks_of_a_plan_are_those_of_one_at_a_time() -> None:
     made, motion = seated()
     places, turns = made.targets(motion.plan)

@@ -178,7 +178,7 @@ def test_a_table_with_a_header(tmp_path: Path) -> None:
             numbers = [f"{number:.6f}" for number in row]
             if frame == 7:
                 numbers[3:6] = ["", "", ""]
-            writer.writerow([f"{frame / 30.0:.6f}", *numbers, "0"])
+            writer.writerow([f"{frame / 30.0:.6f}", *numbers, "left"])
     clip = load_clip(file)
     assert clip.skeleton.names == WALK.skeleton.names
     assert clip.rate == 30.0
@@ -202,6 +202,18 @@ def test_points_of_one_name_are_told_apart(tmp_path: Path) -> None:
     clip = load_clip(file)
     assert clip.skeleton.names == (*NAMES[:-1], f"{NAMES[-2]}_2")
     assert f"the name {NAMES[-2]!r} is there more than once" in " ".join(clip.notes)
+
+
+@pytest.mark.parametrize("parent", ["a", 0])
+def test_parents_that_are_none_are_said(tmp_path: Path, parent: object) -> None:
+    np.savez(tmp_path / "walk.npz", points=WALK.points, names=NAMES, fps=30, parents=[parent] * len(NAMES))
+    assert "left out" in " ".join(load_clip(tmp_path / "walk.npz").notes)
+
+
+def test_a_rate_that_is_a_word_is_none(tmp_path: Path) -> None:
+    np.savez(tmp_path / "walk.npz", points=WALK.points, names=NAMES, fps="thirty")
+    with pytest.raises(RangeError, match="give rate"):
+        load_clip(tmp_path / "walk.npz")
 
 
 def test_an_array_without_names_is_known_by_its_bones(tmp_path: Path) -> None:
@@ -281,7 +293,9 @@ def test_pickles_that_ask_for_more_than_arrays_are_refused(tmp_path: Path) -> No
 def test_broken_files_are_refused_by_name(tmp_path: Path, kind: str) -> None:
     random = np.random.default_rng(0)
     file = tmp_path / f"broken.{kind}"
-    for content in (b"", b"\x00", random.bytes(3000), json.dumps({"a": 1}).encode()):
+    # A pickle's string without an end, and the head of an array that is no Python
+    damaged = b"\x80\x04\x8e" + b"\xff" * 7 + b"\x3f", b"\x93NUMPY\x01\x00\x10\x00{'descr': ((((((\n"
+    for content in (b"", b"\x00", random.bytes(3000), json.dumps({"a": 1}).encode(), *damaged):
         file.write_bytes(content)
         with pytest.raises(ClipFileError, match="broken"):
             load_clip(file, rate=30.0)

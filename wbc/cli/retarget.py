@@ -60,6 +60,9 @@ class RetargetClips:
     clearance: Annotated[float | None, "Links keep this distance from each other [m]. Default: not asked for."] = None
     balance: Annotated[float, "Weight that draws the centre of mass over the contacts [1]; 0: it is not."] = 0.0
     correspondence: Annotated[Path | None, "Corrected correspondence.yaml of a clip's folder, for all clips."] = None
+    correct: Annotated[Path | None, "Correct what leads what by dragging, in the browser, into this file; no more."] = (
+        None
+    )
     clip: Annotated[ClipOptions, "What the clips are"] = ClipOptions()
     format: Annotated[tuple[MotionFormat, ...], "Format besides npz; may be repeated."] = ()
     film: Annotated[bool, "Draw a film of each."] = True
@@ -75,6 +78,9 @@ class RetargetClips:
         from wbc.retarget import retarget_clips
 
         jobs, out = self._jobs()
+        if self.correct is not None:
+            self._correct(jobs[0], self.correct)
+            return 0
         waiting = jobs if self.force else [job for job in jobs if not job.is_done]
         if len(waiting) < len(jobs):
             tell(f"{len(jobs) - len(waiting)} of {len(jobs)} clips are done already; --force does them again", "note")
@@ -103,6 +109,25 @@ class RetargetClips:
             tell("ended early; the same command goes on")
             return INTERRUPTED
         return FAILED if failed else 0
+
+    def _correct(self, job: ClipJob, file: Path) -> None:
+        """Show the correspondence of a clip until the page is closed or Ctrl-C."""
+        from wbc.cli.console import say
+        from wbc.cli.view import show as show_address
+        from wbc.retarget import CorrespondenceEditor, load_clip
+        from wbc.retarget.folders import retargeter_of
+        from wbc.viewer import show
+        from wbc.viewer.paced import ticks
+
+        retargeter = retargeter_of(job.robot, tuple(sorted(job.options.items())), job.correspondence)
+        editor = CorrespondenceEditor(retargeter.correspondence(load_clip(job.clip, **job.loading).skeleton), file)
+        with contextlib.suppress(KeyboardInterrupt), show(editor.controller) as viewer:
+            show_address(viewer.url)
+            say("drag a target to the point that leads it; Ctrl-C ends")
+            for _ in ticks(viewer, editor.controller.stack.dt, None):
+                viewer.update(editor.controller.step(editor.q))
+                editor.look(viewer.stopped)
+        say(f"{file}: is given by --correspondence")
 
     def _jobs(self) -> tuple[list[ClipJob], Path]:
         """The clips, and the folder of theirs."""

@@ -75,7 +75,6 @@ class Play(Driven):
     preset: Annotated[str, Option("panda, dual-arm, talos, g1, mobile, walker or ssrms.", placed=True)] = "panda"
 
     def drive(self, options: dict[str, Any]) -> None:
-        """A preset."""
         from wbc.viewer import run
         from wbc.viewer.presets import playground
 
@@ -93,7 +92,6 @@ class ViewPairs(Driven):
     robot: Annotated[str, Option("ssrms, spdm, or any arm by name or file.", placed=True)] = "ssrms"
 
     def drive(self, options: dict[str, Any]) -> None:
-        """An arm."""
         from wbc.viewer.operating import operate
 
         about("Choose a pair, and drive what it commands by its sliders.")
@@ -115,7 +113,6 @@ class ViewWalk(Driven):
     place: Annotated[str, "Over which it stands at first, such as 13,6 on a grid, or a foothold's id."] = ""
 
     def drive(self, options: dict[str, Any]) -> None:
-        """A climber."""
         from wbc.viewer.climbing import climb, standing
 
         with console.err().status("the first stance"):

@@ -8,6 +8,7 @@ from wbc import lazy
 
 if TYPE_CHECKING:
     from wbc.climb.along import BodyTrack as BodyTrack, plan_along as plan_along
+    from wbc.climb.at_rest import standing as standing
     from wbc.climb.balance import Equilibrium as Equilibrium
     from wbc.climb.climber import Climber as Climber, ClimbLimb as ClimbLimb
     from wbc.climb.contacts import (
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from wbc.climb.motion import MotionOptions as MotionOptions, carry_out as carry_out
     from wbc.climb.places import body_frames as body_frames
     from wbc.climb.plan import ContactMove as ContactMove, ContactPlan as ContactPlan
-    from wbc.climb.planning import ClimbOptions as ClimbOptions, plan_climb as plan_climb, stance_at as stance_at
+    from wbc.climb.planning import ClimbOptions as ClimbOptions, plan_climb as plan_climb
     from wbc.climb.reach import LimbReach as LimbReach
     from wbc.climb.scene import ClimbScene as ClimbScene, Foothold as Foothold, SceneBody as SceneBody
     from wbc.climb.scene_files import read_scene as read_scene, save_scene as save_scene

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, field
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -20,21 +20,6 @@ from wbc.multibody import pin
 RESTS = 600.0
 #: A plan fits a stance whose joints are this near to its first ones [m, rad]
 FITS = 1e-3
-
-
-@dataclass(eq=False)
-class _Planning:
-    """A planner at work.
-
-    Attributes:
-        scene, stance: from which it plans. plan: what it found. error: why it found nothing. done: it has ended.
-    """
-
-    scene: ClimbScene
-    stance: Stance
-    plan: ContactPlan | None = None
-    error: str = ""
-    done: threading.Event = field(default_factory=threading.Event)
 
 
 class PlanAside:
@@ -54,7 +39,8 @@ class PlanAside:
     def __init__(self, climber: Climber) -> None:
         self._climber, self.failed, self.lock = climber, "", threading.Lock()
         self._planner: Replan | None = None
-        self._work: _Planning | None = None
+        #: Scene and stance from which a planner is at work, and what it finds
+        self._work: tuple[ClimbScene, Stance, Future[ContactPlan]] | None = None
         self._again = False
 
     def ask(self, planner: Replan | None, again: bool = False) -> None:
@@ -69,7 +55,7 @@ class PlanAside:
     @property
     def planning(self) -> bool:
         """Whether the planner is at work."""
-        return self._planner is not None and self._work is not None and not self._work.done.is_set()
+        return self._planner is not None and self._work is not None and not self._work[2].done()
 
     @property
     def awaited(self) -> bool:
@@ -81,15 +67,17 @@ class PlanAside:
         work = self._work
         if self._planner is None:
             return standing_plan(self._climber, scene, stance, RESTS)
-        if work is None or not self._fits(work, scene, stance):
+        if work is None or work[0] is not scene or not self._fits(work[1], stance):
             self._begin(scene, stance)
-        elif work.done.is_set():
+        elif work[2].done():
             self._work = None
-            if work.plan is None:
-                self.failed, self._planner = work.error, None
+            try:
+                plan = work[2].result()
+            except WbcError as error:
+                self.failed, self._planner = str(error), None
                 return standing_plan(self._climber, scene, stance, RESTS)
-            self.foresee(work.plan, scene)
-            return work.plan
+            self.foresee(plan, scene)
+            return plan
         return standing_plan(self._climber, scene, stance, STANDS)
 
     def foresee(self, plan: ContactPlan, scene: ClimbScene) -> None:
@@ -101,29 +89,23 @@ class PlanAside:
             # It cannot go on: who asks again will be told so again
             self._planner = None
             return
-        contacts = list(plan.start)
-        for move in sorted(plan.moves, key=lambda move: move.land):
-            contacts[move.limb] = move.lands
-        self._begin(scene, Stance(tuple(contacts), plan.q[-1]))
+        self._begin(scene, Stance(plan.contacts_at(np.inf), plan.q[-1]))
 
-    def _fits(self, work: _Planning, scene: ClimbScene, stance: Stance) -> bool:
-        if work.scene is not scene or work.stance.contacts != stance.contacts:
-            return False
-        return bool(np.abs(pin.difference(self._climber.robot.model, work.stance.q, stance.q)).max() < FITS)
+    def _fits(self, planned: Stance, stance: Stance) -> bool:
+        off = pin.difference(self._climber.robot.model, planned.q, stance.q)
+        return planned.contacts == stance.contacts and bool(np.abs(off).max() < FITS)
 
     def _begin(self, scene: ClimbScene, stance: Stance) -> None:
-        work, planner = _Planning(scene, stance), self._planner
-        self._work = work
+        planner, found = self._planner, Future[ContactPlan]()
+        self._work = scene, stance, found
 
         def run() -> None:
-            try:
-                with self.lock:
-                    # Somebody may have asked for another one meanwhile
-                    if planner is not None and self._work is work:
-                        work.plan = planner(scene, stance)
-            except WbcError as error:
-                work.error = str(error)
-            finally:
-                work.done.set()
+            with self.lock:
+                # Somebody may have asked for another one meanwhile
+                if planner is not None and self._work is not None and self._work[2] is found:
+                    try:
+                        found.set_result(planner(scene, stance))
+                    except Exception as error:  # noqa: BLE001 (raised where the plan is taken)
+                        found.set_exception(error)
 
         threading.Thread(target=run, name="planner", daemon=True).start()

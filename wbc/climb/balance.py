@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import linprog
 
 from wbc import validation
@@ -62,22 +63,9 @@ class Equilibrium:
         """
         held = self._checked(contacts)
         at = validation.real_array("q", q, (self.climber.robot.nq,))
-        poses = self._poses(held, at)
         if motors:
-            return self._with_motors(held, at, poses, effort, np.inf)
-        return self.world.slack(self.world.places_of(held), self.climber.center_of_mass(at), poses)[0]
-
-    def driven(self, contacts: Sequence[int], q: Array, least: float, effort: float = 1.0) -> bool:
-        """Whether :meth:`margin` with motors is at least ``least``: without a program where the least forces show it.
-
-        Args:
-            contacts, q, effort: as of :meth:`margin`. least: in shares of the weight [1].
-
-        Raises:
-            ShapeError, RangeError: contacts that are none.
-        """
-        held = self._checked(contacts)
-        return self._with_motors(held, q, self._poses(held, q), effort, least) >= least
+            return self._with_motors(held, at, effort)
+        return self.world.slack(self.world.places_of(held), self.climber.center_of_mass(at), self._poses(held, at))[0]
 
     def lacking(self, contacts: Sequence[int], q: Array, effort: float = 1.0) -> list[tuple[str, float]]:
         """Which joints' motors lack how much torque [N m; N] to hold the robot at rest with a share of their efforts,
@@ -92,9 +80,9 @@ class Equilibrium:
             ShapeError, RangeError: contacts that are none.
         """
         held, weight = self._checked(contacts), self.world.weight
-        if self.driven(held, q, 0.0, effort):
+        if self._with_motors(held, q, effort) >= 0.0:
             return []
-        G, r, A, _, b, motors = self._motors_program(held, q, self._poses(held, q), effort)
+        G, r, A, _, b, motors = self._program(held, q, effort)
         cones, limits = len(A) - 2 * len(motors), self.climber.robot.limits.effort[motors] / weight
         sizes = np.concatenate([np.ones(cones), limits, limits])
         # What no wrench of these contacts balances at all is the contacts' as well
@@ -145,69 +133,37 @@ class Equilibrium:
         poses = [place(held_pose(self.climber, self.scene, limb, row, q)) for limb, row in enumerate(held)]
         return np.ascontiguousarray(poses)
 
-    def _program(self, held: tuple[int, ...], poses: Array, center: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """G, r, A, s and b of G x = r and A x + s t <= b, in weights; moments about the centre."""
-        weight, gravity = self.world.weight, np.asarray(self.scene.gravity)
-        maps, blocks, slacks, sides = [], [], [], []
-        for limb, at in enumerate(self.world.places_of(held)):
-            if at < 0:
-                continue
-            cone = self.world.cone(limb, at)
-            turn, arm = poses[limb, :9].reshape(3, 3), poses[limb, 9:] - center
-            force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
-            maps.append(np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
-            blocks.append(cone.A)
-            slacks.append(cone.s)
-            sides.append(cone.b / weight)
-        G = np.hstack(maps) if maps else np.zeros((6, 0))
-        A = np.zeros((sum(map(len, blocks)), G.shape[1]))
-        row, column = 0, 0
-        for block in blocks:
-            A[row : row + block.shape[0], column : column + block.shape[1]] = block
-            row, column = row + block.shape[0], column + block.shape[1]
-        r = np.concatenate([-gravity * self.climber.mass / weight, np.zeros(3)])
-        return G, r, A, np.concatenate([*slacks, []]), np.concatenate([*sides, []])
-
-    def _with_motors(self, held: tuple[int, ...], q: Array, poses: Array, effort: float, enough: float) -> float:
-        """The slack with torques of motors within their efforts, which take no part in it; ``enough``, where the least
-        forces have that.
-        """
-        G, r, sides, slacks, ends, _ = self._motors_program(held, q, poses, effort)
-        if np.linalg.matrix_rank(G) < 6:
-            return -np.inf
-        sides = np.hstack([sides, slacks[:, None]])
-        if enough < np.inf and (sides @ [*np.linalg.lstsq(G, r)[0], enough] <= ends).all():
-            return enough
-        free = [(None, None)] * G.shape[1] + [(None, 1.0)]
-        cost = np.concatenate([np.zeros(G.shape[1]), [-1.0]])
-        answer = linprog(cost, sides, ends, np.hstack([G, np.zeros((6, 1))]), r, free, method="highs")
-        if answer.status != 0:
-            return -np.inf
-        slack = float(answer.x[-1])
+    def _with_motors(self, held: tuple[int, ...], q: Array, effort: float) -> float:
+        """The slack with torques of motors within their efforts, which take no part in it."""
+        G, r, A, s, b, _ = self._program(held, q, effort)
+        slack = self.world.largest_slack(G, r, A, s, b)
         return slack if not self.world.numbers.weightless else (np.inf if slack > 0.0 else -np.inf)
 
-    def _motors_program(
-        self, held: tuple[int, ...], q: Array, poses: Array, effort: float
+    def _program(
+        self, held: tuple[int, ...], q: Array, effort: float
     ) -> tuple[Array, Array, Array, Array, Array, list[int]]:
-        """G, r, A, s and b as of :meth:`_program`, with a row for each sign of the torque of the motors at last."""
-        robot, weight = self.climber.robot, self.world.weight
-        model, data = robot.model, robot.model.createData()
-        G, r, A, s, b = self._program(held, poses, self.climber.center_of_mass(q))
+        """G, r, A, s and b of G x = r and A x + s t <= b, in weights, moments about the centre of mass: rows of the
+        contacts, then one for each sign of the torque of the motors, which come last.
+        """
+        robot, weight, gravity = self.climber.robot, self.world.weight, np.asarray(self.scene.gravity)
+        model, data, center = robot.model, robot.model.createData(), self.climber.center_of_mass(q)
         pin.computeJointJacobians(model, data, q)
-        own = (
-            -(self.climber.mass * pin.jacobianCenterOfMass(model, data, q)).T @ np.asarray(self.scene.gravity) / weight
-        )
-        pulled = [np.zeros((model.nv, 0))]
-        for limb, at in enumerate(self.world.places_of(held)):
-            if at >= 0:
-                cone, turn = self.world.cone(limb, at), poses[limb, :9].reshape(3, 3)
-                frame = frame_index(model, self.climber.limbs[limb].frame)
-                pin.updateFramePlacement(model, data, frame)
-                J = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-                arm = poses[limb, 9:] - data.oMf[frame].translation
-                force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
-                pulled.append(J.T @ np.vstack([force, moment + np.cross(arm, force, axisb=0, axisc=0)]))
+        own = -(self.climber.mass * pin.jacobianCenterOfMass(model, data, q)).T @ gravity / weight
+        maps, pulled, cones = [np.zeros((6, 0))], [np.zeros((model.nv, 0))], []
+        for limb, (at, pose) in enumerate(zip(self.world.places_of(held), self._poses(held, q), strict=True)):
+            if at < 0:
+                continue
+            cone, turn = self.world.cone(limb, at), pose[:9].reshape(3, 3)
+            force, moment = turn @ cone.N[:3], turn @ cone.N[3:]
+            frame = frame_index(model, self.climber.limbs[limb].frame)
+            pin.updateFramePlacement(model, data, frame)
+            J = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            for out, by, point in ((maps, np.eye(6), center), (pulled, J.T, data.oMf[frame].translation)):
+                out.append(by @ np.vstack([force, moment + np.cross(pose[9:] - point, force, axisb=0, axisc=0)]))
+            cones.append(cone)
         motors = [dof for dof in robot.motors if np.isfinite(robot.limits.effort[dof])]
         torque, most = -np.hstack(pulled)[motors], effort * robot.limits.effort[motors] / weight
-        sides, slacks = np.vstack([A, torque, -torque]), np.concatenate([s, np.zeros(2 * len(motors))])
-        return G, r, sides, slacks, np.concatenate([b, most - own[motors], most + own[motors]]), motors
+        A = np.vstack([block_diag(np.zeros((0, 0)), *(cone.A for cone in cones)), torque, -torque])
+        s = np.concatenate([*(cone.s for cone in cones), np.zeros(2 * len(motors))])
+        b = np.concatenate([*(cone.b / weight for cone in cones), most - own[motors], most + own[motors]])
+        return np.hstack(maps), np.concatenate([-gravity * self.climber.mass / weight, np.zeros(3)]), A, s, b, motors

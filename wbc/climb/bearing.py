@@ -33,10 +33,8 @@ def check_borne(plan: ContactPlan, effort: float = EFFORT_SHARE) -> None:
     events = {0.0, float(times[-1]), *(time for move in plan.moves for time in (move.lift, move.land))}
     rows = np.searchsorted(times, sorted({*events, *np.arange(0.0, times[-1], EVERY).tolist()}), side="left")
     for k in np.unique(np.minimum(rows, len(times) - 1)):
-        time, held = float(times[k]), list(plan.start)
-        for move in sorted(plan.moves, key=lambda move: move.lift):
-            if time >= move.lift:
-                held[move.limb] = move.lands if time >= move.land else FREE_LIMB
+        time = float(times[k])
+        held = plan.contacts_at(time)
         lacks = balance.lacking(held, plan.q[k], effort)
         if lacks:
             limbs = [limb.name for limb, row in zip(plan.climber.limbs, held, strict=True) if row != FREE_LIMB]

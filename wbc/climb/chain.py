@@ -17,6 +17,7 @@ from wbc.geometry.kernel import HEADERS, checked
 from wbc.multibody import pin
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
+from wbc.native.structures import CStructures
 from wbc.symbolic.joint_steps import JointKind, joint_steps, place
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
@@ -24,12 +25,15 @@ from wbc.validation import Array
 _SOURCES = Path(__file__).parent / "native"
 #: Rows of a contact's pose, by what it fixes
 ROWS = {"position": 3, "axis": 5, "pose": 6}
+#: Structures of the C of limbs, scenes and contacts
+STRUCTURES = CStructures(*(_SOURCES / name for name in ("limb.h", "stand.h")))
+_StepStruct, _LimbStruct = STRUCTURES.structure("step_t"), STRUCTURES.structure("limb_t")
 #: Angles of a limb for which ``native/limb.h`` has room
-MOST_ANGLES = 16
+MOST_ANGLES = STRUCTURES.constants["MOST_ANGLES"]
 #: Steps of a limb for which it has room
-MOST_STEPS = 32
+MOST_STEPS = STRUCTURES.constants["MOST_STEPS"]
 #: Limbs for which it has room
-MOST_LIMBS = 12
+MOST_LIMBS = STRUCTURES.constants["MOST_LIMBS"]
 #: Angles of all limbs for which ``native/posture.h`` has room
 MOST_IN_ALL = 96
 #: Sampled postures of a limb: by the number of its angles, then for all with more
@@ -37,31 +41,6 @@ SAMPLES = {1: 64, 2: 128, 3: 256, 4: 512, 5: 1024}
 SAMPLES_BEYOND = 2048
 #: A joint without limits is sampled within half a turn of rest, or this far [m]
 UNLIMITED_SHIFT = 1.0
-
-
-class StepNumbers(ctypes.Structure):
-    """``step_t`` of ``native/limb.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("shifts", "angle")),
-        ("axis", ctypes.c_double * 3),
-        *((name, ctypes.c_double) for name in ("scale", "offset")),
-        ("place", ctypes.c_double * 12),
-        ("mass", ctypes.c_double),
-        ("center", ctypes.c_double * 3),
-    ]
-
-
-class LimbNumbers(ctypes.Structure):
-    """``limb_t`` of ``native/limb.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("steps", "angles", "rows", "samples")),
-        *((name, ctypes.c_double) for name in ("length", "near", "far")),
-        ("tip", ctypes.c_double * 12),
-        ("wrist", ctypes.c_double * 3),
-        *((name, ctypes.c_void_p) for name in ("step", "lower", "upper", "rest", "sample", "touch")),
-    ]
 
 
 @functools.lru_cache(maxsize=16)
@@ -77,9 +56,7 @@ def library() -> ctypes.PyDLL:
     Raises:
         CompileError: as of :func:`wbc.geometry.kernel.library`.
     """
-    return checked(
-        load_library(kernel(_SOURCES / "climb.c", HEADERS)), wbc_step_size=StepNumbers, wbc_limb_size=LimbNumbers
-    )
+    return checked(load_library(kernel(_SOURCES / "climb.c", HEADERS)), wbc_limb_size=_LimbStruct)
 
 
 def address_of(array: NDArray[Any]) -> ctypes.c_void_p:
@@ -105,7 +82,7 @@ class LimbTable:
         if len(climber.limbs) > MOST_LIMBS:
             raise ShapeError("Climber.limbs", len(climber.limbs), f"expected at most {MOST_LIMBS} limbs")
         self.climber = climber
-        self.numbers = (LimbNumbers * len(climber.limbs))()
+        self.numbers = (_LimbStruct * len(climber.limbs))()
         self._kept: list[object] = []
         self.lower: list[Array] = []
         self.upper: list[Array] = []
@@ -125,7 +102,7 @@ class LimbTable:
 
     def root(self, limb: int) -> Array:
         """Where a limb's first joint is in the body's frame ``(3)`` [m]."""
-        step = ctypes.cast(self.numbers[limb].step, ctypes.POINTER(StepNumbers)).contents
+        step = ctypes.cast(self.numbers[limb].step, ctypes.POINTER(_StepStruct)).contents
         return np.array(step.place[9:])
 
     def touch(self, limb: int, angles: Array) -> Array:
@@ -162,7 +139,7 @@ class LimbTable:
         climber, model = self.climber, self.climber.robot.model
         number_of = {int(dof): k for k, dof in enumerate(climber.joints(limb))}
         tied = {coupling.follower: coupling for coupling in climber.robot.couplings}
-        steps: list[StepNumbers] = []
+        steps: list[Any] = []
         before, length = 1, 0.0
         self.steps_to.append([])
         for joint in chain:
@@ -181,7 +158,7 @@ class LimbTable:
                     dof = tied[dof].leader
                 shifts = step.kind == JointKind.SHIFT
                 number = number_of[dof]
-                steps.append(StepNumbers(int(shifts), number, tuple(step.numbers[:3]), scale, offset, tuple(place(at))))
+                steps.append(_StepStruct(int(shifts), number, tuple(step.numbers[:3]), scale, offset, tuple(place(at))))
                 if shifts:
                     length += self._span(limb, number)
                 length += float(np.linalg.norm(at.translation)) if len(steps) > 1 else 0.0
@@ -199,7 +176,7 @@ class LimbTable:
         row = self.numbers[limb]
         row.steps, row.angles, row.rows = len(steps), len(number_of), ROWS[climber.fixed(limb)]
         row.length, row.tip = length, tuple(place(tip))
-        array = (StepNumbers * len(steps))(*steps)
+        array = (_StepStruct * len(steps))(*steps)
         self._kept.append(array)
         row.step = ctypes.addressof(array)
         for name in ("lower", "upper", "rest"):

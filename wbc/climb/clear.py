@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from math import hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,6 @@ from wbc.errors import ShapeError
 from wbc.geometry.kernel import segments_from
 from wbc.multibody import pin
 from wbc.shapes import PlacedShape, Sphere
-from wbc.shapes.around import distance_to_segment
 from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
@@ -305,11 +305,19 @@ def _plain_name(name: str) -> str:
 
 
 def _beyond(placed: PlacedShape, contact: pin.SE3, tilts: bool) -> float:
-    """How far a shape goes beyond a contact's frame, against its z axis [m]; tilted most where it tilts."""
+    """How far a shape goes beyond a contact's frame, against its z axis [m], both in the last joint's frame; where it
+    tilts, below the frame's origin when the way from that joint is tilted most.
+    """
     a, b, radius = placed.capsule()
     if tilts:
-        off = float(distance_to_segment(contact.translation[None], a, b)[0])
-        return max(0.0, radius - TILTED * off)
+        leg, along = contact.translation, b - a
+        share = float(np.clip((leg - a) @ along / max(float(along @ along), 1e-12), 0.0, 1.0))
+        centre = a + share * along - leg
+        # Up the leg, and beside it, which may be below when it leans
+        up = -float(centre @ leg) / max(float(np.linalg.norm(leg)), 1e-9)
+        beside = sqrt(max(float(centre @ centre) - up * up, 0.0))
+        lowest = TILTED * up - sqrt(1.0 - TILTED**2) * beside if up > 0.0 else -hypot(up, beside)
+        return max(0.0, radius - lowest)
     if placed.shape.is_round:
         return float(max(0.0, radius - min(contact.actInv(a)[2], contact.actInv(b)[2])))
     corners = placed.shape.triangles().reshape(-1, 3)

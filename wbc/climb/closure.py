@@ -10,9 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.climb.chain import ROWS, address_of as _at, library
+from wbc.climb.chain import ROWS, LimbTable, address_of as _at, library, limb_table
 from wbc.climb.climber import Climber
-from wbc.climb.reach import LimbReach
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
@@ -73,7 +72,7 @@ class Closure:
         wanted = np.ascontiguousarray(np.stack(list(poses.values()), axis=1))
         state = self.climber.states(q)
         library().wbc_close(
-            ctypes.byref(self._reach.table.numbers), _at(self._offsets), state.shape[1], len(which), _at(which),
+            ctypes.byref(self._table.numbers), _at(self._offsets), state.shape[1], len(which), _at(which),
             _at(wanted), int(turned), ctypes.c_double(body), ctypes.c_double(CLOSED), steps, ctypes.c_long(len(q)),
             _at(state), _at(left),
         )  # fmt: skip
@@ -94,8 +93,11 @@ class Closure:
         rotation = np.swapaxes(states[:, :9].reshape(-1, 3, 3), 1, 2)
         wanted[:, :9] = (rotation @ poses[:, :9].reshape(-1, 3, 3)).reshape(-1, 9)
         wanted[:, 9:] = np.einsum("nij,nj->ni", rotation, poses[:, 9:] - states[:, 9:12])
-        seeds = states[:, 12 + self._offsets[limb] : 12 + self._offsets[limb + 1]]
-        angles, count = self._reach.brought(limb, wanted, seeds, turned)
+        angles = np.array(states[:, 12 + self._offsets[limb] : 12 + self._offsets[limb + 1]], order="C")
+        code, rows = library(), ROWS["pose" if turned else "position"]
+        code.wbc_reach_each.restype = ctypes.c_long
+        one = ctypes.byref(self._table.numbers[limb])
+        count = int(code.wbc_reach_each(one, ctypes.c_long(len(wanted)), _at(wanted), rows, _at(angles)))
         if count == len(q):
             q[:] = self.climber.with_limb(q, limb, angles)
         return count
@@ -117,8 +119,8 @@ class Closure:
     @cached_property
     def _offsets(self) -> NDArray[np.int32]:
         """Where each limb's angles begin."""
-        return np.cumsum([0, *(len(rest) for rest in self._reach.table.rest)]).astype(np.int32)
+        return np.cumsum([0, *(len(rest) for rest in self._table.rest)]).astype(np.int32)
 
-    @cached_property
-    def _reach(self) -> LimbReach:
-        return LimbReach(self.climber, margin=0.0)
+    @property
+    def _table(self) -> LimbTable:
+        return limb_table(self.climber, 0.0)

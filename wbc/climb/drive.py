@@ -16,7 +16,7 @@ from wbc.climb.goal import BodyPlace, LimbAt
 from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop import ClimbLoop
 from wbc.climb.loop.reference import PlanReference
-from wbc.climb.motion import MotionOptions, MoveError
+from wbc.climb.motion import MoveError
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.scene import ClimbScene
@@ -33,6 +33,8 @@ AHEAD = (8.0, 4.0, 2.0, 1.0)
 BUSY = 1.0
 #: Rates below these are none [m/s, rad/s]
 NONE = 1e-4
+#: A way by rates has a pose after so much turn at least: half a turn and more looks like one the other way round [rad]
+LEG = 2.0
 #: How far ahead it is to come another way [s]
 OTHERWISE = 2.0
 #: Rates that a body may have at least where it goes another way round [m/s, rad/s]
@@ -65,18 +67,17 @@ class ClimbDrive:
 
     Args:
         climber: what is driven.
-        about: a pose in the world about whose axes the twist is, as of a cylinder that is
-            walked round, so that P(t) = exp(t [v; w]) P there; None: those of the body.
         options: of each way.
 
     Attributes:
         stands: why it stands although it is to go; "" where it does not.
     """
 
-    def __init__(self, climber: Climber, about: Any = None, options: AlongOptions | None = None) -> None:
+    def __init__(self, climber: Climber, options: AlongOptions | None = None) -> None:
         self.climber, self.options, self.stands = climber, options or AlongOptions(), ""
-        self._about = None if about is None else validation.pose("about", about)
         self._twist, self._ends = np.zeros(6), False
+        # The largest speed and turn rate so far
+        self._most = np.array([SLOWEST, SLOWEST])
         self._new, self._turned = False, -EVERY
         self._busy, self._changed = False, -BUSY
         self._over: BodyTurn | None = None
@@ -110,6 +111,7 @@ class ClimbDrive:
         asked = validation.real_array("twist", twist, (6,))
         if not np.array_equal(asked, self._twist):
             self._twist, self._new = asked, True
+            self._most = np.maximum(self._most, _sizes(asked))
 
     def finish(self, loop: ClimbLoop) -> None:
         """It comes to rest and the run ends."""
@@ -127,7 +129,7 @@ class ClimbDrive:
     def following(self, scene: ClimbScene, stance: Stance) -> ContactPlan:
         """The way from a stance on; where there is none, one on which it stands."""
         self.stands = ""
-        ahead, turned = float(np.linalg.norm(self._twist[:3])), float(np.linalg.norm(self._twist[3:]))
+        ahead, turned = _sizes(self._twist).tolist()
         if min(stance.contacts) < 0 and (landing := self._landing(scene, stance)) is not None:
             return self._meanwhile(landing) or landing
         if ahead <= NONE and turned <= NONE:
@@ -140,9 +142,7 @@ class ClimbDrive:
                     self.stands = self.stands or str(error)
         # Stances with other places of the body may lead on where none do along the way itself
         end = self._track(stance, OTHERWISE).poses[-1]
-        motion = self.options.motion
-        speeds = replace(motion.speeds, speed=max(ahead, SLOWEST), turn_rate=max(turned, SLOWEST))
-        options = self._freely(replace(motion, speeds=speeds))
+        options = self._freely(max(ahead, SLOWEST), max(turned, SLOWEST))
         try:
             plan = plan_climb(self.climber, scene, stance, BodyPlace(end.translation, end.rotation), options)
         except (NoStancesError, MoveError) as error:
@@ -176,13 +176,7 @@ class ClimbDrive:
     ) -> ContactPlan | None:
         if self._over is None or self._over.scene is not scene:
             self._over = BodyTurn(self.climber, scene, self.options.motion)
-        return self._over.planned(state, self._body_twist(state.q), guide, moves)
-
-    def _body_twist(self, q: Array) -> Array:
-        """The twist in the axes of the body."""
-        if self._about is None:
-            return self._twist
-        return np.asarray(self.climber.body_pose(q).actInv(self._about).toActionMatrix() @ self._twist)
+        return self._over.planned(state, self._twist, guide, moves)
 
     def _landing(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
         """A limb in the air comes down to a foothold that is near, and the body goes along where the drive ends and it
@@ -192,35 +186,39 @@ class ClimbDrive:
         contacts, before = self._aloft
         if contacts == stance.contacts and np.linalg.norm(place - before) < ELSEWHERE:
             return None
-        near = [
-            (self.climber.limbs[limb].name, scene.footholds[int(row)].id)
-            for limb, at in enumerate(stance.contacts)
-            if at == FREE_LIMB
-            for row in np.argsort(
-                np.linalg.norm(scene.positions - self.climber.contact_pose(stance.q, limb).translation, axis=1)
-            )[:LANDINGS]
-        ]
+        near = []
+        for aloft in np.flatnonzero(np.array(stance.contacts) == FREE_LIMB).tolist():
+            name, tip = self.climber.limbs[aloft].name, self.climber.contact_pose(stance.q, aloft).translation
+            order = np.argsort(np.linalg.norm(scene.positions - tip, axis=1)).tolist()
+            mine = [foothold for row in order if name in ((foothold := scene.footholds[row]).limbs or (name,))]
+            near += [(name, foothold.id) for foothold in mine[:LANDINGS]]
         for limb, foothold in near:
             with contextlib.suppress(InfeasibleError, RangeError):
                 return plan_limb_work(self.climber, scene, stance, limb, [foothold], self.options.motion)
-        options = self._freely(self.options.motion)
+        options = self._freely(*self._most.tolist())
         for limb, foothold in near if self._ends else []:
             with contextlib.suppress(NoStancesError, MoveError):
                 return plan_climb(self.climber, scene, stance, LimbAt(limb, foothold), options)
         self._aloft = tuple(stance.contacts), place
         return None
 
-    def _freely(self, motion: MotionOptions) -> ClimbOptions:
-        stances = StanceOptions(self.options.margin, self.options.limits, moves=FEW_MOVES)
-        return ClimbOptions(stances, motion, again=2)
+    def _freely(self, speed: float, turn_rate: float) -> ClimbOptions:
+        """Of plans over stances at such rates of the body at most."""
+        stances, motion = StanceOptions(self.options.margin, self.options.limits, moves=FEW_MOVES), self.options.motion
+        speeds = replace(motion.speeds, speed=speed, turn_rate=turn_rate)
+        return ClimbOptions(stances, replace(motion, speeds=speeds), again=2)
 
     def _track(self, stance: Stance, seconds: float) -> BodyTrack:
         pose = self.climber.body_pose(stance.q)
-        way = pin.exp6(pin.Motion(seconds * self._twist))
-        end = pose * way if self._about is None else self._about * way * self._about.inverse() * pose
-        moved = pin.log6(pose.actInv(end)).vector
-        speeds = [max(float(np.linalg.norm(part)) / seconds, NONE) for part in (moved[:3], moved[3:])]
-        return BodyTrack((pose, end), speeds[0], speeds[1])
+        way, (speed, turn_rate) = seconds * self._twist, _sizes(self._twist)
+        legs = max(1, int(np.ceil(seconds * turn_rate / LEG)))
+        poses = [pose * pin.exp6(pin.Motion(part * way)) for part in np.arange(legs + 1) / legs]
+        return BodyTrack(poses, max(float(speed), NONE), max(float(turn_rate), NONE))
+
+
+def _sizes(twist: Array) -> Array:
+    """Speed and turn rate of a twist ``(2)`` [m/s, rad/s]."""
+    return np.asarray(np.linalg.norm(twist.reshape(2, 3), axis=1))
 
 
 def standing_plan(climber: Climber, scene: ClimbScene, stance: Stance, seconds: float = STANDS) -> ContactPlan:

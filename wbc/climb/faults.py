@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,29 @@ FORMS = {
     "break": "break LIMB at SECONDS",
     "delay": "delay SECONDS",
 }
+#: What the number of a kind is that has one
+SIZED = {"slip": "METRES", "delay": "SECONDS"}
+#: "NAME at SECONDS"
+_AT = re.compile(r"\s*(.+?)\s+at\s+(\S+)\s*")
+
+
+def timed(field: str, text: str, form: str = "NAME at SECONDS") -> tuple[str, float]:
+    """Name and time [s] of a text.
+
+    Args:
+        field, form: named where it is another one.
+
+    Raises:
+        ShapeError: another form. RangeError, NotFiniteError: a time below 0 s, or none.
+    """
+    parts = _AT.fullmatch(text)
+    try:
+        if parts is None:
+            raise ValueError
+        seconds = float(parts[2])
+    except ValueError:
+        raise ShapeError(field, text, f"expected {form!r}") from None
+    return parts[1], validation.scalar(f"{field}, SECONDS", seconds, low=0.0, unit="s")
 
 
 @dataclass(frozen=True)
@@ -47,23 +71,16 @@ class PlantFault:
         Raises:
             UnknownNameError: no such kind. ShapeError: another form. RangeError: a number below 0.
         """
-        kind, *words = text.split() or [""]
-        form = FORMS[validation.one_of("fault", kind, FORMS)].split()
-        numbers = dict[str, float]()
+        kind, _, rest = text.strip().partition(" ")
+        form = FORMS[validation.one_of("fault", kind, FORMS)]
+        words, time = (rest, 0.0) if kind == "delay" else timed("fault", rest, form)
         try:
-            for name, word in zip(form[1:], words, strict=True):
-                if name in ("METRES", "SECONDS"):
-                    numbers[name] = float(word)
-                elif name == "at" and word != name:
-                    raise ValueError
+            *names, number = [*words.split(), *([] if kind in SIZED else ["0"])]
+            (what,) = ["", *names] if kind == "delay" else names
+            size = float(number)
         except ValueError:
-            raise ShapeError("fault", text, f"expected {FORMS[kind]!r}") from None
-        for name, number in numbers.items():
-            validation.scalar(f"fault, {name}", number, low=0.0)
-        seconds = numbers["SECONDS"]
-        if kind == "delay":
-            return cls(kind, size=seconds)
-        return cls(kind, words[0], numbers.get("METRES", 0.0), seconds)
+            raise ShapeError("fault", text, f"expected {form!r}") from None
+        return cls(kind, what, validation.scalar(f"fault, {SIZED.get(kind, '')}", size, low=0.0), time)
 
     def check(self, climber: Climber) -> None:
         """Refuses a fault of what the climber does not have.

@@ -50,7 +50,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0 and world.hold[k] in holds]
         choices.append(near or [(1.0, FREE_LIMB)])
     state, best, tried, outcomes = world.state_of(at), -np.inf, 0, Counter[PostureOutcome]()
-    stands, least = list[Stance](), len(choices) + 1
+    stands, least, touching = list[Stance](), len(choices) + 1, Counter[str]()
     for places in cheapest_first(choices):
         held = [int(world.hold[place]) for place in places if place >= 0]
         if len(set(held)) < len(held):
@@ -67,10 +67,13 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
             if not stuck:
                 break
         best = max(best, slack if how == PostureOutcome.NOT_BORNE else -np.inf)
+        if how == PostureOutcome.TOUCHES and (close := world.first_touch(contacts[None], found[None])):
+            touching[close.names] += 1
     if stands:
         return stands[0]
     reason = f"none of {min(tried, STANCES)} stances on the footholds nearest to it can be stood on"
     reason += f" ({counted(outcomes)})" if outcomes else ""
+    reason += "".join(f"; most often {names} touch" for names, _ in touching.most_common(1))
     if np.isfinite(best):
         reason += f"; the best lacks {given.margin - best:.3g} of the weight"
     if world.numbers.weightless and not any(limb.contact.pulls for limb in climber.limbs):

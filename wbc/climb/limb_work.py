@@ -58,9 +58,8 @@ def plan_limb_work(
     lifting, start = let_go(climber, scene, start, given)
     others = tuple(FREE_LIMB if k == row else at for k, at in enumerate(start.contacts))
     if (slack := balance.margin(others, start.q)) < 0.0:
-        raise InfeasibleError(
-            "limb", limb, f"without it the others do not bear the robot: they lack {-slack:.3g} of its weight"
-        )
+        lack = f"they lack {-slack:.3g} of its weight" if np.isfinite(slack) else "what they hold leaves the body free"
+        raise InfeasibleError("limb", limb, f"without it the others do not bear the robot: {lack}")
     reach, stances = LimbReach(climber), [start]
     for k, target in enumerate(targets):
         field = f"targets[{k}]"

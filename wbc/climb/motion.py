@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakSet
@@ -32,8 +32,8 @@ from wbc.validation import Array
 
 #: How far contacts of a stance may be from their footholds [m]
 AT = 1e-4
-#: Lifts on curves, one after the other: height as a multiple of the asked one, lean of :class:`SwingShape` [1]
-CURVES = ((1.0, 0.0), (1.0, 0.8), (2.0, 0.8))
+#: Leans of :class:`SwingShape` on curves, one after the other [1]
+LEANS = (0.0, 0.8)
 #: Poses of a body that differ by less are one [m, 1]
 ONE_PLACE = 1e-9
 #: Heights to which limbs are lifted along bands, one after the other, as multiples of the asked one
@@ -83,8 +83,6 @@ class MotionOptions:
         clearance: distance that links keep from bodies [m].
         apart: distance that links keep from each other [m]; a loop that follows the motion is some tenths of a mm off.
         lift: how far contacts are lifted off what they leave and land on [m]; 0: a sixteenth of the shortest limb.
-        tries: random postures through which bands begin where nothing simpler is clear, at most.
-        seed: of those.
         margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight; half of
             it where the body shifts and no limb lifts.
         inertia: share of the slack of equilibrium at rest that accelerations may use, where something weighs [1].
@@ -99,8 +97,6 @@ class MotionOptions:
     clearance: float = 0.01
     apart: float = 0.001
     lift: float = 0.0
-    tries: int = 2
-    seed: int = 0
     margin: float = 0.0
     inertia: float = 0.5
     friction: float = 1.0
@@ -118,8 +114,6 @@ class MotionOptions:
         for name in ("inertia", "friction"):
             share = validation.scalar(f"MotionOptions.{name}", getattr(self, name), low=0.0, high=1.0, open_low=True)
             object.__setattr__(self, name, share)
-        validation.integer("MotionOptions.tries", self.tries)
-        validation.integer("MotionOptions.seed", self.seed)
         validation.instance("MotionOptions.speeds", self.speeds, MotionSpeeds, "MotionSpeeds")
 
 
@@ -161,8 +155,7 @@ class Mover:
         """The motion from a stance to the next one, from rest to rest, and its least margin of equilibrium.
 
         Limbs in both stances at the same foothold hold it; the body goes straight and others on curves along the
-        normals, or all by elastic bands, of other lifts, further off what they touch, at last from random postures. A
-        motion that was found is kept.
+        normals, or all by elastic bands, of other lifts, further off what they touch. A motion that was found is kept.
 
         Args:
             row: of the stance in its path, for errors.
@@ -213,18 +206,14 @@ class Mover:
         swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
         begins = [(SwingShape(f * self.lift), aside) for f in (HEIGHTS if swings else HEIGHTS[:1]) for aside in ASIDES]
         begins += [(SwingShape(self.lift, evenly=True), aside) for aside in ASIDES if swings]
-        rng = np.random.default_rng(self.options.seed)
-        for _ in range(self.options.tries if swings else 0):
-            via = {k: rng.uniform(*self._range(k)) for k in (range(len(one.contacts)) if short else swings)}
-            begins.append((SwingShape(self.lift, evenly=True, via=via), ASIDES[0]))
         bodies = [self.climber.body_pose(stance.q) for stance in (one, other)]
         stays = not short and bodies[0].isApprox(bodies[1], ONE_PLACE)
         for still in (True, False) if stays else (False,):
-            for height, lean in CURVES if swings else CURVES[:1]:
+            for lean in LEANS if swings else LEANS[:1]:
                 if still or not stays:
-                    yield SwingShape(height * self.lift, lean)
+                    yield SwingShape(self.lift, lean)
                 if not still and not short:
-                    yield SwingShape(height * self.lift, lean, yields=True)
+                    yield SwingShape(self.lift, lean, yields=True)
             for first, aside in begins:
                 if self.watch.passed:
                     return
@@ -301,38 +290,24 @@ class Mover:
             return None, None, None
         held = tuple(a if a == b else FREE_LIMB for a, b in contacts)
         loads, needed = None, 0.0
+        picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
         if np.any(self.scene.gravity):
             # Second derivatives of a path are largest at its samples
             where = np.unique(np.concatenate([GRID, path.s]).round(9))
             loads = PathLoads(self.balance, path, held, where, self.options.inertia)
             margins, needed = loads.at_rest, self._needed(one, other)
         else:
-            picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
             where, margins = path.s[picked], np.array([self.balance.margin(held, q) for q in path.q[picked]])
         least, part, what = float(margins.min()), 100.0 * where[int(np.argmin(margins))], "contacts that hold"
         if least >= needed and loads is not None and self.options.effort < np.inf:
-            undriven = self._undriven(held, path, needed)
-            if undriven is not None:
-                (least, part), what = undriven, "motors of the limbs that hold"
+            driven = [self.balance.margin(held, q, motors=True, effort=self.options.effort) for q in path.q[picked]]
+            if min(driven) < needed:
+                least, part = min(driven), 100.0 * float(path.s[picked[int(np.argmin(driven))]])
+                what = "motors of the limbs that hold"
         if least < needed:
             text = f"the {what} do not bear the robot at {part:.0f} % of the way: they lack"
             return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, loads
         return None, least, loads
-
-    def _undriven(self, held: Sequence[int], path: MovePath, needed: float) -> tuple[float, float] | None:
-        """The first margin of equilibrium with motors that is less than needed, and where on the path [%]."""
-        assert self.balance is not None
-        effort = self.options.effort
-        for k in np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int)):
-            if not self.balance.driven(held, path.q[k], needed, effort):
-                return self.balance.margin(held, path.q[k], motors=True, effort=effort), 100.0 * float(path.s[k])
-        return None
-
-    def _range(self, limb: int) -> tuple[Array, Array]:
-        """Of random angles: limits, or half a turn about those at rest."""
-        rest = self.climber.angles(self.climber.rest, limb)
-        low, high = self.climber.limits[limb]
-        return np.maximum(low, rest - np.pi), np.minimum(high, rest + np.pi)
 
 
 def carry_out(

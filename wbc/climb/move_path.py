@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -49,7 +49,6 @@ class SwingShape:
             guide, on which limbs in the air turn freely between lift and land where they cannot keep their turn.
         still: the body stays where it is, as both stances have it.
         evenly: bands begin evenly in the joints; else limbs in the air are on their curves at first.
-        via: limb -> angles through which it goes in the middle at first, of bands that begin evenly.
         guide: a path that body and limbs follow, but for what contacts need; None: the body goes straight and evenly,
             contacts in the air on their curves.
     """
@@ -59,7 +58,6 @@ class SwingShape:
     yields: bool = False
     still: bool = False
     evenly: bool = False
-    via: Mapping[int, Array] = field(default_factory=dict)
     guide: MovePath | None = None
 
 
@@ -304,15 +302,12 @@ class _Moving:
         return float(left.max(initial=0.0))
 
     def evenly(self, s: Array) -> Array:
-        """Body on the straight line, joints evenly, or through given angles."""
+        """Body on the straight line, joints evenly."""
         robot, ends = self.climber.robot, (self.one.q, self.other.q)
         first, last = (self.climber.body_pose(q) for q in ends)
         turn, part = pin.log3(first.rotation.T @ last.rotation), s[:, None]
         steps = pin.difference(robot.model, *ends)[6:]
         joints = joint_values(robot, ends[0][None]) + part * steps
-        for limb, angles in self.shape.via.items():
-            rows = self.climber.joints(limb) - 6
-            joints[:, rows] += 16.0 * (part * (1.0 - part)) ** 2 * (angles - joints[0, rows] - 0.5 * steps[rows])
         out = with_joint_values(robot, np.tile(ends[0], (len(s), 1)), joints)
         positions = (1.0 - part) * first.translation + part * last.translation
         for q, rotation, position in zip(out, first.rotation @ exponential(part * turn), positions, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from wbc.climb.climber import Climber
 from wbc.climb.scene import ClimbScene
+from wbc.climb.stance import FREE_LIMB
 from wbc.validation import Array
 
 
@@ -53,3 +54,16 @@ class ContactPlan:
     q: Array
     v: Array
     margin: float | None = None
+
+    def contacts_at(self, time: float) -> tuple[int, ...]:
+        """Of each limb the row of the foothold that it holds at a time [s], or ``FREE_LIMB``."""
+        out = list(self.start)
+        for move in sorted(self.moves, key=lambda move: move.lift):
+            if time >= move.lift:
+                out[move.limb] = move.lands if time >= move.land else FREE_LIMB
+        return tuple(out)
+
+    def told(self, move: ContactMove) -> str:
+        """A move in words, "LIMB: FOOTHOLD -> FOOTHOLD"."""
+        source, target = (self.scene.footholds[k].id if k >= 0 else "the air" for k in (move.leaves, move.lands))
+        return f"{self.climber.limbs[move.limb].name}: {source} -> {target}"

@@ -102,13 +102,8 @@ def save_plan(plan: ContactPlan, path: str | os.PathLike[str]) -> pathlib.Path:
     file = validation.file_path("path", path)
     said = {**record.about, "limbs": record.limbs, "footholds": record.footholds}
     arrays: dict[str, Any] = {name: getattr(record, name) for name in _ARRAYS}
-    fresh = file.with_name(f".{file.name}")
-    try:
-        with fresh.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, about=np.array(json.dumps(said)), **arrays)
-        fresh.replace(file)
-    except OSError as error:
-        raise PlanFileError("plan", str(file), f"cannot be written: {error.strerror}") from error
+    with validation.replacing("plan", file, PlanFileError) as fresh, fresh.open("wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, about=np.array(json.dumps(said)), **arrays)
     return file
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -17,12 +16,11 @@ from wbc.climb.let_go import joined, let_go
 from wbc.climb.motion import MotionOptions, MoveError, Mover, carry_out
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.climb.search import AT_START, LateMove, NoStancesError, StanceOptions, StanceWay, no_stances
+from wbc.climb.search import LateMove, NoStancesError, StanceOptions, StanceWay, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.time_law import MotionSpeeds
 from wbc.climb.watch import PlanWatch
 from wbc.errors import RangeError
-from wbc.validation import Array
 
 #: How often links of a limb at a foothold are in the way, or it cannot leave a stance, before such moves are dear
 BLAMED = 2
@@ -65,21 +63,21 @@ class ClimbOptions:
 
 
 def plan_climb(
-    climber: Climber, scene: ClimbScene, start: Stance | Array, goal: Goal, options: ClimbOptions | None = None
+    climber: Climber, scene: ClimbScene, start: Stance, goal: Goal, options: ClimbOptions | None = None
 ) -> ContactPlan:
     """The motion of a climber to a goal. A move for which no motion is found is left out, and stances are sought again.
     Limbs in the air that touch a body leave it first, as of :func:`let_go`.
 
     Args:
-        start: a stance, or a configuration ``(nq)``: then each limb at a foothold holds it.
+        start: where it stands.
 
     Raises:
         NoStancesError: no stances lead there. MoveError: motions were found for none of so many ways. ShapeError,
             RangeError: start, goal or options that do not fit.
     """
     given = ClimbOptions() if options is None else validation.instance("options", options, ClimbOptions, "ClimbOptions")
-    first = start if isinstance(start, Stance) else stance_at(climber, scene, start)
-    lifting, first = let_go(climber, scene, first, given.motion)
+    validation.instance("start", start, Stance, "a Stance, as of first_stance")
+    lifting, first = let_go(climber, scene, start, given.motion)
     equilibrium = Equilibrium(climber, scene, given.motion.friction)
     watch = PlanWatch(given.seconds, given.told)
     mover = Mover(climber, scene, given.motion, equilibrium, watch)
@@ -123,23 +121,3 @@ def plan_climb(
             blamed.update((at, limb, FREE_LIMB) for limb in range(len(at)) if at[limb] != after[limb])
             way.forbid(ahead, [late for late, times in blamed.items() if times >= BLAMED])
     raise AssertionError
-
-
-def stance_at(climber: Climber, scene: ClimbScene, q: Any) -> Stance:
-    """The stance of a configuration: every limb whose contact is at a foothold holds it.
-
-    Raises:
-        RangeError: no limb is at a foothold; how far the nearest is. What ``robot.configuration`` raises.
-    """
-    at = climber.robot.configuration("start", q)
-    contacts, least = [], np.inf
-    for limb, one in enumerate(climber.limbs):
-        away = np.linalg.norm(scene.positions - climber.contact_pose(at, limb).translation, axis=1)
-        away[[bool(hold.limbs) and one.name not in hold.limbs for hold in scene.footholds]] = np.inf
-        contacts.append(int(np.argmin(away)) if away.min() <= AT_START else FREE_LIMB)
-        least = min(least, float(away.min()))
-    if max(contacts) < 0:
-        raise RangeError(
-            "start", least, f"no limb is within {AT_START:g} m of a foothold; the nearest is {least:.3g} m away"
-        )
-    return Stance(tuple(contacts), at)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc import validation
-from wbc.climb.chain import ROWS, address_of as _at, library, limb_table
+from wbc.climb.chain import address_of as _at, library, limb_table
 from wbc.climb.climber import Climber
 from wbc.validation import Array
 
@@ -70,18 +70,3 @@ class LimbReach:
         solved = np.arange(most) < counts[:, None]
         angles[~solved] = 0.0
         return angles, solved
-
-    def brought(self, limb: int, poses: Array, seeds: Array, turned: bool = True) -> tuple[Array, int]:
-        """Postures of a limb at poses in the body's frame ``(n, 12)``, each from its seed ``(n, k)`` or else from the
-        posture before it, and how many were found, from the first on.
-
-        Args:
-            turned: whether rows of turns count; else only positions do.
-        """
-        angles, wanted = np.array(seeds, order="C"), np.ascontiguousarray(poses)
-        code, rows = library(), ROWS["pose" if turned else "position"]
-        code.wbc_reach_each.restype = ctypes.c_long
-        count = code.wbc_reach_each(
-            ctypes.byref(self.table.numbers[limb]), ctypes.c_long(len(wanted)), _at(wanted), rows, _at(angles)
-        )
-        return angles, int(count)

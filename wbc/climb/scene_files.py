@@ -172,13 +172,10 @@ def save_scene(scene: ClimbScene, path: str | os.PathLike[str]) -> pathlib.Path:
         stream.write("\n[gravity]\n")
         _write(stream, COLUMNS["gravity"][0])
         _write(stream, [repr(float(x)) for x in scene.gravity])
-    # Written beside its place and renamed into it, so that no reader ever meets half a file
-    fresh = file.with_name(f".{file.name}")
-    with validation.writing("path", path, StructureFileError):
+    with validation.replacing("path", file, StructureFileError) as fresh:
         for mesh, numbers in meshes:
             np.save(file.with_name(mesh), numbers, allow_pickle=False)
         fresh.write_text(stream.getvalue(), encoding="utf-8", newline="")
-        fresh.replace(file)
     return file
 
 

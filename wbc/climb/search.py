@@ -400,7 +400,7 @@ class StanceSearch:
         if self._balance is None:
             return True
         q, least = self.world.q_of(state), self.options.margin - ROUNDING
-        return self._balance.driven(self._rows(kept), q, least, self.options.effort)
+        return self._balance.margin(self._rows(kept), q, motors=True, effort=self.options.effort) >= least
 
     def _moves(self, node: _Node) -> Iterator[tuple[float, NDArray[np.int32]]]:
         """Moves from a stance, with what they promise to cost, the least first; far ones come last."""
@@ -586,10 +586,11 @@ class StanceSearch:
         if last is not None:
             rows.append((node.contacts, last))
         margins = [self.first.slack]
-        for (contacts, state), (after, later) in itertools.pairwise(rows):
-            kept = np.where(contacts == after, after, FREE_LIMB).tolist()
-            margins.append(min(self.world.slack(kept, self.world.center(at))[0] for at in (state, later)))
         stances = [Stance(self._rows(contacts), self.world.q_of(state)) for contacts, state in rows]
+        centers = [self.climber.center_of_mass(stance.q) for stance in stances]
+        for k, ((contacts, _), (after, _)) in enumerate(itertools.pairwise(rows)):
+            kept = np.where(contacts == after, after, FREE_LIMB).tolist()
+            margins.append(min(self.world.slack(kept, at)[0] for at in centers[k : k + 2]))
         return StancePath((self.given, *stances[1:]), np.array(margins))
 
     def _crossing(self) -> str:

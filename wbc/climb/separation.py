@@ -117,10 +117,10 @@ class Separation:
             on = f"with the weight on {world.scene.footholds[world.hold[contacts[limb]]].id} " if two else ""
             if how == PostureOutcome.NOT_REACHED:
                 off, turned = self._off(contacts, end)
-                if max(off, turned) < NEARLY_CLOSED:
-                    continue
-                return off + world.length * turned, f"{on}is out of reach by {off:.3g} m and {turned:.3g} rad"
-            if how == PostureOutcome.NOT_BORNE and two:
+                if max(off, turned) >= NEARLY_CLOSED:
+                    return off + world.length * turned, f"{on}is out of reach by {off:.3g} m and {turned:.3g} rad"
+                slack, _ = world.slack(alone, world.climber.center_of_mass(world.q_of(end)))
+            if two and slack < margin:
                 return margin - slack, f"{on}lacks {margin - slack:.3g} of the weight"
         return None
 

@@ -16,6 +16,7 @@ import wbc.log
 from wbc import robots, validation
 from wbc.api import Controller
 from wbc.climb import machines, scenes
+from wbc.climb.at_rest import standing
 from wbc.climb.checker import CheckRules, ClimbReport, check
 from wbc.climb.climber import Climber, ClimbLimb
 from wbc.climb.contacts import ContactKind, FlatFoot, GripHand, PointFoot, SuctionPad
@@ -148,7 +149,12 @@ def climber_of(request: ClimberRequest) -> Climber:
         "point": PointFoot(request.friction), "flat": FlatFoot(friction=request.friction), "grip": GripHand(),
         "rolling-grip": GripHand(rolls=True), "suction": SuctionPad(friction=request.friction),
     }  # fmt: skip
-    return Climber(machines.ready(robot), [ClimbLimb(frame, kinds[request.hold]) for frame in frames], name=path.stem)
+    climber = Climber(
+        machines.ready(robot), [ClimbLimb(frame, kinds[request.hold]) for frame in frames], name=path.stem
+    )
+    # A state of the description may be anything that its maker calls so, but zeros are none
+    stands = kinds[request.hold].pulls or not robot.notes.get("neutral", "").startswith("zero")
+    return climber if stands else standing(climber)
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +315,7 @@ class ClimbSession:
         with contextlib.ExitStack() as stack:
             if folder is not None:
                 stack.enter_context(loop.recorded(folder / PART))
-            run = self._carried_out(loop)
+            run = loop.run(2.0 * self._lasts + MOST_AFTER, self._before_tick)
         looping = time.process_time() - begun
         if folder is not None:
             save(run.log, folder, "npz")
@@ -322,9 +328,6 @@ class ClimbSession:
                 rules = replace(rules, speed=None, turn_rate=None)
             report = check(run.log, setup.climber, run.scene, rules)
         return ClimbDone(setup.request, first, run, report, planning, looping, "; ".join(source.notes))
-
-    def _carried_out(self, loop: ClimbLoop) -> ClimbRun:
-        return loop.run(2.0 * self._lasts + MOST_AFTER, self._before_tick)
 
     def _before_tick(self, loop: ClimbLoop) -> None:
         if not self._ending and self.hooks.stop():
@@ -347,9 +350,7 @@ class ClimbSession:
         """What the one who is asked says to a move."""
         if self._ending or self.hooks.ask is None:
             return None
-        plan = loop.plan
-        places = [plan.scene.footholds[row].id if row >= 0 else "nothing" for row in (move.leaves, move.lands)]
-        text = f"{plan.climber.limbs[move.limb].name}: {places[0]} -> {places[1]}"
+        text = loop.plan.told(move)
         refused, loop.refused = loop.refused, ""
         answer = self.hooks.ask(text, refused)
         if answer is None:

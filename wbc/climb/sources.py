@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +15,7 @@ from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.drive import ClimbDrive, standing_plan
+from wbc.climb.faults import timed
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace, LimbAt, Route
 from wbc.climb.let_go import joined
@@ -36,8 +36,6 @@ from wbc.multibody import pin
 from wbc.track.target_file import read_targets
 from wbc.validation import Array
 
-#: "NAME at SECONDS"
-_AT = re.compile(r"\s*(.+?)\s+at\s+(\S+)\s*")
 #: A body so near to the end of its way is there [m]
 THERE = 1e-3
 
@@ -123,7 +121,8 @@ def source_of(setup: ClimbSetup, twists: TwistSource | None = None) -> PlanSourc
         twists: what drives the body in place of the request's file, as a keyboard; of drives.
 
     Raises:
-        ShapeError, RangeError: texts that are none. What files and planners raise.
+        ShapeError, RangeError: texts that are none, or rates of a body that has none of its own. What files and
+            planners raise.
     """
     mode, rest = setup.request.mode, setup.rest
     if isinstance(mode, DriveRequest):
@@ -162,6 +161,8 @@ def _walked(setup: ClimbSetup, mode: PathRequest) -> PlanSource:
         here = climber.body_pose(at.q)
         left = still_to_go(setup.way, here)
         near = np.linalg.norm(left[0].translation - here.translation) <= THERE
+        if near and len(left) == 1 and min(at.contacts) != FREE_LIMB:
+            return standing_plan(climber, now, at)
         plan = None if near else along(now, at, (here, *left))
         return plan or over_stances(now, at, left)
 
@@ -204,7 +205,11 @@ def _goals(climber: Climber, scene: ClimbScene, way: Sequence[pin.SE3]) -> list[
 
 
 def _driven(setup: ClimbSetup, twists: TwistSource) -> PlanSource:
-    drive, events = ClimbDrive(setup.climber, options=setup.along), events_of(setup)
+    climber = setup.climber
+    if len(Closure(climber).short) == len(climber.limbs):
+        reason = "its limbs have fewer joints than what they hold fixes, so that its body has no rates of its own"
+        raise RangeError("robot", climber.name, reason)
+    drive, events = ClimbDrive(climber, setup.along), events_of(setup)
     now: Array | None = np.zeros(6)
 
     def before_tick(loop: ClimbLoop) -> None:
@@ -216,11 +221,11 @@ def _driven(setup: ClimbSetup, twists: TwistSource) -> PlanSource:
         if asked is None:
             drive.finish(loop)
         elif not np.array_equal(asked, now):
-            drive.steer(round_surface(loop.scene, setup.climber.body_pose(loop.stance.q), asked), loop)
+            drive.steer(round_surface(loop.scene, climber.body_pose(loop.stance.q), asked), loop)
         now = asked
 
     def first() -> ContactPlan:
-        return standing_plan(setup.climber, setup.scene, setup.stands())
+        return standing_plan(climber, setup.scene, setup.stands())
 
     lasts = float(twists.times[-1]) if isinstance(twists, TwistTable) else np.inf
     return PlanSource(first, drive.following, drive.onward, before_tick, lasts)
@@ -273,55 +278,26 @@ def _step(scene: ClimbScene, text: str) -> tuple[str, Any]:
     raise ShapeError("do", text, f"expected {expected}")
 
 
-@dataclass(frozen=True)
-class Happening:
-    """A foothold that vanishes, or a limb that fails: ``what`` happens to ``name`` at ``time`` [s]."""
-
-    time: float
-    what: str
-    name: str
-
-
-def happenings(request: ClimbRequest) -> list[Happening]:
-    """What a request says that happens, by time.
+def events_of(setup: ClimbSetup) -> Callable[[ClimbLoop], None]:
+    """What happens at its time: footholds that vanish, limbs that fail.
 
     Raises:
-        ShapeError, RangeError: texts that are none.
+        ShapeError, RangeError, UnknownNameError: texts that are none, or no such foothold or limb.
     """
-    plant = request.plant
-    asked = [("vanish", text) for text in plant.vanish] + [("fail", text) for text in plant.fail]
-    return sorted((_when(what, text) for what, text in asked), key=lambda happening: happening.time)
-
-
-def events_of(setup: ClimbSetup) -> Callable[[ClimbLoop], None]:
-    """What happens at its time: footholds that vanish, limbs that fail."""
-    waiting = happenings(setup.request)
-    for happening in waiting:
-        if happening.what == "fail":
-            setup.climber.row(happening.name)
-        else:
-            setup.scene.row(happening.name)
+    plant, waiting = setup.request.plant, list[tuple[float, str, str]]()
+    for what, texts, known in (("vanish", plant.vanish, setup.scene.row), ("fail", plant.fail, setup.climber.row)):
+        for text in texts:
+            name, seconds = timed(what, text)
+            known(name)
+            waiting.append((seconds, what, name))
+    waiting.sort(key=lambda event: event[0])
 
     def happen(loop: ClimbLoop) -> None:
-        while waiting and setup.since + loop.time >= waiting[0].time:
-            happening = waiting.pop(0)
-            if happening.what == "fail":
-                loop.fail(happening.name)
-            else:
-                gone = happening.name in {foothold.id for foothold in loop.scene.footholds}
-                loop.see(loop.scene.without(happening.name) if gone else loop.scene)
+        while waiting and setup.since + loop.time >= waiting[0][0]:
+            _, what, name = waiting.pop(0)
+            if what == "fail":
+                loop.fail(name)
+            elif name in {foothold.id for foothold in loop.scene.footholds}:
+                loop.see(loop.scene.without(name))
 
     return happen
-
-
-def _when(field: str, text: str) -> Happening:
-    parts = _AT.fullmatch(text)
-    try:
-        if parts is None:
-            raise ValueError
-        seconds = float(parts[2])
-    except ValueError:
-        raise ShapeError(field, text, "expected 'NAME at SECONDS'") from None
-    if not 0.0 <= seconds < np.inf:
-        raise RangeError(field, seconds, "expected a finite time of at least 0 s")
-    return Happening(seconds, field, parts[1])

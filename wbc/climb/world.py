@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.clearance import SweptBody
-from wbc.climb.chain import address_of as _at, library, limb_table
+from wbc.climb.chain import STRUCTURES, address_of as _at, library, limb_table
 from wbc.climb.clear import SINK, climber_bodies, sunk_tips
 from wbc.climb.climber import Climber
 from wbc.climb.contacts import ContactKind
@@ -28,6 +28,7 @@ from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
+_ConeStruct, _PieceStruct, _ClimbStruct = map(STRUCTURES.structure, ("cone_t", "piece_t", "climb_t"))
 #: Turns about its normal at which a foothold is tried that says nothing of them, by limbs that fix their turn
 TURNS = 12
 #: What postures keep more than motions have to [m]: between two postures links may come nearer
@@ -71,41 +72,6 @@ class SampleAims(NamedTuple):
     near: NDArray[np.int32]
     closed: NDArray[np.bool_]
     poses: Array
-
-
-class _ConeNumbers(ctypes.Structure):
-    """``cone_t`` of ``native/stand.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("forces", "rows")),
-        *((name, ctypes.c_void_p) for name in ("N", "A", "b", "s")),
-    ]
-
-
-class _PieceNumbers(ctypes.Structure):
-    """``piece_t`` of ``native/stand.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("limb", "step", "shape", "tip")),
-        ("depth", ctypes.c_double),
-        ("place", ctypes.c_double * 12),
-    ]
-
-
-class _ClimbNumbers(ctypes.Structure):
-    """``climb_t`` of ``native/stand.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in ("limbs", "footholds", "pieces", "bodies", "pairs", "weightless")),
-        *((name, ctypes.c_double) for name in ("mass", "length", "clear", "apart")),
-        ("down", ctypes.c_double * 3),
-        ("trunk", ctypes.c_double * 4),
-        *((name, ctypes.c_void_p) for name in ("limb", "offset", "foothold", "cone_of", "cone", "on", "hold", "piece")),
-        *((name, ctypes.c_void_p) for name in ("shape", "body", "pair", "support")),
-        *((name, ctypes.c_int) for name in ("places", "supports", "largest")),
-        *((name, ctypes.c_void_p) for name in ("work", "gap")),
-        *((name, ctypes.c_long) for name in ("programs", "searches", "sweeps", "measured")),
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +141,7 @@ class ClimbWorld:
     ) -> None:  # fmt: skip
         self.climber, self.scene, self.margin = climber, scene, margin
         self.limbs = limb_table(climber, margin)
-        self._code = checked(
-            library(), wbc_piece_size=_PieceNumbers, wbc_cone_size=_ConeNumbers, wbc_climb_size=_ClimbNumbers
-        )
+        self._code = checked(library(), wbc_climb_size=_ClimbStruct)
         self._code.wbc_slack.restype = ctypes.c_double
         self._code.wbc_candidates.restype = ctypes.c_long
         counts = [len(rest) for rest in self.limbs.rest]
@@ -201,7 +165,7 @@ class ClimbWorld:
         self._held: list[Any] = [on, pieces, poses, pairs]
         self.touch = self._at_rest()
         down = gravity / strength if strength > 0.0 else np.zeros(3)
-        self.numbers = _ClimbNumbers(
+        self.numbers = _ClimbStruct(
             limbs=len(climber.limbs), footholds=len(self.places), pieces=len(links), bodies=len(names),
             pairs=len(pairs) // 2, weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
             clear=clear + spare, apart=apart + spare, down=tuple(down), trunk=tuple(self.limbs.trunk),
@@ -233,12 +197,6 @@ class ClimbWorld:
     def q_of(self, state: Array) -> Array:
         """The configuration of such a row; joints of no limb are at rest."""
         return np.asarray(self.climber.with_states(self.climber.rest[None], state[None])[0])
-
-    def center(self, state: Array) -> Array:
-        """The robot's centre of mass ``(3)`` [m]."""
-        out = np.zeros(3)
-        self._code.wbc_center(self._world, _at(state), _at(out))
-        return out
 
     def slack(
         self, contacts: Sequence[int] | NDArray[np.int32], center: Array, poses: Array | None = None
@@ -274,6 +232,12 @@ class ClimbWorld:
             _at(slacks), _at(bounds),
         )  # fmt: skip
         return slacks, bounds
+
+    def largest_slack(self, G: Array, r: Array, A: Array, s: Array, b: Array) -> float:
+        """The largest t <= 1 with G x = r and A x + s t <= b, of ``G`` ``(6, n)`` and ``A`` ``(m, n)``; -inf: none."""
+        given = [np.ascontiguousarray(part) for part in (G, r, A, b, s)]
+        self._code.wbc_largest_slack.restype = ctypes.c_double
+        return float(self._code.wbc_largest_slack(G.shape[1], len(A), *map(_at, given)))
 
     def look(self, contacts: NDArray[np.int32], state: Array) -> tuple[Array, str]:
         """Slack, clearance [m] and each limb's distance from its foothold [m] of a state; what is nearest."""
@@ -443,7 +407,7 @@ class ClimbWorld:
             for friction in dict.fromkeys(lower[able].tolist()):
                 table[limb, able & (lower == friction)] = len(self._slack_cones)
                 self._slack_cones.append(SlackCone.of(one.contact.lower(friction, share)))
-        numbers = (_ConeNumbers * max(1, len(self._slack_cones)))()
+        numbers = (_ConeStruct * max(1, len(self._slack_cones)))()
         self._cone_arrays = []
         for row, cone in zip(numbers, self._slack_cones, strict=False):
             arrays = [np.ascontiguousarray(a) for a in (cone.N, cone.A, cone.b / self.weight, cone.s)]
@@ -460,9 +424,9 @@ class ClimbWorld:
         """Pieces of the robot with their links' names, all shapes, poses of the bodies, and pairs of pieces."""
         robot = _pieces_of(self.climber, self.margin)
         links, shapes = robot.links, list(robot.shapes)
-        pieces = (_PieceNumbers * max(1, len(links)))()
+        pieces = (_PieceStruct * max(1, len(links)))()
         for k, (limb, step, sunk, at) in enumerate(robot.places):
-            pieces[k] = _PieceNumbers(limb, step, k, int(sunk is not None), 0.0 if sunk is None else sunk - spare, at)
+            pieces[k] = _PieceStruct(limb, step, k, int(sunk is not None), 0.0 if sunk is None else sunk - spare, at)
         bodies = list(self.scene.bodies.values())
         shapes += [body.shape for body in bodies]
         poses = np.array([place(_centre(body)) for body in bodies]).reshape(-1, 12)

@@ -14,16 +14,13 @@ class ReadPose(pin.SE3):  # type: ignore[misc]
 
     @property
     def translation(self) -> Array:
-        """Read-only [3]."""
         return _read_only(super().translation)
 
     @property
     def rotation(self) -> Array:
-        """Read-only [3, 3]."""
         return _read_only(super().rotation)
 
     def copy(self) -> pin.SE3:
-        """A pose of its own."""
         return pin.SE3(self)
 
 

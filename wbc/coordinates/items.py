@@ -63,7 +63,6 @@ class FollowRows(Task):
             expressions.check(robot, "task", one)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``offset`` and ``speed``, see the class."""
         given = [row for one in self.coordinates for row in expressions.labels(robot, one)]
         zero, unit = np.zeros(len(given)), ", ".join(dict.fromkeys(r.unit for r in given))
         rates = ", ".join(f"{u}/s" for u in unit.split(", "))
@@ -73,7 +72,6 @@ class FollowRows(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """The coordinates' rows, of poses with a metric x, y, z of three points."""
         points = [Row(f"{point}{axis}", "m") for point in "xyz" for axis in "xyz"]
         given = [points if self._spreads(one) else expressions.labels(robot, one) for one in self.coordinates]
         if len(given) == 1:
@@ -82,7 +80,6 @@ class FollowRows(Task):
         return tuple(Row(f"{one} {row.label}", row.unit) for one, rows in named for row in rows)
 
     def error(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """-offset, so that the rows ask for speed + gain offset."""
         return ca.SX(-self.spread(robot, kin) @ inputs["offset"])
 
     def jacobian(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
@@ -147,7 +144,6 @@ class KeepRows(Constraint):
         expressions.check(robot, "constraint", self.coordinate)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """``speed``, ``gain`` and, where there are such, ``reference`` and ``drift``."""
         given = expressions.labels(robot, self.coordinate)
         rates = ", ".join(f"{u}/s" for u in dict.fromkeys(r.unit for r in given))
         held = expressions.reference(robot, self.coordinate)
@@ -177,5 +173,4 @@ class KeepRows(Constraint):
         return Rows(expressions.matrix(robot, kin, self.coordinate), wanted, wanted)
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
-        """e of the class, where it is no sum of rates."""
         return expressions.drift(robot, kin, self.coordinate, inputs.get(REFERENCE))

@@ -172,11 +172,7 @@ def _linearised(
 
 
 def _solved(jacobian: Array, residual: Array, names: tuple[str, ...]) -> Array:
-    """The least-squares step, by columns of unit length.
-
-    Raises:
-        SolverError: columns that the data do not tell apart.
-    """
+    """The least-squares step, by columns of unit length."""
     lengths = np.linalg.norm(jacobian, axis=0)
     longest = lengths.max()
     unit = jacobian / np.where(lengths > EXCITED**2 * longest, lengths, np.inf)

@@ -198,11 +198,7 @@ class _CompiledItem:
         self._sensor = item.sensor(robot, self._numbers) if count else None
 
     def put(self, name: str, value: Any) -> None:
-        """Sets an input.
-
-        Raises:
-            UnknownNameError, ShapeError, NotFiniteError, RotationError: no such input, or no value of it.
-        """
+        """Sets an input."""
         validation.one_of(self.name, name, self._declared)
         self._numbers[name][:] = run_time.flat(self.robot, f"{self.name}.{name}", self._declared[name], value)
 

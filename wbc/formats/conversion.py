@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 
 from wbc import extras, validation
@@ -62,15 +61,10 @@ def convert(
     write, rate = _writer_of(to), validation.scalar("rate", rate, low=1e-3, high=1e4, unit="1/s")
     source = run if isinstance(run, Run) else Run(run, trust)
     place, pieces = _place_of(source.path, to, out), source.pieces(wait, rate, progress)
-    with validation.writing("out", place, FormatError):
-        if to == "foxglove" or wait is not None:
-            # What is to be seen meanwhile
-            write(source, pieces, place)
-        else:
-            # Beside its place, which then has all or nothing
-            with tempfile.TemporaryDirectory(prefix=f".{place.name}.", dir=place.parent) as folder:
-                write(source, pieces, pathlib.Path(folder, place.name))
-                pathlib.Path(folder, place.name).replace(place)
+    # What is to be seen meanwhile is written in its place
+    meanwhile = to == "foxglove" or wait is not None
+    with (validation.writing if meanwhile else validation.replacing)("out", place, FormatError) as fresh:
+        write(source, pieces, fresh or place)
     return place, source.remarks
 
 
@@ -94,36 +88,30 @@ def _place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, ov
     return place
 
 
-class follow(contextlib.AbstractContextManager["follow"]):
+@contextlib.contextmanager
+def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> Iterator[pathlib.Path]:
     """Copies a run into another format while it is recorded, in a process of its own: the loop is not slowed.
 
-    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed.
-    Arguments and errors are those of :func:`convert`; the recorder's file may begin later.
+        with follow("ticks.npz", "mcap") as copy, controller.record("ticks.npz"):
 
-    Attributes:
-        path: where the copy goes.
+    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed; where
+    the block ends it has all that is written. Arguments and errors are those of :func:`convert`; the recorder's file
+    may begin later.
+
+    Raises:
+        FormatError: at the end, too: it could not be written, and why.
     """
-
-    def __init__(self, run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> None:
-        _writer_of(to)
-        source = validation.file_path("run", run)
-        self.path = _place_of(source, to, out)
-        command = [sys.executable, "-m", __name__, str(source), to, str(self.path)]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-    @property
-    def running(self) -> bool:
-        """It still copies."""
-        return self._process.poll() is None
-
-    def close(self) -> None:
-        """Wait until all of the run that is written is in the copy; FormatError: it could not be written, and why."""
-        _, said = self._process.communicate()
-        if self._process.returncode:
-            raise FormatError("run", str(self.path), f"its copy ended early: {said.strip().splitlines()[-1:]}")
-
-    def __exit__(self, *exception: object) -> None:
-        self.close()
+    _writer_of(to)
+    source = validation.file_path("run", run)
+    place = _place_of(source, to, out)
+    command = [sys.executable, "-m", __name__, str(source), to, str(place)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield place
+    finally:
+        _, said = process.communicate()
+    if process.returncode:
+        raise FormatError("run", str(place), f"its copy ended early: {said.strip().splitlines()[-1:]}")
 
 
 @contextlib.contextmanager

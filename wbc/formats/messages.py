@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from operator import itemgetter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from wbc.tick.outcome import STATUSES
 from wbc.validation import Array
 from wbc.viewer.bodies import DrawnMesh
 
+T = TypeVar("T")
 #: Nanoseconds of a second
 NANO = 1_000_000_000
 #: Group of columns -> field of a joint's state
@@ -24,52 +25,43 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 TICK = "/tick"
 #: Topic of what is said once
 SCENE = "/scene"
-#: Topics -> Foxglove's name of their messages, but of ticks
-KINDS = {"/joint_states": "JointStates", "/tf": "FrameTransforms", SCENE: "SceneUpdate", "/why": "Log"}
+#: Topics -> names of the schemas of their messages
+KINDS = {
+    TICK: "wbc.Tick",
+    "/joint_states": "foxglove.JointStates",
+    "/tf": "foxglove.FrameTransforms",
+    SCENE: "foxglove.SceneUpdate",
+    "/why": "foxglove.Log",
+}
 #: Members of a group that keep their names in each tick, at most
 NAMED = 3
 #: Topic, time since the run began [ns], and plain data
 Message = tuple[str, int, dict[str, Any]]
 
 
-class TickTree:
-    """A run's columns ``group.member``, but those ``apart``, as nested objects; where more than :data:`NAMED` members
-    stand alone beside each other they are an array, as names would take a third of a file.
+class RunMessages:
+    """What a run says.
 
     Attributes:
-        names: columns in the order of the numbers of a tick. schema: of its messages.
+        scene: what is drawn, said once. schemas: topic -> of its messages. names: of columns, nested as their numbers.
     """
 
-    def __init__(self, columns: Iterable[str], apart: Collection[str] = ()) -> None:
-        self.names = list[str]()
-        groups = by_first({name: name for name in columns if name not in apart})
-        self._groups = {key: self._laid_out(members) for key, members in groups.items()}
-        self.schema = schema_of(self.tick([0.0] * len(self.names)) | {"status": ""}, "wbc.Tick")
+    def __init__(self, run: Run) -> None:
+        self.scene = of_bodies(run.bodies)
+        # Schemas are those of examples, made as messages are
+        units = dict.fromkeys([f"{group}.any joint" for group in JOINT_PARTS], "rad") | dict(run.units)
+        numbers = Log({name: np.zeros(1) for name in units | {"t": "s"}}, units, {})
+        corner = DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=np.uint32), (0, 0, 0))
+        said = *of_ticks(numbers), *of_seen(SeenTick(0.0, {"link": IDENTITY}, why="why"))
+        examples = {topic: data for topic, _, data in said} | {SCENE: of_bodies({"link": corner})}
+        self.schemas = {topic: schema_of(examples[topic], kind) for topic, kind in KINDS.items()}
+        self.names = nested(_other_columns({name: np.array([name]) for name in run.units}, _joints(numbers)))[0]
 
-    def tick(self, numbers: list[float]) -> dict[str, Any]:
-        """The message of a tick, from its numbers in the order of :attr:`names`."""
-        return {key: group(numbers) for key, group in self._groups.items()}
-
-    def _laid_out(self, members: dict[str, str]) -> Callable[[list[float]], Any]:
-        """What takes columns, given by the rests of their names, out of a tick's numbers."""
-        begin, parts = len(self.names), by_first(members)
-        if members.keys() == {""}:
-            self.names.append(members[""])
-            return itemgetter(begin)
-        if len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
-            self.names += members.values()
-            return itemgetter(slice(begin, len(self.names)))
-        each = {key: self._laid_out(below) for key, below in parts.items()}
-        return lambda numbers: {key: part(numbers) for key, part in each.items()}
-
-
-def by_first(members: dict[str, str]) -> dict[str, dict[str, str]]:
-    """First part of a name -> rest of the name -> column. A column may be called as what others begin with."""
-    out: dict[str, dict[str, str]] = {}
-    for name, column in members.items():
-        first, _, rest = name.partition(".")
-        out.setdefault(first, {})[rest] = column
-    return out
+    def of(self, piece: Piece) -> list[Message]:
+        """The messages of some ticks by their times."""
+        log, seen = piece
+        messages = [*of_ticks(log), *(message for tick in seen for message in of_seen(tick))]
+        return sorted(messages, key=itemgetter(1))
 
 
 def schema_of(example: Any, title: str = "") -> dict[str, Any]:
@@ -82,53 +74,46 @@ def schema_of(example: Any, title: str = "") -> dict[str, Any]:
     return {"type": {bool: "boolean", int: "integer", float: "number", str: "string"}[type(example)]}
 
 
-class RunMessages:
-    """What a run says.
+def by_first(members: Mapping[str, T]) -> dict[str, dict[str, T]]:
+    """First part of a name -> rest of the name -> value. A column may be called as what others begin with."""
+    out: dict[str, dict[str, T]] = {}
+    for name, value in members.items():
+        first, _, rest = name.partition(".")
+        out.setdefault(first, {})[rest] = value
+    return out
 
-    Attributes:
-        tree: of its ticks. scene: what is drawn, said once. schemas: topic -> of its messages.
+
+def nested(columns: Mapping[str, Array], depth: int = 0) -> list[Any]:
+    """Columns ``group.member`` as nested objects, one a row; where more than :data:`NAMED` members of a group stand
+    alone beside each other they are an array, as names would take a third of a file. What is not finite is None.
     """
-
-    def __init__(self, run: Run) -> None:
-        joints, self.scene = single_joints(run.units), of_bodies(run.bodies)
-        self.tree = TickTree(run.units, {f"{group}.{name}" for name in joints for group in JOINT_PARTS})
-        # Schemas are those of examples, made as messages are
-        corner = DrawnMesh(np.zeros((1, 3)), np.zeros((1, 3), dtype=np.uint32), (0, 0, 0))
-        state: dict[str, Any] = {"name": ""} | dict.fromkeys(JOINT_PARTS.values(), 0.0)
-        examples = {"/joint_states": _stamped(0.0, joints=[state]), SCENE: of_bodies({"link": [corner]})}
-        examples |= {topic: data for topic, _, data in of_seen(SeenTick(0.0, {"link": IDENTITY}, why="why"))}
-        self.schemas = {topic: schema_of(examples[topic], f"foxglove.{kind}") for topic, kind in KINDS.items()}
-        self.schemas[TICK] = self.tree.schema
-
-    def of(self, piece: Piece) -> list[Message]:
-        """The messages of some ticks by their times."""
-        log, seen = piece
-        messages = [*of_ticks(log, self.tree), *(message for tick in seen for message in of_seen(tick))]
-        return sorted(messages, key=itemgetter(1))
+    parts = by_first(columns)
+    if depth and columns.keys() == {""}:
+        return _plain(columns[""])
+    if depth and len(parts) > NAMED and all(below.keys() == {""} for below in parts.values()):
+        return _plain(np.column_stack(list(columns.values())))
+    each = {key: nested(below, depth + 1) for key, below in parts.items()}
+    return [dict(zip(each, row, strict=True)) for row in zip(*each.values(), strict=True)]
 
 
-def of_ticks(log: Log, tree: TickTree) -> Iterator[Message]:
-    """Two messages for each tick: all its numbers, and its joints. What is not finite is null."""
-    rows, joints = _plain(np.column_stack([log[name] for name in tree.names])), _joints(log)
-    codes = log["flag"].tolist() if "flag" in log else None
+def of_ticks(log: Log) -> Iterator[Message]:
+    """Two messages for each tick: its joints, and all its other numbers."""
+    joints = _joints(log)
+    ticks = nested(_other_columns(log.columns, joints))
+    statuses = [str(STATUSES[int(code)]) for code in log["flag"]] if "flag" in log else []
     for k, t in enumerate(log["t"].tolist()):
-        said = {"status": str(STATUSES[codes[k]])} if codes else {}
-        yield TICK, round(t * NANO), tree.tick(rows[k]) | said
+        yield TICK, round(t * NANO), ticks[k] | ({"status": statuses[k]} if statuses else {})
         if joints:
             states = [{"name": name} | {part: row[k] for part, row in parts.items()} for name, parts in joints.items()]
             yield "/joint_states", round(t * NANO), _stamped(t, joints=states)
 
 
-def single_joints(units: Mapping[str, str]) -> list[str]:
-    """Joints with one coordinate, of the units of columns."""
-    return [name[2:] for name, unit in units.items() if name.startswith("q.") and unit in ("rad", "m")]
-
-
 def _joints(log: Log) -> dict[str, dict[str, list[Any]]]:
     """Joint -> field of its state -> a number a tick; the two coordinates of one without end are an angle."""
-    out: dict[str, dict[str, list[Any]]] = {name: {} for name in single_joints(log.units)}
-    for name in [name[2:-2] for name in log.units if name.startswith("q.") and name.endswith(".1")]:
-        if name and f"q.{name}.2" not in log:
+    coordinates = {name[2:]: unit for name, unit in log.units.items() if name.startswith("q.")}
+    out: dict[str, dict[str, list[Any]]] = {name: {} for name, unit in coordinates.items() if unit in ("rad", "m")}
+    for name in [name[:-2] for name in coordinates if name.endswith(".1")]:
+        if name and f"{name}.2" not in coordinates:
             out[name] = {"position": _plain(np.arctan2(log[f"q.{name}.1"], log[f"q.{name}.0"]))}
     for group, part in JOINT_PARTS.items():
         for name, row in log.group(group).items():
@@ -137,23 +122,28 @@ def _joints(log: Log) -> dict[str, dict[str, list[Any]]]:
     return out
 
 
-def _plain(numbers: Array) -> Any:
+def _other_columns(columns: Mapping[str, Array], joints: Collection[str]) -> dict[str, Array]:
+    """Those that are not of the states of joints."""
+    apart = {f"{group}.{name}" for name in joints for group in JOINT_PARTS}
+    return {name: column for name, column in columns.items() if name not in apart}
+
+
+def _plain(numbers: Array) -> list[Any]:
     """Numbers as JSON has them: what is not finite is None."""
-    if (finite := np.isfinite(numbers)).all():
-        return numbers.tolist()
-    return np.where(finite, numbers, np.array(None)).tolist()
+    if numbers.dtype.kind == "U" or (finite := np.isfinite(numbers)).all():
+        return list((numbers if numbers.dtype.kind == "U" else numbers.astype(np.float64)).tolist())
+    return list(np.where(finite, numbers, np.array(None)).tolist())
 
 
-def of_bodies(bodies: Mapping[str, list[DrawnMesh]]) -> dict[str, Any]:
+def of_bodies(bodies: Mapping[str, DrawnMesh]) -> dict[str, Any]:
     """What is drawn in each frame, which stays as it is."""
     entities = []
-    for frame, meshes in bodies.items():
-        surfaces, pose = [], {"position": _named(IDENTITY[:3]), "orientation": _named(IDENTITY[3:])}
-        for corners, triangles, colour in meshes:
-            points = [_named(point) for point in corners.round(5).astype(float)]
-            surface = {"pose": pose, "points": points, "color": _named(np.array([*colour, 255]) / 255.0, "rgba")}
-            surfaces.append(surface | {"indices": triangles.ravel().tolist()})
-        kept = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True, "triangles": surfaces}
+    for frame, (corners, triangles, colour) in bodies.items():
+        points = [_named(point) for point in corners.round(5).astype(float)]
+        pose = {"position": _named(IDENTITY[:3]), "orientation": _named(IDENTITY[3:])}
+        surface: dict[str, Any] = {"pose": pose, "points": points}
+        surface |= {"color": _named(np.array([*colour, 255]) / 255.0, "rgba"), "indices": triangles.ravel().tolist()}
+        kept = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True, "triangles": [surface]}
         entities.append(_stamped(0.0, frame_id=frame.removeprefix("robot/"), id=f"body/{frame}") | kept)
     return {"deletions": [], "entities": entities}
 

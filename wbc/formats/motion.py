@@ -13,7 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.api import Controller
 from wbc.formats.errors import FormatError
-from wbc.log import Log, TickRecorder
+from wbc.log import Log
 from wbc.multibody import pin
 from wbc.record.recorder import names
 from wbc.robot.robot import Robot, checked_robot
@@ -167,19 +167,20 @@ def answered(
         FormatError, UnknownNameError: as of :class:`PlayedPlant`. WbcError: as of :meth:`wbc.Controller.step`.
     """
     validation.instance("controller", controller, Controller, "a wbc Controller")
-    robot, dt, said = controller.stack.robot, controller.stack.dt, names(controller)
-    plant, statuses = PlayedPlant(robot, motion, ignored), list(Status)
+    robot, said, statuses, rows = controller.stack.robot, names(controller), list(Status), list[Array]()
+    plant = PlayedPlant(robot, motion, ignored)
     rates = [(name, f"{unit}/s") for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)]
-    groups, columns = {"q": said["q"], "v": rates, "command": said["v"]}, {"t": ("s", "f8"), "status": ("", "i8")}
-    columns |= {f"{group}.{name}": (unit, "f8") for group, members in groups.items() for name, unit in members}
-    recorder = TickRecorder(columns, {"robot": robot.name, "dt": dt})
+    groups = {"q": said["q"], "v": rates, "command": said["v"]}
+    units = {"t": "s", "status": ""}
+    units |= {f"{group}.{name}": unit for group, members in groups.items() for name, unit in members}
     plant.reset(robot.neutral, float(motion.t[0]))
     controller.reset(plant.read().q)
     while (state := plant.read()).valid:
         if aim is not None:
             aim(controller, state.time)
         step = controller.step(state.q, state.v)
-        numbers = [state.time], [statuses.index(step.status)], state.q, state.v, step.command
-        recorder.extend(np.concatenate(numbers)[None])
-        plant.advance(dt)
-    return recorder.log()
+        rows.append(np.concatenate([[state.time, statuses.index(step.status)], state.q, state.v, step.command]))
+        plant.advance(controller.stack.dt)
+    columns = dict(zip(units, np.array(rows).T, strict=True))
+    columns["status"] = columns["status"].astype(int)
+    return Log(columns, units, {"robot": robot.name, "dt": controller.stack.dt})

@@ -21,10 +21,9 @@ from wbc.record.recording import Recording
 from wbc.replaying.ticks import compiled, redoing
 from wbc.robot import Robot
 from wbc.robots import load as load_robot, names
-from wbc.shapes import Box
 from wbc.tasks import Obstacle
 from wbc.validation import Array
-from wbc.viewer.bodies import DrawnMesh, indexed, robot_meshes, shape_mesh
+from wbc.viewer.bodies import DrawnMesh, robot_meshes, shape_mesh
 from wbc.viewer.drawing import is_place
 from wbc.viewer.link import SharedTick
 from wbc.viewer.reading import sentences
@@ -35,8 +34,6 @@ from wbc.viewer.tick import Tick
 RATE = 30.0
 #: Time between two explanations, which cost some milliseconds each [s]
 EXPLAINED = 1.0
-#: Length and width of the axes that mark a target [m]
-AXIS = (0.1, 0.005)
 #: Says whether to look again for ticks where a file ends that is still written
 Wait = Callable[[], bool]
 
@@ -76,7 +73,7 @@ class Run:
         place, trust = validation.existing("run", path, FormatError), validation.flag("trust", trust)
         self.path = recording_in(place) or place
         file = next((self.path / name for name in FILES if (self.path / name).is_file()), self.path)
-        self.remarks, self.bodies = list[str](), dict[str, list[DrawnMesh]]()
+        self.remarks, self.bodies = list[str](), dict[str, DrawnMesh]()
         self._controller: Controller | None = None
         self._placed, self._said, self._said_at = dict[str, tuple[str, str]](), tuple[str, ...](), -np.inf
         self._chunks: Callable[[Wait | None], Iterable[tuple[Log, Array]]]
@@ -92,7 +89,7 @@ class Run:
             self._read_stack(recording, trust)
         self._robot = self._own_robot() if self._controller is None else self._controller.stack.robot
         if self._robot is not None:
-            self.bodies |= {f"robot/{link}": [mesh] for link, mesh in robot_meshes(self._robot).items()}
+            self.bodies |= {f"robot/{link}": mesh for link, mesh in robot_meshes(self._robot).items()}
 
     def _read_stack(self, recording: Recording, trust: bool) -> None:
         try:
@@ -104,10 +101,10 @@ class Run:
         for name, block in core_of(controller).layout.blocks.items():
             item, target = block.entry.item, block.slots.get("target")
             if target is not None and is_place(target.input):
-                self._placed[f"target/{name}"], self.bodies[f"target/{name}"] = (name, "target"), _axes()
+                self._placed[f"target/{name}"] = name, "target"
             if isinstance(item, Obstacle):
                 self._placed[f"obstacle/{name}"] = name, "pose"
-                self.bodies[f"obstacle/{name}"] = [shape_mesh(item.parts)]
+                self.bodies[f"obstacle/{name}"] = shape_mesh(item.parts)
 
     def _own_robot(self) -> Robot | None:
         """The robot of a run without a stack: by name, where the run has its whole configuration."""
@@ -151,15 +148,6 @@ class Run:
         if (said := (str(step.status), *binding)) != self._said and t >= self._said_at + EXPLAINED:
             self._said, self._said_at, why = said, t, " ".join(sentences(step.explain()))
         return SeenTick(t, poses, str(step.status), binding, why)
-
-
-def _axes() -> list[DrawnMesh]:
-    """Bars along x, y and z, in red, green and blue."""
-    bars, (length, width) = list[DrawnMesh](), AXIS
-    for along in np.eye(3):
-        (x, y, z), (red, green, blue) = (width + (length - width) * along).tolist(), (255 * along).astype(int).tolist()
-        bars.append(indexed(Box((x, y, z)).triangles() + 0.5 * length * along, (red, green, blue)))
-    return bars
 
 
 def _seven(pose: pin.SE3) -> Array:

@@ -26,6 +26,8 @@ CHUNK = 1 << 18
 OLD = 0.5
 #: Ticks that are sent to Rerun together; some thousand take little place
 TOGETHER = 5000
+#: Length of the axes that mark a target [m]
+AXIS = 0.1
 #: Largest difference of a tick's time from the grid of a dataset's frames [s]
 TOLERANCE = 1e-4
 
@@ -36,7 +38,7 @@ def write_mcap(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None:
     from mcap.writer import CompressionType, Writer
 
     messages, encode, flushed, channels = RunMessages(run), msgspec.json.Encoder().encode, time.monotonic(), {}
-    columns = {"columns": json.dumps(messages.tree.names), "units": json.dumps(dict(run.units))}
+    columns = {"columns": json.dumps(messages.names), "units": json.dumps(dict(run.units))}
     with path.open("xb") as file:
         # Any: half of the package has no types
         writer: Any = Writer(file, chunk_size=CHUNK, compression=CompressionType.ZSTD)
@@ -64,10 +66,9 @@ def write_rerun(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None:
     stream.send_blueprint(_layout(groups))
     stream.log("about", rerun.TextDocument(json.dumps(run.about, indent=1)), static=True)
     stream.log("scene", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for frame, meshes in run.bodies.items():
-        for k, (corners, triangles, colour) in enumerate(meshes):
-            mesh = rerun.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[*colour, 255])
-            stream.log(f"scene/{frame}/{k}", mesh, static=True)
+    for frame, (corners, triangles, colour) in run.bodies.items():
+        mesh = rerun.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[*colour, 255])
+        stream.log(f"scene/{frame}/mesh", mesh, static=True)
     for group, members in groups.items():
         stream.log(f"tick/{group}", rerun.SeriesLines(names=[name or group for name in members]), static=True)
 
@@ -83,7 +84,8 @@ def write_rerun(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None:
         for tick in seen:
             stream.set_time("time", duration=tick.t)
             for frame, pose in tick.poses.items():
-                stream.log(f"scene/{frame}", rerun.Transform3D(translation=pose[:3], quaternion=pose[3:]))
+                axes = [rerun.TransformAxes3D(AXIS)] if frame.startswith("target/") else []
+                stream.log(f"scene/{frame}", rerun.Transform3D(translation=pose[:3], quaternion=pose[3:]), *axes)
             if tick.status and (binding := "\n".join([tick.status, *tick.binding])) != said:
                 stream.log("binding", rerun.TextDocument(said := binding))
             if tick.why:

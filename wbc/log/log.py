@@ -87,14 +87,9 @@ def save(log: Log, folder: pathlib.Path, kind: str = "parquet", name: str = "log
         raise RangeError("log.tables", sorted(log.tables), "a Parquet file has columns alone; choose npz")
     folder = validation.file_path("folder", folder)
     file = folder / f"{name}.{kind}"
-    # Written beside its place and renamed into it, so that no reader ever meets half a file
-    fresh = folder / f".{file.name}"
-    try:
+    with validation.replacing("folder", file, LogFileError, KeyError, TypeError, ValueError) as fresh:
         folder.mkdir(parents=True, exist_ok=True)
         _write(log, kind, fresh)
-        fresh.replace(file)
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise LogFileError("folder", str(file), f"cannot be written: {error}") from error
     return file
 
 

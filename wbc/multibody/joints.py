@@ -104,7 +104,6 @@ class Revolute(_OneAxis):
         self.S[3:, 0] = self.axis
 
     def placement(self, q: Array) -> SE3:
-        """A turn by q."""
         angle = float(q[0])
         return SE3(turns.turn_about(self.axis, math.cos(angle), math.sin(angle)), np.zeros(3))
 
@@ -117,7 +116,6 @@ class Prismatic(_OneAxis):
         self.S[:3, 0] = self.axis
 
     def placement(self, q: Array) -> SE3:
-        """A shift by q."""
         return SE3(np.eye(3), float(q[0]) * self.axis)
 
 
@@ -150,23 +148,18 @@ class Unbounded(Revolute):
         self.neutral = np.array([1.0, 0.0])
 
     def placement(self, q: Array) -> SE3:
-        """A turn by the angle of (cos, sin)."""
         return SE3(turns.turn_about(self.axis, float(q[0]), float(q[1])), np.zeros(3))
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """(cos, sin) turned on by v."""
         return np.array(_turned(q, float(v[0])))
 
     def difference(self, q: Array, later: Array) -> Array:
-        """The turn from q to later."""
         return np.array([_angle(q, later)])
 
     def normalize(self, q: Array) -> Array:
-        """(cos, sin) of unit length."""
         return _unit(q, self.neutral)
 
     def unit_error(self, q: Array) -> float:
-        """| |(c, s)| - 1 |."""
         return abs(math.sqrt(float(q @ q)) - 1.0)
 
 
@@ -181,23 +174,18 @@ class Spherical(JointModel):
         self.neutral = np.array([0.0, 0.0, 0.0, 1.0])
 
     def placement(self, q: Array) -> SE3:
-        """The turn of a quaternion."""
         return SE3(turns.quaternion_matrix(q), np.zeros(3))
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """q exp(v / 2)."""
         return _near(turns.product(q, turns.quaternion_exp(v)), q)
 
     def difference(self, q: Array, later: Array) -> Array:
-        """The rotation vector of q^-1 later."""
         return turns.quaternion_log(turns.product(q * [-1.0, -1.0, -1.0, 1.0], later))
 
     def normalize(self, q: Array) -> Array:
-        """The quaternion of unit length."""
         return _unit(q, self.neutral)
 
     def unit_error(self, q: Array) -> float:
-        """| |q| - 1 |."""
         return abs(math.sqrt(float(q @ q)) - 1.0)
 
 
@@ -218,26 +206,21 @@ class FreeFlyer(JointModel):
         self.neutral = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
     def placement(self, q: Array) -> SE3:
-        """The pose of the body."""
         return SE3(turns.quaternion_matrix(q[3:]), q[:3])
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """The pose times exp6(v)."""
         moved = q[:3] + turns.quaternion_matrix(q[3:]) @ (turns.left_jacobian(v[3:]) @ v[:3])
         return np.concatenate([moved, _near(turns.product(q[3:], turns.quaternion_exp(v[3:])), q[3:])])
 
     def difference(self, q: Array, later: Array) -> Array:
-        """log6 of the pose from q to later."""
         turn = turns.quaternion_log(turns.product(q[3:] * [-1.0, -1.0, -1.0, 1.0], later[3:]))
         local = turns.quaternion_matrix(q[3:]).T @ (later[:3] - q[:3])
         return np.concatenate([turns.left_jacobian_inverse(turn) @ local, turn])
 
     def normalize(self, q: Array) -> Array:
-        """x, y, z and the quaternion of unit length."""
         return np.concatenate([q[:3], _unit(q[3:], self.neutral[3:])])
 
     def unit_error(self, q: Array) -> float:
-        """| |quaternion| - 1 |."""
         return abs(math.sqrt(float(q[3:] @ q[3:])) - 1.0)
 
 
@@ -252,27 +235,22 @@ class Planar(JointModel):
         self.neutral = np.array([0.0, 0.0, 1.0, 0.0])
 
     def placement(self, q: Array) -> SE3:
-        """The pose of the body."""
         rotation = turns.turn_about(np.array([0.0, 0.0, 1.0]), float(q[2]), float(q[3]))
         return SE3(rotation, np.array([q[0], q[1], 0.0]))
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """The pose times exp6(v)."""
         local = exp6(SpatialMotion([v[0], v[1], 0.0, 0.0, 0.0, v[2]])).translation
         c, s = float(q[2]), float(q[3])
         shift = [c * local[0] - s * local[1], s * local[0] + c * local[1]]
         return np.array([q[0] + shift[0], q[1] + shift[1], *_turned(q[2:], float(v[2]))])
 
     def difference(self, q: Array, later: Array) -> Array:
-        """log6 of the pose from q to later."""
         return log6(self.placement(q).actInv(self.placement(later))).vector[[0, 1, 5]]
 
     def normalize(self, q: Array) -> Array:
-        """x, y and (cos, sin) of unit length."""
         return np.concatenate([q[:2], _unit(q[2:], self.neutral[2:])])
 
     def unit_error(self, q: Array) -> float:
-        """| |(c, s)| - 1 |."""
         return abs(math.sqrt(float(q[2:] @ q[2:])) - 1.0)
 
 

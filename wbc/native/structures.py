@@ -16,13 +16,14 @@ _NUMBERS: dict[str, Any] = {
     "long": ctypes.c_long,
     "long long": ctypes.c_longlong,
     "unsigned long long": ctypes.c_ulonglong,
+    "signed char": ctypes.c_byte,
     "double": ctypes.c_double,
 }
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _CONSTANT = re.compile(r"^#define (\w+) (\d+) *$", re.MULTILINE)
 _FUNCTION = re.compile(r"typedef [^;{]*\(\*(\w+)\)\(")
 _STRUCTURE = re.compile(r"typedef struct(?: \w+)? \{([^}]*)\} (\w+);")
-_FIELDS = re.compile(r"(?:const )?((?:unsigned )?(?:long )?(?:long|\w+)) (.+)", re.DOTALL)
+_FIELDS = re.compile(r"(?:const )?((?:(?:un)?signed )?(?:long )?(?:long|\w+)) (.+)", re.DOTALL)
 
 
 class CStructures:

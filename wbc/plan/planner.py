@@ -325,11 +325,7 @@ class _Search:
         return None
 
     def find_goals(self) -> None:
-        """Free configurations of all goals that are wanted.
-
-        Raises:
-            InfeasibleError: there is none.
-        """
+        """Free configurations of all goals that are wanted."""
         faults = list[tuple[float, str]]()
         for goal in self.wanted:
             if isinstance(goal, TargetGoal):
@@ -389,11 +385,7 @@ class _Search:
         return [(min(off), f"no configuration that meets {names} was found in {DESCENTS} descents; {at_best}")]
 
     def paths(self) -> tuple[Array, float]:
-        """The shortest of some paths, and its length.
-
-        Raises:
-            NoPathError: none in the time.
-        """
+        """The shortest of some paths, and its length."""
         native, options = self.native, self.options
         best: Array | None = None
         shortest, samples, searched, ease = np.inf, FIRST, 0, 1.0

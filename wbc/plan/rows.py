@@ -150,11 +150,7 @@ class RowsBuilder:
         return RollingBase.of_rows(text, robot, samples[:, :, :-1])
 
     def _slip(self, hard: Mapping[Block, Constraint]) -> tuple[list[str], ca.Function]:
-        """Items with rows on velocities alone, and (q, p) -> (A, their sides).
-
-        Raises:
-            CommandError: they are about a frame that moves.
-        """
+        """Items with rows on velocities alone, and (q, p) -> (A, their sides)."""
         robot, layout = self._core.stack.robot, self._core.layout
         matrices, names = [ca.SX(0, robot.nv + 1)], list[str]()
         for block, item in hard.items():

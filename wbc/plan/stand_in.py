@@ -27,15 +27,12 @@ class MeasuredApart(Constraint):
     item: Apart
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
-        """Those of the item."""
         return self.item.inputs(robot)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One that always holds."""
         return (Row("apart", "m"),)
 
     def margins(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX:
-        """1 m."""
         return ca.SX.ones(1)
 
 

@@ -12,6 +12,7 @@ from wbc.geometry.kernel import HEADERS, ShapeTable, Tolerance, checked
 from wbc.multibody import pin
 from wbc.native.kernel import kernel
 from wbc.native.library import load_library
+from wbc.native.structures import CStructures
 from wbc.proximity.corners import NEAR
 from wbc.proximity.rows import PairRows
 from wbc.proximity.scene import PairScene
@@ -29,28 +30,7 @@ KEEP_LENGTH = 0.005
 #: What rounding may do to bounds, in the same parts.
 OFF = 1e-12
 
-_INTEGERS = ("joints", "steps", "bodies", "pairs", "rows", "corners", "width", "nv", "has_pose", "has_velocity")
-_LENGTHS = ("keep_share", "keep_length", "off", "near")
-_ARRAYS = (
-    *("joint_parent", "joint_steps", "joint_place", "step_kind", "step_q", "step_number", "joint_pose"),
-    *("body_joint", "body_place", "body_pose", "shape", "corner", "corner_count"),
-    *("first", "second", "outward", "pair_side", "most", "answer", "doubtful", "has_row", "is_measured", "urgent"),
-    *("score", "least", "row_pair", "heap", "row_near", "row_fresh", "distance", "drift", "line", "side"),
-    *("pose", "velocity", "margin", "rate", "screws", "v", "braking", "joint_v", "joint_twist", "speed"),
-)
-
-
-class _SceneStruct(ctypes.Structure):
-    """``scene_t`` of ``native/scene.h``."""
-
-    _fields_ = [
-        *((name, ctypes.c_int) for name in _INTEGERS),
-        ("far", ctypes.c_double),
-        ("how", Tolerance),
-        *((name, ctypes.c_double) for name in _LENGTHS),
-        *((name, ctypes.c_void_p) for name in _ARRAYS),
-        ("measured", ctypes.c_int),
-    ]
+_SceneStruct = CStructures(SOURCES / "scene.h", HEADERS / "shapes.h").structure("scene_t")
 
 
 @functools.cache
@@ -82,6 +62,7 @@ class Sensing:
     def __init__(self, scene: PairScene, rows: PairRows | None = None) -> None:
         functions = library()
         length = scene.robot.characteristic_length
+        how = Tolerance.of(length)
         count, pairs = (0 if rows is None else rows.count), len(scene.first)
         self._q, self._pose = np.zeros(scene.robot.nq), np.zeros(12)
         self._answer, self._doubtful = np.zeros((pairs, 7)), np.zeros(pairs, dtype=np.int8)
@@ -106,7 +87,7 @@ class Sensing:
             joints=scene.robot.model.njoints, steps=len(arrays["step_q"]), bodies=len(scene.bodies), pairs=pairs,
             rows=count, corners=0 if rows is None else rows.corners, width=arrays["corner"].shape[1],
             nv=scene.robot.nv, has_pose=bool(scene.moving.any()), has_velocity="velocity" in arrays, far=FAR,
-            how=Tolerance.of(length), shape=self._table.address, keep_share=KEEP_SHARE,
+            how=(how.touch, how.tie, how.trust), shape=self._table.address, keep_share=KEEP_SHARE,
             keep_length=KEEP_LENGTH * length, off=OFF * length, near=NEAR * length,
             **{name: array.ctypes.data for name, array in self._arrays.items()},
         )  # fmt: skip

@@ -155,11 +155,7 @@ class Recording(LogFile):
             yield Log(columns, units, self.about), rows
 
     def _names(self, part: str) -> list[list[Any]]:
-        """What ``about.json`` says of the numbers of a part.
-
-        Raises:
-            RecordingError: the recording is of an older version, which kept no names, residuals and margins.
-        """
+        """What ``about.json`` says of the numbers of a part."""
         if "names" not in self.about:
             reason = "has no names, residuals and margins, as older versions kept none; wbc.record.replayed gives them"
             raise RecordingError("recording", self.about["format"], reason)

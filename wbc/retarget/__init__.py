@@ -9,6 +9,7 @@ from wbc import lazy
 if TYPE_CHECKING:
     from wbc.retarget.body import BodyError as BodyError
     from wbc.retarget.clip import Clip as Clip, Skeleton as Skeleton
+    from wbc.retarget.correcting import CorrespondenceEditor as CorrespondenceEditor
     from wbc.retarget.correspondence import (
         Correspondence as Correspondence,
         CorrespondenceError as CorrespondenceError,

@@ -141,10 +141,10 @@ def find_body(tree: PointTree, *, field: str = "skeleton", arms: bool = False, s
     for kind, pair in (("leg", legs), ("arm", fore)):
         if pair is not None:
             feet = kind == "leg" or not upright
-            branches = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
-            chains = sorted(branches, key=lambda chain: -float(tree.points[chain[0]] @ left))
-            if abs(float((tree.points[chains[0][0]] - tree.points[chains[1][0]]) @ left)) < SHORT * pair.reach:
-                chains = sorted(branches, key=lambda chain: -float(tree.points[chain[-1]] @ left))
+            chains = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
+            apart = abs(float((tree.points[chains[0][0]] - tree.points[chains[1][0]]) @ left))
+            side = 0 if apart >= SHORT * pair.reach else -1
+            chains.sort(key=lambda chain: -float(tree.points[chain[side]] @ left))
             limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
     if arms and fore is None:
         limbs = {name.replace("leg", "arm"): chain for name, chain in limbs.items()}
@@ -155,19 +155,16 @@ def find_body(tree: PointTree, *, field: str = "skeleton", arms: bool = False, s
 
 def longest_chain(tree: PointTree, first: int) -> tuple[int, ...]:
     """Points from one to the end of the longest branch below it."""
-    children, reach = tree.children(), _reaches(tree)
-    chain = [first]
-    while children[chain[-1]]:
-        here = chain[-1]
+    children, reach, chain = tree.children(), _reaches(tree), [first]
+    while children[here := chain[-1]]:
         chain.append(max(children[here], key=lambda child: reach[child] + tree.length((here, child))))
     return tuple(chain)
 
 
 def _lowest_branch(tree: PointTree, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
     """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest."""
-    children = tree.children()
-    ends = [k for k in reversed(range(len(children))) if not children[k] and chain[0] in ancestors(tree.parents, k)]
-    lowest = min(ends, key=lambda point: float(tree.points[point] @ up))
+    ends = [k for k in reversed(range(len(tree.names))) if chain[0] in ancestors(tree.parents, k)]
+    lowest = min(set(ends) - {*tree.parents}, key=lambda point: (float(tree.points[point] @ up), -point))
     if float((tree.points[chain[-1]] - tree.points[lowest]) @ up) > LOWER * tree.length(chain):
         return tree.path(chain[0], lowest)
     return chain
@@ -218,13 +215,10 @@ def _unlike(tree: PointTree, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[fl
 
 def _up(tree: PointTree, pairs: Sequence[_LimbPair]) -> Array:
     """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings."""
-    rise = np.zeros(3)
-    for chain in itertools.chain(*(pair.chains for pair in pairs)):
-        rise += tree.points[chain[0]] - tree.points[chain[-1]]
+    chains = np.array([(chain[0], chain[-1]) for pair in pairs for chain in pair.chains])
+    rise = (tree.points[chains[:, 0]] - tree.points[chains[:, 1]]).sum(axis=0)
     axis = int(np.argmax(np.abs(rise)))
-    up = np.zeros(3)
-    up[axis] = np.sign(rise[axis]) or 1.0
-    return up
+    return np.asarray(np.eye(3)[axis] * (np.sign(rise[axis]) or 1.0))
 
 
 def _across(tree: PointTree, pairs: Sequence[_LimbPair], up: Array, straight: float) -> Array:
@@ -239,9 +233,7 @@ def _across(tree: PointTree, pairs: Sequence[_LimbPair], up: Array, straight: fl
     if size == 0.0:
         raise BodyError("skeleton", ", ".join(tree.names[:8]), "both limbs of each pair lie in one line at rest")
     axis = int(np.argmax(np.abs(out)))
-    snapped = np.zeros(3)
-    snapped[axis] = np.sign(out[axis])
-    return snapped if abs(out[axis]) > straight * size else out / size
+    return np.eye(3)[axis] * np.sign(out[axis]) if abs(out[axis]) > straight * size else out / size
 
 
 def _left(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair | None], across: Array, up: Array, upright: bool) -> Array:

@@ -77,11 +77,7 @@ def ancestors(parents: Sequence[int], joint: int) -> list[int]:
 
 def intervals(marks: Marks) -> list[tuple[int, int]]:
     """First frame and the one after the last of every run of true."""
-    if not len(marks):
-        return []
-    edges = (
-        [0] * bool(marks[0]) + (np.flatnonzero(marks[1:] != marks[:-1]) + 1).tolist() + [len(marks)] * bool(marks[-1])
-    )
+    edges = np.flatnonzero(np.diff(np.asarray(marks, dtype=np.int8), prepend=0, append=0)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 

@@ -14,8 +14,9 @@ from wbc import validation
 from wbc.extras import require
 from wbc.retarget.body import LIMBS, BodyError, BodyPlan, PointTree, find_body
 from wbc.retarget.clip import Array, Skeleton
-from wbc.retarget.robot_body import RobotBody
-from wbc.retarget.words import ARM_WORDS
+from wbc.retarget.hands import FINGERS, bent, find_hand, handedness
+from wbc.retarget.robot_body import RobotBody, RobotLimb
+from wbc.retarget.words import ARM_WORDS, side_of
 
 #: How much a limb's longer bone counts against its shorter one when knee and elbow are sought
 UNEVEN = 0.5
@@ -62,6 +63,7 @@ class Correspondence:
         axes: forward, left and up of the skeleton at rest, as columns. upright: whether it stands on two legs there.
         scale: metres of the robot to one of the skeleton.
         all_fours: a person's hands and feet lead four legs; False: the feet alone, in diagonal pairs.
+        mirrored: a left hand leads a right one, or a right one a left one.
         notes: what is worth knowing: what was guessed or left out.
     """
 
@@ -76,6 +78,7 @@ class Correspondence:
     upright: bool
     scale: float
     all_fours: bool = False
+    mirrored: bool = False
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -151,7 +154,7 @@ class Correspondence:
             field, points = f"limbs.{limb}", validation.strings(f"limbs.{limb}", row)
             if len(points) != 5:
                 raise CorrespondenceError(field, row, "expected a limb and four points: base, middle, end, tip")
-            source = validation.one_of(field, points[0], LIMBS)
+            source = validation.one_of(field, points[0], (*LIMBS, *FINGERS))
             limbs[limb] = LimbMatch(source, *(names.index(validation.one_of(field, k, names)) for k in points[1:]))
         return replace(self, limbs=limbs, **changes)
 
@@ -170,8 +173,13 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
         CorrespondenceError: no limbs in the skeleton, or none that the robot needs: a robot that walks needs legs.
     """
     rest, robot, some = skeleton.rest, body.robot, ", ".join(skeleton.names[:8])
-    plan = find_body(PointTree(skeleton.names, skeleton.parents, rest))
-    limbs = {name: _hinges(plan, chain, name, skeleton.ends) for name, chain in plan.limbs.items()}
+    tree, hand = PointTree(skeleton.names, skeleton.parents, rest), "index" in body.limbs
+    if hand:
+        plan = find_hand(tree, side_of(robot.name))
+        limbs = {name: _finger(name, chain, body.limbs.get(name)) for name, chain in plan.limbs.items()}
+    else:
+        plan = find_body(tree)
+        limbs = {name: _hinges(plan, chain, name, skeleton.ends) for name, chain in plan.limbs.items()}
     if "left_arm" not in limbs and plan.tree.said([*plan.limbs.values()]) & ARM_WORDS:
         renamed = {name.replace("leg", "arm"): match for name, match in limbs.items()}
         limbs = {name: replace(match, source=name) for name, match in renamed.items()}
@@ -192,11 +200,19 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
         raise CorrespondenceError("skeleton", some, f"has no limb that {robot.name!r} has")
     guessed = [limb for limb, own in body.limbs.items() if own.guessed]
     notes += [f"{limb}: the size of its end is not in the robot's file and is assumed" for limb in guessed]
+    mirrored = hand and handedness(plan, rest) * handedness(body.plan, bent(body)) < 0.0
+    notes += ["a hand leads one of the other side: it is mirrored"] if mirrored else []
     head = plan.head[min(1, len(plan.head) - 1)] if plan.head else -1
     return Correspondence(
         body, skeleton, rest, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright,
-        _scale(body, rest, pairs, plan), all_fours, tuple(notes),
+        _scale(body, rest, pairs, plan), all_fours, mirrored, tuple(notes),
     )  # fmt: skip
+
+
+def _finger(name: str, chain: tuple[int, ...], limb: RobotLimb | None) -> LimbMatch:
+    """Knuckles and tip of a finger; one that leads a finger of two bones goes from its middle to the tip."""
+    base, middle, end = chain[:3] if limb is None or limb.wrist else (*chain[:2], chain[-1])
+    return LimbMatch(name, base, middle, end, chain[-1])
 
 
 def _hinges(plan: BodyPlan, chain: tuple[int, ...], name: str, ends: tuple[bool, ...]) -> LimbMatch:
@@ -224,7 +240,7 @@ def _hinges(plan: BodyPlan, chain: tuple[int, ...], name: str, ends: tuple[bool,
 def _scale(body: RobotBody, rest: Array, pairs: Mapping[str, LimbMatch], plan: BodyPlan) -> float:
     """Metres of the robot to one of the skeleton: of the legs' lengths, or of the heights of backs on four legs."""
     kind = "leg" if "left_leg" in pairs else "arm"
-    sides = [name for name in (f"left_{kind}", f"right_{kind}") if name in pairs]
+    sides = [name for name in (f"left_{kind}", f"right_{kind}") if name in pairs] or list(pairs)
     theirs = float(np.mean([pairs[name].length(rest) for name in sides]))
     if body.plan.upright:
         return float(np.mean([sum(body.limbs[name].lengths) for name in sides])) / theirs

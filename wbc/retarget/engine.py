@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc import robots, tasks
 from wbc.api import Controller, Stack
@@ -42,8 +43,8 @@ LINK_CORNERS = 500
 NEAR_ENOUGH = 1e-5
 #: Half the thickness of what is drawn as a plane [m]
 THIN = 2e-4
-#: Links besides feet that have rows of the ground at a time; of arms one a limb more
-NEAREST = 8
+#: Links besides feet that have rows of the ground at a time; of arms two a limb more
+NEAREST = 4
 #: The ground's rows begin this far above it: links that roll lower another corner within a tick [m]
 ABOVE = 3e-4
 #: What a foot that goes below the ground costs, see docs/soft.md
@@ -125,27 +126,25 @@ class Engine:
         self.robot = self._shaped(limited(body.robot, options))
         self._limbs = [name for name in body.limbs if name in followed]
         weights = options.weights
-        stack = Stack(self.robot, dt=dt, calm=False)
+        self._stack = stack = Stack(self.robot, dt=dt, calm=False)
+        self._followers: list[_PlanFollower] = []
         gain = min(GAIN / dt, FASTEST)
         free = self.robot.base != "fixed"
-        followers: list[_PlanFollower] = []
+        self._holds = free and options.hold
         if free:
             six = (weights.pelvis,) * 3 + (weights.turn,) * 3
-            stack.add(tasks.EndEffector(body.pelvis, weights=six, gain=gain), name="pelvis")
-            followers.append(_PlanFollower("pelvis", "pelvis", "pelvis"))
-        if body.plan.upright and body.plan.chest != body.plan.pelvis:
-            stack.add(tasks.EndEffector(body.chest, "orientation", gain=gain), name="chest", weight=weights.chest)
-            followers.append(_PlanFollower("chest", turn="chest"))
-        if head and body.head:
-            stack.add(tasks.EndEffector(body.head, "orientation", gain=gain), name="head", weight=weights.head)
-            followers.append(_PlanFollower("head", turn="head"))
+            self._follow("pelvis", tasks.EndEffector(body.pelvis, weights=six, gain=gain), "pelvis", "pelvis")
+        chest = body.chest if body.plan.upright and body.plan.chest != body.plan.pelvis else ""
+        for name, frame, weight in (("chest", chest, weights.chest), ("head", body.head if head else "", weights.head)):
+            if frame:
+                self._follow(name, tasks.EndEffector(frame, "orientation", gain=gain), turn=name, weight=weight)
         if options.balance and free:
             # Over the contacts, wherever their height
             mass = tasks.CenterOfMass(weights=(1.0, 1.0, 0.0), gain=gain)
-            stack.add(mass, name="balance", weight=options.balance)
-            followers.append(_PlanFollower("balance", "balance"))
+            self._follow("balance", mass, "balance", weight=options.balance)
         for name in self._limbs:
-            followers += self._add_limb(stack, name, gain)
+            self._add_limb(name, gain)
+        followers = self._followers
         stack.add(tasks.Posture(start="neutral", gain=1.0), name="posture", weight=weights.posture)
         stack.add(tasks.JointLimits(shortest_dt=dt), name="limits")
         if options.clearance is not None:
@@ -153,19 +152,21 @@ class Engine:
             stack.add(clear, name="clearance", soft=CLEARANCE_PRICE)
         self._ground: list[str] = []
         if free:
-            self._add_ground(stack)
-        self.stack = stack
+            self._add_ground()
         self.controller: Controller = stack.compile()
-        if free:
-            for item in self._ground:
-                self.controller[item].rate = (LINK_RATE if item == ARMS else GROUND_RATE) / dt
+        for item in self._ground:
+            self.controller[item].rate = (LINK_RATE if item == ARMS else GROUND_RATE) / dt
         inputs = [(f.item, part, None) for f in followers for part in ("target", "feedforward")[: 1 if f.stands else 2]]
         self._ticks = RowTicks(self.controller, inputs, ARMS if ARMS in self._ground else "")
         self._places = tuple(dict.fromkeys(("pelvis", *(f.place for f in followers if f.place))))
         self._turns = tuple(dict.fromkeys(("pelvis", "", *(f.turn for f in followers))))
-        self._order = np.array([column for f in followers for column in self._columns_of(f)])
+        self._order = self._order_of()
         self._held: dict[str, ContactGrip] = {}
         self._data = self.robot.model.createData()
+        if free:
+            #: the root as seen from the pelvis, where the robot is as at rest
+            neutral = body.robot.neutral
+            self._root = body.robot.pose(neutral, body.pelvis).inverse() * pin.XYZQUATToSE3(neutral[:7])
         self._ends = {name: int(self.robot.model.getFrameId(body.limbs[name].end)) for name in self._limbs}
         tasks_there = [entry.name for entry in stack.entries if isinstance(entry.item, Task)]
         self._gains = InputGroup(core_of(self.controller), [(item, "gain", None) for item in tasks_there])
@@ -180,23 +181,18 @@ class Engine:
             robot = robots.fit_shapes(robot)
             found = robots.find_self_pairs(robot, samples=PAIR_SAMPLES).kept
             pairs = tuple(pair for pair in found if _joints_between(robot, *pair) > NEIGHBOURS)
-        ends = self.body.limbs.values()
-        shapes: dict[str, list[PlacedShape]] = {}
-        last = {limb.joints[-1] for limb in ends}
+        limbs, shapes = self.body.limbs, dict[str, list[PlacedShape]]()
         #: frames of links besides ends: of arms, and of all others
-        self._arms: list[str] = []
-        self._links: list[str] = []
-        of_arms = {
-            joint for name, limb in self.body.limbs.items() if not self.body.is_foot(name) for joint in limb.joints
-        }
-        for name, limb in self.body.limbs.items():
+        self._arms, self._links = list[str](), list[str]()
+        last = {limb.joints[-1] for limb in limbs.values()}
+        of_arms = {joint for name, limb in limbs.items() if not self.body.is_foot(name) for joint in limb.joints}
+        for name, limb in limbs.items():
             ball = np.linalg.norm(limb.surface, axis=1) <= limb.radius + NEAR_ENOUGH
             if not self.body.is_foot(name) or limb.contact == "flat" or ball.all() or not ball.any():
                 shapes[limb.end] = [_solid(limb.surface)]
                 continue
             # A point foot's ball is off the ground however its leg turns, what is above the ball is not
-            end = robot.model.frames[robot.model.getFrameId(limb.end)]
-            frame = f"retarget_ground_{name}"
+            end, frame = robot.model.frames[robot.model.getFrameId(limb.end)], f"retarget_ground_{name}"
             robot = with_frame(robot, frame, int(end.parentJoint), end.placement)
             shapes |= {limb.end: [_solid(limb.surface[ball])], frame: [_solid(limb.surface[~ball])]}
             self._links.append(frame)
@@ -208,31 +204,31 @@ class Engine:
                 (self._arms if joint in of_arms else self._links).append(frame)
         return robot.with_shapes({**robot.shapes, **shapes}).with_self_pairs(pairs)
 
-    def _add_ground(self, stack: Stack) -> None:
+    def _add_ground(self) -> None:
         """Rows of the ground: of each foot, which end while it is held, of hands and arms, and of other links.
 
         A foot that is held comes down to its place on the ground as fast as the plan says. A row that lets it come down
         slower would be served by turns of its leg, which lift corners of its hull.
         """
-        ends, ground_pose = {name: limb.end for name, limb in self.body.limbs.items()}, pin.SE3.Identity()
-        ground_pose.translation = np.array([0.0, 0.0, ABOVE])
-        held = self._limbs if self.options.hold else []
-        self._own_ground = {name: f"{name} above ground" for name in held if self.body.is_foot(name)}
-        for name, item in self._own_ground.items():
-            ground = tasks.Obstacle(HalfSpace(), links=(ends.pop(name),), pose=ground_pose)
-            stack.add(ground, name=item, soft=GROUND_PRICE)
-        self._ground = [*self._own_ground.values()]
+        ends, feet = {name: limb.end for name, limb in self.body.limbs.items()}, filter(self.body.is_foot, self._limbs)
+        self._own_ground = {name: f"{name} above ground" for name in feet if self.options.hold}
+        groups = {item: [ends.pop(name)] for name, item in self._own_ground.items()}
         arms = [ends.pop(name) for name in [*ends] if not self.body.is_foot(name)] + self._arms
-        groups = {
-            name: links for name, links in (("above ground", [*ends.values(), *self._links]), (ARMS, arms)) if links
-        }
-        for name, links in groups.items():
-            closest = min(NEAREST + len(self.body.limbs) * (name == ARMS), len(links))
-            ground = tasks.Obstacle(HalfSpace(), links=tuple(links), pose=ground_pose, closest=closest)
-            stack.add(ground, name=name, soft=GROUND_PRICE)
-            self._ground.append(name)
+        groups |= {"above ground": [*ends.values(), *self._links], ARMS: arms}
+        pose = pin.SE3(np.eye(3), np.array([0.0, 0.0, ABOVE]))
+        for item, links in groups.items():
+            if links:
+                closest = NEAREST + 2 * len(self.body.limbs) * (item == ARMS)
+                ground = tasks.Obstacle(HalfSpace(), links=tuple(links), pose=pose, closest=closest)
+                self._stack.add(ground, name=item, soft=GROUND_PRICE)
+                self._ground.append(item)
 
-    def _add_limb(self, stack: Stack, name: str, gain: float) -> list[_PlanFollower]:
+    def _follow(self, item: str, task: Task, place: str = "", turn: str = "", weight: float = 1.0) -> None:
+        """Add a task that follows a position, a rotation or both of the plan."""
+        self._stack.add(task, name=item, weight=weight)
+        self._followers.append(_PlanFollower(item, place, turn))
+
+    def _add_limb(self, name: str, gain: float) -> None:
         """Add what follows a limb's targets."""
         body, weights, limb = self.body, self.options.weights, self.body.limbs[name]
         flat, foot = limb.contact == "flat", self.body.is_foot(name)
@@ -241,36 +237,29 @@ class Engine:
             points += [(f"{name} wrist", limb.wrist, weights.wrist), (name, limb.end, 0.1 * weights.wrist)]
         elif not flat:
             points.append((name, limb.end, weights.foot))
-        followers = []
         for item, frame, weight in points:
             if frame:
-                stack.add(tasks.EndEffector(frame, "position", gain=gain), name=item, weight=weight)
-                followers.append(_PlanFollower(item, item))
+                self._follow(item, tasks.EndEffector(frame, "position", gain=gain), item, weight=weight)
         if foot and flat:
             six = (weights.foot,) * 3 + (weights.sole,) * 3
-            stack.add(tasks.EndEffector(limb.end, weights=six, gain=gain), name=name)
-            followers.append(_PlanFollower(name, name, name))
-        if self.robot.base != "fixed" and self.options.hold:
-            kind: Literal["pose", "position"] = "pose" if flat else "position"
-            stack.add(StillContact(limb.end, kind, gain=1.0 / self.dt), name=f"{name} stands")
-            followers.append(_PlanFollower(f"{name} stands", name, name if flat else "", stands=True))
-        return followers
+            self._follow(name, tasks.EndEffector(limb.end, weights=six, gain=gain), name, name)
+        if self._holds:
+            contact = StillContact(limb.end, "pose" if flat else "position", gain=1.0 / self.dt)
+            self._stack.add(contact, name=f"{name} stands")
+            self._followers.append(_PlanFollower(f"{name} stands", name, name if flat else "", stands=True))
 
-    def _columns_of(self, follower: _PlanFollower) -> list[int]:
-        """Which of the numbers of :meth:`rows`, before they are put in order, an item's inputs are."""
-        nine, three, place, turn = 9 * len(self._turns), 3 * len(self._places), follower.place, follower.turn
-        # Where turns, next turns, places, next places, their rates and the turns' rates begin
-        first = np.cumsum([0, nine, nine, three, three, three]).tolist()
-
-        def columns(block: int, names: Sequence[str], name: str, size: int) -> list[int]:
-            start = first[block] + size * names.index(name)
-            return list(range(start, start + size))
-
-        ahead, stands = int(follower.stands), follower.stands
-        target = columns(ahead, self._turns, turn, 9) if turn or stands else []
-        target += columns(2 + ahead, self._places, place, 3) if place else []
-        rates = columns(4, self._places, place, 3) if place and not stands else []
-        return target + rates + (columns(5, self._turns, turn, 3) if turn and not stands else [])
+    def _order_of(self) -> NDArray[np.int_]:
+        """Which of the numbers of :meth:`rows`, before they are put in order, each item's inputs are."""
+        turns, places = len(self._turns), len(self._places)
+        blocks = np.split(np.arange(21 * turns + 9 * places), np.cumsum([18 * turns, 6 * places, 3 * places]))
+        targets, points = blocks[0].reshape(2, turns, 9), blocks[1].reshape(2, places, 3)
+        rates, spins = blocks[2].reshape(places, 3), blocks[3].reshape(turns, 3)
+        order = []
+        for follower in self._followers:
+            ahead, place = int(follower.stands), [self._places.index(follower.place)] if follower.place else []
+            turn = [self._turns.index(follower.turn)] if follower.turn or ahead else []
+            order += [targets[ahead, turn], points[ahead, place], *(() if ahead else (rates[place], spins[turn]))]
+        return np.concatenate([columns.ravel() for columns in order])
 
     def targets(self, plan: MotionPlan) -> tuple[Array, Array]:
         """Positions [ticks, places, 3] and rotations [ticks, turns, 3, 3] that the stack follows."""
@@ -307,58 +296,60 @@ class Engine:
         robot, controller = self.robot, self.controller
         q = robot.neutral.copy()
         if robot.base != "fixed":
-            now = self.body.robot.pose(q, self.body.pelvis)
-            target = pin.SE3(turns[0, 0], places[0, 0])
-            root = robot.model.joints[1]
-            base = pin.SE3(pin.XYZQUATToSE3(q[:7])) if root.nq == 7 else pin.SE3.Identity()
-            q[:7] = pin.SE3ToXYZQUAT(target * now.inverse() * base)
+            q[:7] = pin.SE3ToXYZQUAT(pin.SE3(turns[0, 0], places[0, 0]) * self._root)
             q[3:7] /= np.linalg.norm(q[3:7])
         first, second = (self.rows(places[[k]], turns[[k]])[0] for k in (0, min(1, len(places) - 1)))
         self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
         self._gains.write(np.full(len(self._own_gains), GAIN / self.dt))
-        q = self._settled(q, first, SETTLING)
-        # What is held jumps to its place, so it is brought there before
+        q, _ = self._settled(q, first, SETTLING)
+        # What is held jumps to its place, so it is brought there before; what cannot be there is not held
         self._hold(held)
-        q = self._settled(q, first, SETTLING // 4)
-        after = self._settled(q, second, SETTLING // 4)
+        placed, served = self._settled(q, first, SETTLING // 4)
+        if not served:
+            self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
+        q = placed if served else q
+        after, _ = self._settled(q, second, SETTLING // 4)
         self._gains.write(self._own_gains)
         v = pin.difference(robot.model, q, after) / self.dt
         limit = robot.limits.velocity
         controller.reset(q, np.clip(v, -limit, limit))
         return q
 
-    def _settled(self, q: Array, row: Array, most: int) -> Array:
+    def _settled(self, q: Array, row: Array, most: int) -> tuple[Array, bool]:
+        """Where ticks with the same inputs lead, and whether nothing gives way there."""
         self.controller.reset(q)
         self._ticks.most, self._ticks.rest = np.inf, SETTLED
         rows, out = np.tile(row, (most, 1)), np.empty((most + 1, len(q)))
         out[0] = q
-        done = self._ran(rows, out)
+        done, served = self._ran(rows, out)
         self._ticks.rest = 0.0
-        return np.asarray(out[done])
+        return np.asarray(out[done]), served
 
-    def _ran(self, rows: Array, q: Array) -> int:
-        """Ticks of some rows, whatever gives way; how many were done before all was at rest."""
+    def _ran(self, rows: Array, q: Array) -> tuple[int, bool]:
+        """Ticks of some rows, whatever gives way: how many were done before all was at rest, and whether the last is
+        one in which nothing gives way.
+        """
         done = 0
         while done < len(rows):
             count, step = self._ticks.run(rows[done:], q[done:])
             done += count
             if step is None:
-                break
+                return done, True
             q[done + 1], done = step.q_next, done + 1
-        return done
+        return done, False
 
     def _hold(self, wanted: Mapping[str, ContactGrip]) -> None:
         """Hold contacts, or let them go."""
-        for name, grip in wanted.items():
-            if self.options.hold and self.robot.base != "fixed" and self._held.get(name) is not grip:
+        for name, grip in wanted.items() if self._holds else ():
+            if self._held.get(name) is not grip:
                 contact = self.controller[f"{name} stands"]
-                if not self.body.is_foot(name):
-                    # The hull of a hand that lies on the ground may ask it to be higher, by the rows of the ground
-                    contact.mask = (1.0, 1.0, 1.0 if grip is ContactGrip.FIRM else 0.0)
-                    self.controller[name].mask = (1.0, 1.0, LYING if grip is ContactGrip.LEVEL else 1.0)
-                contact.enabled = grip is not ContactGrip.FREE
                 if name in self._own_ground:
                     self.controller[self._own_ground[name]].enabled = grip is ContactGrip.FREE
+                else:
+                    # The hull of a hand that lies on the ground may ask it to be higher, by the rows of the ground
+                    contact.mask = (1.0, 1.0, float(grip is ContactGrip.FIRM))
+                    self.controller[name].mask = (1.0, 1.0, LYING if grip is ContactGrip.LEVEL else 1.0)
+                contact.enabled = grip is not ContactGrip.FREE
                 self._held[name] = grip
 
     def run(self, plan: MotionPlan) -> tuple[Array, list[tuple[int, tuple[str, ...]]]]:
@@ -375,13 +366,9 @@ class Engine:
         limbs = [plan.limbs[name] for name in self._limbs]
         marks = np.array([mark for limb in limbs for mark in (limb.held, limb.lies)]).T
         changing = np.flatnonzero(np.concatenate([[True], (marks[1:] != marks[:-1]).any(axis=1)]))
-        #: limb -> the first tick in which it may be held again
-        not_before = dict.fromkeys(self._limbs, 0)
-        #: limb -> the tick from which it is held
-        since = dict.fromkeys(self._limbs, -plan.ticks)
-        waiting: list[str] = []
-        risen: set[str] = set()
-        gave: list[tuple[int, tuple[str, ...]]] = []
+        #: limb -> the first tick in which it may be held again, and the tick from which it is held
+        not_before, since = dict.fromkeys(self._limbs, 0), dict.fromkeys(self._limbs, -plan.ticks)
+        risen, gave = set[str](), list[tuple[int, tuple[str, ...]]]()
         k, last, solved = 0, plan.ticks - 1, Status.SOLVED
         while k < last:
             asked = [name for name, limb in zip(self._limbs, limbs, strict=True) if limb.held[k]]
@@ -389,7 +376,9 @@ class Engine:
             there = self._near(plan, [name for name in waiting if k >= not_before[name]], out[k], k)
             kept = [name for name in asked if name in there or name not in waiting]
             risen &= set(kept)
-            self._hold({n: self._grip(plan, n, k, risen) if n in kept else ContactGrip.FREE for n in self._limbs})
+            # Hands are held in place until they have to rise
+            firm = {n: plan.limbs[n].grip(k) if n in risen else ContactGrip.FIRM for n in kept}
+            self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE) | firm)
             waiting = [name for name in waiting if name not in there]
             since |= dict.fromkeys(there, k)
             later = int(np.searchsorted(changing, k, side="right"))
@@ -412,6 +401,12 @@ class Engine:
                 not_before |= dict.fromkeys(landing, k + AGAIN)
                 if landing or step.status is Status.CAPPED:
                     step = self.controller.step(out[k], v)
+            slipping = [name for name in self._limbs if any(slack.item == f"{name} stands" for slack in step.relaxed)]
+            if slipping:
+                # What cannot be held still is led to its place above the ground
+                self._hold(dict.fromkeys(slipping, ContactGrip.FREE))
+                not_before |= dict.fromkeys(slipping, k + AGAIN)
+                step = self.controller.step(out[k], v)
             lying = [name for name in lying if self._held[name] is ContactGrip.FIRM]
             if lying and any(slack.item == ARMS and slack.amount > PUSHED for slack in step.relaxed):
                 # Hands that lie on the ground rise where their links would sink
@@ -422,11 +417,6 @@ class Engine:
                 gave.append((k, tuple(dict.fromkeys(slack.item for slack in step.relaxed)) or (str(step.status),)))
             out[k + 1], k = step.q_next, k + 1
         return out, gave
-
-    def _grip(self, plan: MotionPlan, name: str, tick: int, risen: Set[str]) -> ContactGrip:
-        """How a limb is held: a hand in place until it has to rise."""
-        grip = plan.limbs[name].grip(tick)
-        return ContactGrip.FIRM if grip is ContactGrip.LEVEL and name not in risen else grip
 
     def follow(self, places: Array, turns: Array, held: Mapping[str, ContactGrip], q: Array) -> Array:
         """Ticks from q along some of :meth:`targets`; the configuration after the last."""

@@ -11,8 +11,9 @@ import pathlib
 import shutil
 import signal
 import time
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -86,24 +87,21 @@ def find_clips(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[pathlib.Pa
         ClipFileError: no such file or folder, or a folder without a clip.
     """
     out: list[tuple[pathlib.Path, pathlib.Path]] = []
+    taken = Counter[pathlib.Path]()
     for given in paths:
-        path = validation.file_path("clip", given)
-        if not path.is_dir():
-            if not validation.is_file("clip", path):
-                raise ClipFileError("clip", str(path), validation.no_such(path, "there is no such file or folder"))
-            out.append((path, pathlib.Path(path.stem)))
-            continue
-        files = sorted(file for file in path.rglob("*") if file.suffix.lower() in CLIP_SUFFIXES and file.is_file())
-        if not files:
-            raise ClipFileError("clip", str(path), f"the folder has no clip ({', '.join(CLIP_SUFFIXES)})")
-        out += [(file, file.relative_to(path).with_suffix("")) for file in files]
-    taken: dict[pathlib.Path, int] = {}
-    unlike = []
-    for file, place in out:
-        taken[place] = taken.get(place, 0) + 1
-        # walk.bvh and walk.c3d, or the same name from two folders
-        unlike.append((file, place if taken[place] == 1 else place.with_name(f"{place.name}-{taken[place]}")))
-    return unlike
+        path = validation.existing("clip", given, ClipFileError)
+        files, top = [path], path.parent
+        if path.is_dir():
+            top = path
+            files = sorted(file for file in path.rglob("*") if file.suffix.lower() in CLIP_SUFFIXES and file.is_file())
+            if not files:
+                raise ClipFileError("clip", str(path), f"the folder has no clip ({', '.join(CLIP_SUFFIXES)})")
+        for file in files:
+            place = file.relative_to(top).with_suffix("")
+            taken[place] += 1
+            # walk.bvh and walk.c3d, or the same name from two folders
+            out.append((file, place if taken[place] == 1 else place.with_name(f"{place.name}-{taken[place]}")))
+    return out
 
 
 def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None) -> Iterator[ClipDone]:
@@ -117,27 +115,27 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
     """
     jobs = list(jobs)
     if client is not None:
-        from distributed import as_completed
+        from distributed import as_completed as ended_of
 
-        for future in as_completed([client.submit(retarget_job, job, pure=False) for job in jobs]):
+        for future in ended_of([client.submit(retarget_job, job, pure=False) for job in jobs]):
             yield future.result()
-        return
-    if workers == 1 or len(jobs) < 2:
+    elif workers == 1 or len(jobs) < 2:
         yield from map(retarget_job, jobs)
-        return
-    # Forks of a process with threads may hang
-    context = multiprocessing.get_context("spawn")
-    # Ctrl-C goes to all processes of a terminal; the first one ends the others
-    deaf = signal.SIGINT, signal.SIG_IGN
+    else:
+        yield from _in_processes(jobs, workers)
+
+
+def _in_processes(jobs: list[ClipJob], workers: int) -> Iterator[ClipDone]:
+    # Forks of a process with threads may hang; Ctrl-C goes to all processes of a terminal, and the first one ends them
+    context, deaf = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)
     with ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=signal.signal, initargs=deaf) as pool:
         waiting = {pool.submit(retarget_job, job): job for job in jobs}
         try:
-            while waiting:
-                ended, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in ended:
-                    job, error = waiting.pop(future), future.exception()
-                    # A process that was killed is a reason too
-                    yield future.result() if error is None else ClipDone(job, {}, f"{type(error).__name__}: {error}")
+            for future in as_completed(waiting):
+                # A process that was killed is a reason too
+                error = future.exception()
+                failed = ClipDone(waiting[future], {}, f"{type(error).__name__}: {error}")
+                yield future.result() if error is None else failed
         except BaseException:
             # Those that are busy would be waited for, and are forgotten by a pool that was shut down
             busy = list((getattr(pool, "_processes", None) or {}).values())
@@ -152,9 +150,9 @@ def retarget_job(job: ClipJob) -> ClipDone:
     try:
         clip = load_clip(job.clip, **job.loading)
         start = time.perf_counter()
-        known = _retargeter.cache_info().hits
-        retargeter = _retargeter(job.robot, tuple(sorted(job.options.items())), job.correspondence)
-        first = _retargeter.cache_info().hits == known
+        known = retargeter_of.cache_info().hits
+        retargeter = retargeter_of(job.robot, tuple(sorted(job.options.items())), job.correspondence)
+        first = retargeter_of.cache_info().hits == known
         motion = retargeter.run(clip)
         seconds = time.perf_counter() - start
         with _fresh(job.folder) as fresh:
@@ -170,14 +168,23 @@ def retarget_job(job: ClipJob) -> ClipDone:
 
 
 @functools.lru_cache(maxsize=4)
-def _retargeter(robot: str, options: tuple[tuple[str, Any], ...], file: pathlib.Path | None) -> Retargeter:
-    """One for all clips of this process, since its stack is made once."""
+def retargeter_of(robot: str, options: tuple[tuple[str, Any], ...], file: pathlib.Path | None) -> Retargeter:
+    """A retargeter for all clips of this process, since its stack is made once; the same for the same arguments."""
     # Imported for clips that can be read
+    from wbc.retarget.body import BodyError
+    from wbc.retarget.hands import hand_of
     from wbc.retarget.options import RetargetOptions
     from wbc.retarget.retargeter import Retargeter
 
-    loaded = robots.load(robot, base="floating")
-    return Retargeter(loaded, None, RetargetOptions(**dict(options)), correspondence=file)
+    own, given = robots.load(robot), RetargetOptions(**dict(options))
+    walks = own if own.base == "floating" or hand_of(own) else robots.load(robot, base="floating")
+    try:
+        return Retargeter(walks, None, given, correspondence=file)
+    except BodyError:
+        if own is walks:
+            raise
+        # Arms without legs stand where they are
+        return Retargeter(own, None, given, correspondence=file)
 
 
 @contextlib.contextmanager

@@ -18,6 +18,7 @@ from wbc.retarget.plan import (
     BLEND,
     LimbPlan,
     MotionPlan,
+    in_the_air,
     logarithms,
     lowering,
     minimum_jerk,
@@ -133,6 +134,8 @@ class LiveRetargeter:
     def _limb(self, name: str, limb: LimbPlaces) -> LimbPlan:
         """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
         robot, state = self._match.body.limbs[name], self._limbs[name]
+        if self._match.body.robot.base == "fixed":
+            return in_the_air(limb)
         stands = state.stands
         if stands and state.share >= 1.0:
             state.place, state.heading = standing_place(robot, limb, 0, 1)

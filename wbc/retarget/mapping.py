@@ -162,10 +162,11 @@ class Mapper:
         hips = 0.5 * (points[:, self._hips[0]] + points[:, self._hips[1]])
         if body.robot.base == "fixed":
             # The robot's trunk stands where it stands: arms move as seen from the pelvis
-            still = body.axes @ np.swapaxes(pelvis, 1, 2)
+            mirror = np.array([-1.0 if match.mirrored else 1.0, 1.0, 1.0])
+            still = body.axes * mirror @ np.swapaxes(pelvis, 1, 2)
             points = (still[:, None] @ (points - hips[:, None])[..., None])[..., 0]
-            turns = None if turns is None else still[:, None] @ turns
-            pelvis, chest = still @ pelvis, still @ chest
+            turns = None if turns is None or match.mirrored else still[:, None] @ turns
+            pelvis, chest = still @ pelvis * mirror, still @ chest * mirror
             place = np.broadcast_to(body.places[0], hips.shape).copy()
         else:
             ground = min((ankle[m.source] for name, m in match.limbs.items() if name.endswith("leg")), default=0.0)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wbc.retarget.body import LIMBS
 from wbc.retarget.clip import Array, Marks, intervals
 from wbc.retarget.mapping import LimbPlaces, Places, lift
 from wbc.retarget.robot_body import RobotBody, RobotLimb
@@ -26,6 +25,8 @@ GROUND = 0.03
 NEARLY_TURNED = -0.99
 #: A foot stands flat where its sole is tilted by less than the angle of this cosine
 SOLE_LEVEL = 0.8
+#: It cannot be flat where its ankle would have to turn farther than this beyond its limit [rad]
+BEYOND_ANKLE = 0.35
 #: A foot on its toes or heel stands so far from where its ankle's limit would hold it [rad]
 ANKLE_SPARE = 0.05
 #: Most of a leg's length that a standing leg has between hip and ankle
@@ -138,7 +139,7 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
     """
     dt = float(times[1] - times[0]) if len(times) > 1 else 1.0 / rate
     at = _nearest(len(places.pelvis), rate, times)
-    names = sorted(places.limbs, key=LIMBS.index)
+    names = sorted(places.limbs, key=list(body.limbs).index)
     own = [places.limbs[name] for name in names]
     points = [places.pelvis, *(values for limb in own for values in (limb.middle, limb.wrist, limb.end))]
     given = [places.turn, places.chest, places.head, *(limb.rotation for limb in own)]
@@ -150,11 +151,20 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
     for number, name in enumerate(names):
         middle, wrist, end = points[3 * number : 3 * number + 3]
         there = LimbPlaces(middle, wrist, end, rotations[number])
+        if body.robot.base == "fixed":
+            limbs[name] = in_the_air(there)
+            continue
         limbs[name] = _limb_plan(body.limbs[name], there, marks[name][at], dt, hand=not body.is_foot(name))
     assert turn is not None
     assert chest is not None
     pelvis = pelvis - np.array([0.0, 0.0, 1.0]) * lowering(body, pelvis, turn, limbs, dt)[:, None]
     return MotionPlan(pelvis, turn, chest, head, limbs, dt)
+
+
+def in_the_air(limb: LimbPlaces) -> LimbPlan:
+    """A limb's targets as they are, of a robot whose base is fixed: it stands on nothing."""
+    never = np.zeros(len(limb.end), dtype=bool)
+    return LimbPlan(limb.middle, limb.wrist, limb.end, limb.rotation, never, never, never)
 
 
 def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
@@ -198,8 +208,8 @@ def _lowest(robot: RobotLimb, end: Array, rotation: Array | None) -> Array:
     """Height of the lowest point of a foot, or of a hand's ball [ticks] [m]."""
     if rotation is None or robot.contact != "flat":
         return np.asarray(end[:, 2] - robot.radius)
-    # Not a product of matrices, which would start threads
-    return np.asarray(np.einsum("ti,ci->tc", rotation[:, 2], robot.surface).min(axis=1) + end[:, 2])
+    # A product a tick: one of all would start threads
+    return np.asarray((rotation[:, 2, None] @ np.ascontiguousarray(robot.surface.T)).min(axis=2)[:, 0] + end[:, 2])
 
 
 def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[Array, Array | None]:
@@ -212,25 +222,29 @@ def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[
         level = float(place[2]) - robot.radius
         place[2] = robot.radius + (0.0 if level < GROUND else level)
         return place, None
-    if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL:
-        forward = rotation[:, :, 0].mean(axis=0)
-        yaw = float(np.arctan2(forward[1], forward[0]))
-        standing = exponential(np.array([[0.0, 0.0, yaw]]))[0]
+    forward, shanks = rotation[:, :, 0].mean(axis=0), limb.middle[a:b] - limb.wrist[a:b]
+    standing = exponential(np.array([[0.0, 0.0, float(np.arctan2(forward[1], forward[0]))]]))[0]
+    bend = abs(_ankle_turn(robot, standing, _median(shanks)[None]))
+    if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL and bend < BEYOND_ANKLE:
         level = float(_median(limb.wrist[a:b, 2])) - float(np.linalg.norm(robot.places[2] - robot.places[3]))
         lowest = np.zeros(3)
     else:
         standing = np.asarray(Rotation.from_matrix(rotation).mean().as_matrix())
-        # No farther from the shank than the ankle can turn it
-        shank = (limb.middle[a:b] - limb.wrist[a:b]) @ standing
-        leans = np.arctan2(shank[:, 0], shank[:, 2])
-        turn = np.clip(0.0, robot.pitch[0] + ANKLE_SPARE + leans.max(), robot.pitch[1] - ANKLE_SPARE + leans.min())
-        standing = standing @ exponential(np.array([[0.0, turn, 0.0]]))[0]
+        standing = standing @ exponential(np.array([[0.0, _ankle_turn(robot, standing, shanks), 0.0]]))[0]
         lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
         level = float(_median(_lowest(robot, ends, rotation)))
     # The lowest point of the sole stands where it is in the mean
     place = _median(ends + rotation @ lowest) - standing @ lowest
     place[2] = (0.0 if level < GROUND else level) - float(standing[2] @ lowest)
     return place, standing
+
+
+def _ankle_turn(robot: RobotLimb, standing: Array, shanks: Array) -> float:
+    """The least turn of a foot about its axis to the left with which its ankle can hold it against its shanks [rad]."""
+    along = shanks @ standing
+    leans = np.arctan2(along[:, 0], along[:, 2])
+    least, most = robot.pitch[0] + ANKLE_SPARE + leans.max(), robot.pitch[1] - ANKLE_SPARE + leans.min()
+    return float(np.clip(0.0, least, most))
 
 
 def _median(values: Array) -> Array:

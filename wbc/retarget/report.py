@@ -128,23 +128,24 @@ def save_motion_film(motion: Retargeted, file: pathlib.Path) -> pathlib.Path:
     q = motion.q
     count = int(np.clip(motion.time[-1] * FILM_RATE, 2, MOST_PICTURES))
     rows = np.unique(np.linspace(0, len(q) - 1, count).astype(int))
-    extent = _extent(motion, rows)
+    extent, size = _extent(motion, rows)
     points, bones = _beside(motion, rows, extent)
     everything = np.concatenate([points.reshape(-1, 3), extent])
-    low, high = everything.min(axis=0) - BEYOND, everything.max(axis=0) + BEYOND
-    scene = Scene(motion.robot, colours={"*": ROBOT}, floor=False, detail=DETAIL)
-    middle = pin.SE3(np.eye(3), np.array([*(0.5 * (low + high))[:2], -0.01]))
+    low, high = everything.min(axis=0) - BEYOND * size, everything.max(axis=0) + BEYOND * size
+    scene = Scene(motion.robot, colours={"*": ROBOT}, floor=False, detail=DETAIL * size)
+    ground = min(0.0, float(everything[:, 2].min())) - 0.01
+    middle = pin.SE3(np.eye(3), np.array([*(0.5 * (low + high))[:2], ground]))
     scene.add_shape(Box((*(high - low)[:2].tolist(), 0.02)), middle, "ground", GROUND)
     shot = scene.film(render.framed(everything, FILM_SIZE, AZIMUTH, ELEVATION, filled=0.9))
     frames = []
     for k, row in enumerate(rows):
         scene.add_robot(q[row])
         for line in points[k][bones]:
-            if np.linalg.norm(line[1] - line[0]) > BONE:
-                scene.add_path(line, colour=PERSON, radius=BONE)
+            if np.linalg.norm(line[1] - line[0]) > BONE * size:
+                scene.add_path(line, colour=PERSON, radius=BONE * size)
         image = Image.fromarray(shot())
-        standing = [limb for limb, stands in motion.stance.items() if stands[row]]
-        words = f"{motion.clip.name}  {motion.time[row]:6.2f} s   stands: {', '.join(standing) or 'nothing'}"
+        standing = ", ".join(limb for limb, stands in motion.stance.items() if stands[row])
+        words = f"{motion.clip.name}  {motion.time[row]:6.2f} s   stands: {standing or 'nothing'}"
         ImageDraw.Draw(image).text((8, 8), words, fill=(34, 39, 46))
         frames.append(image)
     return save_film(frames, file, len(rows) / max(float(motion.time[-1]), 1e-9))
@@ -157,8 +158,8 @@ def _beside(motion: Retargeted, rows: NDArray[np.int_], extent: Array) -> tuple[
     tall, height = float(np.ptp(clip.points[:, :, 2], axis=1).max()), float(np.ptp(extent[:, 2])) or 1.0
     points = points * (height / max(tall, 1e-6))
     aside = extent.mean(axis=0) - points.mean(axis=(0, 1))
-    width = float(np.ptp(points[:, :, 1])) / 2.0 + float(np.ptp(extent[:, 1])) / 2.0
-    points = points + np.array([aside[0], aside[1] + width + ASIDE * height, 0.0])
+    aside[1] += 0.5 * float(np.ptp(points[:, :, 1]) + np.ptp(extent[:, 1])) + ASIDE * height
+    points = points + np.array([*aside[:2], 0.0 if motion.robot.base != "fixed" else aside[2]])
     if max(parents) >= 0:
         return points, [(parent, joint) for joint, parent in enumerate(parents) if parent >= 0]
     # Markers without bones: each with the nearest one
@@ -167,11 +168,12 @@ def _beside(motion: Retargeted, rows: NDArray[np.int_], extent: Array) -> tuple[
     return points, [(joint, int(other)) for joint, other in enumerate(apart.argmin(axis=1))]
 
 
-def _extent(motion: Retargeted, rows: NDArray[np.int_]) -> Array:
-    """Places of the robot's joints in some frames, and what its links may reach beyond them [n, 3]."""
+def _extent(motion: Retargeted, rows: NDArray[np.int_]) -> tuple[Array, float]:
+    """Places of joints in some frames and what links reach beyond them [n, 3], and the robot's size, up to 1 [m]."""
     model, data, out = motion.robot.model, motion.robot.model.createData(), []
     for row in rows[:: max(1, len(rows) // 40)]:
         pin.forwardKinematics(model, data, motion.q[row])
         out += [data.oMi[joint].translation.copy() for joint in range(1, model.njoints)]
     places = np.array(out)
-    return np.concatenate([places, places.max(axis=0, keepdims=True) + LINK])
+    size = min(1.0, float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0)
+    return np.concatenate([places, places.max(axis=0, keepdims=True) + LINK * size]), size

@@ -93,20 +93,12 @@ class Retargeted:
     @cached_property
     def errors(self) -> MotionErrors:
         """See :class:`MotionErrors`."""
-        limbs = {limb: self.body.limbs[limb] for limb in self.stance}
+        body, plan, fixed = self.body, self.plan, self.robot.base == "fixed"
         figures = motion_figures(
-            self.robot, self.rate, self.q, {limbs[limb].end: stands for limb, stands in self.stance.items()},
-            ground=None if self.robot.base == "fixed" else 0.0,
-            balls={limb.end for limb in limbs.values() if limb.radius > 0.0},
+            self.robot, self.rate, self.q, {body.limbs[limb].end: stands for limb, stands in self.stance.items()},
+            ground=None if fixed else 0.0, balls={own.end for own in body.limbs.values() if own.radius > 0.0},
         )  # fmt: skip
-        return MotionErrors(self._far(), figures)
-
-    def _far(self) -> dict[str, Array]:
-        """Distances of key points from their targets at the frames [m]."""
-        body, plan = self.body, self.plan
-        targets: dict[str, tuple[str, Array]] = {}
-        if self.robot.base != "fixed":
-            targets["pelvis"] = (body.pelvis, plan.pelvis)
+        targets: dict[str, tuple[str, Array]] = {} if fixed else {"pelvis": (body.pelvis, plan.pelvis)}
         for name, limb in plan.limbs.items():
             own = body.limbs[name]
             if body.plan.upright and own.middle:
@@ -115,7 +107,8 @@ class Retargeted:
                 targets[f"{name} wrist"] = (own.wrist, limb.wrist)
             targets[name] = (own.end, limb.end)
         _, positions = frame_poses(self.robot, tuple(frame for frame, _ in targets.values()), self.q)
-        return {
+        far = {
             name: np.linalg.norm(positions[:, i] - target[:: self.every], axis=1)
             for i, (name, (_, target)) in enumerate(targets.items())
         }
+        return MotionErrors(far, figures)

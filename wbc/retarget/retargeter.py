@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from wbc.errors import NotFiniteError, ShapeError
 from wbc.retarget.clip import Array, Clip, Marks, Skeleton, intervals
 from wbc.retarget.correspondence import Correspondence, CorrespondenceError, correspondence
 from wbc.retarget.engine import Engine
+from wbc.retarget.hands import hand_of
 from wbc.retarget.live import LiveRetargeter
 from wbc.retarget.mapping import Mapper
 from wbc.retarget.options import RetargetOptions
@@ -68,7 +70,7 @@ class Retargeter:
     ) -> None:
         loaded = robot if isinstance(robot, Robot) else robots.load(os.fspath(robot))
         self.options = validation.instance("options", options or RetargetOptions(), RetargetOptions, "RetargetOptions")
-        self.body: RobotBody = body_of(loaded)
+        self.body: RobotBody = hand_of(loaded) or body_of(loaded)
         self.skeleton, self._file = skeleton, correspondence
         self._matches: dict[Any, Correspondence] = {}
         self._engines: dict[Any, Engine] = {}
@@ -117,7 +119,7 @@ class Retargeter:
         all_q, gave = engine.run(plan)
         offsets = _offsets(engine.robot, self.body, plan, all_q)
         landed = _landed(engine.robot, plan, offsets)
-        given_up = (*_gave_way(gave, dt), *_not_served(plan, offsets, landed))
+        given_up = (*_gave_way(gave, plan), *_not_served(plan, offsets, landed))
         return Retargeted(
             robot=engine.robot, rate=rate, time=times[::every], q=all_q[::every],
             stance={name: marks_[::every] for name, marks_ in landed.items()},
@@ -176,15 +178,13 @@ def _check(clip: Clip, skeleton: Skeleton | None) -> None:
     points = np.asarray(clip.points)
     if points.ndim != 3 or points.shape[1:] != (joints, 3) or len(points) < 1:
         raise ShapeError("clip.points", points.shape, f"expected [frames, {joints}, 3] with a frame at least")
-    if clip.turns is not None and np.shape(clip.turns) != (len(points), joints, 3, 3):
-        raise ShapeError("clip.turns", np.shape(clip.turns), f"expected [{len(points)}, {joints}, 3, 3]")
+    if clip.turns is not None:
+        validation.real_array("clip.turns", clip.turns, (len(points), joints, 3, 3))
     validation.scalar("clip.rate", clip.rate, low=1.0, high=1e4, unit="Hz")
     bad = np.argwhere(~np.isfinite(points).all(axis=2))
     if len(bad):
         frame, joint = bad[0]
         raise NotFiniteError("clip.points", points[frame, joint], f"{clip.skeleton.names[joint]} at frame {frame}")
-    if clip.turns is not None and not np.isfinite(clip.turns).all():
-        raise NotFiniteError("clip.turns", clip.name, "expected finite numbers")
     if skeleton is not None and clip.skeleton.names != skeleton.names:
         raise CorrespondenceError("clip.skeleton", clip.name, "its points are not those of the skeleton that was given")
 
@@ -222,31 +222,27 @@ def _landed(robot: Robot, plan: MotionPlan, offsets: dict[str, tuple[Array, Arra
     return out
 
 
-def _gave_way(gave: list[tuple[int, tuple[str, ...]]], dt: float) -> list[GivenUp]:
+def _gave_way(gave: list[tuple[int, tuple[str, ...]]], plan: MotionPlan) -> Iterator[GivenUp]:
     """Rows that gave way in their ticks, by name."""
-    ticks: dict[str, list[int]] = {}
-    for tick, names in gave:
-        for name in names:
-            ticks.setdefault(name, []).append(tick)
-    out = []
-    for name, when in ticks.items():
-        marks = np.isin(np.arange(max(when) + 1), when)
-        out += [GivenUp(name, a * dt, b * dt, "gave way to limits of the joints") for a, b in _joined(marks, dt)]
-    return out
+    for name in dict.fromkeys(name for _, names in gave for name in names):
+        ticks = [tick for tick, names in gave if name in names]
+        for a, b in _joined(np.isin(np.arange(plan.ticks), ticks), plan.dt):
+            yield GivenUp(name, a * plan.dt, b * plan.dt, "gave way to limits of the joints")
 
 
-def _not_served(plan: MotionPlan, offsets: dict[str, tuple[Array, Array]], landed: dict[str, Marks]) -> list[GivenUp]:
+def _not_served(
+    plan: MotionPlan, offsets: dict[str, tuple[Array, Array]], landed: dict[str, Marks]
+) -> Iterator[GivenUp]:
     """Contacts that come late or are not held, and limbs far from their targets."""
-    dt, out = plan.dt, list[GivenUp]()
+    dt = plan.dt
     for name, limb in plan.limbs.items():
         for a, b in intervals(limb.stands):
             late = int(np.argmax(landed[name][a:b])) if landed[name][a:b].any() else b - a
             if late * dt > LATE:
-                out.append(GivenUp(name, a * dt, (a + late) * dt, "comes to stand later than the skeleton"))
+                yield GivenUp(name, a * dt, (a + late) * dt, "comes to stand later than the skeleton")
         for a, b in _joined(offsets[name][1] > FAR, dt):
             if (b - a) * dt > LONG:
-                out.append(GivenUp(name, a * dt, b * dt, f"is more than {FAR} m from its target: out of reach"))
-    return out
+                yield GivenUp(name, a * dt, b * dt, f"is more than {FAR} m from its target: out of reach")
 
 
 def _joined(marks: Marks, dt: float) -> list[tuple[int, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -135,49 +135,76 @@ class RobotBody:
         return _is_foot(name, self.plan, self.robot.base == "fixed")
 
 
-def joint_tree(robot: Robot, balls: dict[int, LinkBalls]) -> tuple[PointTree, pin.Data]:
-    """Joints at ``robot.neutral``, with one more point at the end of each last link; and Pinocchio's data there.
+class RestPose:
+    """A robot at ``robot.neutral``.
 
-    Args:
-        balls: of :func:`~wbc.retarget.solids.balls_of_joints`.
+    Attributes:
+        poses: of its joints. axes: directions of the joints in the world, zero of those of several degrees of freedom
+            [joints, 3]. balls: of :func:`~wbc.retarget.solids.balls_of_joints`, or others. tree: of its joints, with
+            one more point at the end of each last link.
     """
-    model, data = robot.model, robot.model.createData()
-    pin.forwardKinematics(model, data, robot.neutral)
-    pin.updateFramePlacements(model, data)
-    pin.computeJointJacobians(model, data, robot.neutral)
-    names = [str(name) for name in list(model.names)]
-    parents = [-1, *(int(model.parents[j]) for j in range(1, model.njoints))]
-    points = [np.array(pose.translation) for pose in data.oMi]
-    if robot.base != "fixed":
-        # The world is no part of a body that moves in it
-        points[0] = points[1].copy()
-    for joint in sorted({*range(1, model.njoints)} - {*parents}):
-        names.append(f"{names[joint]} end")
-        parents.append(joint)
-        points.append(_tip(robot, data, joint, ancestors(parents, joint)[:-1], balls.get(joint)))
-    return PointTree(tuple(names), tuple(parents), np.array(points)), data
 
+    def __init__(self, robot: Robot, balls: dict[int, LinkBalls] | None = None) -> None:
+        model, data = robot.model, robot.model.createData()
+        pin.forwardKinematics(model, data, robot.neutral)
+        pin.updateFramePlacements(model, data)
+        pin.computeJointJacobians(model, data, robot.neutral)
+        self.robot, self.fixed, self._data = robot, robot.base == "fixed", data
+        self.balls = balls_of_joints(robot) if balls is None else balls
+        self.poses, self.axes = list(data.oMi), np.array([self._axis(joint) for joint in range(model.njoints)])
+        names, parents = [str(name) for name in list(model.names)], [-1, *list(model.parents)[1:]]
+        points = [np.array(pose.translation) for pose in self.poses]
+        if not self.fixed:
+            # The world is no part of a body that moves in it
+            points[0] = points[1].copy()
+        for joint in sorted({*range(1, model.njoints)} - {*parents}):
+            names.append(f"{names[joint]} end")
+            points.append(self._tip(joint, ancestors(parents, joint)[:-1]))
+            parents.append(joint)
+        self.points = np.array(points)
+        self.tree = PointTree(tuple(names), tuple(map(int, parents)), self.points)
 
-def _tip(robot: Robot, data: pin.Data, joint: int, chain: list[int], balls: LinkBalls | None) -> Array:
-    """The point of a last link that is farthest from the joint before; ``chain``: it and the joints above it."""
-    own, places = data.oMi[joint], [np.array(data.oMi[k].translation) for k in chain]
-    here = places[0]
-    lengths = [float(np.linalg.norm(a - b)) for a, b in itertools.pairwise(places)]
-    candidates = [
-        np.array(data.oMf[k].translation)
-        for k, frame in enumerate(robot.model.frames)
-        if int(frame.parentJoint) == joint
-    ]
-    if balls is not None:
-        candidates.append(own.act(balls.middle))
-    most = max(LONGEST * sum(lengths), 0.05)
-    candidates = [point for point in candidates if float(np.linalg.norm(point - here)) < most]
-    far = max(candidates, key=lambda point: float(np.linalg.norm(point - here)), default=here)
-    if float(np.linalg.norm(far - here)) > 1e-3:
-        return far
-    places.append(np.array(data.oMi[0].translation))
-    before = 2 if len(chain) > 1 and float(np.linalg.norm(here - places[1])) < 1e-9 else 1
-    return np.asarray(here + HAND * (here - places[before]))
+    @cached_property
+    def plan(self) -> BodyPlan:
+        """Limbs and trunk of its tree; BodyError: no pair of limbs."""
+        return find_body(self.tree, field="robot", arms=self.fixed, straight=STRAIGHT)
+
+    def _axis(self, joint: int) -> Array:
+        model = self.robot.model
+        if int(model.nvs[joint]) != 1:
+            return np.zeros(3)
+        column = np.asarray(pin.getJointJacobian(model, self._data, joint, pin.WORLD)).reshape(6, self.robot.nv)
+        twist = column[:, int(model.idx_vs[joint])]
+        return np.asarray(twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3])
+
+    def _tip(self, joint: int, chain: list[int]) -> Array:
+        """The point of a last link that is farthest from the joint before; ``chain``: it and the joints above it."""
+        places = np.array([self.poses[k].translation for k in (*chain, 0)])
+        here, frames = places[0], self.robot.model.frames
+        points = [np.array(self._data.oMf[k].translation) for k, f in enumerate(frames) if int(f.parentJoint) == joint]
+        if joint in self.balls:
+            points.append(self.poses[joint].act(self.balls[joint].middle))
+        most = max(LONGEST * float(np.linalg.norm(np.diff(places[:-1], axis=0), axis=1).sum()), 0.05)
+        away = [float(np.linalg.norm(point - here)) for point in points]
+        away = [length if length < most else 0.0 for length in away]
+        if max(away, default=0.0) > 1e-3:
+            return points[int(np.argmax(away))]
+        before = 2 if len(chain) > 1 and float(np.linalg.norm(here - places[1])) < 1e-9 else 1
+        return np.asarray(here + HAND * (here - places[before]))
+
+    def meeting(self, joints: Sequence[int], start: Array) -> Array:
+        """The point nearest to the axes of some joints, and a little to where they are."""
+        joints = list(joints)
+        across = np.eye(3) - self.axes[joints, :, None] * self.axes[joints, None, :]
+        side = NEAR * start + np.einsum("jab,jb->a", across, self.points[joints])
+        return np.asarray(np.linalg.solve(NEAR * np.eye(3) + across.sum(axis=0), side))
+
+    def reach(self, joint: int, way: Array) -> float:
+        """How far a link stands out from its joint along a direction [m]; 0 without bodies."""
+        balls = self.balls.get(joint) if joint else None
+        return (
+            0.0 if balls is None else float((balls.centers @ (self.poses[joint].rotation.T @ way) + balls.radii).max())
+        )
 
 
 def body_of(robot: Robot) -> RobotBody:
@@ -186,20 +213,16 @@ def body_of(robot: Robot) -> RobotBody:
     Raises:
         BodyError: it has no pair of limbs.
     """
-    balls = balls_of_joints(robot)
-    tree, data = joint_tree(robot, balls)
-    fixed = robot.base == "fixed"
-    plan = find_body(tree, field="robot", arms=fixed, straight=STRAIGHT)
+    rest = RestPose(robot)
+    plan, fixed, count = rest.plan, rest.fixed, robot.model.njoints
     if robot.base not in ("fixed", "floating"):
         raise BodyError("robot", robot.name, f"its base is {robot.base}; load it with base='floating' or 'fixed'")
-    said = tree.said([*plan.limbs.values()])
+    said = plan.tree.said([*plan.limbs.values()])
     if not fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
-    count = robot.model.njoints
-    limbs: dict[str, RobotLimb] = {}
-    new = robot
+    limbs, new = dict[str, RobotLimb](), robot
     for name in plan.limbs:
-        limbs[name], placed = _limb(name, robot, data, plan, balls)
+        limbs[name], placed = _limb(name, rest)
         for frame, (joint, placement) in placed.items():
             new = with_frame(new, frame, joint, placement)
     pelvis, chest = (
@@ -208,23 +231,18 @@ def body_of(robot: Robot) -> RobotBody:
     )
     carriers = {"pelvis": (plan.pelvis, pelvis), "chest": (plan.chest, chest)}
     if plan.head and plan.upright:
-        carriers["head"] = (max(joint for joint in plan.head if joint < count), tree.points[plan.head[0]])
+        carriers["head"] = (max(joint for joint in plan.head if joint < count), rest.points[plan.head[0]])
     for name, (joint, place) in carriers.items():
-        new = with_frame(new, f"retarget_{name}", joint, data.oMi[joint].actInv(pin.SE3(plan.axes, place)))
+        new = with_frame(new, f"retarget_{name}", joint, rest.poses[joint].actInv(pin.SE3(plan.axes, place)))
     waist = None
     if plan.chest != plan.pelvis:
         between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < count]
-        waist = _meeting(data, robot, between[:MEETING], np.mean([tree.points[j] for j in between], axis=0))
-    up = plan.axes[:, 2]
-    lowest = min(
-        (float(limb.places[3] @ up) - limb.radius for name, limb in limbs.items() if _is_foot(name, plan, fixed)),
-        default=0.0,
-    )
+        waist = rest.meeting(between[:MEETING], np.mean(rest.points[between], axis=0))
+    heights = [limb.places[3] @ plan.axes[:, 2] - limb.radius for k, limb in limbs.items() if _is_foot(k, plan, fixed)]
     return RobotBody(
         robot=new, plan=plan, limbs=limbs, pelvis="retarget_pelvis", chest="retarget_chest",
         places=np.array([pelvis, chest]), waist=waist, head="retarget_head" if "head" in carriers else "",
-        height=float(pelvis @ up) - lowest,
-        balls=balls,
+        height=float(pelvis @ plan.axes[:, 2] - min(heights, default=0.0)), balls=rest.balls,
     )  # fmt: skip
 
 
@@ -241,48 +259,26 @@ def _is_foot(name: str, plan: BodyPlan, fixed: bool) -> bool:
     return not fixed and (name.endswith("leg") or not plan.upright)
 
 
-def _axis(robot: Robot, data: pin.Data, joint: int) -> Array:
-    """Direction of a joint's axis in the world; zero of a joint of several degrees of freedom."""
-    if int(robot.model.nvs[joint]) != 1:
-        return np.zeros(3)
-    column = np.asarray(pin.getJointJacobian(robot.model, data, joint, pin.WORLD)).reshape(6, robot.nv)
-    twist = column[:, int(robot.model.idx_vs[joint])]
-    return np.asarray(twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3])
-
-
-def _meeting(data: pin.Data, robot: Robot, joints: list[int], start: Array) -> Array:
-    """The point nearest to the axes of some joints, and a little to where they are."""
-    matrix, side = NEAR * np.eye(3), NEAR * start
-    for joint in joints:
-        axis, place = _axis(robot, data, joint), np.array(data.oMi[joint].translation)
-        across = np.eye(3) - np.outer(axis, axis)
-        matrix, side = matrix + across, side + across @ place
-    return np.asarray(np.linalg.solve(matrix, side))
-
-
-def _limb(
-    name: str, robot: Robot, data: pin.Data, plan: BodyPlan, balls: dict[int, LinkBalls]
-) -> tuple[RobotLimb, dict[str, tuple[int, pin.SE3]]]:
-    """A limb, and its frames: in which joint, and where. ``balls``: by number of the joint that carries them."""
-    points, chain, frame = plan.tree.points, plan.limbs[name], f"retarget_{name}"
-    joints = tuple(joint for joint in chain if joint < robot.model.njoints)
-    foot = _is_foot(name, plan, robot.base == "fixed")
-    tip = points[chain[-1]]
-    middle = _middle_hinge(robot, data, joints, tip)
+def _limb(name: str, rest: RestPose) -> tuple[RobotLimb, dict[str, tuple[int, pin.SE3]]]:
+    """A limb, and its frames: in which joint, and where."""
+    plan, points, frame = rest.plan, rest.points, f"retarget_{name}"
+    chain, foot = plan.limbs[name], _is_foot(name, plan, rest.fixed)
+    joints, tip = tuple(joint for joint in chain if joint < rest.robot.model.njoints), points[chain[-1]]
+    last, size = joints[-1], float(np.linalg.norm(tip - points[joints[0]]))
+    middle = _middle_hinge(rest, joints, tip)
     before = list(joints[: joints.index(middle)]) or [joints[0]]
-    base = _meeting(data, robot, before[-MEETING:], points[before[-MEETING:][0]])
-    size = float(np.linalg.norm(tip - points[joints[0]]))
+    base = rest.meeting(before[-MEETING:], points[before[-MEETING:][0]])
     if float(np.linalg.norm(points[before] - base, axis=1).min()) > OFF * size:
         base = points[before[0]]
-    wrist = _wrist(robot, data, joints, middle, tip)
+    wrist = _wrist(rest, joints, middle, tip)
     ankle = points[wrist] if wrist else tip
-    own = balls.get(joints[-1])
+    own = rest.balls.get(last)
     if own is not None and float(np.linalg.norm(own.middle)) > size:
         own = None
-    balls_there = None if own is None else own.moved(data.oMi[joints[-1]])
+    balls_there = None if own is None else own.moved(rest.poses[last])
     end, contact, radius, corners, guessed = _end(balls_there, plan.axes, ankle, tip, size, foot=foot)
     guess = LinkBalls(corners, np.full(len(corners), radius))
-    surface = (guess if own is None else own.moved(end.actInv(data.oMi[joints[-1]]))).corners(CORNERS, EXACT)
+    surface = (guess if own is None else own.moved(end.actInv(rest.poses[last]))).corners(CORNERS, EXACT)
     if foot and contact == "point" and radius > 0.0:
         # Its ball covers what is drawn of the foot, beyond the ball's middle as seen from the knee
         far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
@@ -290,47 +286,38 @@ def _limb(
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
     # A knee lies on its front, an elbow on its back: the outer sides of their bends
     outer = plan.axes[:, 0] if name.endswith("leg") else -plan.axes[:, 0]
-    thick, thin = (_reach(balls.get(joint), data.oMi[joint], outer) if joint else 0.0 for joint in (middle, wrist))
     limb = RobotLimb(
         joints, base, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, contact, radius, corners,
-        surface, (thick, thin, radius),
-        _pitch(robot, data, joints[joints.index(middle) + 1 :], places, plan.axes), guessed,
+        surface, (rest.reach(middle, outer), rest.reach(wrist, outer), radius),
+        _pitch(rest, joints[joints.index(middle) + 1 :], places), guessed,
     )  # fmt: skip
-    placed = {frame: (joints[-1], data.oMi[joints[-1]].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
-    if wrist:
-        placed[limb.wrist] = (wrist, pin.SE3.Identity())
-    return limb, placed
+    placed = {frame: (last, rest.poses[last].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
+    return limb, placed | ({limb.wrist: (wrist, pin.SE3.Identity())} if wrist else {})
 
 
-def _reach(balls: LinkBalls | None, pose: pin.SE3, way: Array) -> float:
-    """How far a link with this pose stands out from its joint along a direction [m]; 0 without bodies."""
-    return 0.0 if balls is None else float((balls.centers @ (pose.rotation.T @ way) + balls.radii).max())
-
-
-def _pitch(robot: Robot, data: pin.Data, joints: tuple[int, ...], places: Array, axes: Array) -> tuple[float, float]:
+def _pitch(rest: RestPose, joints: tuple[int, ...], places: Array) -> tuple[float, float]:
     """Least and most turn of an end against its last bone about the axis to the left [rad]."""
+    robot, axes = rest.robot, rest.plan.axes
     forward, _, up = (places[1] - places[2]) @ axes
     least = most = -float(np.arctan2(forward, up))
     for joint in joints:
-        along = float(_axis(robot, data, joint) @ axes[:, 1])
+        along = float(rest.axes[joint] @ axes[:, 1])
         if abs(along) > ACROSS:
             number = int(robot.model.idx_vs[joint])
-            low, high = robot.limits.position_lower[number], robot.limits.position_upper[number]
-            ends = np.sign(along) * (np.array([low, high]) - robot.neutral[int(robot.model.idx_qs[joint])])
+            limits = np.array([robot.limits.position_lower[number], robot.limits.position_upper[number]])
+            ends = np.sign(along) * (limits - robot.neutral[int(robot.model.idx_qs[joint])])
             least, most = least + float(ends.min()), most + float(ends.max())
     return least, most
 
 
-def _middle_hinge(robot: Robot, data: pin.Data, joints: tuple[int, ...], tip: Array) -> int:
+def _middle_hinge(rest: RestPose, joints: tuple[int, ...], tip: Array) -> int:
     """The knee or elbow: the joint that changes the distance from where the axes before it meet to the end of the limb
     most, weighted with how evenly it divides the limb.
     """
 
     def score(count: int) -> float:
-        joint = joints[count]
-        axis, place = _axis(robot, data, joint), np.array(data.oMi[joint].translation)
-        before = joints[max(count - MEETING, 0) : count]
-        start = _meeting(data, robot, list(before), np.array(data.oMi[before[-1]].translation))
+        axis, place = rest.axes[joints[count]], rest.points[joints[count]]
+        start = rest.meeting(joints[max(count - MEETING, 0) : count], rest.points[joints[count - 1]])
         distances = [float(np.linalg.norm(place + pin.exp3(axis * angle) @ (tip - place) - start)) for angle in SWEEP]
         even = min(float(np.linalg.norm(place - start)), float(np.linalg.norm(tip - place)))
         return (max(distances) - min(distances)) * even
@@ -338,14 +325,14 @@ def _middle_hinge(robot: Robot, data: pin.Data, joints: tuple[int, ...], tip: Ar
     return joints[max(range(1, len(joints)), key=score)]
 
 
-def _wrist(robot: Robot, data: pin.Data, joints: tuple[int, ...], middle: int, tip: Array) -> int:
+def _wrist(rest: RestPose, joints: tuple[int, ...], middle: int, tip: Array) -> int:
     """The first joint far enough behind the middle hinge that turns across the bone; 0 without one."""
-    start = np.array(data.oMi[middle].translation)
+    start = rest.points[middle]
     reach = float(np.linalg.norm(tip - start))
     for joint in joints[joints.index(middle) + 1 :]:
-        bone = np.array(data.oMi[joint].translation) - start
+        bone = rest.points[joint] - start
         length = float(np.linalg.norm(bone))
-        if length > DISTAL * reach and abs(float(_axis(robot, data, joint) @ bone)) < ACROSS * length:
+        if length > DISTAL * reach and abs(float(rest.axes[joint] @ bone)) < ACROSS * length:
             return joint
     return 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
 from dataclasses import dataclass
 
@@ -39,17 +40,11 @@ class LinkBalls:
     centers: Array
     radii: Array
 
-    def lowest(self, pose: pin.SE3) -> float:
-        """Height of the lowest point where the joint has this pose [m]."""
-        heights = self.centers @ np.asarray(pose.rotation)[2] + float(pose.translation[2]) - self.radii
-        return float(heights.min())
-
     @property
     def middle(self) -> Array:
         """Of the box around them."""
-        return np.asarray(
-            0.5 * ((self.centers - self.radii[:, None]).min(axis=0) + (self.centers + self.radii[:, None]).max(axis=0))
-        )
+        radii = self.radii[:, None]
+        return np.asarray(0.5 * ((self.centers - radii).min(axis=0) + (self.centers + radii).max(axis=0)))
 
     def moved(self, placement: pin.SE3) -> LinkBalls:
         """The same in another frame, in which this one is placed so."""
@@ -108,19 +103,19 @@ def surface_points(robot: Robot) -> dict[str, Array]:
     corners: dict[str, list[Array]] = {}
     for link, triangles in link_meshes(robot):
         corners.setdefault(link, []).append(triangles.reshape(-1, 3))
-    return {link: _hull_corners(np.unique(np.concatenate(parts), axis=0)) for link, parts in corners.items()}
+    return {link: _hull_corners(np.concatenate(parts)) for link, parts in corners.items()}
 
 
 def _hull_corners(points: Array) -> Array:
-    try:
+    points = np.unique(points, axis=0)
+    with contextlib.suppress(QhullError):
         return np.asarray(points[ConvexHull(points).vertices] if len(points) > 4 else points)
-    except QhullError:
-        return points
+    return points
 
 
 def _hull(centers: Array, radii: Array) -> LinkBalls:
     """The same hull of fewer balls."""
-    corners = _hull_corners(np.unique(centers[radii == 0.0], axis=0))
+    corners = _hull_corners(centers[radii == 0.0])
     round_ = radii > 0.0
     return LinkBalls(np.concatenate([corners, centers[round_]]), np.append(np.zeros(len(corners)), radii[round_]))
 
@@ -128,19 +123,18 @@ def _hull(centers: Array, radii: Array) -> LinkBalls:
 def _balls(body: Raw) -> tuple[Array, Array]:
     """Centres and radii of a body in its own frame."""
     if isinstance(body, Mesh):
-        points = np.asarray(body.vertices, dtype=float)
-        return points, np.zeros(len(points))
+        return np.asarray(body.vertices, dtype=float), np.zeros(len(body.vertices))
     if isinstance(body, (Sphere, Capsule)):
         a, b, radius = body.capsule()
         return np.array([a, b]), np.full(2, radius)
     if isinstance(body, RawBox):
-        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * body.half
-        return corners, np.zeros(8)
+        return body.half * np.array([*itertools.product((-1, 1), repeat=3)]), np.zeros(8)
     if isinstance(body, RawCylinder):
-        angles = np.linspace(0.0, 2.0 * np.pi, RIM, endpoint=False)
-        ring = body.radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(RIM)], axis=1)
-        offset = np.array([0.0, 0.0, body.half])
-        return np.concatenate([ring + offset, ring - offset]), np.zeros(2 * RIM)
+        angles, z = (
+            np.tile(np.linspace(0.0, 2.0 * np.pi, RIM, endpoint=False), 2),
+            np.repeat([body.half, -body.half], RIM),
+        )
+        return np.stack([body.radius * np.cos(angles), body.radius * np.sin(angles), z], axis=1), np.zeros(2 * RIM)
     if isinstance(body, RawEllipsoid):
         radius = float(np.min(body.radii))
         return np.diag(body.radii - radius)[[0, 0, 1, 1, 2, 2]] * np.array([1, -1] * 3)[:, None], np.full(6, radius)

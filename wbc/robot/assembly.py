@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +24,11 @@ from wbc.validation import Array
 
 #: Two values of a joint this close are one [rad or m]
 SAME_VALUE = 1e-9
+
+#: What loops may move the neutral configuration by in silence: numbers of files are rounded [rad or m]
+SLIGHT = 1e-2
+#: Random starts from which loops are closed with joints where they are given
+SEARCHES = 20
 
 #: What Pinocchio has as position limits of the numbers of a quaternion or (cos, sin), which limit nothing
 PIN_UNIT = 1.01
@@ -102,11 +107,12 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     robot = _actuated(robot, description, recipe)
     for role, frame in recipe.frames.items():
         robot.check_frame(f"frames.{role}", frame)
+    loops = tuple(_unlocked(loop, locked) for loop in (*description.loops, *recipe.more_loops))
     if description.loops and not recipe.loops:
         names = ", ".join(loop.name for loop in description.loops)
         log.warning("%s: loops that are not kept closed, as load(loops=False) asked: %s", robot.name, names)
-    elif description.loops:
-        robot = robot.with_loops(*(_unlocked(loop, locked) for loop in description.loops))
+    elif loops:
+        robot = _closed(robot, loops, recipe.neutral)
     if still := [name for name, j in undriven.items() if int(model.idx_vs[j]) in robot.locked_dofs]:
         said = f"nothing drives {', '.join(still)}, which is no base: its velocity must stay 0"
         log.warning("%s: %s", description.source or model.name, said)
@@ -115,11 +121,7 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
 
 
 def _actuated(robot: Robot, description: Description, recipe: Recipe) -> Robot:
-    """The robot with motors where the recipe, or else the description, says; locked joints have none to name.
-
-    Raises:
-        RangeError: transmissions are asked for, and there are none. UnknownNameError: no such joint.
-    """
+    """The robot with motors where the recipe, or else the description, says; locked joints have none to name."""
     said = description.actuated
     if recipe.actuated == "transmissions":
         said = description.transmissions
@@ -131,12 +133,30 @@ def _actuated(robot: Robot, description: Description, recipe: Recipe) -> Robot:
     return robot.with_actuated(moved) if moved else robot
 
 
-def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
-    """A loop of a robot of which some joints are locked: what follows one of them stands still.
-
-    Raises:
-        LoopError: the joint that follows is locked, the one that leads it is not.
+def _closed(robot: Robot, loops: Sequence[AnyLoop], given: Mapping[str, float]) -> Robot:
+    """The robot with loops; joints with given values have them in ``neutral`` where loops close so, and where it is
+    elsewhere than the description says is noted.
     """
+    closed, start = robot.with_loops(*loops), robot.neutral
+    single = [name for name in robot.joint_names if robot.position_index[robot.dofs(name).start] >= 0]
+    kept = {name: float(start[robot.position_index[robot.dofs(name).start]]) for name in single if name in given}
+    modes = closed.assemblies(kept, count=SEARCHES) if kept else ()
+    closed = replace(closed, neutral=modes[0]) if modes else closed
+    gaps, moved = closed.loop_gaps(start), np.abs(closed.difference(start, closed.neutral))
+    worst, furthest = max(gaps, key=lambda name: gaps[name]), int(moved.argmax())
+    if moved[furthest] <= SLIGHT:
+        return closed
+    said = f"{worst} is open by {gaps[worst]:.3g} m or rad there: moved to where loops are closed, "
+    said += f"{robot.dof_names[furthest]} by {moved[furthest]:.3g} {robot.dof_units[furthest]}"
+    said = f"{closed.notes['neutral']}; {said}" if "neutral" in closed.notes else said
+    # What follows a curve is where that says, as what is coupled; frames that are apart are a mistake of the file
+    if not modes and any(gaps[loop.name] > SLIGHT for loop in loops if not isinstance(loop, JointCurve)):
+        log.warning("%s: neutral configuration: %s", robot.name, said)
+    return changed(closed, notes={**closed.notes, "neutral": said})
+
+
+def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
+    """A loop of a robot of which some joints are locked: what follows one of them stands still."""
     if not isinstance(loop, JointCurve) or not {loop.follower, loop.leader} & set(locked):
         return loop
     if loop.follower in locked:
@@ -148,11 +168,7 @@ def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
 
 
 def _check_order(model: pin.Model) -> None:
-    """Branch by branch, as files are read: else ``pin.crba`` and derivatives of ``pin.rnea`` are silently wrong.
-
-    Raises:
-        UnsupportedJointError: a joint whose parent is neither the one before it nor one that carries that.
-    """
+    """Branch by branch, as files are read: else ``pin.crba`` and derivatives of ``pin.rnea`` are silently wrong."""
     for j in range(1, model.njoints):
         at, parent = j - 1, int(model.parents[j])
         while at > parent:
@@ -296,12 +312,7 @@ def with_values(model: pin.Model, q: Array, values: Mapping[str, Array]) -> Arra
 def _locked(
     model: pin.Model, mimics: tuple[Mimic, ...], lock: Mapping[str, float | None], q: Array
 ) -> dict[str, Array]:
-    """Joint name -> where it is locked; locking one end of a mimic pair locks the other where the coupling puts it.
-
-    Raises:
-        ShapeError: a value for a joint with several degrees of freedom, which can only be locked as it is.
-        RangeError: two ends of a mimic pair at values that contradict each other.
-    """
+    """Joint name -> where it is locked; locking one end of a mimic pair locks the other where the coupling puts it."""
     values: dict[str, Array] = {}
     for name, value in lock.items():
         if value is not None and model.nvs[model.getJointId(name)] != 1:
@@ -390,11 +401,7 @@ def read_limits(model: pin.Model, base: str, notes: dict[str, str]) -> Limits:
 
 
 def _both_ways(key: str, names: list[str], lower: Array, upper: Array) -> Array:
-    """The largest size that a velocity or effort may have in both directions; a lower one that says more is said.
-
-    Raises:
-        RangeError: a negative size, or one direction only.
-    """
+    """The largest size that a velocity or effort may have in both directions; a lower one that says more is said."""
     out, uneven = np.array(upper), []
     for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
         if (low > 0.0 and (key == "velocity" or low == high)) or (high == 0.0 and np.isinf(low)):

@@ -62,6 +62,8 @@ class Loop:
     def __post_init__(self) -> None:
         validation.name("Loop.name", self.name)
         validation.one_of("Loop.kind", self.kind, LABELS)
+        if self.first == self.second:
+            raise RangeError("Loop.second", self.second, "a frame closes no loop with itself")
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -161,7 +163,7 @@ class LoopRows:
     Attributes:
         loops: in the order of their rows.
         bases: of each loop the directions of its residual that no other row has, rows x residual.
-        rows: label and unit of each row; one that mixes several is named by the largest of them.
+        rows: label and unit of each row; one that mixes several is named by the largest of them that no other row has.
         moved: of each loop the degrees of freedom that move it. Indices into v.
         held: of each linkage how many of its rows are independent at closed configurations; empty: not known.
     """
@@ -295,9 +297,7 @@ class Closing:
         ]
         rows = []
         for loop, basis in zip(self._loops, bases, strict=False):
-            for row in basis:
-                k = int(np.argmax(np.abs(row)))
-                label = loop.labels[k]
+            for label in _labels(basis, loop.labels):
                 turns = label.startswith("r")
                 unit = units[loop.follower] if isinstance(loop, JointCurve) else "rad" if turns else "m"
                 rows.append((f"{loop.name}.{label}", unit))
@@ -308,6 +308,17 @@ class Closing:
         ]
         held = (max(rank(each[np.ix_(part.rows, part.dofs)]) for each in kept) for part in made.linkages)
         return replace(made, held=tuple(held))
+
+
+def _labels(basis: Array, labels: Sequence[str]) -> list[str]:
+    """Of each row the label of its largest entry that no row before has."""
+    left = np.abs(basis)
+    out = list[str]()
+    for row in left:
+        k = int(row.argmax())
+        out.append(labels[k])
+        left[:, k] = -1.0
+    return out
 
 
 def rank(jacobian: Array) -> int:

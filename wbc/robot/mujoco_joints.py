@@ -87,11 +87,7 @@ class MujocoJoints:
         self.columns[j] = column
 
     def _compare(self, model: mujoco.MjModel, names: MjNames) -> None:
-        """Bodies at a random configuration, each seen from the first so that the robot may stand elsewhere.
-
-        Raises:
-            ShapeError: one is elsewhere.
-        """
+        """Bodies at a random configuration, each seen from the first so that the robot may stand elsewhere."""
         import mujoco
 
         robot, data = self._robot, mujoco.MjData(model)

@@ -13,6 +13,7 @@ from wbc import validation
 from wbc.errors import ShapeError, UnknownNameError
 from wbc.multibody import own
 from wbc.quick_dataclasses import dataclass
+from wbc.robot.loops import AnyLoop
 from wbc.shapes import Capsule, PlacedShape, Sphere
 from wbc.validation import Array
 
@@ -55,6 +56,7 @@ class Recipe:
         actuated: joints with motors, see :meth:`~wbc.robot.Robot.with_actuated`; ``"transmissions"``: those that the
             file has a ``<transmission>`` of; None: as an MJCF file says, else all.
         loops: whether closed loops of the description are kept, see :meth:`~wbc.robot.Robot.with_loops`.
+        more_loops: than the description has.
         arguments: of a xacro file, name -> value.
     """
 
@@ -75,6 +77,7 @@ class Recipe:
     problem: str = ""
     actuated: Sequence[str] | None = None
     loops: bool = True
+    more_loops: tuple[AnyLoop, ...] = ()
     arguments: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -654,7 +654,14 @@ class Robot:
                 frame.placement = away * frame.placement
         turned = (away.rotation @ part for part in (model.gravity.linear, model.gravity.angular))
         model.gravity, model.inertias[0] = library.Motion(*turned), away.act(model.inertias[0])
-        return changed(self, model=model)
+        loops = list(self.loops.loops)
+        for k, loop in enumerate(loops):
+            if isinstance(loop, Loop) and WORLD in (loop.first, loop.second):  # stays where the world was
+                origin = f"{loop.name}:{WORLD}"
+                model.addFrame(library.Frame(origin, 0, 0, away, library.FrameType.OP_FRAME))
+                first, second = (origin if end == WORLD else end for end in (loop.first, loop.second))
+                loops[k] = Loop(loop.name, first, second, loop.kind)
+        return changed(self, model=model, loops=replace(self.loops, loops=tuple(loops)))
 
     def with_limits(self, **changes: Any) -> Robot:
         """A copy with overridden limits.
@@ -777,11 +784,7 @@ def checked_robot(robot: Any) -> Robot:
 
 
 def _as_read(robot: Robot) -> Robot:
-    """The robot, whose model is what it was.
-
-    Raises:
-        RobotFileError: ``robot.model`` was changed in place.
-    """
+    """The robot, whose model is what it was."""
     handed_out = vars(robot).get(f"model{CONVERTED}")
     if isinstance(robot.tree, own.Model) and handed_out is not None and handed_out != to_pin(robot.tree):
         reason = "it was changed in place, which the robot does not see: use dataclasses.replace(robot, model=changed)"

@@ -96,7 +96,6 @@ class HeightMap(Solid):
 
     @property
     def sizes(self) -> tuple[float, float, float, float, float]:
-        """Steps along x and y, the base, half the length along y."""
         (rows, columns), (x, y) = self.heights.shape, self.size
         return (x / (columns - 1), y / (rows - 1), self.base, y / 2, 0.0)
 

@@ -44,7 +44,6 @@ class CoupledDynamics(ConstrainedDynamics):
         self._loops = _rows(robot, model) if robot.loops else None
 
     def reduced(self, matrix: Array) -> Array:
-        """G' X G."""
         return np.asarray(self._G.T @ matrix @ self._G)
 
     def coupled(self, q: Array, v: Array) -> tuple[Array, Array]:

@@ -75,11 +75,7 @@ class Gripping(ABC):
         return state.scale * self._drive.torque(state.motors, state.command, v, state.random)
 
     def _take(self, frame: str, pose: pin.SE3, kind: GripKind) -> pin.SE3:
-        """A frame is held from now on; returns where it is.
-
-        Raises:
-            UnknownNameError: no such kind. RangeError: held already, or out of reach.
-        """
+        """A frame is held from now on; returns where it is."""
         kind = GripKind(validation.one_of("kind", str(kind), [str(k) for k in GripKind]))
         pose = validation.pose("pose", pose)
         if frame in self._state.grips:

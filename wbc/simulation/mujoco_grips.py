@@ -103,7 +103,6 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         self.commands = Gripping.commands
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
-        """At a configuration, at rest or with a velocity, and nothing grasped."""
         super().reset(q, time, v)
         drive = self._drive
         self._state = _GripState(command=np.zeros(self.nv), motors=drive.fresh(), scale=drive.driven.copy(),
@@ -143,7 +142,6 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
 
     @property
     def state(self) -> PlantState:
-        """The truth, which is what is read."""
         return self.read()
 
     @property
@@ -164,7 +162,6 @@ class GrippingMujocoPlant(Gripping, MujocoPlant):
         return out
 
     def save(self) -> SavedMujocoState:
-        """As of :class:`MujocoPlant`, with grips, motors and the generator of noise."""
         return replace(super().save(), _grips=copy.deepcopy(self._state))
 
     def restore(self, saved: SavedMujocoState) -> None:

@@ -200,11 +200,7 @@ class NativeBehind:
 
 
 def _start(folder: Path) -> subprocess.Popen[str] | None:
-    """The process that makes a library from what a folder has, and prints its name; None without an interpreter.
-
-    Raises:
-        CompileError: this process ends. OSError: it cannot be started.
-    """
+    """The process that makes a library from what a folder has, and prints its name; None without an interpreter."""
     if getattr(sys, "frozen", False) or not sys.executable:
         return None
     if _work.ends.is_set():
@@ -224,11 +220,7 @@ def _start(folder: Path) -> subprocess.Popen[str] | None:
 
 
 def _finish(child: subprocess.Popen[str]) -> str:
-    """Wait for it: the name of what it made.
-
-    Raises:
-        CompileError: the compiler failed.
-    """
+    """Wait for it: the name of what it made."""
     with child:
         if _work.ends.is_set():
             _stop(child)

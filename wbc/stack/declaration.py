@@ -335,12 +335,7 @@ class Declaration:
         """An item is in the stack."""
 
     def _framed(self, item: Item, name: str, frame: str | None) -> tuple[Item, str]:
-        """The item as it is in its own world, and the name of the moving frame that is this world.
-
-        Raises:
-            UnknownNameError: no such moving frame. RangeError: an item to which frames mean nothing.
-            DuplicateNameError: a moving frame that has the name of one of the robot's.
-        """
+        """The item as it is in its own world, and the name of the moving frame that is this world."""
         if isinstance(item, MovingFrame) and name in self._robot.frame_names:
             raise DuplicateNameError("name", name, f"a frame of {self._robot.name!r} has this name")
         known = [entry.name for entry in self.entries if isinstance(entry.item, MovingFrame)]
@@ -467,11 +462,7 @@ def _frame(entry: Entry) -> list[dict[str, str]]:
 
 
 def _require_soft(item: Item, field: str, value: object) -> None:
-    """Refuse what cannot be soft.
-
-    Raises:
-        RangeError: a task, simple bounds, or rows of the actuators or the mechanism.
-    """
+    """Refuse what cannot be soft."""
     if not isinstance(item, Constraint):
         raise RangeError(field, value, "a task is never hard: it has a weight")
     if item.form == "bounds":

@@ -142,8 +142,8 @@ class SecondOrder:
             return Rows(ca.SX(0, self._layout.variables), ca.SX(0, 1), ca.SX(0, 1)), None, None
         if block.entry.yielding:
             return self._limits(block, item), None, None
-        if item.later:
-            return self._later(block, item, tracer), None, None
+        if (declared := item.later_rows(self._robot, tracer, inputs, self._b.dt)) is not None:
+            return self._later(block, declared, tracer), None, None
         if block.form == "rows":
             return self._rates(block, item, tracer), None, None
         margins = item.margins(robot, tracer, inputs)
@@ -191,11 +191,9 @@ class SecondOrder:
                 out[i] = ca.fmax(most - ca.fabs(self._still[i]), LEAST_SHARE * most) / inertia[i]
         return out
 
-    def _later(self, block: Block, item: Constraint, tracer: Tracer) -> Rows:
+    def _later(self, block: Block, declared: Rows, tracer: Tracer) -> Rows:
         """Rows on the velocity at the end of the tick, v + a dt."""
         b = self._b
-        declared = item.velocity_rows(self._robot, tracer, b.values(block), b.dt)
-        assert declared is not None
         matrix = tracer.expand(ca.SX(declared.matrix))
         now = ca.densify(matrix @ self._kinematics.v)
         ends = (tracer.expand(b.column(block, "side", end)) for end in (declared.lower, declared.upper))

@@ -115,11 +115,9 @@ class Kept:
         import pyarrow.parquet as pq
 
         path = self.folder / RESULTS
-        part = path.with_suffix(".part")
-        with validation.writing("study", path, RobotFileError):
+        with validation.replacing("study", path, RobotFileError) as fresh:
             about = {"study": json.dumps(self.study.data())}
-            pq.write_table(pa.table(self.table()).replace_schema_metadata(about), part)
-            part.replace(path)
+            pq.write_table(pa.table(self.table()).replace_schema_metadata(about), fresh)
         return path
 
     def __enter__(self) -> Kept:

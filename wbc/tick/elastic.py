@@ -33,7 +33,6 @@ class ElasticTick(SolvedTick):
         self._wide = Prepared(Daqp(layout.with_slacks + layout.general_rows, layout.general_rows))
 
     def answer(self, qp: QP) -> tuple[int, Array, Relaxed | None]:
-        """See the class; brakes where rows of the actuators cannot hold."""
         n, m = qp.n, qp.m
         nothing = BRAKED, self.rest(qp), None
         if not self.assembly.usable:

@@ -38,11 +38,7 @@ _capsule_name.restype, _capsule_name.argtypes = ctypes.c_char_p, [ctypes.py_obje
 
 @functools.cache
 def _evaluate() -> int:
-    """Address of what evaluates a buffer of CasADi.
-
-    Raises:
-        CompileError: its library does not have it.
-    """
+    """Address of what evaluates a buffer of CasADi."""
     # The one that is loaded: the wheel has the same library by several names, and another would be a second copy of it
     folder = os.path.dirname(ca.__file__)
     for name in sorted(name for name in os.listdir(folder) if name.startswith("libcasadi.")):

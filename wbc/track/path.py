@@ -155,11 +155,7 @@ def smooth_step(t: float, duration: float) -> tuple[float, float]:
 
 
 def _continuous(quaternions: Array) -> Array:
-    """Signs such that neighbours are nearest.
-
-    Raises:
-        RangeError: neighbours further apart than LARGEST_TURN.
-    """
+    """Signs such that neighbours are nearest."""
     out = continuous_quaternions(quaternions)
     for k in range(1, len(out)):
         angle = 2.0 * math.acos(min(float(out[k] @ out[k - 1]), 1.0))

@@ -314,13 +314,7 @@ def _quads(rings: Array) -> Array:
 
 
 def _fill(screen: Array, names: Numbers, least: Numbers, owner: Numbers, width: int, height: int) -> None:
-    """Keep, at each pixel whose middle lies in a triangle, the least third coordinate and whose it is.
-
-    Args:
-        screen: (column, row, a coordinate that is linear in them) of the corners, m x 3 x 3.
-        names: m numbers.
-        least, owner: what is kept, height * width.
-    """
+    """Keep, at each pixel whose middle lies in a triangle, the least third coordinate and whose it is."""
     low, high = _extremes(screen[..., 1])
     first = np.clip(np.ceil(low - 0.5), 0, height).astype(np.int64)
     rows = np.maximum(np.clip(np.floor(high - 0.5), -1, height - 1).astype(np.int64) - first + 1, 0)

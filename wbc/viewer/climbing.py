@@ -98,7 +98,6 @@ class WalkOperation(Operation):
     # What a page says
 
     def check(self, message: Mapping[str, Any]) -> None:
-        """Raise what :meth:`obey` would raise for values, and change nothing."""
         ids = tuple(foothold.id for foothold in self.loop.scene.footholds)
         checked(message, ids, tuple(limb.name for limb in self.climber.limbs))
 
@@ -132,7 +131,6 @@ class WalkOperation(Operation):
             super().obey(message)
 
     def stop(self, reason: str) -> None:
-        """Come to rest along the plan; the first reason stays."""
         if not self.stopped:
             self.stopped = reason
             self._rest()
@@ -269,17 +267,12 @@ class WalkOperation(Operation):
 
     def _approve(self, move: ContactMove) -> str | None:
         """The answer to a lift, once there is one."""
-        named = self._named(move)
+        named = self.loop.plan.told(move)
         if self._answer is not None and self._answer[0] == named:
             answer, self._answer = self._answer[1], None
             return answer
         self.waiting = named
         return None
-
-    def _named(self, move: ContactMove) -> str:
-        ids = [foothold.id for foothold in self.loop.plan.scene.footholds]
-        source, target = ("the air" if row == FREE_LIMB else ids[row] for row in (move.leaves, move.lands))
-        return f"{self.climber.limbs[move.limb].name}: {source} -> {target}"
 
     # What a page is told
 

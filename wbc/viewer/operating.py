@@ -35,7 +35,6 @@ class PairOperation(Operation):
         self._order: Order | None = None
 
     def check(self, message: Mapping[str, Any]) -> None:
-        """Raise what :meth:`obey` would raise for values, and change nothing."""
         self.pairing.checked(message)
 
     def obey(self, message: Mapping[str, Any]) -> None:
@@ -67,13 +66,11 @@ class PairOperation(Operation):
             self._order = Order(tuple((full * np.clip(message["rates"], -1.0, 1.0)).tolist()))
 
     def stop(self, reason: str) -> None:
-        """Brake, see the class; the first reason stays."""
         if not self.stopped:
             self.stopped, self._order = reason, Order(stop=True)
             self.session.control.halt()
 
     def resume(self) -> None:
-        """Obey again, from rest."""
         self.stopped = ""
 
     def take(self) -> Order | None:

@@ -288,11 +288,7 @@ class Session:
         return Tick(self._controller, tick.state._replace(data=numbers.tobytes()))
 
     def _send(self, message: dict[str, Any]) -> None:
-        """On to the loop.
-
-        Raises:
-            WbcError: what it would refuse.
-        """
+        """On to the loop."""
         if self._link is None:
             raise ViewerError(message["type"], "recording", "a recording obeys nobody")
         if self._scenery is not None:

@@ -37,11 +37,7 @@ def _scale(relation: Relation) -> int:
 def _terms(
     half: HalfAngles, form: HalfPoly, degrees: tuple[int, ...], scale: int, q: Any, functions: tuple[Any, Any]
 ) -> Iterator[Any]:
-    """Terms of a form in sin(q/2), cos(q/2) of given degrees, over a scale, at numbers or at arrays of one shape.
-
-    Args:
-        functions: sine and cosine of such.
-    """
+    """Terms of a form in sin(q/2), cos(q/2) of given degrees, over a scale, at numbers or at arrays of one shape."""
     sine, cosine = functions
     symbols = [float(v) for v in half.ring.symbols.values()]
     for powers, number in form.terms():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from wbc.analysis.algebra.trig_form import TrigForm
 from wbc.errors import RangeError
 from wbc.native.kernel import kernel
+from wbc.native.structures import CStructures
 from wbc.validation import Array
 
 _SOURCES = Path(__file__).parent / "native"
@@ -26,23 +27,8 @@ _ROOM = 2000
 _KEPT = 64
 
 
-class _Form(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_int) for name in ("rows", "cols", "joints", "waves", "terms")] + [
-        (name, ctypes.c_void_p) for name in ("w", "start", "wave", "a", "b")
-    ]
-
-
-class _Proofs(ctypes.Structure):
-    _fields_ = [("proofs", ctypes.c_int), ("ends", ctypes.c_void_p), ("forms", ctypes.c_void_p)]
-
-
-class _Totals(ctypes.Structure):
-    _fields_ = [
-        *((name, ctypes.c_double) for name in ("boxes", "regular", "tube", "undecided")),
-        *((name, ctypes.c_double) for name in ("regular_part", "tube_part", "undecided_part")),
-        ("pending", ctypes.c_long),
-        ("kept", ctypes.c_long),
-    ]
+_STRUCTURES = CStructures(_SOURCES / "form.h", _SOURCES / "subdivide.c")
+_Form, _Proofs, _Totals = map(_STRUCTURES.structure, ("Form", "Proofs", "Totals"))
 
 
 @dataclass(frozen=True)
@@ -113,7 +99,7 @@ class BoxSearch:
         counts = Counts(*(getattr(totals, f.name) for f in fields(Counts)))
         return counts, stack[: totals.pending].copy(), kept[: totals.kept].copy()
 
-    def _form(self, form: TrigForm) -> _Form:
+    def _form(self, form: TrigForm) -> Any:
         sizes = dict(zip(_MOST, (*form.shape, form.waves.shape[1], len(form.waves)), strict=True))
         for name, most in _MOST.items():
             if sizes[name] > most:

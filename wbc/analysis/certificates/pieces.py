@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -129,14 +128,9 @@ class BoxPieces:
         if self._path is None:
             return
         boxes = np.concatenate([*self._waiting, *running, np.empty((0, self.kept.shape[1]))])
-        fresh = self._path.with_name(self._path.name + ".part")
-        with validation.writing("state", self._path, RobotFileError):
-            with fresh.open("wb") as file:
-                counts = np.array(astuple(self.counts))
-                np.savez_compressed(
-                    file, name=self._name, boxes=boxes, kept=self.kept, counts=counts, seconds=self.seconds
-                )
-            os.replace(fresh, self._path)
+        counts = np.array(astuple(self.counts))
+        with validation.replacing("state", self._path, RobotFileError) as fresh, fresh.open("wb") as file:
+            np.savez_compressed(file, name=self._name, boxes=boxes, kept=self.kept, counts=counts, seconds=self.seconds)
 
     def _load(self, path: Path) -> None:
         try:

@@ -90,11 +90,7 @@ def _analyse_arm(asked: AnalysisAsked, robot: str, own: list[Rows]) -> list[dict
 
 
 def _analyse_tree(asked: AnalysisAsked, robot: str) -> list[dict[str, Any]]:
-    """Sets of a tree by name, all of them by default, by blocks.
-
-    Raises:
-        UnknownNameError: no such set. RangeError: an option that has no meaning for blocks.
-    """
+    """Sets of a tree by name, all of them by default, by blocks."""
     for option in ("approximate", "full", "screen"):
         if value := getattr(asked, option):
             reason = "not for a tree, which is decided by blocks: analyse its arms (ssrms, spdm --full) by themselves"

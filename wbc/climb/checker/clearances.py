@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 # isort: split
 from wbc.multibody import pin
@@ -172,11 +173,10 @@ def _lower_near(
     pose = climbed.scene.footholds[row].pose
     offs, normal = pose.translation - climbed.tips[0][first:last, limb], pose.rotation[:, 2]
     beside = ASIDE + rules.hold_distance
-    for k in np.flatnonzero(offs @ normal <= rules.depth).tolist():
-        if around.distance(link, body, first + k) < rules.clearance:
-            held = around.distance(link, body, first + k, offs[k])
-            lowest = held + RISES * max(float(np.linalg.norm(offs[k])) - beside, 0.0) - rules.depth
-            floor[first + k] = min(floor[first + k], lowest)
+    for k in around.nearer(link, body, first + np.flatnonzero(offs @ normal <= rules.depth), rules.clearance):
+        held = around.distance(link, body, k, offs[k - first])
+        lowest = held + RISES * max(float(np.linalg.norm(offs[k - first])) - beside, 0.0) - rules.depth
+        floor[k] = min(floor[k], lowest)
 
 
 def _outside(climbed: Climbed, limb: int, body: _SweptPart, rules: CheckRules) -> Array:
@@ -218,6 +218,16 @@ class _PairDistances:
         self._known[key] = self._between(a, b, first, other)
         return self._known[key]
 
+    def nearer(self, a: _SweptPart, b: _SweptPart, ticks: NDArray[np.intp], distance: float) -> list[int]:
+        """Those of some ticks at which two parts are nearer to each other than so much [m]."""
+        passed, known, out = np.append(0.0, np.cumsum(self._ball(a)[1] + self._ball(b)[1])), -np.inf, list[int]()
+        for k in ticks.tolist():
+            # What was measured, less the way since
+            if known - passed[k] < distance:
+                known = self.distance(a, b, k) + passed[k]
+                out += [k] if known - passed[k] < distance else []
+        return out
+
     def room(self, a: _SweptPart, b: _SweptPart, floor: Array) -> Array:
         """How far above ``floor`` ``(n)`` the distance is, from each tick to the next one: proven to be, within the
         rule's tolerance, where that is above 0; counted up to ``FAR`` [m].
@@ -231,8 +241,13 @@ class _PairDistances:
         near = apart < FAR + floor + np.append(travel, 0.0)
         near[1:] |= near[:-1].copy()
         values = apart - floor
+        passed, least, known = np.concatenate([[0.0], np.cumsum(travel)]), FAR, -np.inf
         for k in np.flatnonzero(near).tolist():
-            values[k] = self.distance(a, b, k) - floor[k]
+            # What was measured, less the way since: ticks and ways that it leaves above the least one are not the worst
+            values[k] = known - passed[k] - floor[k]
+            if values[k] + passed[k] - passed[min(k + 1, len(travel))] <= least:
+                values[k] = self.distance(a, b, k) - floor[k]
+                known, least = values[k] + floor[k] + passed[k], min(least, values[k])
         out = np.minimum(values, FAR)
         step = np.minimum(floor[:-1], floor[1:]) - floor[:-1]
         proven = (values[:-1] + values[1:] + floor[1:] - floor[:-1] - travel) / 2.0 - step

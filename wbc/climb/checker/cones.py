@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from wbc.climb.checker.record import OPEN, Climbed
@@ -16,6 +17,8 @@ FIXES = 1e-4
 STANDARD = 9.80665
 #: Largest slack that is asked for, in weights: cones that hold more are all the same
 ENOUGH = 10.0
+#: Rows of cones that differ by less are the same
+SAME_ROW = 1e-12
 
 
 def check_cones(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> None:
@@ -52,9 +55,13 @@ def _instants(climbed: Climbed, every: float) -> list[int]:
     return sorted({*changes.tolist(), *(changes + 1).tolist(), *regular.tolist(), len(climbed.t) - 1})
 
 
-def cone_at(climbed: Climbed, limb: int, row: int) -> tuple[Array, Array]:
-    """A and b of a limb at a foothold, of whose frictions the lower counts."""
-    return climbed.climber.limbs[limb].contact.lower(climbed.scene.footholds[row].friction).cone()
+def cone_at(climbed: Climbed, limb: int, row: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """A and b of a limb at a foothold, of whose frictions the lower counts, and which rows have a slack to give: a
+    component that cannot be borne at all is two rows with b = 0.
+    """
+    a, b = climbed.climber.limbs[limb].contact.lower(climbed.scene.footholds[row].friction).cone()
+    opposed = np.any(np.all(np.abs(a[:, None] + a) < SAME_ROW, axis=2), axis=1)
+    return a, b, (b != 0.0) | ~opposed
 
 
 def _margin(climbed: Climbed, k: int, mass: float, gravity: Array) -> float:
@@ -71,12 +78,10 @@ def _margin(climbed: Climbed, k: int, mass: float, gravity: Array) -> float:
         turn = climbed.tips[1][k][limb] if turned else climbed.scene.footholds[row].pose.rotation
         arm = pin.skew(places[limb])
         balance.append(np.block([[turn, np.zeros((3, 3))], [arm @ turn, turn]]))
-        a, b = cone_at(climbed, limb, row)
+        a, b, gives = cone_at(climbed, limb, row)
         wide = np.zeros((len(a), 6 * len(closed) + 1))
         wide[:, 6 * at : 6 * at + 6] = a
-        # A component that cannot be borne at all is two rows with b = 0: they have no slack to give
-        equal = (b == 0.0) & np.array([bool((np.abs(a + one) < 1e-12).all(axis=1).any()) for one in a])
-        wide[:, -1] = np.where(equal, 0.0, np.linalg.norm(a, axis=1))
+        wide[:, -1] = gives * np.linalg.norm(a, axis=1)
         rows.append(wide)
         limits.append(b / weight)
     if not closed:
@@ -110,7 +115,7 @@ def _check_logged(climbed: Climbed, rules: CheckRules, tally: RuleTally, weight:
     for limb, own in enumerate(climbed.climber.limbs):
         for first, last, row in climbed.stretches(limb):
             if row != OPEN:
-                a, b = cone_at(climbed, limb, row)
+                a, b, _ = cone_at(climbed, limb, row)
                 beyond = (climbed.wrenches[first:last, limb] @ a.T - b).max(axis=1) / weight
                 where = f"{own.name} on {climbed.scene.footholds[row].id}"
                 tally.add(rule, beyond, climbed.t[first:last], where)

@@ -67,7 +67,7 @@ class LimbMachine:
 
     Attributes:
         state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
-        frame: name of its contact frame.
+        frame: name of its contact frame. moves: those of the plan that are not over.
     """
 
     def __init__(self, limb: ClimbLimb, parts: LoopParts) -> None:
@@ -87,7 +87,7 @@ class LimbMachine:
         self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
         self._data = parts.robot.model.createData()
         self.state, self.held, self._since = LimbState.FREE, FREE_LIMB, 0.0
-        self._late, self._moves, self._target = 0.0, list[ContactMove](), pin.SE3.Identity()
+        self._late, self.moves, self._target = 0.0, list[ContactMove](), pin.SE3.Identity()
         self._footholds: tuple[Foothold, ...] = ()
         self._contact.enabled = False
 
@@ -95,7 +95,7 @@ class LimbMachine:
 
     def begin(self, moves: list[ContactMove], plan: ContactPlan, reference: PlanReference, held: int) -> None:
         """A plan begins, in which this limb has these moves and is closed on a foothold, or not."""
-        self._moves, self._footholds, self._reference = moves, tuple(plan.scene.footholds), reference
+        self.moves, self._footholds, self._reference = moves, tuple(plan.scene.footholds), reference
         self._gone, self._late, self.held = set[int](), 0.0, held
         self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
 
@@ -113,7 +113,7 @@ class LimbMachine:
     @property
     def coming(self) -> ContactMove | None:
         """The move that is under way or comes next; None: no more."""
-        return self._moves[0] if self._moves else None
+        return self.moves[0] if self.moves else None
 
     @property
     def aim(self) -> int:
@@ -122,17 +122,12 @@ class LimbMachine:
         under_way = self.state in (LimbState.SWINGING, LimbState.REACHING)
         return move.lands if under_way and move is not None else FREE_LIMB
 
-    @property
-    def moves(self) -> list[ContactMove]:
-        """Those that are not over."""
-        return self._moves
-
     def missing(self, rows: set[int]) -> str:
         """Footholds are gone: what of this limb's plan cannot be done, in words; "" for nothing."""
         said = ""
         if self.state in CLOSED and self.held in rows:
             said = f"the foothold {self._footholds[self.held].id} of {self.name} is gone"
-        for move in self._moves:
+        for move in self.moves:
             if move.lands in rows:
                 self._gone.add(move.lands)
                 said = said or f"the foothold {self._footholds[move.lands].id} that {self.name} was to land on is gone"
@@ -224,7 +219,7 @@ class LimbMachine:
         elif cause is Cause.NEW_PLAN and state is LimbState.HELD and self._force is not None:
             self._force.ramp(self._bearing, self._loading)
         elif cause in (Cause.SETTLED, Cause.NO_FOOTHOLD):
-            self._moves = self._moves[1:]
+            self.moves = self.moves[1:]
         if state is LimbState.SWINGING and move is not None and move.lands != FREE_LIMB:
             self._target = self._at(move.lands, move.land)
         return state

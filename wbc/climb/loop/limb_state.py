@@ -41,6 +41,8 @@ class Cause(StrEnum):
     NEW_PLAN = "a new plan begins"
 
 
+#: States in which a limb's contact is closed
+CLOSED = frozenset({LimbState.HELD, LimbState.UNLOADING, LimbState.LATCHING})
 #: (state, cause) -> next state: what is not here does not happen
 TRANSITIONS: dict[tuple[LimbState, Cause], LimbState] = {
     (LimbState.HELD, Cause.LIFT_NEARS): LimbState.UNLOADING,
@@ -50,23 +52,14 @@ TRANSITIONS: dict[tuple[LimbState, Cause], LimbState] = {
     (LimbState.SWINGING, Cause.NO_FOOTHOLD): LimbState.FREE,
     (LimbState.REACHING, Cause.AT_FOOTHOLD): LimbState.LATCHING,
     (LimbState.LATCHING, Cause.SETTLED): LimbState.HELD,
-    # A foothold that gives way
-    (LimbState.HELD, Cause.HOLD_LOST): LimbState.FREE,
-    (LimbState.UNLOADING, Cause.HOLD_LOST): LimbState.FREE,
-    (LimbState.LATCHING, Cause.HOLD_LOST): LimbState.FREE,
-    # A limb that fails
-    (LimbState.HELD, Cause.LIMB_FAILED): LimbState.FREE,
-    (LimbState.UNLOADING, Cause.LIMB_FAILED): LimbState.FREE,
-    (LimbState.LATCHING, Cause.LIMB_FAILED): LimbState.FREE,
+    # A foothold that gives way, or a limb that fails
+    **{(state, cause): LimbState.FREE for state in CLOSED for cause in (Cause.HOLD_LOST, Cause.LIMB_FAILED)},
     # A plan that begins where another was broken off: limbs that are closed hold, those in the air are free
     (LimbState.UNLOADING, Cause.NEW_PLAN): LimbState.HELD,
     (LimbState.LATCHING, Cause.NEW_PLAN): LimbState.HELD,
     (LimbState.SWINGING, Cause.NEW_PLAN): LimbState.FREE,
     (LimbState.REACHING, Cause.NEW_PLAN): LimbState.FREE,
 }
-
-#: States in which a limb's contact is closed
-CLOSED = frozenset({LimbState.HELD, LimbState.UNLOADING, LimbState.LATCHING})
 
 
 def after(state: LimbState, cause: Cause) -> LimbState:

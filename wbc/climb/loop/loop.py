@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from math import inf, sqrt
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,8 @@ OVERLOAD = 0.1
 RESTING = 2.0
 #: How far from the present plan another one may begin that goes on from it [m, rad]
 CONTINUES = 1e-6
+#: How far from where the robot is the next plan may begin [m, rad]: limbs under torques close beside their footholds
+BEGINS = 0.05
 #: States before a lift
 STANDING = (LimbState.HELD, LimbState.UNLOADING, LimbState.FREE)
 #: Changes of one limb's state within a tick, at most
@@ -129,6 +132,8 @@ class ClimbLoop:
         place: what plans a move to a foothold that ``approve`` names instead; ``replan`` plans the rest.
         step: of the controller, of the last tick; None: there was none.
         waiting: the move that waits for an answer. refused: why a foothold that was named is not taken; "" if it is.
+        stopped: why :meth:`stop` was called; "" where the run goes on.
+        reference, path_time: motion of the plan that is carried out now, and where on it the robot is [s].
 
     Raises:
         ShapeError, RangeError: a plan that is none, or that motors and contacts do not bear at rest under torques; a
@@ -155,39 +160,32 @@ class ClimbLoop:
         stack = climb_stack(plan.climber, plan.scene.gravity, self.dt, kind)
         command: Any = str(kind)
         self.robot, self.controller = stack.robot, stack.compile(command=command, backend=backend)
-        grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
-        self._grips = grips
-        parts = LoopParts(self.robot, stack, self.controller, options, grips, self._torques, self.dt)
+        self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
+        parts = LoopParts(self.robot, stack, self.controller, options, self._grips, self._torques, self.dt)
         self._limbs = [LimbMachine(limb, parts) for limb in plan.climber.limbs]
         self._set_gains(options)
         fields = ("target", "feedforward", *(["acceleration"] * self._torques))
         self._follow = InputGroup(core_of(self.controller), [("reference", field, None) for field in fields])
         self._planned, self._seen = self.robot.model.createData(), self.robot.model.createData()
         self._changes: list[tuple[float, str, LimbState, Cause]] = []
+        self._states: list[int] = []
         self._plans: list[ContactPlan] = []
         self._footholds: dict[str, Foothold] = {}
         self._recorder, self._logs = ClimbRecorder(plan, self._torques, self.dt), options.log
         self.step: Step | None = None
         self._outcome: ClimbOutcome | None = None
         self._reason, self._scene, self._in_sight = "", plan.scene, plan.scene
-        self._needs, self._turns, self._late, self._due = "", "", False, -inf
         self._failed: set[str] = set()
         self.approve: Approve | None = None
-        self.place: Placed = _place_by(plan.climber)
-        self.waiting: ContactMove | None = None
-        self.refused, self._stopped, self._other, self._aside = "", "", "", False
+        self.place: Placed = partial(_placed, plan.climber)
+        self.refused, self.stopped = "", ""
         self._unload, self._patience = (options.unload if self._torques else 0.0), options.patience
         self._pace = PlanPace(self.robot, self.dt, hard=not self._torques)
         self._noted: list[tuple[float, str]] = []
-        self._states: list[int] = []
-        self._granted: set[int] = set()
         self._broken, self._ends_by, self._given_way = "", inf, 0
-        self._path_time = 0.0
-        self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
         self._ahead = StateAhead(self.robot, options.delay, self.dt)
         self._state = self._connection.reset(np.array(plan.q[0], dtype=float))
-        felt: FeltPlant | None = plant if self._torques and isinstance(plant, FeltPlant) else None
-        self._felt = felt
+        self._felt: FeltPlant | None = plant if self._torques and isinstance(plant, FeltPlant) else None
         self._motors = MotorWatch(self.robot, self.dt, options.delay)
         self._motors.begin(self._state.q, self._state.v)
         self.controller.reset(self._state.q)
@@ -201,6 +199,26 @@ class ClimbLoop:
         motion = self._state.q, self._state.v, np.zeros(self.robot.nv)
         none = np.zeros(len(WRENCH) * len(self._limbs)) if self._torques else None
         self._recorder.add((self.time, 0.0), motion, self._logged(), self._states, True, none)
+
+    def _begin(self, plan: ContactPlan, goes_on: bool = False) -> None:
+        """A plan, from where the robot is, which is as fast as the plan at once where it goes on from another one."""
+        self._plans.append(plan)
+        for foothold in plan.scene.footholds:
+            self._footholds.setdefault(foothold.id, foothold)
+        rows = {name: row for row, name in enumerate(self._footholds)}
+        self._log_rows = [rows[foothold.id] for foothold in plan.scene.footholds]
+        reference = self.reference = PlanReference(plan, self.robot)
+        ordered = sorted(plan.moves, key=lambda move: move.lift)
+        self._hand_overs = HandOvers(ordered, reference, self._unload)
+        for row, limb in enumerate(self._limbs):
+            limb.begin([move for move in ordered if move.limb == row], plan, reference, plan.start[row])
+        self._needs, self._turns, self._late, self._due = "", "", False, -inf
+        self.waiting: ContactMove | None = None
+        self._granted: set[int] = set()
+        self._other, self._aside, self.path_time = "", False, 0.0
+        self._pace.begin(reference, 1.0 if goes_on else _rate_along(plan.v[0], self._state.v))
+        self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
+        self._look()
 
     # ------------------------------------------------------------------ what users do
 
@@ -258,10 +276,15 @@ class ClimbLoop:
         """What the scene is from now on: footholds may have gone or come, and bodies appeared.
 
         Raises:
-            RangeError: a scene with another gravity.
+            RangeError: a scene with another gravity, or a foothold that is elsewhere than it was.
         """
         if not np.array_equal(scene.gravity, self._scene.gravity):
             raise RangeError("scene.gravity", scene.gravity, "the stack was compiled for another one")
+        for foothold in scene.footholds:
+            known = self._footholds.get(foothold.id, foothold).pose
+            if known is not foothold.pose and known != foothold.pose:
+                place = foothold.pose.translation.tolist()
+                raise RangeError(f"scene.footholds, {foothold.id}", place, "it was elsewhere; give it another id there")
         before, there = ({foothold.id for foothold in some.footholds} for some in (self._in_sight, scene))
         for row, name in enumerate(self._footholds):
             if (name in before) != (name in there):
@@ -312,12 +335,12 @@ class ClimbLoop:
         Args:
             reason: in words.
         """
-        self._stopped = validation.name("reason", reason)
+        self.stopped = validation.name("reason", reason)
         self._grant_unavoidable()
 
     def carry_on(self) -> None:
         """Go on after :meth:`stop`."""
-        self._stopped, self._due = "", -inf
+        self.stopped, self._due = "", -inf
 
     def fail(self, limb: str) -> None:
         """A limb holds no more, now and for the rest of the run; its joints still move. What is left of the plan is not
@@ -329,6 +352,7 @@ class ClimbLoop:
         names = [one.name for one in self._limbs]
         machine = self._limbs[names.index(validation.one_of("limb", limb, names))]
         self._failed.add(limb)
+        machine.missing({move.lands for move in machine.moves})
         if machine.state in CLOSED:
             self._change(machine, Cause.LIMB_FAILED)
         self._scene = self._able(self._scene)
@@ -345,11 +369,6 @@ class ClimbLoop:
         return self._scene
 
     @property
-    def stopped(self) -> str:
-        """Why :meth:`stop` was called; "" where the run goes on."""
-        return self._stopped
-
-    @property
     def still(self) -> bool:
         """Whether the robot is at rest."""
         return self._pace.rate <= 0.0 and bool(np.abs(self._state.v).max() < STILL)
@@ -357,13 +376,8 @@ class ClimbLoop:
     @property
     def steady(self) -> bool:
         """Whether its plan goes on at its full rate, by velocities, and nothing keeps it from that."""
-        kept = self._needs or self._turns or self._stopped or self._other or self._late or self._torques
+        kept = self._needs or self._turns or self.stopped or self._other or self._late or self._torques
         return not kept and self._pace.rate == 1.0 and self._outcome is None
-
-    @property
-    def reference(self) -> PlanReference:
-        """The motion of the plan that is carried out now."""
-        return self._reference
 
     @property
     def plan(self) -> ContactPlan:
@@ -374,11 +388,6 @@ class ClimbLoop:
     def held(self) -> tuple[int, ...]:
         """Of each limb the row of the foothold in the plan's scene that it holds, or ``FREE_LIMB``."""
         return tuple(self._held)
-
-    @property
-    def path_time(self) -> float:
-        """Of that plan [s]."""
-        return self._path_time
 
     @property
     def coming(self) -> tuple[ContactMove, ...]:
@@ -425,27 +434,27 @@ class ClimbLoop:
         dt = self.dt
         if self._turns and all(limb.state in STANDING for limb in self._limbs):
             self._needs, self._turns = self._needs or self._turns, ""
-        stops = self._needs or self._late or self._stopped or self._other
-        aimed = 0.0 if stops else min(self._followed(), self._hand_overs.rate(self._path_time))
+        stops = self._needs or self._late or self.stopped or self._other
+        aimed = 0.0 if stops else min(self._followed(), self._hand_overs.rate(self.path_time))
         end = self._before_lifts() if self._turns or self.approve or aimed == 0.0 else inf
         rate = self._pace.rate
         if rate != aimed or end < inf:
-            rate = self._pace.go(self._path_time, aimed, end)
-        rests = rate <= 0.0 and (self._needs or self._other) and not self._stopped and self.still
+            rate = self._pace.go(self.path_time, aimed, end)
+        rests = rate <= 0.0 and (self._needs or self._other) and not self.stopped and self.still
         if rests or self.time > self._ends_by:
             self._plan_anew()
             return
-        ahead = self._path_time + rate * dt
+        ahead = self.path_time + rate * dt
         if ahead >= self._due:
             ahead = self._advance_limbs(ahead)
             if self._outcome is not None:
                 return
             if ahead in self._hand_overs.moving:
                 # A plan that was held up where it moves goes on from rest
-                self._pace.rate = min(rate, (ahead - self._path_time) / dt)
-        q_next = self._reference.q(ahead)
+                self._pace.rate = min(rate, (ahead - self.path_time) / dt)
+        q_next = self.reference.q(ahead)
         self._write(q_next)
-        self._path_time, state = ahead, self._state
+        self.path_time, state = ahead, self._state
         if self._torques:
             step = self.controller.step(*self._ahead.met(state.q, state.v))
             command, wrenches = step.torque, self._wrenches(step.forces)
@@ -465,11 +474,11 @@ class ClimbLoop:
             self._given_way = 0 if step.status == "solved" else self._given_way + 1
             if self._given_way * dt > OVERLOAD and not self._broken:
                 self._break(_gave_way(step))
-        if ahead >= self._reference.end and not self._broken and all(limb.coming is None for limb in self._limbs):
+        if ahead >= self.reference.end and not self._broken and all(limb.coming is None for limb in self._limbs):
             # Motors at their limits, or a load that nobody knows, may have kept the body from where the plan ends
             if self._followed() > ARRIVED:
                 self._go_on()
-            elif ahead > self._reference.end + self._patience:
+            elif ahead > self.reference.end + self._patience:
                 away = float(np.linalg.norm(state.q[:3] - self._q[:3]))
                 self._end(ClimbOutcome.STOPPED, f"the body is {1e3 * away:.1f} mm off the end of the plan")
 
@@ -551,26 +560,26 @@ class ClimbLoop:
                 ready = limb.state is LimbState.FREE or limb.unloaded(now)
                 # A plan that is given up comes to rest behind that, as soon as joints can, the limb still held
                 if not self._needs and not (ready and self._may_lift(move) and self._borne(limb, move)):
-                    ahead = max(min(ahead, move.lift), self._path_time)
+                    ahead = max(min(ahead, move.lift), self.path_time)
             if move is not None and move.land < ahead and limb.state not in STANDING:
                 # What comes after a landing counts on its load, which by torques takes a time, or has its limb lift
                 loads = self._torques and limb.state is not LimbState.SWINGING
                 again = any(later.lift < ahead for later in limb.moves[1:2])
                 if again or (loads and move.land in self._hand_overs.resting):
-                    ahead = max(min(ahead, move.land), self._path_time)
+                    ahead = max(min(ahead, move.land), self.path_time)
         self._late = False
         for limb in self._limbs:
             for _ in range(CHANGES):
                 move = limb.coming
                 may = move is None or (self._may_lift(move) and self._borne(limb, move))
-                cause = limb.cause(ahead, self._path_time, q, now, may)
+                cause = limb.cause(ahead, self.path_time, q, now, may)
                 if cause is None:
                     break
                 self._change(limb, cause)
                 if cause is Cause.SETTLED:
                     # It bears for a tick at least, also where it is to lift again at once
                     break
-            if limb.wait(self._path_time):
+            if limb.wait(self.path_time):
                 self._late = True
                 late = "" if self._needs else limb.too_late(q)
                 if late:
@@ -586,11 +595,12 @@ class ClimbLoop:
         """Whether nothing keeps a limb that is not in the air from its next move."""
         if self._needs:
             return False
-        return id(move) in self._granted or not (self._turns or self._stopped or self._other or self.approve)
+        return id(move) in self._granted or not (self._turns or self.stopped or self._other or self.approve)
 
     def _before_lifts(self) -> float:
         """Time of the plan of the first lift that may not be made now [s]; whoever has a say is asked."""
-        first, self.waiting = inf, None
+        self.waiting = None
+        first = inf
         for limb in self._limbs:
             move = limb.coming
             if move is None or limb.state not in STANDING:
@@ -598,8 +608,8 @@ class ClimbLoop:
             lift = move.lift
             if self.approve and id(move) not in self._granted and limb.state is not LimbState.UNLOADING:
                 lift -= self._unload
-                near = not self._pace.stops(self._path_time + 2.0 * self.dt, lift)
-                if near and not (self._needs or self._turns or self._stopped or self._other):
+                near = not self._pace.stops(self.path_time + 2.0 * self.dt, lift)
+                if near and not (self._needs or self._turns or self.stopped or self._other):
                     self._ask(self.approve, move)
             if self._late or not self._may_lift(move):
                 first = min(first, lift)
@@ -622,7 +632,7 @@ class ClimbLoop:
             move = limb.coming
             if move is None or limb.state not in STANDING or self.approve:
                 continue
-            if move.lift >= self._path_time and not self._pace.stops(self._path_time, move.lift, self._pace.rate):
+            if move.lift >= self.path_time and not self._pace.stops(self.path_time, move.lift, self._pace.rate):
                 self._granted.add(id(move))
         self._due = -inf
 
@@ -639,33 +649,21 @@ class ClimbLoop:
 
     # ------------------------------------------------------------------ plans
 
-    def _begin(self, plan: ContactPlan, goes_on: bool = False) -> None:
-        """A plan, from where the robot is, which is as fast as the plan at once where it goes on from another one."""
-        self._plans.append(plan)
-        for foothold in plan.scene.footholds:
-            self._footholds.setdefault(foothold.id, foothold)
-        rows = {name: row for row, name in enumerate(self._footholds)}
-        self._log_rows = [rows[foothold.id] for foothold in plan.scene.footholds]
-        reference = self._reference = PlanReference(plan, self.robot)
-        ordered = sorted(plan.moves, key=lambda move: move.lift)
-        self._hand_overs = HandOvers(ordered, reference, self._unload)
-        for row, limb in enumerate(self._limbs):
-            limb.begin([move for move in ordered if move.limb == row], plan, reference, plan.start[row])
-        self._needs, self._turns, self._late, self._due = "", "", False, -inf
-        self.waiting, self._other, self._aside = None, "", False
-        self._granted = set()
-        self._path_time = 0.0
-        self._pace.begin(reference, 1.0 if goes_on else _rate_along(plan.v[0], self._state.v))
-        self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
-        self._look()
-
     def _logged(self) -> list[int]:
         """Contacts and aims as the log has them: rows of the footholds of all plans, those of the first plan first."""
         return [self._log_rows[row] if row >= 0 else row for row in (*self._held, *self._aims)]
 
-    def _check(self, plan: ContactPlan) -> None:
-        """Refuses a plan that is none, and under torques one that contacts or motors do not bear."""
+    def _check(self, plan: ContactPlan, stance: Stance | None = None) -> None:
+        """Refuses a plan that is none, that does not begin in a stance, and under torques one that contacts or motors
+        do not bear.
+        """
         _check_plan(plan)
+        if stance is not None:
+            if tuple(plan.start) != stance.contacts:
+                raise RangeError("plan.start", plan.start, f"expected the stance's contacts {stance.contacts}")
+            off = float(np.abs(pin.difference(self.robot.model, stance.q, np.asarray(plan.q[0], dtype=float))).max())
+            if off > BEGINS:
+                raise RangeError("plan.q", off, f"expected a plan that begins within {BEGINS:g} m and rad of the robot")
         if self._torques:
             check_borne(plan)
 
@@ -675,12 +673,12 @@ class ClimbLoop:
             self._needs = "another foothold was chosen"
             self._plan_anew()
             return
-        after = None
+        after, stance = None, self.stance
         if self._onward is not None:
             try:
-                after = self._onward(self._scene, self.stance)
+                after = self._onward(self._scene, stance)
                 if after is not None:
-                    self._check(after)
+                    self._check(after, stance)
             except WbcError as error:
                 self._end(ClimbOutcome.STOPPED, f"nothing comes after the plan; {error}")
                 return
@@ -703,9 +701,7 @@ class ClimbLoop:
         stance = self.stance
         try:
             plan = self._replan(self._scene, stance)
-            self._check(plan)
-            if tuple(plan.start) != stance.contacts:
-                raise RangeError("plan.start", plan.start, f"expected the stance's contacts {stance.contacts}")
+            self._check(plan, stance)
         except WbcError as error:
             self._end(ClimbOutcome.STOPPED, f"{self._needs}; {error}")
             return
@@ -733,15 +729,13 @@ class ClimbLoop:
         self._begin(plan)
 
     def _set_gains(self, options: LoopOptions) -> None:
-        names = [limb.name for limb in self._limbs]
         items: Any = self.controller
-        for name in ("reference", *(f"{name} swing" for name in names)):
-            if self._torques:
-                items[name].set(stiffness=options.bandwidth**2, damping=2.0 * options.bandwidth)
-            else:
-                items[name].gain = FOLLOWING / self.dt
-        for name in names:
-            items[f"{name} contact"].gain = options.bandwidth if self._torques else FOLLOWING / self.dt
+        gain = options.bandwidth if self._torques else FOLLOWING / self.dt
+        following = {"stiffness": gain**2, "damping": 2.0 * gain} if self._torques else {"gain": gain}
+        items["reference"].set(**following)
+        for limb in self._limbs:
+            items[f"{limb.name} swing"].set(**following)
+            items[f"{limb.name} contact"].gain = gain
 
     def _end(self, outcome: ClimbOutcome, reason: str) -> None:
         self._outcome, self._reason = outcome, reason
@@ -767,13 +761,10 @@ def _rate_along(planned: Array, v: Array) -> float:
     return min(max(float(v @ planned) / float(planned @ planned), 0.0), 1.0)
 
 
-def _place_by(climber: Climber) -> Placed:
-    def place(scene: ClimbScene, stance: Stance, limb: str, foothold: str) -> ContactPlan:
-        from wbc.climb.limb_work import plan_limb_work
+def _placed(climber: Climber, scene: ClimbScene, stance: Stance, limb: str, foothold: str) -> ContactPlan:
+    from wbc.climb.limb_work import plan_limb_work
 
-        return plan_limb_work(climber, scene, stance, limb, [foothold])
-
-    return place
+    return plan_limb_work(climber, scene, stance, limb, [foothold])
 
 
 def _check_plan(plan: ContactPlan) -> None:

@@ -15,6 +15,9 @@ STOPPING = 0.2
 ACCELERATION_SHARE = 0.9
 #: What is left at least where a plan itself needs all of them, dr/dt [1/s]
 SLOWEST_STOP = 0.5
+#: How much of its rate a plan loses in a tick at most, where it has to stop in less than that time [1]: what a body
+#: does changes by a fifth of it at most
+STEEPEST = 0.15
 #: Rates of joints below this have no part in a stop [m/s, rad/s]
 MOVES = 1e-9
 
@@ -53,14 +56,15 @@ class PlanPace:
         Args:
             time: of the plan. aimed: rate that is wanted. end: time of the plan that must not be passed [s].
         """
-        rate, dt = self.rate, self._dt
+        rate, dt, most = self.rate, self._dt, inf
         if end < inf:
-            aimed = min(aimed, sqrt(self._most_squared(time + rate * dt, end)), max(end - time, 0.0) / dt)
+            most = min(sqrt(self._most_squared(time + rate * dt, end)), max(end - time, 0.0) / dt)
+            aimed = min(aimed, most)
         if aimed == rate:
             return rate
         low, high = self._changes(time)
-        steep = (rate - aimed) / dt if end < inf and self._hard else 0.0
-        low = max(low, -max(1.0 / STOPPING, steep))
+        # Only as much steeper than in other stops as the end asks for
+        low = max(low, -max(1.0 / STOPPING, (rate - most) / dt if self._hard else 0.0))
         self.rate = rate + dt * min(max((aimed - rate) / dt, low), high, 1.0 / STOPPING)
         return self.rate
 
@@ -75,7 +79,7 @@ class PlanPace:
                 v, a = (part[last, self._first :] for part in self._reference.knots)
                 moves = v > MOVES
                 room = (self._most[moves] - a[moves] * squared[-1]) / v[moves]
-                falls = float(room.min(initial=1.0 / self._dt if self._hard else 1.0 / STOPPING))
+                falls = float(room.min(initial=STEEPEST / self._dt if self._hard else 1.0 / STOPPING))
                 at.append(float(times[last]))
                 squared.append(squared[-1] + 2.0 * max(falls, SLOWEST_STOP) * (at[-2] - at[-1]))
             self._before = at[::-1], squared[::-1]

@@ -9,7 +9,6 @@
 #include "moves.h"
 #include "spans.h"
 #include "swings.h"
-#include "touch.h"
 
 /* Instants between samples, at which limbs that hold are looked at */
 #define INTERVAL 3
@@ -42,7 +41,7 @@
 #define REFUSED_WAYS 40
 
 /* A limb at a place from the first to the last sample: angles at rough ones, from `rough` on and `rough_by` apart, and once it is
- * `followed` at all from `begin` on, with poses of its pieces. `left`: swings that the limb needs at least from there on */
+ * `followed` at all from `begin` on. `left`: swings that the limb needs at least from there on */
 typedef struct beside {
     struct beside *next;
     int other, first, count;
@@ -50,7 +49,7 @@ typedef struct beside {
 } beside_t;
 typedef struct {
     int limb, place, first, last, begun, followed, begin, rough, roughs;
-    double left, *rough_angle, *angle, *piece;
+    double left, *rough_angle, *angle;
     beside_t *beside;
 } span_t;
 
@@ -91,6 +90,7 @@ typedef struct {
     char *trunk;
     block_t *blocks;
     double *work;
+    placed_t *placed; /* of all limbs: too large for a stack that may not grow */
     long looked, why[WHYS];
     int furthest;
     jmp_buf no_memory; /* where a call goes back to that lacks memory; nothing but wbc_along_forget may follow */
@@ -138,18 +138,23 @@ static void longest_clear(const char *mark, int n, int begun, int *first, int *l
     if (begun && *last < 0) *last = 0;
 }
 
-/* Marks samples from `first` on, `by` apart, at which a limb that holds touches the scene, the body or itself */
-static void mark_held(const along_t *a, const span_t *s, int first, int by, int n, const double *piece, char *mark) {
-    double *body = malloc(sizeof *body * 27 * (size_t)n), *off = body + 12L * n, *more = off + n;
-    int *contact = (int *)(more + 13L * n);
-    got(a, body);
-    for (int k = 0; k < n; k++) {
+/* Whether a limb (-1: the body) at a place touches the scene, the body or itself at an instant; `angle`: its angles */
+static int touches_alone(const along_t *a, int limb, int place, int instant, const double *angle) {
+    near_t near = {.seen = BODY | bit_of(limb), .of = bit_of(limb)};
+    placed_t *placed = a->placed;
+    int contact[MOST_LIMBS], which[2];
+    for (int l = 0; l < MOST_LIMBS; l++) contact[l] = l == limb ? place : -1;
+    const double *base = a->body + 12L * instant;
+    if (limb >= 0) place_steps(a->climb->limb + limb, base, angle, placed + limb);
+    return clearance_near(a->climb, contact, base, placed, which, &near) < 0.0;
+}
+
+/* Marks n samples from `first` on, `by` apart, at which a limb that holds, or the body, touches what it may not; `angle`: row by row */
+static void mark_held(const along_t *a, const span_t *s, int first, int by, int n, const double *angle, char *mark) {
+    for (int k = 0; k < n; k++, angle += limb_of(a, s)->angles) {
         const int sample = first + by * k < a->samples ? first + by * k : a->samples - 1;
-        memcpy(body + 12 * k, a->body + 12L * instant_of(a, sample), 12 * sizeof *body);
-        off[k] = 0.0, contact[k] = s->place, mark[k] = a->trunk[sample];
+        mark[k] = a->trunk[sample] || touches_alone(a, s->limb, s->place, instant_of(a, sample), angle);
     }
-    mark_alone(a->climb, s->limb, piece, body, contact, off, n, 0, mark, more);
-    free(body);
 }
 
 /* Adds spans of a limb at a place that last from a rough sample to another; `start`: posture with which it begins, or 0 */
@@ -160,7 +165,7 @@ static void spans_at(along_t *a, int limb, int place, int postures, const double
     double *wanted = malloc(sizeof *wanted * count * (12 + (size_t)postures * n)), *angles = wanted + 12L * count, nearest = INFINITY, step[MOST_ANGLES];
     char *mark = malloc((size_t)count);
     got(a, wanted), got(a, mark);
-    span_t made = {limb, place, 0, 0, start != 0, 0, 0, 0, 0, INFINITY, 0, 0, 0, 0};
+    span_t made = {limb, place, 0, 0, start != 0, 0, 0, 0, 0, INFINITY, 0, 0, 0};
     for (int k = 0; k < count; k++) {
         double by[3], *w = wanted + 12 * k;
         wanted_at(a, &made, instant_of(a, k * a->every), w);
@@ -176,11 +181,7 @@ static void spans_at(along_t *a, int limb, int place, int postures, const double
         const int size = last[j] - first[j] + 1;
         int low, high;
         const double *some = angles + ((long)j * count + first[j]) * n;
-        double *piece = malloc(sizeof *piece * 12 * size * (size_t)(pieces_of(a->climb, limb, 0, 0, 0) + 1));
-        got(a, piece);
-        pieces_of(a->climb, limb, size, some, piece);
-        mark_held(a, &made, first[j] * a->every, a->every, size, piece, mark);
-        free(piece);
+        mark_held(a, &made, first[j] * a->every, a->every, size, some, mark);
         longest_clear(mark, size, start != 0, &low, &high);
         if (high <= low) continue;
         made.rough = first[j] + low, made.roughs = high - low + 1;
@@ -198,7 +199,7 @@ static void spans_at(along_t *a, int limb, int place, int postures, const double
 static int follow_span(along_t *a, span_t *s) {
     if (s->followed) return s->last > s->first;
     const limb_t *l = limb_of(a, s);
-    const int n = l->angles, size = s->last - s->first + 1, pieces = pieces_of(a->climb, s->limb, 0, 0, 0);
+    const int n = l->angles, size = s->last - s->first + 1;
     double *wanted = malloc(sizeof *wanted * 12 * (size_t)size), step[MOST_ANGLES];
     char *mark = malloc((size_t)size);
     got(a, wanted), got(a, mark);
@@ -217,9 +218,7 @@ static int follow_span(along_t *a, span_t *s) {
     s->first = s->begin + low, s->last = s->begin + high;
     if (high > low) {
         int clear, last;
-        s->piece = kept_memory(a, sizeof(double) * 12 * pieces * size);
-        pieces_of(a->climb, s->limb, high - low + 1, s->angle + (long)low * n, s->piece + 12L * pieces * low);
-        mark_held(a, s, s->first, 1, high - low + 1, s->piece + 12L * pieces * low, mark);
+        mark_held(a, s, s->first, 1, high - low + 1, s->angle + (long)low * n, mark);
         longest_clear(mark, high - low + 1, s->begun, &clear, &last);
         s->last = s->first + last, s->first += clear;
     }
@@ -249,6 +248,18 @@ static const double *about_angles(const along_t *a, const span_t *s, int instant
     return s->rough_angle + (long)(k < 0 ? 0 : k >= s->roughs ? s->roughs - 1 : k) * n;
 }
 
+/* Whether two limbs that hold touch each other at a sample, at which neither does by itself */
+static int touch_both(const along_t *a, const span_t *s, const span_t *o, int sample) {
+    near_t near = {.seen = bit_of(s->limb) | bit_of(o->limb), .of = bit_of(s->limb)};
+    placed_t *placed = a->placed;
+    int contact[MOST_LIMBS], which[2];
+    const double *base = a->body + 12L * instant_of(a, sample);
+    contact[s->limb] = s->place, contact[o->limb] = o->place;
+    place_steps(limb_of(a, s), base, s->angle + (long)(sample - s->begin) * limb_of(a, s)->angles, placed + s->limb);
+    place_steps(limb_of(a, o), base, o->angle + (long)(sample - o->begin) * limb_of(a, o)->angles, placed + o->limb);
+    return clearance_near(a->climb, contact, base, placed, which, &near) < 0.0;
+}
+
 /* The first sample from one on at which two limbs that hold touch each other */
 static int touch_after(along_t *a, int one, int other, int sample) {
     if (one > other) return touch_after(a, other, one, sample);
@@ -260,10 +271,8 @@ static int touch_after(along_t *a, int one, int other, int sample) {
         const int count = last >= first ? last - first + 1 : 0;
         b = kept_memory(a, sizeof *b + (size_t)count);
         *b = (beside_t){s->beside, other, first, count};
-        memset(b->mark, 0, (size_t)count);
         s->beside = b;
-        const long at = 12L * pieces_of(a->climb, s->limb, 0, 0, 0), to = 12L * pieces_of(a->climb, o->limb, 0, 0, 0);
-        if (count) mark_limbs(a->climb, s->limb, s->piece + at * (first - s->begin), o->limb, o->piece + to * (first - o->begin), 0, count, b->mark);
+        for (int k = 0; k < count; k++) b->mark[k] = touch_both(a, s, o, first + k);
     }
     for (int k = sample > b->first ? sample - b->first : 0; k < b->count; k++)
         if (b->mark[k]) return b->first + k;
@@ -293,7 +302,7 @@ static int bear(along_t *a, const int *row, int swinging, int instant) {
     climb_t *c = a->climb;
     int contact[MOST_LIMBS];
     double angle[MOST_LIMBS * MOST_ANGLES], center[3] = {0};
-    placed_t placed[MOST_LIMBS];
+    placed_t *placed = a->placed;
     for (int l = 0; l < MOST_LIMBS; l++) contact[l] = l < c->limbs && l != swinging ? a->span[row[l]].place : -1;
     support_t *known = support_of(c, contact);
     got(a, known);
@@ -325,40 +334,25 @@ static double swing_between(const along_t *a, const span_t *from, const span_t *
 /* Whether a swing is clear of the scene, of the body and of the limbs that hold, at n instants */
 static int swing_clear(const along_t *a, const int *row, const span_t *from, const span_t *onto, int n, const int *at, const double *angle) {
     climb_t *c = a->climb;
-    const limb_t *l = limb_of(a, from);
-    const int count = pieces_of(c, from->limb, 0, 0, 0);
-    double *body = malloc(sizeof *body * (27 + MOST_ANGLES + 12 * ((size_t)count + c->pieces)) * n), *off = body + 12L * n, *more = off + n, *piece = more + 14L * n, *beside = piece + 12L * n * count;
-    int *contact = (int *)(more + 13L * n), ok = 1;
-    char *mark = (char *)(contact + n);
-    placed_t placed;
-    got(a, body);
-    memset(mark, 0, (size_t)n);
+    placed_t *placed = a->placed;
+    int contact[MOST_LIMBS], which[2];
+    near_t near = {.seen = EVERYTHING, .of = bit_of(from->limb)};
     for (int j = 0; j < n; j++) {
-        double tip[12], by[3], far[2], *out = piece + 12L * j * count;
-        memcpy(body + 12 * j, a->body + 12L * at[j], 12 * sizeof *body);
-        place_steps(l, AT_BODY, angle + (long)j * l->angles, &placed);
-        for (int k = 0; k < c->pieces; k++)
-            if (c->piece[k].limb == from->limb) compose(placed.pose[c->piece[k].step], c->piece[k].place, out), out += 12;
-        compose(body + 12 * j, placed.tip, tip);
+        const double *base = a->body + 12L * at[j];
+        double by[3], far[2], held[MOST_ANGLES];
+        for (int l = 0; l < c->limbs; l++) {
+            contact[l] = a->span[row[l]].place;
+            if (l != from->limb) angles_at(a, a->span + row[l], at[j], held);
+            place_steps(c->limb + l, base, l == from->limb ? angle + (long)j * c->limb[l].angles : held, placed + l);
+        }
         for (int k = 0; k < 2; k++) {
-            minus3(tip + 9, c->foothold + 12 * (k ? onto : from)->place + 9, by);
+            minus3(placed[from->limb].tip + 9, c->foothold + 12 * (k ? onto : from)->place + 9, by);
             far[k] = sqrt(dot3(by, by));
         }
-        contact[j] = far[1] < far[0] ? onto->place : from->place, off[j] = fmin(far[0], far[1]);
+        contact[from->limb] = far[1] < far[0] ? onto->place : from->place, near.off[from->limb] = fmin(far[0], far[1]);
+        if (clearance_near(c, contact, base, placed, which, &near) < 0.0) return 0;
     }
-    mark_alone(c, from->limb, piece, body, contact, off, n, 1, mark, more);
-    for (int j = 0; j < n; j++) ok &= !mark[j];
-    for (int o = 0; o < c->limbs && ok; o++) {
-        if (o == from->limb) continue;
-        const span_t *s = a->span + row[o];
-        double *some = beside + 12L * n * pieces_of(c, o, 0, 0, 0);
-        for (int j = 0; j < n; j++) angles_at(a, s, at[j], some + (long)j * c->limb[o].angles);
-        pieces_of(c, o, n, some, beside);
-        mark_limbs(c, from->limb, piece, o, beside, 0, n, mark);
-        for (int j = 0; j < n; j++) ok &= !mark[j];
-    }
-    free(body);
-    return ok;
+    return 1;
 }
 
 static const standing_t *before(const along_t *a, int level, const standing_t *s) { return a->level[level - 1].some + s->before; }
@@ -735,14 +729,7 @@ static void refuse_found(along_t *a, int level, int swings) {
 /* Fills in the spans of all limbs, with at most so many postures at a place */
 static void begin_along(along_t *a, const double *step, const double *most, int postures) {
     climb_t *c = a->climb;
-    const span_t trunk = {-1, -1, 0, 0, 0, 0, 0, 0, 0, 0.0, 0, 0, 0, 0};
-    double *piece = malloc(sizeof *piece * 12 * (size_t)(pieces_of(c, -1, 0, 0, 0) + 1) * a->samples);
-    char *mark = calloc((size_t)a->samples, 1);
-    got(a, piece), got(a, mark);
-    pieces_of(c, -1, a->samples, 0, piece);
-    mark_held(a, &trunk, 0, 1, a->samples, piece, mark);
-    memcpy(a->trunk, mark, (size_t)a->samples);
-    free(piece), free(mark);
+    for (int k = 0; k < a->samples; k++) a->trunk[k] = (char)touches_alone(a, -1, -1, instant_of(a, k), 0);
     for (int l = 0; l < c->limbs; l++) {
         a->step[l] = step + c->offset[l], a->most[l] = most + 2 * c->offset[l];
         a->lifted[l] = 4.0 * a->height / c->limb[l].length;
@@ -758,7 +745,7 @@ void wbc_along_forget(along_t *a) {
         free(a->blocks);
         a->blocks = next;
     }
-    free(a->span), free(a->level), free(a->forbidden), free(a->barred), free(a->trunk), free(a->work), free(a);
+    free(a->span), free(a->level), free(a->forbidden), free(a->barred), free(a->trunk), free(a->work), free(a->placed), free(a);
 }
 
 #endif

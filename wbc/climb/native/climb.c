@@ -3,7 +3,6 @@
 #include "close.h"
 #include "time_law.h"
 
-long long wbc_step_size(void) { return (long long)sizeof(step_t); }
 long long wbc_limb_size(void) { return (long long)sizeof(limb_t); }
 
 /* Contact poses of n postures in the body's frame, 12 each */
@@ -21,8 +20,6 @@ void wbc_postures(const limb_t *l, long n, const double *wanted, const double *s
         count[k] = postures(l, wanted + 12 * k, seed ? seed + k * l->angles : 0, most, out + (size_t)k * most * l->angles);
 }
 
-long long wbc_piece_size(void) { return (long long)sizeof(piece_t); }
-long long wbc_cone_size(void) { return (long long)sizeof(cone_t); }
 long long wbc_climb_size(void) { return (long long)sizeof(climb_t); }
 
 /* Frees what was kept of supports */
@@ -43,6 +40,14 @@ void wbc_wrench_slacks(climb_t *c, const int *contact, const double *poses, cons
     for (long k = 0; k < n; k++) slack[k] = slack_of_wrench(c, contact, poses, point, wrench + 6 * k, bound + 7 * k);
 }
 
+/* As of largest_slack, -INFINITY where there is no memory */
+double wbc_largest_slack(int n, int m, const double *G, const double *r, const double *A, const double *b, const double *s) {
+    double bound[7], *work = malloc(balance_work(n, m) * sizeof *work);
+    const double slack = work ? largest_slack(n, m, G, r, A, b, s, bound, work) : -INFINITY;
+    free(work);
+    return slack;
+}
+
 static void padded(const climb_t *c, const int *contact, int *out) {
     for (int l = 0; l < MOST_LIMBS; l++) out[l] = l < c->limbs ? contact[l] : -1;
 }
@@ -53,9 +58,9 @@ int wbc_stand(climb_t *c, const int *contact, const int *bears, double wanted, c
               double *slack) {
     int all[MOST_LIMBS];
     padded(c, bears, all);
-    wish_t wish = {1, {support_of(c, all)}, wanted, body[0], body[1], REST, {0}, 0, {{0}}};
+    wish_t wish = {.support = support_of(c, all), .slack = wanted, .place = body[0], .turn = body[1], .rest = REST};
     memcpy(wish.pose, body + 2, sizeof wish.pose);
-    if (!wish.support[0]) return NOT_BORNE;
+    if (!wish.support) return NOT_BORNE;
     double from[12 + MOST_LIMBS * MOST_ANGLES], far;
     int which[2];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
@@ -71,7 +76,7 @@ int wbc_stuck(climb_t *c, const int *contact, const double *state) {
     for (int l = 0; l < c->limbs; l++) {
         memcpy(kept, all, sizeof kept);
         kept[l] = -1;
-        count += all[l] >= 0 && (!can_rise(c, all, kept, state, state + 12) || clear_once_up(c, all, kept, state, which) < 0.0);
+        count += all[l] >= 0 && (clear_once_up(c, all, kept, state, 0) < 0.0 || clear_once_up(c, all, kept, state, which) < 0.0);
     }
     return count;
 }
@@ -155,11 +160,6 @@ double wbc_stretch(const climb_t *c, const int *contact, const double *touch, co
     return guess_body(c, contact, (const double (*)[12])touch, body);
 }
 
-void wbc_center(const climb_t *c, const double *state, double *center) {
-    placed_t placed[MOST_LIMBS];
-    place_all(c, state, state + 12, placed, center);
-}
-
 /* What is known of a way: `rest`: contact poses at rest, 12 each; `body`: its poses at `end` + 1 instants; `every`: samples from rough
  * one to rough one; `numbers`: height and least instants of swings, least slack; `step`, `most`: of all angles, limb by limb */
 along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, int every, const double *numbers, const double *step,
@@ -172,6 +172,7 @@ along_t *wbc_along(climb_t *c, const double *rest, int end, const double *body, 
     a->height = numbers[0], a->shortest = (int)numbers[1], a->margin = numbers[2];
     a->work = got(a, malloc(sizeof *a->work * (MOST_ANGLES + 1) * ((size_t)a->samples + 8)));
     a->trunk = got(a, calloc((size_t)a->samples, 1));
+    a->placed = got(a, malloc(sizeof *a->placed * MOST_LIMBS));
     begin_along(a, step, most, postures);
     return a;
 }
@@ -257,7 +258,7 @@ void wbc_band(climb_t *c, long n, const int *contact, const char *closed, const 
               double slack, double aside, const double *state, double *H, double *g, double *cost, double *far, double *open, double *center) {
     const int angles = c->offset[c->limbs], m = 6 + angles;
     placed_t placed[MOST_LIMBS];
-    near_t near = {.within = aside};
+    near_t near = {.seen = EVERYTHING, .of = EVERYTHING, .within = aside};
     int start[MOST_LIMBS], which[2];
     for (int l = 0; l < c->limbs; l++) start[l] = 6 + c->offset[l];
     memset(H, 0, sizeof *H * (size_t)(n * m * m)), memset(g, 0, sizeof *g * (size_t)(n * m));

@@ -14,7 +14,7 @@ typedef struct {
     double axis[3], scale, offset, place[12], mass, center[3];
 } step_t;
 
-/* wbc/climb/chain.py has the same; `rows`: of the contact's pose that are fixed, 3, 5 or 6; `touch`: contact poses in the
+/* `rows`: of the contact's pose that are fixed, 3, 5 or 6; `touch`: contact poses in the
  * body's frame at sampled angles, 12 each; `near`, `far`: least and greatest distance from the first step's place of the point that is
  * at `wrist` in the contact's frame */
 typedef struct {

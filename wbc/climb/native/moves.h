@@ -164,12 +164,13 @@ static int follow(climb_t *c, const int *contact, const int *at_last, const wish
                   const double *angle, const double *to, double *reached, double *slack, int *which, double *far) {
     double pose[BETWEEN][12], now[MOST_ANGLES], center[3], way[BETWEEN][MOST_LIMBS * MOST_ANGLES];
     placed_t placed[MOST_LIMBS];
-    int other = 0, held[MOST_LIMBS];
+    near_t near = {.seen = BODY, .of = EVERYTHING};
+    int other = 0;
     if (yields(c, contact)) return follow_whole(c, contact, base, angle, to, reached);
     for (int k = 1; k < BETWEEN; k++) pose_between(base, to, (double)k / BETWEEN, pose[k]), memset(way[k], 0, sizeof way[k]);
     for (int l = 0; l < c->limbs; l++) {
-        held[l] = contact[l] < 0 ? LEFT_OUT : contact[l];
         if (contact[l] < 0) continue;
+        near.seen |= bit_of(l);
         const limb_t *limb = c->limb + l;
         double *end = reached + c->offset[l];
         memcpy(now, angle + c->offset[l], (size_t)limb->angles * sizeof *now);
@@ -185,44 +186,30 @@ static int follow(climb_t *c, const int *contact, const int *at_last, const wish
     }
     for (int k = 1; k < BETWEEN && clear; k++) {
         place_all(c, pose[k], way[k], placed, center);
-        if ((*far = link_clearance(c, held, pose[k], placed, which)) < 0.0) return TOUCHES;
+        if ((*far = clearance_near(c, contact, pose[k], placed, which, &near)) < 0.0) return TOUCHES;
     }
     if (!other) return STANDS;
     place_all(c, to, reached, placed, center);
-    *slack = INFINITY;
-    for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
+    *slack = slack_of(c, wish->support, center, wish->slack);
     if (*slack < wish->slack) return NOT_BORNE;
     return (*far = link_clearance(c, at_last, to, placed, which)) >= 0.0 ? STANDS : TOUCHES;
 }
 
-/* Raises a limb off its contact with the body as it is; whether it reaches there */
-static int rise(const climb_t *c, int l, int contact, const double *base, double *angle) {
-    double wanted[12];
-    const double *at = c->foothold + 12 * contact, normal[3] = {at[2], at[5], at[8]};
-    memcpy(wanted, at, sizeof wanted);
-    along3(at + 9, RISEN * c->limb[l].length, normal, wanted + 9);
-    return reach_from(c->limb + l, base, wanted, angle);
-}
-
-/* Whether limbs that are not kept can rise off their contacts with the body as it is, or take it along */
-static int can_rise(const climb_t *c, const int *contact, const int *kept, const double *base, const double *angle) {
-    for (int l = 0; l < c->limbs; l++) {
-        if (contact[l] < 0 || contact[l] == kept[l] || c->limb[l].angles < c->limb[l].rows) continue;
-        double now[MOST_ANGLES];
-        memcpy(now, angle + c->offset[l], (size_t)c->limb[l].angles * sizeof *now);
-        if (!rise(c, l, contact[l], base, now)) return 0;
-    }
-    return 1;
-}
-
-/* How clear links are once limbs that are not kept are up, at the least [m]; `which`: as of link_clearance */
+/* How clear links are, at the least, once limbs that are not kept are raised off their contacts with the body as it is, where it need not
+ * go along [m]; -INFINITY where one does not reach there, all that is asked where `which`, as of link_clearance, is 0 */
 static double clear_once_up(climb_t *c, const int *contact, const int *kept, const double *state, int *which) {
     placed_t placed[MOST_LIMBS];
-    double center[3], risen[12 + MOST_LIMBS * MOST_ANGLES];
+    double center[3], risen[12 + MOST_LIMBS * MOST_ANGLES], wanted[12];
     memcpy(risen, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *risen);
-    for (int l = 0; l < c->limbs; l++)
-        if (contact[l] >= 0 && contact[l] != kept[l] && c->limb[l].angles >= c->limb[l].rows)
-            rise(c, l, contact[l], state, risen + 12 + c->offset[l]);
+    for (int l = 0; l < c->limbs; l++) {
+        const limb_t *limb = c->limb + l;
+        if (contact[l] < 0 || contact[l] == kept[l] || limb->angles < limb->rows) continue;
+        const double *at = c->foothold + 12 * contact[l], normal[3] = {at[2], at[5], at[8]};
+        memcpy(wanted, at, sizeof wanted);
+        along3(at + 9, RISEN * limb->length, normal, wanted + 9);
+        if (!reach_from(limb, state, wanted, risen + 12 + c->offset[l]) && !which) return -INFINITY;
+    }
+    if (!which) return 0.0;
     place_all(c, risen, risen + 12, placed, center);
     return link_clearance(c, contact, risen, placed, which);
 }
@@ -245,7 +232,7 @@ static int posture_from(climb_t *c, const int *contact, const int *kept, const i
     memcpy(own, state, size);
     for (int look = 0; look <= RISING; look++) {
         int how = posture(c, contact, &wish, own, own + 12, &least, pair);
-        if (how == STANDS && strict && !can_rise(c, contact, kept, own, own + 12)) how = NOT_REACHED;
+        if (how == STANDS && strict && clear_once_up(c, contact, kept, own, 0) < 0.0) how = NOT_REACHED;
         const int found = how == STANDS;
         if (found) how = follow(c, held, contact, &wish, strict, from, from + 12, own, own + 12, &least, pair, &far);
         if (how == STANDS || !look) memcpy(state, own, size), memcpy(which, pair, 2 * sizeof *pair), *slack = least;
@@ -276,19 +263,19 @@ static void begin_anew(const climb_t *c, const int *contact, const double (*touc
  * the least; `moves`: whether it is another one */
 static int lift_off(climb_t *c, const int *contact, const int *kept, double wanted, const double (*touch)[12], int attempt,
                     double *state, double *slack, int *which, int *moves) {
-    wish_t wish = {1, {support_of(c, kept)}, wanted, 0.0, 0.0, REST, {0}, 0, {{0}}};
-    if (!wish.support[0]) return NOT_BORNE;
+    wish_t wish = {.support = support_of(c, kept), .slack = wanted, .rest = REST};
+    if (!wish.support) return NOT_BORNE;
     placed_t placed[MOST_LIMBS];
     double center[3], from[12 + MOST_LIMBS * MOST_ANGLES];
     const size_t size = (size_t)(12 + c->offset[c->limbs]) * sizeof *from;
     place_all(c, state, state + 12, placed, center);
     *moves = 0;
-    *slack = slack_of(c, wish.support[0], center, wanted);
+    *slack = slack_of(c, wish.support, center, wanted);
     if (*slack == -INFINITY) return NOT_BORNE;
     memcpy(from, state, size);
     if (*slack >= wanted) {
         if (attempt == LAST_ATTEMPT) return STANDS;
-        if (!can_rise(c, contact, kept, state, state + 12)) return NOT_REACHED;
+        if (clear_once_up(c, contact, kept, state, 0) < 0.0) return NOT_REACHED;
         const double far = clear_once_up(c, contact, kept, state, which), had = *slack;
         if (far >= 0.0) return STANDS;
         keep_apart(&wish, which, far);
@@ -305,8 +292,8 @@ static int lift_off(climb_t *c, const int *contact, const int *kept, double want
 /* From there, the posture at which limbs hold again or are at rest in the air; in place */
 static int land_on(climb_t *c, const int *next, const int *kept, double wanted, const double (*touch)[12], int attempt,
                    double *state, double *slack, int *which) {
-    wish_t wish = {1, {support_of(c, kept)}, wanted, 0.0, 0.0, REST, {0}, 0, {{0}}};
-    if (!wish.support[0]) return NOT_BORNE;
+    wish_t wish = {.support = support_of(c, kept), .slack = wanted, .rest = REST};
+    if (!wish.support) return NOT_BORNE;
     double from[12 + MOST_LIMBS * MOST_ANGLES];
     memcpy(from, state, (size_t)(12 + c->offset[c->limbs]) * sizeof *from);
     guess_body(c, next, touch, state);

@@ -29,10 +29,9 @@
 /* How much clearer of bodies postures are than they have to be, where that can be [lengths of the robot] */
 #define CLEARER 7e-3
 
-/* What is wanted: the slack of each of some supports, and the body at a pose by weights of place and turn */
+/* What is wanted: the slack of a support (0: none), and the body at a pose by weights of place and turn */
 typedef struct {
-    int supports;
-    support_t *support[2];
+    support_t *support;
     double slack, place, turn, rest, pose[12];
     int avoided, avoid[AVOIDED][2]; /* pairs, as of link_clearance, that are kept apart */
     double aside;                   /* how much further than ASIDE [m] */
@@ -199,9 +198,8 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
         turn_between(wish->pose, base, by);
         for (int i = 0; i < 3; i++) H[(3 + i) * (n + 1)] += wish->turn, g[3 + i] -= wish->turn * by[i];
     }
-    for (int s = 0; s < wish->supports; s++)
-        for (int b = 0; b < wish->support[s]->bounds; b++)
-            add_bound(c, wish->support[s]->bound[b], wish->slack, center, base, placed, start, BEARS, n, H, g);
+    for (int b = 0; wish->support && b < wish->support->bounds; b++)
+        add_bound(c, wish->support->bound[b], wish->slack, center, base, placed, start, BEARS, n, H, g);
     for (int k = 0; k < wish->avoided; k++)
         add_avoided(c, contact, 0, wish->avoid[k], ASIDE * c->length + wish->aside, base, placed, start, BEARS, n, H, g);
     /* Angles at a limit against which they are pulled stay there */
@@ -276,17 +274,16 @@ static int is_avoided(const wish_t *wish, const int *which) {
     return known;
 }
 
-/* Finds a posture from the given one on, in place. `slack`: the least over the supports [1]; `which`: as of clearance */
+/* Finds a posture from the given one on, in place. `slack`: that of the support [1]; `which`: as of clearance */
 static int posture(climb_t *c, const int *contact, const wish_t *given, double *base, double *angle, double *slack, int *which) {
     placed_t placed[MOST_LIMBS];
     wish_t more = *given, *wish = &more;
     double center[3];
     int how = NOT_BORNE;
-    c->searches++;
     *slack = INFINITY;
     for (int look = 0; look < LOOKS; look++) {
         double left, before = INFINITY;
-        for (int k = 0; k < SWEEPS; k++, c->sweeps++) {
+        for (int k = 0; k < SWEEPS; k++) {
             if (sweep(c, contact, wish, base, angle, placed, &left) < NEAR_ENOUGH) break;
             if (k % STALLED || (look && !k)) continue; /* contacts that are closed open at first, for a new bound */
             if (left > CLOSE && left > STALLS * before) break;
@@ -294,8 +291,7 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
         }
         if (!tighten(c, contact, base, angle)) return NOT_REACHED;
         place_all(c, base, angle, placed, center);
-        *slack = INFINITY;
-        for (int s = 0; s < wish->supports; s++) *slack = fmin(*slack, slack_of(c, wish->support[s], center, wish->slack));
+        *slack = slack_of(c, wish->support, center, wish->slack);
         how = NOT_BORNE;
         if (*slack == -INFINITY) return how;
         if (*slack < wish->slack) continue;

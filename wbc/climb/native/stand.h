@@ -7,8 +7,6 @@
 #include "measure.h"
 #include "reach.h"
 
-/* Stands for the contact of a limb that does not count */
-#define LEFT_OUT -2
 /* Bounds on the slack that are kept of a set of contacts */
 #define BOUNDS 12
 
@@ -31,7 +29,6 @@ typedef struct {
     double depth, place[12];
 } piece_t;
 
-/* wbc/climb/world.py has the same */
 typedef struct {
     int limbs, footholds, pieces, bodies, pairs, weightless;
     double mass, length, clear, apart, down[3], trunk[4];
@@ -49,7 +46,7 @@ typedef struct {
     support_t **support;      /* hashed by contacts */
     int places, supports, largest;
     double *work, *gap;
-    long programs, searches, sweeps, measured; /* linear programs, postures, their sweeps and distances so far */
+    long programs; /* so far */
 } climb_t;
 
 static unsigned hashed(const int *contact, int limbs) {
@@ -193,9 +190,10 @@ static double kept_distance(const climb_t *c, const int *contact, const double *
     return p->tip && contact[p->limb] >= 0 && c->on[contact[p->limb]] == other ? tip_distance(c, p, off ? off[p->limb] : 0.0) : c->clear;
 }
 
-static int left_out(const climb_t *c, const int *contact, int piece) {
-    return c->piece[piece].limb >= 0 && contact[c->piece[piece].limb] == LEFT_OUT;
-}
+/* Limbs as bits, and the body */
+#define BODY 1u
+#define EVERYTHING ~0u
+static unsigned bit_of(int limb) { return BODY << (limb + 1); }
 
 /* No more than the signed distance of two convex shapes, or of one from an endless cylinder: that along a direction in the world */
 static double gap_along(const shape_t *a, const double *A, const shape_t *b, const double *B, const double *normal) {
@@ -227,32 +225,35 @@ static double moved_within(const double *from, const double *to, double radius) 
     return sqrt(dot3(by, by)) + radius * sqrt(turned);
 }
 
-/* Pairs, as of link_clearance, that keep less than `within` more than they have to [m], of links a share of that; `off`: as of
- * kept_distance */
+/* Which links count: those that are `seen`, and of each pair one of those whose clearance it is, `of`. Pairs, as of link_clearance,
+ * that keep less than `within` more than they have to [m], of links a share of that; `off`: as of kept_distance */
 #define MOST_NEAR 64
 #define OF_LINKS 0.2
 typedef struct {
+    unsigned seen, of;
     double within, off[MOST_LIMBS];
     int count, pair[MOST_NEAR][2];
 } near_t;
 
 /* Least distance less what is kept [m] of links from bodies and each other, as far as it may be below 0. `which`: piece, and body or
- * -1 - piece; links of limbs that are left out do not count. `near`: all pairs that are, 0: one that lacks is enough */
+ * -1 - piece. `near`: all pairs that are; where `within` is 0, one that lacks is enough */
 static double clearance_near(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which, near_t *near) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
     double pose[c->pieces ? c->pieces : 1][12], least = INFINITY, *const known = gap_rows(c);
-    for (int k = 0; k < c->pieces; k++) place_piece(c, k, base, placed, pose[k]);
+    unsigned bit[c->pieces ? c->pieces : 1];
+    for (int k = 0; k < c->pieces; k++)
+        if ((bit[k] = near->seen & bit_of(c->piece[k].limb))) place_piece(c, k, base, placed, pose[k]);
     for (int k = 0; k < c->pieces + c->pairs; k++) {
         const int own = k >= c->pieces;
-        const int i = own ? c->pair[2 * (k - c->pieces)] : k;
-        if (left_out(c, contact, i) || (own && left_out(c, contact, c->pair[2 * (k - c->pieces) + 1]))) continue;
+        const int i = own ? c->pair[2 * (k - c->pieces)] : k, beside = own ? c->pair[2 * (k - c->pieces) + 1] : i;
+        if (!bit[i] || !bit[beside] || !((bit[i] | bit[beside]) & near->of)) continue;
         const shape_t *a = c->shape + c->piece[i].shape;
         for (int j = 0; j < (own ? 1 : c->bodies); j++) {
-            const int other = own ? c->pair[2 * (k - c->pieces) + 1] : j;
+            const int other = own ? beside : j;
             const shape_t *b = c->shape + (own ? c->piece[other].shape : c->pieces + j);
             const double *at = own ? pose[other] : c->body + 12 * j;
-            const double least_kept = kept_distance(c, contact, near ? near->off : 0, i, own ? -1 - other : j);
-            const double keep = least_kept + (near ? near->within * (own ? OF_LINKS : 1.0) : 0.0);
+            const double least_kept = kept_distance(c, contact, near->off, i, own ? -1 - other : j);
+            const double keep = least_kept + near->within * (own ? OF_LINKS : 1.0);
             if (b->size[5] < 1e6) {
                 double apart[3];
                 minus3(pose[i] + 9, at + 9, apart);
@@ -273,22 +274,22 @@ static double clearance_near(climb_t *c, const int *contact, const double *base,
                 continue;
             }
             measure_shapes(&how, a, pose[i], b, at, &found);
-            c->measured++;
             if (last) {
                 memcpy(last, pose[i], 12 * sizeof *last), memcpy(last + 12, at, 12 * sizeof *last), last[24] = found.gap;
                 copy3(found.normal, last + 25);
             }
             const int pair[2] = {i, own ? -1 - other : j};
-            if (near && found.gap < keep && near->count < MOST_NEAR) memcpy(near->pair[near->count++], pair, sizeof pair);
+            if (found.gap < keep && near->count < MOST_NEAR) memcpy(near->pair[near->count++], pair, sizeof pair);
             if (found.gap - least_kept < least) least = found.gap - least_kept, memcpy(which, pair, sizeof pair);
-            if (!near && least < 0.0) return least;
+            if (near->within == 0.0 && least < 0.0) return least;
         }
     }
     return least;
 }
 
 static double link_clearance(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which) {
-    return clearance_near(c, contact, base, placed, which, 0);
+    near_t all = {.seen = EVERYTHING, .of = EVERYTHING};
+    return clearance_near(c, contact, base, placed, which, &all);
 }
 
 #endif

@@ -6,7 +6,7 @@ import json
 import pathlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import wbc.log
 from wbc.climb.checker import ClimbReport
@@ -18,9 +18,6 @@ from wbc.extras import MissingPackageError, require
 from wbc.track import page
 from wbc.track.page import RunPage
 from wbc.track.summary import Figure
-
-if TYPE_CHECKING:
-    from wbc.climb.report.pictures import ClimbPictures
 
 #: Figures of a run, as plain data
 FIGURES = "figures.json"
@@ -102,19 +99,11 @@ def _drawings(
         swings = drawn.swings()
         chosen = sorted({swings[k * (len(swings) - 1) // max(pictures.STILLS - 1, 1)] for k in range(pictures.STILLS)})
         for number, row in enumerate(chosen, start=1):
-            yield "stills", partial(_still, drawn, row, folder / f"still_{number}.png")
-
-        def film() -> list[pathlib.Path]:
-            made = pictures.save_film(run, folder / "climb.mp4", lambda share: told("film", share), asked)
-            return [] if made is None else [made]
-
-        yield "film", film
+            yield "stills", partial(drawn.still, row, folder / f"still_{number}.png")
+        film = folder / "climb.mp4"
+        yield "film", lambda: pictures.save_film(run, film, lambda share: told("film", share), asked)
     if replay is not None:
         yield "replay", lambda: [replay(run, folder / REPLAY)]
-
-
-def _still(drawn: ClimbPictures, row: int, file: pathlib.Path) -> list[pathlib.Path]:
-    return [drawn.still(row, file)]
 
 
 def _save_page(

@@ -156,11 +156,11 @@ class ClimbPictures:
         self.add_way(scene)
         return scene.save(file, PICTURE_SIZE, self.azimuth, self.elevation, self.around)
 
-    def still(self, row: int, file: pathlib.Path) -> pathlib.Path:
-        """The robot at a tick."""
+    def still(self, row: int, file: pathlib.Path) -> list[pathlib.Path]:
+        """The robot at a tick, as the only file."""
         scene = self.begin(self.held_at(row))
         self.add_robot(scene, row)
-        return scene.save(file, PICTURE_SIZE, self.azimuth, self.elevation, self.around)
+        return [scene.save(file, PICTURE_SIZE, self.azimuth, self.elevation, self.around)]
 
     def frames(self, size: tuple[int, int] = FILM_SIZE, most: int = MOST_FRAMES) -> Iterator[tuple[float, Image.Image]]:
         """Pictures of a film, evenly over the climb, each with the share of the film that is done by then."""
@@ -187,13 +187,13 @@ def save_film(
     file: pathlib.Path,
     progress: Callable[[float], None] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> pathlib.Path | None:
-    """An MP4 where an encoder is installed, else a GIF; None where ``stop`` ended it."""
+) -> list[pathlib.Path]:
+    """An MP4 where an encoder is installed, else a GIF, as the only file; none where ``stop`` ended it."""
     drawn, pictures = list[Image.Image](), ClimbPictures(run, DETAIL * size_of(run.plans[0].climber))
     for share, image in pictures.frames():
         if stop is not None and stop():
-            return None
+            return []
         drawn.append(image)
         if progress is not None:
             progress(share)
-    return film.save_film(drawn, file, FRAMES)
+    return [film.save_film(drawn, file, FRAMES)]

@@ -21,8 +21,6 @@ from wbc.validation import Array
 PLOTS = ("contacts", "speed", "rates", "loads")
 #: Share of a plot's width that a letter takes
 LETTER = 0.013
-#: Rows of cones that differ by less are the same
-BORNE = 1e-12
 #: Letters that fit upright into a bar, at most
 SHORT_NAME = 5
 
@@ -113,10 +111,8 @@ def _loads(plt: Any, climbed: Climbed) -> Any:
         slack = np.full(len(climbed.t), np.nan)
         for first, last, foothold in climbed.stretches(row):
             if foothold != OPEN:
-                a, b = cone_at(climbed, row, foothold)
-                # Components that are not borne at all are two rows with b = 0, whose slack says nothing
-                bears = [b[k] != 0.0 or not (np.abs(a + a[k]) < BORNE).all(axis=1).any() for k in range(len(a))]
-                slack[first:last] = (b - climbed.wrenches[first:last, row] @ a.T)[:, bears].min(axis=1) / weight
+                a, b, gives = cone_at(climbed, row, foothold)
+                slack[first:last] = (b - climbed.wrenches[first:last, row] @ a.T)[:, gives].min(axis=1) / weight
         size = np.linalg.norm(climbed.wrenches[:, row, :3], axis=1) / weight
         forces.append((np.where(np.isnan(slack), np.nan, size), limb_colour(row), limb.name))
         slacks.append((slack, limb_colour(row), limb.name))

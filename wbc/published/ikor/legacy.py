@@ -30,12 +30,10 @@ class LegacyHermies(ArmMachine):
         return hermies(self.base, (*others, 0.0), elbow=tool)
 
     def place(self, q: Array) -> tuple[Array, Array]:
-        """Position of the tool and rotation of the hand."""
         place, rotation = super().place(q)
         return place, rotation @ QUARTER
 
     def jacobian(self, q: Array) -> Array:
-        """With both defects [6, M]."""
         J = self._other.jacobian(q)
         if self.base != "none":
             x, y = _arm_place(q)

@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbc.published.three_arm_walker.gait.tracking import pose_error
 from wbc.published.three_arm_walker.machine.arm import ES, HW, SN, START, forward, joint_beyond
 from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
-from wbc.published.three_arm_walker.machine.motion import CYCLE
+from wbc.published.three_arm_walker.machine.grid import cross, inverse
+from wbc.published.three_arm_walker.machine.motion import CYCLE, pose_error
 from wbc.published.three_arm_walker.machine.plant import CycleCommand, Fault
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
-from wbc.published.three_arm_walker.machine.rigid import cross, inverse
 from wbc.validation import Array
 
 #: Below this |sin theta5|, axes 4 and 6 count as aligned

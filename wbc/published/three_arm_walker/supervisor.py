@@ -17,15 +17,13 @@ from typing import Literal
 
 import numpy as np
 
-from wbc.published.three_arm_walker.arm_control import ArmMotion
-from wbc.published.three_arm_walker.commands import WalkCommand
 from wbc.published.three_arm_walker.gait.gait import LATE, Gait, Lift
 from wbc.published.three_arm_walker.gait.holds import handholds
-from wbc.published.three_arm_walker.machine.body import body_place, body_twist
 from wbc.published.three_arm_walker.machine.grid import Place
 from wbc.published.three_arm_walker.machine.motion import CYCLE
-from wbc.published.three_arm_walker.machine.plant import Fault, WalkerPose
+from wbc.published.three_arm_walker.machine.plant import Fault, WalkerPose, body_place, body_twist
 from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
+from wbc.published.three_arm_walker.modes import ArmMotion, WalkCommand
 from wbc.published.three_arm_walker.record import WalkerRecorder
 from wbc.validation import Array
 
@@ -74,7 +72,7 @@ class Supervisor:
         """A mode of walking, until it ends by itself, by key, or by time [s]."""
 
         def cycle(place: Array) -> Fault | Reason | None:
-            rates = command.rates(self.gait.time, place)
+            rates = command(self.gait.time, place)
             if rates is None:
                 return "reached"
             self.recorder.add(self.plant, self.gait, rates)
@@ -85,15 +83,12 @@ class Supervisor:
 
     def control_arm(self, task: ArmMotion, key: Key, duration: float = np.inf) -> PublishedOutcome:
         """Arm control with the body standing, until the arm is done, by key, or by time [s]."""
-        started = False
 
         def cycle(place: Array) -> Fault | Reason | None:
-            nonlocal started
-            if not started:
-                task.start(self.gait, self.plant)
-                started = True
+            if not self.gait.cycle:
+                next(task)
             self.recorder.add(self.plant, self.gait, np.zeros(3))
-            order = task.step(self.gait, self.plant)
+            order = next(task, None)
             if order is None:
                 return "reached"
             return order if isinstance(order, Fault) else self.plant.move(np.zeros(6), order)
@@ -162,18 +157,10 @@ class Supervisor:
         """The mode's outcome, all arms being set down."""
         gait = self.gait
         time, rows = gait.time, slice(first, len(self.recorder.rows))
-        joint = None if fault is None else fault.joint
-        arm = gait.in_air if reason == "no hold" else None if fault is None else fault.arm - 1
-        if reason != "no hold":
+        joint, arm = (None, None) if fault is None else (fault.joint, fault.arm)
+        if reason == "no hold" and gait.in_air is not None:
+            arm = gait.in_air + 1
+        else:
             self.set_down()
-        return PublishedOutcome(
-            reason,
-            time,
-            message,
-            joint,
-            None if arm is None else arm + 1,
-            gait.in_air is None,
-            rows,
-            tuple(gait.lifts),
-            tuple(gait.replans),
-        )
+        moves = tuple(gait.lifts), tuple(gait.replans)
+        return PublishedOutcome(reason, time, message, joint, arm, gait.in_air is None, rows, *moves)

@@ -9,11 +9,8 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, ShapeError
-from wbc.published.three_arm_walker.arm_control import ArmMotion, Destination, Handhold, Velocity
-from wbc.published.three_arm_walker.commands import DestinationCommand, VelocityCommand, joystick
 from wbc.published.three_arm_walker.gait.gait import Gait
 from wbc.published.three_arm_walker.literal import LiteralPlant
-from wbc.published.three_arm_walker.machine.body import moved
 from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import (
     COLUMNS,
@@ -27,8 +24,16 @@ from wbc.published.three_arm_walker.machine.grid import (
     frame,
 )
 from wbc.published.three_arm_walker.machine.motion import CYCLE
-from wbc.published.three_arm_walker.machine.plant import IdealPlant, WalkerPose
+from wbc.published.three_arm_walker.machine.plant import IdealPlant, WalkerPose, moved
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders
+from wbc.published.three_arm_walker.modes import (
+    ArmMotion,
+    DestinationCommand,
+    at_velocity,
+    joystick,
+    past_poses,
+    to_handhold,
+)
 from wbc.published.three_arm_walker.record import PublishedLog
 from wbc.published.three_arm_walker.supervisor import PublishedOutcome, Supervisor
 from wbc.validation import Array
@@ -131,8 +136,7 @@ class PublishedWalker:
         """
         scale = np.array([STEP * (RADIUS + self.supervisor.gait.shoulders.height) * INCH, PITCH * INCH, 1.0])
         given = _function("velocity", velocity, 3)
-        command = VelocityCommand(lambda time: given(time) / scale)
-        return self.supervisor.walk(command, _pressed(key), _ending(duration, key))
+        return self.supervisor.walk(lambda time, _: given(time) / scale, _pressed(key), _ending(duration, key))
 
     def joystick(
         self, counts: Given, duration: float | None = None, key: Callable[[float], bool] | None = None
@@ -140,7 +144,7 @@ class PublishedWalker:
         """Robot velocity control by three axes of -32768 to 32767 counts: T, A, spin."""
         given = _function("counts", counts, 3)
         return self.supervisor.walk(
-            VelocityCommand(lambda time: joystick(given(time).tolist())), _pressed(key), _ending(duration, key)
+            lambda time, _: joystick(given(time).tolist()), _pressed(key), _ending(duration, key)
         )
 
     def handhold(self, arm: int, place: Sequence[int], key: Callable[[float], bool] | None = None) -> PublishedOutcome:
@@ -152,7 +156,7 @@ class PublishedWalker:
         wanted = checked_place("place", place)
         if not self.supervisor.gait.terrain.has(wanted):
             raise RangeError("place", place, "there is no hold")
-        return self._arm(Handhold(_arm(arm), wanted), key)
+        return self._arm(to_handhold(*self._moved, _arm(arm), wanted), key)
 
     def hand_to(self, arm: int, poses: Sequence[Any], key: Callable[[float], bool] | None = None) -> PublishedOutcome:
         """Arm control: the hand of an arm, 1 to 3, past poses in the frame of the structure [m], the body standing.
@@ -166,7 +170,7 @@ class PublishedWalker:
         checked = [validation.pose(f"poses[{k}]", pose).homogeneous for k, pose in enumerate(poses)]
         for pose in checked:
             pose[:3, 3] /= INCH
-        return self._arm(Destination(number, checked), key)
+        return self._arm(past_poses(*self._moved, number, checked), key)
 
     def hand_at(
         self, arm: int, twist: Given, duration: float | None = None, key: Callable[[float], bool] | None = None
@@ -178,7 +182,12 @@ class PublishedWalker:
         """
         given = _function("twist", twist, 6)
         scale = np.repeat([1.0 / INCH, 1.0], 3)
-        return self._arm(Velocity(_arm(arm), lambda time: given(time) * scale), key, _ending(duration, key))
+        motion = at_velocity(*self._moved, _arm(arm), lambda time: given(time) * scale)
+        return self._arm(motion, key, _ending(duration, key))
+
+    @property
+    def _moved(self) -> tuple[Gait, WalkerPose]:
+        return self.supervisor.gait, self.supervisor.plant
 
     def _arm(self, task: ArmMotion, key: Callable[[float], bool] | None, duration: float = np.inf) -> PublishedOutcome:
         return self.supervisor.control_arm(task, _pressed(key), duration)

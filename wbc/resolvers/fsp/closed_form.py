@@ -153,11 +153,7 @@ def one_shot(J: Array, x: Array, A: Array, values: Array, criterion: Criterion =
 
 
 def _coordinates(V: Array, r: Array, A: Array, values: Array) -> Array | None:
-    """t of a space's [K, m] point nearest to r with A v = values; None where rows of A are dependent in the space.
-
-    Raises:
-        RangeError: the vectors are dependent.
-    """
+    """t of a space's [K, m] point nearest to r with A v = values; None where rows of A are dependent in the space."""
     (K, m), p = V.shape, len(A)
     t = np.empty(K)
     if functions := library(K + p + m):

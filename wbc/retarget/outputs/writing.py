@@ -62,18 +62,21 @@ def write_motion(
     columns = JointColumns.of(motion)
     if joints is not None:
         columns = columns.in_order(joints)
-    fresh = path.with_name(f".{path.name}")
-    with validation.writing("file", path, ClipFileError):
+    if kind == "log":
+        return wbc.log.save(log_of(motion), path.parent, "npz", path.stem)
+    with validation.replacing("file", path, ClipFileError) as fresh:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if kind == "log":
-            return wbc.log.save(log_of(motion), path.parent, "npz", path.stem)
-        if kind == "keyframes":
-            _write_keyframes(motion, fresh, model)
-        elif kind.startswith("csv"):
-            _write_table(motion, columns, fresh, plain=kind == "csv-plain")
+        if kind == "csv-plain":
+            np.savetxt(fresh, columns.table, fmt="%.9g", delimiter=",")
+        elif kind == "keyframes":
+            fresh.write_text(_keyframes(motion, model), encoding="utf-8")
+        elif kind == "csv":
+            with fresh.open("w", newline="", encoding="utf-8") as stream:
+                writer, table = csv.writer(stream), np.column_stack((motion.time, columns.table))
+                writer.writerow(["time", *ROOT, *columns.names])
+                writer.writerows([[repr(number) for number in row] for row in table.tolist()])
         else:
             _write_arrays(motion, columns, fresh, kind)
-        fresh.replace(path)
     return path
 
 
@@ -99,29 +102,17 @@ def _write_arrays(motion: Retargeted, columns: JointColumns, file: pathlib.Path,
     with file.open("wb") as stream:
         if kind == "gmr":
             whole = round(motion.rate)
-            parts |= {"fps": whole if abs(whole - motion.rate) < 1e-6 else motion.rate}
+            parts["fps"] = whole if abs(whole - motion.rate) < 1e-6 else motion.rate
             parts |= {"local_body_pos": None, "link_body_list": None, "joint_names": list(columns.names)}
             pickle.dump(parts, stream)
             return
         parts |= {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
-        parts |= {"q": motion.q, "time": motion.time, "rate": np.array(motion.rate)}
-        parts |= {"robot": np.array(motion.robot.name), "joint_names": np.array(columns.names)}
-        np.savez_compressed(stream, allow_pickle=False, **parts)
+        parts |= {"q": motion.q, "time": motion.time, "rate": motion.rate}
+        np.savez_compressed(stream, robot=motion.robot.name, joint_names=columns.names, allow_pickle=False, **parts)
 
 
-def _write_table(motion: Retargeted, columns: JointColumns, file: pathlib.Path, *, plain: bool) -> None:
-    """With a header, times and all digits, or numbers alone."""
-    if plain:
-        np.savetxt(file, columns.table, fmt="%.9g", delimiter=",")
-        return
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["time", *ROOT, *columns.names])
-        table = np.column_stack((motion.time, columns.table))
-        writer.writerows([[repr(number) for number in row] for row in table.tolist()])
-
-
-def _write_keyframes(motion: Retargeted, file: pathlib.Path, model: mujoco.MjModel | None) -> None:
+def _keyframes(motion: Retargeted, model: mujoco.MjModel | None) -> str:
+    """MuJoCo's XML of a key a frame."""
     extras.require("mujoco", "MuJoCo's keyframes")
     from wbc.robot.mujoco_joints import MujocoJoints
     from wbc.simulation import mujoco_model
@@ -133,7 +124,7 @@ def _write_keyframes(motion: Retargeted, file: pathlib.Path, model: mujoco.MjMod
         joints.put_q(qpos, q)
         numbers = " ".join(f"{number:.9g}" for number in qpos)
         lines.append(f'    <key name="frame{frame}" time="{time:.9g}" qpos="{numbers}"/>')
-    file.write_text("\n".join([*lines, "  </keyframe>", "</mujoco>", ""]), encoding="utf-8")
+    return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
 
 
 def write_lerobot(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pathlib
 import pickle
 import zipfile
-import zlib
 from collections.abc import Sequence
 from typing import IO, Any
 
@@ -13,11 +12,6 @@ import numpy as np
 
 from wbc.retarget.sources.recorded import no_clip
 
-#: What numpy, zipfile and pickle raise for files that are cut off or no files of theirs
-BROKEN = (
-    OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, IndexError, ImportError, StopIteration,
-    zipfile.BadZipFile, zlib.error, pickle.UnpicklingError,
-)  # fmt: skip
 #: What a pickle of arrays may ask for: names by module, which is called otherwise in other versions
 SAFE = {
     "numpy": {"ndarray", "dtype"}, "numpy._core.multiarray": {"_reconstruct", "scalar"}, "_codecs": {"encode"},
@@ -91,7 +85,8 @@ def load(path: pathlib.Path) -> Any:
                 return _ArrayUnpickler(archive.open(f"{folder}data.pkl"), archive, folder).load()
         with path.open("rb") as stream:
             return _ArrayUnpickler(stream).load()
-    except BROKEN as error:
+    except Exception as error:
+        # Of files that are cut off, or no files of theirs, numpy, zipfile and pickle raise errors of many kinds
         raise no_clip(path, f"no {kind[1:]} of arrays that can be read, or it is cut off: {error}") from error
 
 

@@ -7,9 +7,9 @@ import itertools
 
 import numpy as np
 
-from wbc.errors import RangeError
 from wbc.retarget.body import BodyError, PointTree, find_body
 from wbc.retarget.clip import Array, ancestors, rest_places
+from wbc.retarget.sources.layouts import side_sines
 from wbc.retarget.sources.recorded import Recorded
 from wbc.retarget.words import numbers_of
 
@@ -49,27 +49,20 @@ STANDING_SPEED = 0.12
 FRAMES = 600
 
 
-def sizes(points: Array) -> float:
-    """Median over the frames of the diagonal of a box round the points, in the file's unit."""
-    box = np.nanmax(points, axis=1) - np.nanmin(points, axis=1)
-    return float(np.nanmedian(np.linalg.norm(box, axis=1)))
-
-
-def find_up(clip: Recorded) -> tuple[str, bool]:
-    """The axis of the file that is up, and whether that is sure.
+def find_up(clip: Recorded) -> str:
+    """The axis of the file that is up; a note says it where it is not z, or not sure.
 
     Each axis has a cost: how far what stands still is spread along it and lies above the lowest points, as shares of
     the body's size, and how far the head is from being above the feet. What is usual in the format decides near ties.
     """
-    points = clip.points
-    size = sizes(points) or 1.0
-    standing = _standing(clip, size)
+    points, size = clip.points, _size(clip) or 1.0
     head, feet = _head_and_feet(clip)
+    standing = _standing(clip, feet, size)
     above = np.zeros(3)
     if head and feet:
         above = np.nanmean(np.nanmean(points[:, head], axis=1) - np.nanmean(points[:, feet], axis=1), axis=0)
         above = above / max(float(np.linalg.norm(above)), 1e-9)
-    rest = _said_by_rest(clip)
+    rest = said_by_rest(clip)
     costs: dict[str, float] = {}
     for name, to_world in TO_Z_UP.items():
         up = to_world[2]
@@ -77,10 +70,16 @@ def find_up(clip: Recorded) -> tuple[str, bool]:
         if len(standing):
             here = standing @ up
             cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(points @ up, 2.0))) / size
-        cost += NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (rest not in ("", name))
-        costs[name] = cost
+        costs[name] = cost + NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (rest not in ("", name))
     best, second = sorted(costs, key=lambda name: costs[name])[:2]
-    return best, costs[second] - costs[best] > UNSURE
+    doubt = "" if costs[second] - costs[best] > UNSURE else ", which is not sure: give up= where that is wrong"
+    clip.notes += [f"{best} is up in the file{doubt}"] if best != "z" or doubt else []
+    return best
+
+
+def _size(clip: Recorded) -> float:
+    """Median over the frames of the diagonal of a box round the points, in the file's unit."""
+    return float(np.nanmedian(np.linalg.norm(np.nanmax(clip.points, axis=1) - np.nanmin(clip.points, axis=1), axis=1)))
 
 
 def _head_and_feet(clip: Recorded) -> tuple[list[int], list[int]]:
@@ -88,14 +87,13 @@ def _head_and_feet(clip: Recorded) -> tuple[list[int], list[int]]:
     head, feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
     if clip.offsets is not None and not (head and feet):
         with contextlib.suppress(BodyError):
-            tree = PointTree(tuple(clip.names), tuple(clip.parents), rest_places(clip.parents, clip.offsets))
-            plan = find_body(tree)
+            plan = find_body(PointTree(tuple(clip.names), tuple(clip.parents), rest_places(clip.parents, clip.offsets)))
             legs = [chain[-1] for name, chain in plan.limbs.items() if name.endswith("leg")]
             head, feet = head or list(plan.head[-1:]), feet or legs
     return head, feet
 
 
-def _said_by_rest(clip: Recorded) -> str:
+def said_by_rest(clip: Recorded) -> str:
     """The axis of the rest pose along which the head is above the feet; "" where that is not clear."""
     head, feet = _head_and_feet(clip)
     if clip.offsets is None or not head or not feet:
@@ -106,78 +104,48 @@ def _said_by_rest(clip: Recorded) -> str:
     return best if float(TO_Z_UP[best][2] @ between) > 0.9 * float(np.linalg.norm(between)) > 0.0 else ""
 
 
-def rest_up(clip: Recorded, up: str) -> str:
-    """The axis that is up in the rest pose: what its head and feet say, else that of the motion."""
-    return clip.rest_up or _said_by_rest(clip) or up
-
-
-def _standing(clip: Recorded, size: float) -> Array:
-    """Places of feet, or of all points where no feet are named, while they stand still [n, 3]."""
-    points = clip.points[:, _head_and_feet(clip)[1] or list(range(len(clip.names)))]
-    lag = max(1, min(len(points) - 1, round(STANDING_TIME * clip.rate)))
-    every = max(1, len(points) // FRAMES)
+def _standing(clip: Recorded, feet: list[int], size: float) -> Array:
+    """Places of feet, or of all points where no feet are known, while they stand still [n, 3]."""
+    points = clip.points[:, feet or list(range(len(clip.names)))]
+    lag, every = max(1, min(len(points) - 1, round(STANDING_TIME * clip.rate))), max(1, len(points) // FRAMES)
     before, after = points[:-lag:every], points[lag::every]
     speed = np.linalg.norm(after - before, axis=2) * clip.rate / lag
-    with np.errstate(invalid="ignore"):
-        return np.asarray(before[speed < STANDING_SPEED * size])
+    return np.asarray(before[speed < STANDING_SPEED * size])
 
 
-def mirrored(clip: Recorded, points: Array) -> bool:
-    """Whether left and right are the wrong way round in points with z up: a file of left-handed axes.
-
-    The hips' line from right to left, and the feet's direction ahead, must be as y and x.
-    """
-    hips, toes, ankles = (
-        [numbers_of(clip.names, part, side) for side in (1, -1)] for part in ("hip", "toe", "hindfoot")
-    )
-    ankles = [[k for k in own if k not in toe] for own, toe in zip(ankles, toes, strict=True)]
-    if not all((*hips, *toes, *ankles)):
-        return False
-    left, right = (points[:, own].mean(axis=1) for own in hips)
-    across = (left - right)[:, :2]
-    feet = [
-        points[:, toe].mean(axis=1) - points[:, ankle].mean(axis=1) for toe, ankle in zip(toes, ankles, strict=True)
-    ]
-    ahead = (feet[0] + feet[1])[:, :2]
-    turn = ahead[:, 0] * across[:, 1] - ahead[:, 1] * across[:, 0]
-    most = np.linalg.norm(ahead, axis=1) * np.linalg.norm(across, axis=1)
-    good = np.isfinite(turn) & (most > 0.0)
-    # Ahead in nearly all frames: hips and feet may be across each other for a moment
-    return bool(good.any() and np.mean(turn[good] < -0.5 * most[good]) > 0.9)
+def mirrored(names: list[str], points: Array) -> bool:
+    """Whether left and right are the wrong way round in points with z up: a file of left-handed axes."""
+    sines = side_sines(names, points, TO_Z_UP["z"][2])
+    sines = sines[np.isfinite(sines)]
+    # In nearly all frames: hips and feet may be across each other for a moment
+    return bool(sines.size and np.mean(sines < -0.5) > 0.9)
 
 
 def find_unit(clip: Recorded, up: str) -> tuple[str, float]:
-    """Name of the file's unit, and the size of the body in it.
-
-    Raises:
-        RangeError: no unit makes it a body's size.
-    """
-    size, heights = sizes(clip.points), clip.points @ TO_Z_UP[up][2]
+    """Name of the file's unit, "" where none makes it a body's size, and the size of the body in it."""
+    size, heights = _size(clip), clip.points @ TO_Z_UP[up][2]
     tall = float(np.nanmax(np.nanmax(heights, axis=1) - np.nanmin(heights, axis=1)))
     along = _head_to_feet(clip)
-    if clip.offsets is not None and (rest := _said_by_rest(clip)):
+    if clip.offsets is not None and (rest := said_by_rest(clip)):
         tall = max(tall, float(np.ptp(rest_places(clip.parents, clip.offsets) @ TO_Z_UP[rest][2])))
     if along and tall > UPRIGHT * along:
-        for name, (_, _, (low, high)) in UNITS.items():
-            if low <= along < high:
-                return name, along
-    else:
-        name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
-        if 0.1 < size * UNITS[name][0] / OTHER_SIZE < 10.0:
-            return name, size
-    raise RangeError("unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft")
+        return next((name for name, (_, _, (low, high)) in UNITS.items() if low <= along < high), ""), along
+    name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
+    return name if 0.1 < size * UNITS[name][0] / OTHER_SIZE < 10.0 else "", size
 
 
 def _head_to_feet(clip: Recorded) -> float:
     """Length of the bones from head to foot, or how far they are apart where bones are not known; 0 without them."""
     points, parents = clip.points, clip.parents
-    bones = [points[:, joint] - points[:, parent if parent >= 0 else joint] for joint, parent in enumerate(parents)]
-    lengths = [float(np.nanmedian(np.linalg.norm(bone, axis=1))) for bone in bones]
+
+    def median(a: int, b: int) -> float:
+        return float(np.nanmedian(np.linalg.norm(points[:, a] - points[:, b], axis=1)))
+
     longest = 0.0
     for head, foot in itertools.product(*_head_and_feet(clip)):
         above, below = set(ancestors(parents, head)), set(ancestors(parents, foot))
-        if above & below:
-            longest = max(longest, sum(lengths[k] for k in above ^ below))
-        else:
-            longest = max(longest, float(np.nanmax(np.linalg.norm(points[:, head] - points[:, foot], axis=1))))
+        apart = [median(k, parents[k]) for k in above ^ below] if above & below else []
+        if not apart:
+            apart = [float(np.nanmax(np.linalg.norm(points[:, head] - points[:, foot], axis=1)))]
+        longest = max(longest, sum(apart))
     return longest

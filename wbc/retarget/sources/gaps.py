@@ -33,7 +33,7 @@ def fill_gaps(points: Array, parents: list[int], names: list[str], rate: float) 
         free = parent < 0 or lost[:, parent].all()
         base = middle if free else out[:, parent]
         step = out[:, joint] - base
-        filled = _between(step)
+        filled = between(step)
         length = float(np.nanmedian(np.linalg.norm(step, axis=1)))
         size = np.linalg.norm(filled, axis=1, keepdims=True)
         if not free and length > 0.0:
@@ -45,23 +45,20 @@ def fill_gaps(points: Array, parents: list[int], names: list[str], rate: float) 
 
 
 def _centre(points: Array) -> Array:
-    """Middle of the points of each frame, as far as they are seen, without jumps where one is lost: that of a median
-    body carried along [frames, 3].
+    """Middle of the points of each frame, without jumps where one is lost: that of the first frame, moved from frame to
+    frame as what is seen in both [frames, 3].
     """
-    seen = np.isfinite(points[:, :, 0])
+    some = np.flatnonzero(np.isfinite(points[:, :, 0]).any(axis=1))
+    own = points[some]
+    steps = np.diff(own, axis=0)
+    both = np.isfinite(steps[:, :, :1])
+    moved = np.where(both, steps, 0.0).sum(axis=1) / np.maximum(both.sum(axis=1), 1)
     middle = np.full((len(points), 3), np.nan)
-    # Moves from frame to frame, of what is seen in both
-    last, at = None, np.zeros(3)
-    for frame in np.flatnonzero(seen.any(axis=1)):
-        if last is None:
-            at = np.nanmean(points[frame], axis=0)
-        elif (both := seen[frame] & seen[last]).any():
-            at = at + np.mean(points[frame, both] - points[last, both], axis=0)
-        middle[frame], last = at, frame
-    return _between(middle)
+    middle[some] = np.cumsum(np.concatenate([np.nanmean(own[:1], axis=1), moved]), axis=0)
+    return between(middle)
 
 
-def _between(values: Array) -> Array:
+def between(values: Array) -> Array:
     """Values without NaN, along curves without corners, and constant at the ends [frames, 3]."""
     good = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(good) < 3:

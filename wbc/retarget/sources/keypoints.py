@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import ShapeError, UnknownNameError
+from wbc.errors import ShapeError
 from wbc.retarget.clip import Array, listed
 from wbc.retarget.sources.layouts import LAYOUTS, best_layout, parents_by_name, parents_of
 from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in, text_of, unlike
@@ -50,12 +50,12 @@ def read_npz(path: pathlib.Path, data: dict[str, Any], names: Names) -> Recorded
         names = [str(name) for name in np.ravel(named)]
     clip = of_points(path, points, names)
     clip.rate = rate_in(data)
-    if parents is not None and np.size(parents) == len(clip.names):
-        given = [int(parent) for parent in np.ravel(parents)]
-        if all(parent < joint for joint, parent in enumerate(given)):
-            clip.parents = given
+    if parents is not None:
+        given = np.ravel(parents)
+        if len(given) == len(clip.names) and given.dtype.kind in "iuf" and (given < np.arange(len(given))).all():
+            clip.parents = np.maximum(given, -1).astype(int).tolist()
         else:
-            clip.notes.append("parents that come after their children are left out")
+            clip.notes.append("parents that are no numbers of joints before their children are left out")
     if "unit" in data:
         clip.notes.append(f"the file's unit is {data['unit']}")
     return clip
@@ -71,10 +71,10 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
         raise no_clip(path, f"no table: {error}") from error
     if not rows:
         raise no_clip(path, "the file is empty")
-    header = [cell.strip() for cell in rows[0]]
+    header = [cell.strip() for cell in rows.pop(0)]
     columns: dict[str, dict[str, int]] = {}
     other: list[str] = []
-    unit = 0.0
+    unit, clock = 0.0, -1
     for number, title in enumerate(header):
         match = COLUMN.match(title)
         if match and match[1].strip():
@@ -82,32 +82,32 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
             if axes.setdefault(match[2].lower(), number) != number:
                 raise no_clip(path, f"two columns {title}")
             unit = COLUMN_UNITS.get(match[3] or "", unit)
-        elif title.lower() not in (*TIMES, *COUNTERS):
+        elif title.lower() in TIMES:
+            clock = number if clock < 0 else clock
+        elif title.lower() not in COUNTERS:
             other.append(title)
     joints = [name for name, places in columns.items() if set(places) == {"x", "y", "z"}]
     other += [name for name in columns if name not in joints]
     if not joints:
         raise no_clip(path, f"no header with names such as LeftFoot_x, LeftFoot_y, LeftFoot_z: {', '.join(header[:6])}")
-    table = np.full((len(rows) - 1, len(header)), np.nan)
-    for frame, row in enumerate(rows[1:]):
-        for column, cell in enumerate(row[: len(header)]):
+    cut = len(rows) > 1 and len(rows[-1]) < len(header)
+    used = [*(columns[name][axis] for name in joints for axis in "xyz"), *([clock] if clock >= 0 else [])]
+    table = np.full((len(rows) - cut, len(used)), np.nan)
+    for frame, row in enumerate(rows[: len(table)]):
+        for place, column in enumerate(used):
             try:
-                table[frame, column] = float(cell) if cell.strip() else np.nan
+                table[frame, place] = float(row[column].strip() or "nan") if column < len(row) else np.nan
             except ValueError as error:
                 raise no_clip(path, f"line {frame + 2}, column {header[column]!r}: {error}") from error
-    cut = len(rows) > 2 and len(rows[-1]) < len(header)
-    table = table[:-1] if cut else table
-    points = np.stack([table[:, [columns[name][axis] for axis in "xyz"]] for name in joints], axis=1)
-    clip = of_points(path, points, joints if names is None else names)
+    clip = of_points(path, table[:, : 3 * len(joints)], joints if names is None else names)
     clip.notes += [f"columns that are no points: {listed(other, 6)}"] if other else []
     clip.notes += ["the file is cut off: its last line is left out"] if cut else []
     clip.unit = unit
-    at = next((number for number, title in enumerate(header) if title.lower() in TIMES), -1)
-    if at >= 0 and len(table) > 1:
-        steps = np.diff(table[:, at])
-        step = float(np.nanmedian(steps))
+    if clock >= 0:
+        steps = np.diff(table[:, -1])
+        step = float(np.nanmedian(steps)) if np.isfinite(steps).any() else np.nan
         if not step > 0.0 or np.nanmax(np.abs(steps - step)) > 0.5 * step:
-            raise no_clip(path, f"times of column {header[at]!r} do not rise in equal steps")
+            raise no_clip(path, f"times of column {header[clock]!r} do not rise in equal steps")
         clip.rate = 1.0 / step
     return clip
 
@@ -122,36 +122,34 @@ def of_points(path: pathlib.Path, points: Array, names: Names) -> Recorded:
     Raises:
         ClipFileError: no points of joints. UnknownNameError: no such layout. ShapeError: another number of names.
     """
-    kind = np.asarray(points)
-    if kind.dtype.kind not in "fiu" or kind.ndim not in (2, 3) or 0 in kind.shape:
-        raise no_clip(path, f"expected points [frames, joints, 3], not {kind.dtype} {list(kind.shape)}")
-    if path.suffix.lower() == ".pt" and kind.shape[1:] == (INTERMIMIC_COLUMNS,):
-        kind = kind[:, INTERMIMIC_FIRST : INTERMIMIC_FIRST + 52 * 3]
+    given = np.asarray(points)
+    if given.dtype.kind not in "fiu" or given.ndim not in (2, 3) or 0 in given.shape:
+        raise no_clip(path, f"expected points [frames, joints, 3], not {given.dtype} {list(given.shape)}")
+    if path.suffix.lower() == ".pt" and given.shape[1:] == (INTERMIMIC_COLUMNS,):
+        given = given[:, INTERMIMIC_FIRST : INTERMIMIC_FIRST + 52 * 3]
         names = "smplh-mujoco" if names is None else names
-    if kind.ndim == 2 and kind.shape[1] % 3 == 0:
-        kind = kind.reshape(len(kind), -1, 3)
-    if kind.ndim != 3 or kind.shape[2] != 3:
-        raise no_clip(path, f"expected points [frames, joints, 3], not {list(kind.shape)}")
-    if len(kind) < 2:
-        raise no_clip(path, f"the file has {len(kind)} frames: a clip has at least 2")
-    points = np.where(np.isfinite(kind), kind, np.nan).astype(np.float64)
-    notes = []
+    if given.ndim == 2 and given.shape[1] % 3 == 0:
+        given = given.reshape(len(given), -1, 3)
+    if given.ndim != 3 or given.shape[2] != 3:
+        raise no_clip(path, f"expected points [frames, joints, 3], not {list(given.shape)}")
+    if len(given) < 2:
+        raise no_clip(path, f"the file has {len(given)} frames: a clip has at least 2")
+    count = given.shape[1]
+    clip = Recorded([], [], np.where(np.isfinite(given), given, np.nan).astype(np.float64), 0.0)
     if names is None:
-        names = best_layout(points)
+        names = best_layout(clip.points)
         if not names:
             counts = ", ".join(map(str, sorted({len(joints) for joints in LAYOUTS.values()})))
-            reason = f"{points.shape[1]} joints without names; give names= (known are layouts of {counts} joints)"
-            raise no_clip(path, reason)
-        notes.append(f"names and parents are those of the layout {names!r}")
+            raise no_clip(path, f"{count} joints without names; give names= (known are layouts of {counts} joints)")
+        clip.notes.append(f"names and parents are those of the layout {names!r}")
     if isinstance(names, str):
-        if names not in LAYOUTS:
-            raise UnknownNameError("names", names, LAYOUTS)
-        joints = LAYOUTS[names]
-        if len(joints) != points.shape[1]:
-            raise ShapeError("names", names, f"this layout has {len(joints)} joints, the file {points.shape[1]}")
-        return Recorded([name for name, _ in joints], parents_of(joints), points, 0.0, notes=notes)
-    given = list(validation.strings("names", names))
-    if len(given) != points.shape[1]:
-        raise ShapeError("names", given, f"expected {points.shape[1]} names, one a joint, not {len(given)}")
-    given = unlike(given, notes)
-    return Recorded(given, parents_by_name(given), points, 0.0, notes=notes)
+        layout = LAYOUTS[validation.one_of("names", names, LAYOUTS)]
+        if len(layout) != count:
+            raise ShapeError("names", names, f"this layout has {len(layout)} joints, the file {count}")
+        clip.names, clip.parents = [name for name, _ in layout], parents_of(layout)
+    else:
+        clip.names = unlike(list(validation.strings("names", names)), clip.notes)
+        if len(clip.names) != count:
+            raise ShapeError("names", names, f"expected {count} names, one a joint, not {len(clip.names)}")
+        clip.parents = parents_by_name(clip.names)
+    return clip

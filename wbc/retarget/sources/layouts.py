@@ -72,6 +72,16 @@ LAYOUTS: dict[str, Layout] = {
         _hand("RightHand", "RightHand", "Thumb Index Middle Ring Pinky"), _LEGS["Left"], _LEGS["Right"],
         "LeftFoot > LeftFootMod, RightFoot > RightFootMod",
     ),
+    # MediaPipe's order of a hand, and MANO's with and without tips
+    "mediapipe-hand": _tree(
+        "wrist, wrist > thumb_cmc thumb_mcp thumb_ip thumb_tip",
+        *(f"wrist > {name}_mcp {name}_pip {name}_dip {name}_tip" for name in ("index", "middle", "ring", "pinky")),
+    ),
+    "mano": _tree("wrist", _hand("wrist", "")),
+    "mano-tips": _tree(
+        "wrist", _hand("wrist", ""), "thumb3 > thumb_tip, index3 > index_tip, middle3 > middle_tip",
+        "ring3 > ring_tip, pinky3 > pinky_tip",
+    ),
     "human36m": _tree(
         "pelvis right_hip right_knee right_ankle, pelvis > left_hip left_knee left_ankle",
         "pelvis > spine thorax neck head, thorax > left_shoulder left_elbow left_wrist",
@@ -95,23 +105,33 @@ def best_layout(points: Array) -> str:
     fitting = [name for name, layout in LAYOUTS.items() if len(layout) == points.shape[1]]
 
     def cost(name: str) -> tuple[float, bool]:
-        return round(_stretch(frames, parents_of(LAYOUTS[name])), 6), _is_mirrored(LAYOUTS[name], frames)
+        names = [joint for joint, _ in LAYOUTS[name]]
+        up = [frames[:, numbers].mean(axis=1) for part in ("head", "hindfoot") if (numbers := numbers_of(names, part))]
+        sines = side_sines(names, frames, up[0] - up[1]) if len(up) == 2 else np.zeros(0)
+        mirrored = bool(np.isfinite(sines).any() and np.nanmean(sines) < 0.0)
+        return round(_stretch(frames, parents_of(LAYOUTS[name])), 6), mirrored
 
     return min(fitting, key=cost, default="")
 
 
-def _is_mirrored(layout: Layout, frames: Array) -> bool:
-    """Whether a person's left is to the right of where the toes point, with the head up."""
-    names = [name for name, _ in layout]
+def side_sines(names: Sequence[str], points: Array, up: Array) -> Array:
+    """Sines of the turns from where the feet point to the line from the right hip to the left, about a direction that
+    is up [3] or [frames, 3]: 1 of a person who stands, -1 in a mirror [frames]; empty without names of hips and feet.
+    """
+    hips, toes, heels = ([numbers_of(names, part, side) for side in (1, -1)] for part in ("hip", "toe", "hindfoot"))
+    heels = [[k for k in own if k not in toe] for own, toe in zip(heels, toes, strict=True)]
+    if not all((*hips, *toes, *heels)):
+        return np.zeros(0)
 
-    def middle(part: str, side: int = 0) -> Array:
-        return np.asarray(frames[:, numbers_of(names, part, side)].mean(axis=1))
+    def level(vectors: Array) -> Array:
+        vectors = vectors - np.sum(vectors * z, axis=-1, keepdims=True) * z
+        size = np.linalg.norm(vectors, axis=1, keepdims=True)
+        return np.asarray(vectors / np.where(size > 0.0, size, np.nan))
 
-    if not all(numbers_of(names, part) for part in ("hip", "toe", "hindfoot", "head")):
-        return False
-    across = middle("hip", 1) - middle("hip", -1)
-    ahead, up = middle("toe") - middle("hindfoot"), middle("head") - middle("hindfoot")
-    return bool(np.nanmean(np.sum(np.cross(ahead, across) * up, axis=1)) < 0.0)
+    z = up / np.maximum(np.linalg.norm(up, axis=-1, keepdims=True), 1e-12)
+    left, right = (points[:, own].mean(axis=1) for own in hips)
+    feet = [points[:, toe].mean(axis=1) - points[:, heel].mean(axis=1) for toe, heel in zip(toes, heels, strict=True)]
+    return np.asarray(np.sum(np.cross(level(feet[0] + feet[1]), level(left - right)) * z, axis=1))
 
 
 def parents_of(layout: Layout) -> list[int]:

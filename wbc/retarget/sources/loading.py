@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
-from wbc.retarget.clip import Array, Clip, Skeleton, listed
+from wbc.retarget.clip import Array, Clip, Skeleton, ancestors, listed
 from wbc.retarget.sources import axes
 from wbc.retarget.sources.gaps import fill_gaps
 from wbc.retarget.sources.keypoints import Names, of_points, read_csv, read_npz
@@ -76,6 +76,8 @@ def load_clip(
     """
     file = validation.file_path("clip", path)
     recorded = _read(file, body_model, names)
+    if names is not None and file.suffix.lower() in (".bvh", ".c3d"):
+        recorded.notes.append("names= is for files without names, and is left out")
     recorded.rate = _rate(rate, recorded)
     return _finished(recorded, file.stem, up, unit)
 
@@ -131,23 +133,20 @@ def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float |
     notes, names, parents, rate = recorded.notes, recorded.names, recorded.parents, recorded.rate
     # Axes and units are looked for in points without gaps
     whole = replace(recorded, points=fill_gaps(recorded.points, parents, names, rate)[0])
-    up = _up(whole, up)
+    up = axes.find_up(whole) if up is None else validation.one_of("up", up, axes.TO_Z_UP)
     length = _unit(whole, up, unit)
-    to_world = axes.TO_Z_UP[up]
+    to_world, mirror = axes.TO_Z_UP[up], np.eye(3)
     points, turns = recorded.points @ to_world.T * length, recorded.turns
-    mirror = np.eye(3)
-    if axes.mirrored(whole, whole.points @ to_world.T):
+    if axes.mirrored(names, whole.points @ to_world.T):
         mirror = np.diag([1.0, -1.0, 1.0])
         points = points @ mirror
         notes.append("the file has left-handed axes: left and right are put right")
     if turns is None:
         points, said = mend_swaps(points, names, rate)
         notes += said
-    seen = recorded.seen if turns is not None else None
-    seen = np.asarray(np.isfinite(points).all(axis=2)) if seen is None else seen
+    seen = recorded.seen if recorded.seen is not None else np.asarray(np.isfinite(points).all(axis=2))
     points, said = fill_gaps(points, parents, names, rate)
-    notes += said
-    points = _on_the_ground(points, notes)
+    points = _on_the_ground(points, notes := [*notes, *said])
     apart = turns is None and sum(parent < 0 for parent in parents) > 1
     if apart and (made := joined(names, points, seen)) is not None:
         names, parents, points, seen = made
@@ -155,7 +154,7 @@ def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float |
     if recorded.offsets is None or turns is None:
         offsets = _offsets(points, parents)
     else:
-        of_rest = mirror @ axes.TO_Z_UP[axes.rest_up(whole, up)]
+        of_rest = mirror @ axes.TO_Z_UP[recorded.rest_up or axes.said_by_rest(whole) or up]
         offsets = recorded.offsets @ of_rest.T * length
         turns = mirror @ to_world @ turns @ of_rest.T
     sizes = np.linalg.norm(offsets, axis=1)
@@ -165,32 +164,19 @@ def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float |
     return Clip(Skeleton(tuple(names), tuple(parents), offsets, ends), rate, points, turns, seen, name, tuple(notes))
 
 
-def _up(recorded: Recorded, given: str | None) -> str:
-    if given is not None:
-        return validation.one_of("up", given, axes.TO_Z_UP)
-    up, sure = axes.find_up(recorded)
-    if up != "z" or not sure:
-        doubt = "" if sure else ", which is not sure: give up= where that is wrong"
-        recorded.notes.append(f"{up} is up in the file{doubt}")
-    return up
-
-
 def _unit(recorded: Recorded, up: str, given: str | float | None) -> float:
     """Length of the file's unit [m]."""
     if isinstance(given, str):
         return axes.UNITS[validation.one_of("unit", given, axes.UNITS)][0]
     if given is not None:
         return validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
-    said = recorded.unit
-    try:
-        name, size = axes.find_unit(recorded, up)
-    except RangeError:
-        if said:
-            return said
-        raise
-    length, whole_name, _ = axes.UNITS[name]
+    said, (name, size) = recorded.unit, axes.find_unit(recorded, up)
+    length, whole_name, _ = axes.UNITS[name or "m"]
+    if not (name or said):
+        reason = "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft"
+        raise RangeError("unit", size, reason)
     # Some files say a unit that they are not in; neighbours in size are left as they say
-    if said and max(length / said, said / length) <= OTHER_UNIT:
+    if said and (not name or max(length / said, said / length) <= OTHER_UNIT):
         return said
     if said:
         wrong = f"the file says units of {said:g} m, which makes a body of {size * said:.3g} m"
@@ -203,18 +189,14 @@ def _unit(recorded: Recorded, up: str, given: str | float | None) -> float:
 def _without_unseen(recorded: Recorded, name: str) -> None:
     """Take out joints without a point in any frame; their children hang from their parents."""
     never = np.asarray(~np.isfinite(recorded.points).all(axis=2).any(axis=0))
-    if not never.any():
-        return
     if never.all():
         raise no_clip(name, "no point in any frame")
+    if not never.any():
+        return
+    kept, parents = np.flatnonzero(~never).tolist(), recorded.parents
+    chains = [[joint for joint in ancestors(parents, old)[1:] if not never[joint]] for old in kept]
     gone = [joint for joint, lost in zip(recorded.names, never, strict=True) if lost]
-    parents = recorded.parents
-    for joint in range(len(parents)):
-        while parents[joint] >= 0 and never[parents[joint]]:
-            parents[joint] = parents[parents[joint]]
-    kept = np.flatnonzero(~never)
-    number = {int(old): new for new, old in enumerate(kept)}
-    recorded.parents = [number.get(parents[old], -1) for old in kept]
+    recorded.parents = [kept.index(chain[0]) if chain else -1 for chain in chains]
     recorded.names = [recorded.names[old] for old in kept]
     recorded.points = recorded.points[:, kept]
     recorded.notes.append(f"never seen, and left out: {listed(gone, JOINTS_NAMED)}")
@@ -222,12 +204,11 @@ def _without_unseen(recorded: Recorded, name: str) -> None:
 
 def _on_the_ground(points: Array, notes: list[str]) -> Array:
     """Points that are not far below z = 0, as those of a root at the origin are."""
-    lowest = float(np.percentile(points[:, :, 2].min(axis=1), 5.0))
+    lowest, least = float(np.percentile(points[:, :, 2].min(axis=1), 5.0)), float(points[:, :, 2].min())
     if lowest < -BELOW:
         notes.append(f"raised by {-lowest:.3g} m: its lowest points were below z = 0")
         return np.asarray(points - np.array([0.0, 0.0, lowest]))
-    if float(points[:, :, 2].min()) > ABOVE:
-        notes.append(f"its lowest point is {points[:, :, 2].min():.3g} m above z = 0")
+    notes += [f"its lowest point is {least:.3g} m above z = 0"] if least > ABOVE else []
     return points
 
 

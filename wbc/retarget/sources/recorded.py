@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
 from wbc.errors import ClipFileError
 from wbc.retarget.clip import Array, Marks
+from wbc.retarget.sources.gaps import between
 
 #: Keys of frames a second in files of arrays
 RATES = ("rate", "fps", "mocap_framerate", "mocap_frame_rate", "frequency", "sample_rate")
@@ -49,25 +51,44 @@ class Recorded:
     notes: list[str] = field(default_factory=list)
 
 
-def in_the_world(parents: list[int], offsets: Array, own: Array, moves: dict[int, Array]) -> tuple[Array, Array]:
-    """Positions and rotations of a tree's joints in the file's axes.
+def place(clip: Recorded, path: pathlib.Path, own: Array, moves: dict[int, Array]) -> Recorded:
+    """The clip with points and rotations of its tree; numbers that are missing are filled in between their neighbours.
 
         R_j = R_parent R_own,j        p_j = p_parent + R_parent d_j
 
     Args:
-        own: rotations in the parent's axes [frames, joints, 3, 3].
+        own: rotations in the parent's axes [frames, joints, 3, 3]; NaN where they are missing.
         moves: joint -> d_j of each frame [frames, 3]; elsewhere it is the joint's offset.
+
+    Raises:
+        ClipFileError: a joint without numbers in any frame.
     """
-    points, turns = np.empty(own.shape[:3]), np.empty_like(own)
-    for joint, parent in enumerate(parents):
-        step = moves.get(joint, offsets[joint])
-        if parent < 0:
-            turns[:, joint], points[:, joint] = own[:, joint], step
-        else:
-            turns[:, joint] = turns[:, parent] @ own[:, joint]
-            step = np.broadcast_to(step, (len(own), 3))
-            points[:, joint] = points[:, parent] + np.einsum("fij,fj->fi", turns[:, parent], step)
-    return points, turns
+    assert clip.offsets is not None
+    steps = np.broadcast_to(clip.offsets, own.shape[:3]).copy()
+    for joint, move in moves.items():
+        steps[:, joint] = move
+    seen = np.asarray(np.isfinite(own).all(axis=(2, 3)) & np.isfinite(steps).all(axis=2))
+    if not seen.all():
+        lacking = f"{int((~seen.all(axis=1)).sum())} of {len(own)} frames"
+        clip.notes.append(f"numbers are missing in {lacking}: filled in between their neighbours")
+    for joint in np.flatnonzero(~seen.all(axis=0)).tolist():
+        good = np.flatnonzero(np.isfinite(own[:, joint]).all(axis=(1, 2)))
+        if not good.size or not np.isfinite(steps[:, joint]).all(axis=1).any():
+            raise no_clip(path, f"a channel of {clip.names[joint]} has no number in any frame")
+        steps[:, joint] = between(steps[:, joint])
+        if good.size < len(own):
+            # A last rotation once more, since one alone has nothing between
+            turns = Rotation.from_matrix(own[[*good, good[-1]], joint])
+            inside = np.clip(np.arange(len(own)), good[0], good[-1])
+            own[:, joint] = Slerp([*good, good[-1] + 1], turns)(inside).as_matrix()
+    clip.points, clip.turns, clip.seen = steps.copy(), own.copy(), seen
+    for joint, parent in enumerate(clip.parents):
+        if parent >= 0:
+            above = clip.turns[:, parent]
+            clip.turns[:, joint] = above @ own[:, joint]
+            clip.points[:, joint] = clip.points[:, parent] + np.einsum("fij,fj->fi", above, steps[:, joint])
+            seen[:, joint] &= seen[:, parent]
+    return clip
 
 
 def unlike(names: list[str], notes: list[str]) -> list[str]:
@@ -90,8 +111,8 @@ def first_of(data: Mapping[str, Any], keys: Sequence[str]) -> Any:
 
 def rate_in(data: Mapping[str, Any]) -> float:
     """Frames a second that arrays by name say [Hz]; 0 where they do not."""
-    rate = first_of(data, RATES)
-    return float(np.ravel(rate)[0]) if rate is not None and np.size(rate) == 1 else 0.0
+    rate = np.ravel(first_of(data, RATES))
+    return float(rate[0]) if rate.size == 1 and rate.dtype.kind in "fiu" else 0.0
 
 
 def text_of(path: pathlib.Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from wbc.errors import ClipFileError
 from wbc.retarget.clip import Array
 from wbc.retarget.sources import arrays
 from wbc.retarget.sources.layouts import LAYOUTS, parents_of
-from wbc.retarget.sources.recorded import Recorded, first_of, in_the_world, no_clip, rate_in
+from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, place, rate_in
 
 #: Keys of rotation vectors of all joints one after the other
 POSES = ("poses", "smpl_poses", "fullpose", "pose")
@@ -54,51 +53,42 @@ def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) ->
         raise no_clip(path, reason)
     notes: list[str] = []
     joints, parents = _joints(body_model, data.get("betas"), notes)
-    count = poses.shape[1]
+    frames, count = poses.shape[:2]
     used = count if count == len(joints) else BODY
     if used < count or used < len(joints):
         notes.append(f"the clip has {count} joints and the body model {len(joints)}: the {BODY} of the body are used")
-    layout = LAYOUTS[OF_SIZE.get(used, "smpl-body")]
-    if parents[:used] != parents_of(layout)[:used]:
+    layout, parents = LAYOUTS[OF_SIZE.get(used, "smpl-body")], parents[:used]
+    if parents != parents_of(layout)[:used]:
         raise no_clip(body_model, "its joints are no tree of SMPL, SMPL-H or SMPL-X")
-    offsets = np.array(
-        [joints[k] - (joints[parent] if parent >= 0 else 0.0) for k, parent in enumerate(parents[:used])]
-    )
-    own = rotations.exponential(np.nan_to_num(poses[:, :used]).reshape(-1, 3)).reshape(len(poses), used, 3, 3)
-    place = first_of(data, PLACES)
-    place = np.zeros((len(poses), 3)) if place is None else np.asarray(place, dtype=float)
-    place = np.ravel(place).reshape(-1, 3) / float(np.ravel(data.get("smpl_scaling", 1.0))[0])
-    if len(place) != len(poses):
-        raise no_clip(path, f"{len(place)} places of the root for {len(poses)} frames")
-    points, turns = in_the_world(parents[:used], offsets, own, {0: offsets[0] + place})
-    lost = np.isnan(poses).any(axis=(1, 2)) | np.isnan(place).any(axis=1)
-    points[lost] = np.nan
-    if lost.any() and (good := np.flatnonzero(~lost)).size:
-        # Rotations of frames that are lost: those of the last one before, else of the first
-        turns = turns[good[np.clip(np.searchsorted(good, np.arange(len(turns)), side="right") - 1, 0, None)]]
+    offsets = joints[:used] - np.where(np.array(parents)[:, None] < 0, 0.0, joints[parents])
+    own = rotations.exponential(poses[:, :used].reshape(-1, 3)).reshape(frames, used, 3, 3)
+    moves = np.asarray(first_of(data, PLACES) if first_of(data, PLACES) is not None else np.zeros((frames, 3)), float)
+    moves = moves.reshape(-1, 3) / float(np.ravel(data.get("smpl_scaling", 1.0))[0])
+    if len(moves) != frames:
+        raise no_clip(path, f"{len(moves)} places of the root for {frames} frames")
     names = [name for name, _ in layout]
-    return Recorded(
-        names, parents[:used], points, rate_in(data), offsets, turns, [False] * used, unit=1.0, usual="z", rest_up="y",
+    clip = Recorded(
+        names, parents, moves, rate_in(data), offsets, ends=[False] * used, unit=1.0, usual="z", rest_up="y",
         notes=notes,
     )  # fmt: skip
+    return place(clip, path, own, {0: offsets[0] + moves})
 
 
-def _poses(path: pathlib.Path, data: Mapping[str, Any]) -> Array:
-    """Rotation vectors [frames, joints, 3]."""
-    poses = first_of(data, POSES)
+def _poses(path: pathlib.Path, data: dict[str, Any]) -> Array:
+    """Rotation vectors [frames, joints, 3]; NaN in frames that lack any."""
     parts = ("global_orient", "body_pose") if "body_pose" in data else [name for name in POSE_PARTS if name in data]
+    whole = [name for name in POSES if name in data][:1]
     try:
-        if poses is None:
-            own = [np.asarray(data[name], dtype=float) for name in parts]
-            poses = np.concatenate([rows.reshape(len(rows), -1) for rows in own], axis=1)
-        poses = np.asarray(poses, dtype=float)
+        own = [np.asarray(data[name], dtype=float) for name in whole or parts]
+        poses = np.concatenate([rows.reshape(len(rows), -1) for rows in own], axis=1)
         poses = poses.reshape(len(poses), -1, 3)
     except (ValueError, TypeError, KeyError, IndexError) as error:
         raise no_clip(path, f"its rotations have no shape [frames, joints, 3]: {error}") from error
     if poses.shape[1] < BODY or len(poses) < 2:
-        found = f"{len(poses)} frames of {poses.shape[1]} joints"
-        raise no_clip(path, f"{found}: expected 2 frames of {BODY} joints at least")
-    return np.asarray(np.where(np.isfinite(poses), poses, np.nan))
+        there = f"{len(poses)} frames of {poses.shape[1]} joints"
+        raise no_clip(path, f"{there}: expected 2 frames of {BODY} joints at least")
+    poses[~np.isfinite(poses).all(axis=(1, 2))] = np.nan
+    return poses
 
 
 def _joints(file: pathlib.Path, betas: Any, notes: list[str]) -> tuple[Array, list[int]]:

@@ -49,13 +49,12 @@ def mend_swaps(points: Array, names: list[str], rate: float) -> tuple[Array, lis
     wrong = orders != np.arange(count)
     if not wrong.any():
         return points, []
-    swaps: list[tuple[int, str]] = []
-    for joint in np.flatnonzero(wrong.any(axis=0)):
-        for start, stop in intervals(wrong[:, joint]):
-            other = int(orders[start, joint])
-            if other > joint or orders[start, other] != joint:
-                when = f"from {start / rate:.2f} to {stop / rate:.2f} s"
-                swaps.append((start, f"{names[joint]} and {names[other]} {when}"))
+    swaps = [
+        (start, f"{names[joint]} and {names[other]} from {start / rate:.2f} to {stop / rate:.2f} s")
+        for joint in range(count)
+        for start, stop in intervals(wrong[:, joint])
+        if (other := int(orders[start, joint])) > joint or orders[start, other] != joint
+    ]
     said = listed([text for _, text in sorted(swaps)], SWAPS_NAMED, "; ")
     return np.take_along_axis(points, orders[:, :, None], axis=1), [f"swapped, now mended: {said}"]
 

@@ -181,11 +181,7 @@ def _mujoco_bodies(robot: Robot, model: Any) -> list[CollisionBody]:
 
 
 def _from_geom(model: Any, g: int) -> Raw:
-    """The body of a geom, in its own frame.
-
-    Raises:
-        RobotFileError: a plane or a signed distance field.
-    """
+    """The body of a geom, in its own frame."""
     kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
     if kind == _MESH:
         mesh = int(model.geom_dataid[g])

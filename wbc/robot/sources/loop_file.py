@@ -17,7 +17,7 @@ def read_loops(path: pathlib.Path) -> tuple[Loop, ...]:
     # say nothing; a row ``first,second,kind,name`` is a heading.
 
     Raises:
-        RobotFileError: it cannot be read, or a row has not two to four fields. UnknownNameError: no such kind.
+        RobotFileError: it cannot be read, has no row, or one of not two to four fields. UnknownNameError: no such kind.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -32,4 +32,6 @@ def read_loops(path: pathlib.Path) -> tuple[Loop, ...]:
             raise RobotFileError("loops", str(path), f"line {number} is {line!r}, expected {', '.join(COLUMNS)}")
         first, second, kind, name = (*fields, *[""] * (len(COLUMNS) - len(fields)))
         loops.append(Loop(name or f"{first}-{second}", first, second, kind or "connect"))  # type: ignore[arg-type]
+    if not loops:
+        raise RobotFileError("loops", str(path), f"it has no row, expected {', '.join(COLUMNS)}")
     return tuple(loops)

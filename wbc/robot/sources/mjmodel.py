@@ -301,11 +301,7 @@ def _inertia(model: mujoco.MjModel, body: int) -> own.Inertia:
 
 
 def _set_limits(model: mujoco.MjModel, out: own.Model, order: list[int], names: MjNames) -> dict[str, str]:
-    """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates.
-
-    Returns:
-        What of them a robot cannot hold, one sentence a key.
-    """
+    """Ranges of joints, and what its actuators or the joint itself allow as force; MuJoCo knows no rates."""
     lower, upper, effort = np.full(out.nq, -np.inf), np.full(out.nq, np.inf), np.zeros(out.nv)
     off, uneven = _off(model, "LIMIT", "CONSTRAINT"), list[str]()
     for k, j in enumerate(order, start=1):

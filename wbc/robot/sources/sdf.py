@@ -141,11 +141,7 @@ class _Reader:
         )
 
     def _tree(self) -> dict[str, _Joint]:
-        """Link -> the joint that it hangs on; the root has none.
-
-        Raises:
-            RobotFileError: links that nothing ties to the root.
-        """
+        """Link -> the joint that it hangs on; the root has none."""
         hangs = dict[str, _Joint]()
         for joint in self._joints:
             hangs.setdefault(joint.child, joint)

@@ -89,11 +89,7 @@ def _leaders(joints: Joints, corrections: dict[str, str]) -> dict[str, str]:
 
 
 def _mimics(joints: Joints, leaders: dict[str, str], model: own.Model, remarks: Remarks) -> tuple[Mimic, ...]:
-    """The mimic joints; one whose leader the file does not have stays free, one whose leader is fixed stands still.
-
-    Raises:
-        RangeError: a mimic of a joint with several numbers.
-    """
+    """The mimic joints; one whose leader the file does not have stays free, one whose leader is fixed stands still."""
     found, lost = [], []
     for follower, leader in leaders.items():
         if leader not in joints:

@@ -14,7 +14,7 @@
 #define CLOSING_SPEED 0.1
 #define CLOSING_SHARE 0.1
 /* Torques are off by what loops are open by, more so where forces in loops are so many times their units: near dead points of
- * motors. A last correction, which is not looked at, closes them to rounding there */
+ * motors. A last correction closes them to rounding there, but where loops branch and it opens them */
 #define LARGE_FORCE 10.0
 /* Loops that were closed where a tick begins that is not solved are closed by as much as the fastest joint's way */
 #define WHOLE_SHARE 1.0
@@ -28,6 +28,8 @@
  * squares of rows lose half of the digits */
 #define ROUNDED_RATE 1e-13
 #define PROJECTIONS 3
+/* Velocities that open loops by more do not keep them closed [rad, or characteristic lengths, per second] */
+#define OPEN_RATE 1e-9
 /* The share of a bound that accelerations may pass it by, by rounding */
 #define ROUNDED_BOUND 1e-9
 
@@ -160,16 +162,21 @@ static int close_there(wbc_tick *t, const double *way, const double *ease, doubl
     }
     if (!(off <= EXACT)) return 0;
     if (forces_large(t) && closing_way(t, ease, sum, most, change)) {
+        const double rest[NV] = {0};
         memcpy(from, t->report.next_q, NQ * sizeof(double));
-        arrive_at(t, from, change);
+        if (!(arrive_at(t, from, change) <= EXACT)) arrive_at(t, from, rest);
     }
     for (int i = 0; i < DOFS; i++) sum[i] = 0.0;
-    for (int n = 0; n < PROJECTIONS && open_rate(t, v, e) > ROUNDED_RATE; n++) {
+    double rate = open_rate(t, v, e);
+    for (int n = 0; n <= PROJECTIONS && rate > (n < PROJECTIONS ? ROUNDED_RATE : OPEN_RATE); n++) {
+        /* Next to where loops branch rows turn so fast that those before the last step are too far off */
+        if (n == PROJECTIONS) factor_closing(t, ease);
         shortest_change(t, ease, e, change);
         if (!adds(change, sum, larger(BENT_SPEED, share < WHOLE_SHARE ? 0.0 : fastest))) return 0;
         for (int i = 0; i < DOFS; i++) v[i] += change[i];
+        rate = open_rate(t, v, e);
     }
-    return 1;
+    return rate <= OPEN_RATE;
 }
 
 /* Whether a number passes an end that the command keeps, or passes it by more than that */

@@ -148,7 +148,12 @@ static int same_rows(const wbc_tick *t) {
         const int i = t->daqp.WS[a];
         if (!stays(t, i) && (t->sense[i] & LOWER ? t->daqp.lam_star[a] > 0.0 : t->daqp.lam_star[a] < 0.0)) return 0;
     }
-    for (int i = 0; i < M_ALL; i++) {
+    int outside = 0;
+    for (int i = 0; i < NV; i++) {
+        const double rounding = TOLERANCE * dof_scale[i];
+        outside |= (t->x[i] < t->low[i] - rounding) | (t->x[i] > t->high[i] + rounding);
+    }
+    for (int i = outside ? 0 : NV; i < M_ALL; i++) {
         if (t->sense[i] & ACTIVE || (i >= NV && (t->idle[i - NV] || HELD(t, i - NV)))) continue;
         /* Rows that are taken out hold by what follows from them */
         if (REDUCES && t->reduced && t->low[i] == t->high[i]) continue;

@@ -296,9 +296,33 @@ static int decompose(wbc_tick *t) {
     return ok;
 }
 
+/* The same pivots of H, one row after the other, and no factor: of rows that have nothing of a pivot's nothing is taken */
+static void choose_pivots(wbc_tick *t, const wbc_pivots *chosen) {
+    const double inverse_bound = 1.0 / chosen->bound;
+    for (int i = 0; i < NV; i++)
+        for (int at = i & ~3; at < WIDE; at += 4)
+            FOUR(t->R + i * WIDE + at) = GIVEN_FOUR(t->H + i * WIDE + at) * EACH(chosen->scale[i]) * GIVEN_FOUR(chosen->scale + at);
+    for (int k = 0; k < NV; k++) {
+        const double *own = t->R + k * WIDE, given = own[k], unit = chosen->scale[k];
+        const four_bits behind = PLACES(k & ~3) > (four_bits){k, k, k, k};
+        four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(own + (k & ~3))) & behind);
+        for (int at = (k & ~3) + 4; at < WIDE; at += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(own + at)));
+        const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3])), needed = aside * aside * inverse_bound;
+        const double pivot = given >= chosen->least && given >= needed ? given : larger(larger(fabs(given), needed), chosen->least);
+        chosen->more[k] = (pivot - given) / (unit * unit);
+        const double reciprocal = 1.0 / pivot;
+        for (int i = k + 1; i < NV; i++) {
+            if (own[i] == 0.0) continue;
+            const four share = EACH(-own[i] * reciprocal);
+            double *row = t->R + i * WIDE;
+            for (int at = i & ~3; at < WIDE; at += 4) FOUR(row + at) = MADD(share, GIVEN_FOUR(own + at), GIVEN_FOUR(row + at));
+        }
+    }
+}
+
 /* H += a diagonal that makes it positive definite, with pivots of v / dof_scale of `least` or more, where it is not (Gill and
  * Murray); where it is, its plain factor. H = R'R afterwards, equality rows left out. H without entries as large as `added` is
- * positive semidefinite. 1 where anything was added. */
+ * positive semidefinite. 1 where anything was added. Of a reduced problem R is not the factor. */
 static int decompose_amended(wbc_tick *t, double least, double added) {
     const double share = 1.0 / sqrt(larger((double)NV * NV - 1.0, 1.0));
     double diagonal = 0.0, other = 0.0, scale[WIDE] = {0}, more[WIDE];
@@ -309,7 +333,8 @@ static int decompose_amended(wbc_tick *t, double least, double added) {
     for (int i = 0; (diagonal + 2.0 * added) * share > diagonal && i < NV; i++)
         for (int j = i + 1; j < NV; j++) other = larger(other, fabs(t->H[i * WIDE + j]) * dof_scale[i] * dof_scale[j]);
     chosen.bound = larger(diagonal, other * share);
-    factor_rows(t, t->H, &chosen);
+    if (REDUCES && t->reduced) choose_pivots(t, &chosen);
+    else factor_rows(t, t->H, &chosen);
     int amended = 0;
     for (int i = 0; i < NV; i++) {
         t->H[i * WIDE + i] += more[i];

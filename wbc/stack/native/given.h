@@ -45,24 +45,34 @@ static int unit_rows(wbc_tick *t, int count) {
 /* Variable j of `total` is given by the row, of those in `open`, whose entry is the largest; 0 where that is below `least`. Columns of
  * the other variables lose their entry there: those that are given are columns of P, and its own becomes one. */
 INLINE int give(double *columns, int total, int j, int count, double least, double *open, int *given) {
-    double *own = columns + j * WIDE;
+    double *own = columns + j * WIDE, share[WIDE];
     four most = {0};
-    int which = 0;
-    for (int i = 0; i < count; i += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(own + i)) * GIVEN_FOUR(open + i));
+    four_bits where = {0};
+    for (int i = 0; i < count; i += 4) {
+        const four size = SIZE_OF_FOUR(GIVEN_FOUR(own + i)) * GIVEN_FOUR(open + i);
+        const four_bits more = size > most;
+        where = (PLACES(i) & more) | (where & ~more);
+        RAISE_FOUR(most, size);
+    }
     const double largest = larger(larger(most[0], most[2]), larger(most[1], most[3]));
     if (!(largest >= least)) return 0;
-    while (fabs(own[which]) * open[which] != largest) which++;
+    int which = count;
+    for (int r = 0; r < 4; r++) which = most[r] == largest && where[r] < which ? (int)where[r] : which;
     const double inverse = 1.0 / own[which];
-    own[which] -= 1.0;
-    for (int i = 0; i < count; i += 4) FOUR(own + i) *= EACH(-inverse);
+    /* Groups of four are written whole: to read four numbers after one of them was written takes long */
+    for (int i = 0; i < count; i += 4) {
+        const four_bits here = PLACES(i) == (four_bits){which, which, which, which};
+        const four one = (four)((four_bits)EACH(1.0) & here), part = (GIVEN_FOUR(own + i) - one) * EACH(-inverse);
+        FOUR(share + i) = part;
+        FOUR(own + i) = part + one;
+        FOUR(open + i) = (four)((four_bits)GIVEN_FOUR(open + i) & ~here);
+    }
     for (int c = 0; c < total; c++) {
         double *column = columns + c * WIDE;
         const double f = column[which];
         if (f == 0.0 || c == j) continue;
-        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(own + i), GIVEN_FOUR(column + i));
+        for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(share + i), GIVEN_FOUR(column + i));
     }
-    own[which] += 1.0;
-    open[which] = 0.0;
     given[which] = j;
     return 1;
 }

@@ -20,9 +20,12 @@ static void held_back(const wbc_tick *t, const double *step, double *force) {
 
 /* The same where they are taken out of the problem: what slope - (H + more / dof_scale^2) step leaves on the variables that they give */
 static void held_by_reduced(const wbc_tick *t, const double *slope, const double *step, double more, double *force) {
-    double rest[WIDE], lambda[WIDE];
-    times_hessian(t, step, rest);
-    for (int i = 0; i < NV; i++) rest[i] += more / (dof_scale[i] * dof_scale[i]) * step[i] - slope[i];
+    double rest[WIDE], lambda[WIDE], z[WIDE] = {0};
+    for (int c = 0; c < t->width; c++) z[c] = step[t->left[c]] / dof_scale[t->left[c]];
+    for (int n = 0; n < t->reduced; n++) {
+        const int i = t->given[n];
+        rest[i] = thin_dot(t->product_of_basis + i * WIDE, z) + more / (dof_scale[i] * dof_scale[i]) * step[i] - slope[i];
+    }
     multipliers_of(t, rest, lambda);
     for (int k = 0; k < MC; k++) force[MT + k] = 0.0;
     for (int k = 0; k < t->reduced; k++)

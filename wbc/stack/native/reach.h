@@ -144,11 +144,7 @@ static int refactor(wbc_tick *t) { return REDUCES && t->reduced ? factor_reduced
 
 /* R = factor of H with blocked joints cut off from the others, and `more` on the diagonal */
 static int cut_off(wbc_tick *t, const double *free, double more) {
-    if (REDUCES && t->reduced) {
-        const int ok = more == 0.0 ? factor_reduced(t) : stiffen_reduced(t, more, 0);
-        t->prepared = ok && more == 0.0;
-        return ok;
-    }
+    if (REDUCES && t->reduced) return t->prepared = factor_reduced(t);
     load(t);
     blend(t->R, free, 1.0);
     for (int i = 0; more != 0.0 && i < NV; i++) t->R[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
@@ -225,6 +221,7 @@ static int trusted_step(wbc_tick *t, const double *free, const double *slope, do
     const double length = largest_step(step);
     if (length > TRUSTED) {
         *more = held_short(slope, length);
+        if (REDUCES && t->reduced) return solve_stiffened(t, *more, slope, step);
         if (!cut_off(t, free, *more)) return 0;
         solve_with(t, slope, step);
         sharpen(t, free, *more, slope, step);
@@ -239,7 +236,7 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
     const int ok = trusted_step(t, free, slope, step, &more);
-    *changed |= more != 0.0;
+    *changed |= more != 0.0 && !(REDUCES && t->reduced);
     if (!ok) return 0;
     along_all(t, step, force);
     for (int k = 0; k < LEADING; k++) force[k] = t->weight[k] * t->report.factor[k] * (error[k] - force[k]);

@@ -54,12 +54,19 @@ static int eliminate(wbc_tick *t) {
         if (!t->is_given[j]) t->left[left++] = j;
     t->width = left;
     if (!ok || left > THIN) return t->reduced = 0;
-    for (int i = 0; i < NV * WIDE; i += WIDE)
-        for (int at = 0; at < THIN; at += 4) FOUR(t->basis + i + at) = (four){0};
-    for (int c = 0; c < left; c++) {
-        const double *column = t->equal + t->left[c] * WIDE;
-        t->basis[t->left[c] * WIDE + c] = dof_scale[t->left[c]];
-        for (int i = 0; i < count; i++) t->basis[t->given[i] * WIDE + c] = -dof_scale[t->given[i]] * column[i];
+    for (int c = left; c < THIN; c++) t->left[c] = 0;
+    for (int at = 0; at < THIN; at += 4) {
+        const double *columns[4];
+        for (int r = 0; r < 4; r++) columns[r] = t->equal + t->left[at + r] * WIDE;
+        const four_bits known = PLACES(at) < (four_bits){left, left, left, left};
+        for (int i = 0; i < count; i++) {
+            const four row = EACH(-dof_scale[t->given[i]]) * (four){columns[0][i], columns[1][i], columns[2][i], columns[3][i]};
+            FOUR(t->basis + t->given[i] * WIDE + at) = (four)((four_bits)row & known);
+        }
+        for (int c = 0; c < left; c++) {
+            const int i = t->left[c];
+            FOUR(t->basis + i * WIDE + at) = (four)((four_bits)EACH(dof_scale[i]) & (PLACES(at) == (four_bits){c, c, c, c}));
+        }
     }
     return count;
 }
@@ -139,21 +146,6 @@ static void multipliers_of(const wbc_tick *t, const double *r, double *lambda) {
     for (int k = t->reduced; k < WIDE; k++) lambda[k] = 0.0;
 }
 
-/* out = H x, of whose symmetric matrix the upper triangle is stored, with zeros left of the diagonal in its group of 8 */
-static void times_hessian(const wbc_tick *t, const double *x, double *out) {
-    for (int i = 0; i < WIDE; i += 4) FOUR(out + i) = (four){0};
-    for (int i = 0; i < NV; i++) {
-        const double *row = t->H + i * WIDE, own = x[i] * row[i];
-        four sum = {0};
-        for (int at = i & ~3; at < WIDE; at += 4) {
-            const four h = GIVEN_FOUR(row + at);
-            sum = MADD(h, GIVEN_FOUR(x + at), sum);
-            FOUR(out + at) = MADD(h, EACH(x[i]), GIVEN_FOUR(out + at));
-        }
-        out[i] += SUM_OF_FOUR(sum) - own;
-    }
-}
-
 /* `count` rows of H Z from i on, at most four, columns from `at` on */
 INLINE void some_products(wbc_tick *t, int i, int count, int at) {
     const double *basis = t->basis + at;
@@ -171,7 +163,7 @@ INLINE void some_products(wbc_tick *t, int i, int count, int at) {
 }
 
 /* Entries of four columns from `at` on that are right of column a */
-#define BEHIND(x, at, a) ((four)((four_bits)(x) & ((four_bits){(at), (at) + 1, (at) + 2, (at) + 3} > (four_bits){(a), (a), (a), (a)})))
+#define BEHIND(x, at, a) ((four)((four_bits)(x) & (PLACES(at) > (four_bits){(a), (a), (a), (a)})))
 
 /* R^-1 of R'R = `gram`, and the squares of R's pivots; 0 where it is not positive definite. Rows wait for reciprocals of pivots only,
  * not for their roots. */
@@ -294,6 +286,24 @@ static void solve_reduced(const wbc_tick *t, const double *b, double *x) {
     reduced_transposed(t, z, y);
     for (int a = 0; a < t->width; a++) z[a] = thin_dot(t->reduced_inverse + a * WIDE, y);
     for (int i = 0; i < WIDE; i++) x[i] = i < NV ? thin_dot(t->basis + i * WIDE, z) : 0.0;
+}
+
+/* The same of H + more / dof_scale^2, whose factor is not kept; 0 where it has none */
+static int solve_stiffened(wbc_tick *t, double more, const double *b, double *x) {
+    double gram[REDUCED_NV * THIN + 1], inverse[REDUCED_NV * THIN + 1];
+    for (int a = 0; a < t->width; a++)
+        for (int at = 0; at < THIN; at += 4) {
+            FOUR(gram + a * THIN + at) = GIVEN_FOUR(t->gram + a * WIDE + at);
+            FOUR(inverse + a * THIN + at) = GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
+        }
+    const int ok = stiffen_reduced(t, more, 0);
+    if (ok) solve_reduced(t, b, x);
+    for (int a = 0; a < t->width; a++)
+        for (int at = 0; at < THIN; at += 4) {
+            FOUR(t->gram + a * WIDE + at) = GIVEN_FOUR(gram + a * THIN + at);
+            FOUR(t->reduced_inverse + a * WIDE + at) = GIVEN_FOUR(inverse + a * THIN + at);
+        }
+    return ok;
 }
 
 /* `count` rows of T from the n-th variable that was given on, at most four, columns from `at` on */

@@ -147,6 +147,9 @@ typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(size
 typedef wbc_bits four_bits __attribute__((vector_size(4 * sizeof(wbc_bits))));
 #define SIZE_OF_FOUR(x) ((four)((four_bits)(x) & (four_bits){MOST_BITS, MOST_BITS, MOST_BITS, MOST_BITS}))
 
+/* The numbers of four places from one on */
+#define PLACES(i) ((four_bits){(i), (i) + 1, (i) + 2, (i) + 3})
+
 #define SUM_OF_FOUR(x) (((x)[0] + (x)[2]) + ((x)[1] + (x)[3]))
 /* Macros and no functions: what returns four numbers is called in another way on each processor. */
 #define RAISE_FOUR(most, x) \

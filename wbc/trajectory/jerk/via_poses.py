@@ -190,12 +190,7 @@ class _Build:
         axis: Array | None = None,
         angle: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """One piece, unless the clock would not show it.
-
-        Args:
-            motion: acceleration, velocity and position at its beginning.
-            angle: angular acceleration / 2, angular speed, angle.
-        """
+        """One piece, unless the clock would not show it."""
         if span <= self.least:
             return
         self.spans.append(span)
@@ -212,12 +207,7 @@ class _Build:
         turn: tuple[Array, Array],
         about: list[Piece],
     ) -> None:
-        """A straight part with its rotation: a new piece wherever one of both changes its acceleration.
-
-        Args:
-            line: its beginning and its direction.
-            turn: the rotation at its beginning, and the axis that it turns about.
-        """
+        """A straight part with its rotation: a new piece wherever one of both changes its acceleration."""
         (origin, direction), (rotation, axis) = line, turn
         moving, turning = _table(along, speed), _table(about, 0.0)
         breaks = np.sort(np.concatenate([moving[:, 0], turning[:, 0], [sum(span for span, _ in along)]]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import zipfile
 import zlib
@@ -86,15 +85,8 @@ def save(law: Saved, file: str | os.PathLike[str]) -> None:
     _put(arrays, "path", law.path)
     if not target.name:
         raise LawFileError("file", str(target), "is a folder")
-    partial = target.with_name(f"{target.name}.{os.getpid()}.part")
-    try:
-        with partial.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, **arrays)
-        partial.replace(target)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise LawFileError("file", str(target), f"cannot be written: {error.strerror}") from error
+    with validation.replacing("file", target, LawFileError) as fresh, fresh.open("wb") as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
 
 
 def read(file: str | os.PathLike[str]) -> Saved:

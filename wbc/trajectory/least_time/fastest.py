@@ -158,11 +158,7 @@ def _corners(path: Path) -> list[int]:
 
 
 def _limited(grid: Grid, rows: list[PathRows]) -> None:
-    """Refuses intervals on which no row bounds the path acceleration.
-
-    Raises:
-        RangeError: where they are.
-    """
+    """Refuses intervals on which no row bounds the path acceleration."""
     bounded = np.zeros(len(grid.piece), dtype=bool)
     for r in rows:
         bounded |= (np.abs(r.a) + np.abs(r.b)).max(axis=(1, 2), initial=0.0) > 0.0

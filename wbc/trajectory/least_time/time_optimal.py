@@ -188,11 +188,7 @@ def _robot(name: str, path: Path, robot: Robot | None) -> Robot:
 
 
 def _within_positions(path: Path, limits: MotionLimits) -> None:
-    """Refuses paths that leave the position limits.
-
-    Raises:
-        BoundsError: with the joint and the path coordinate.
-    """
+    """Refuses paths that leave the position limits."""
     if limits.lower is None or isinstance(path, JoinedPath):
         if isinstance(path, JoinedPath):
             _within_positions(path.first, limits)

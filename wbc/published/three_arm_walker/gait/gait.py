@@ -19,10 +19,9 @@ import numpy as np
 
 from wbc.published.three_arm_walker.gait.holds import handholds
 from wbc.published.three_arm_walker.gait.margin import margins
-from wbc.published.three_arm_walker.gait.tracking import has_arrived, tracking_command
 from wbc.published.three_arm_walker.machine.calibration import Variant, WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import RADIUS, Place, Terrain, frame
-from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion
+from wbc.published.three_arm_walker.machine.motion import RATE, BodyMotion, has_arrived, tracking_command
 from wbc.published.three_arm_walker.machine.plant import CycleCommand, WalkerPose
 from wbc.published.three_arm_walker.machine.reach import ARMS, Shoulders, View
 from wbc.validation import Array

@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.published.three_arm_walker.machine.calibration import Variant
-from wbc.published.three_arm_walker.machine.grid import PITCH
+from wbc.published.three_arm_walker.machine.grid import PITCH, cross
 from wbc.published.three_arm_walker.machine.reach import ARMS, INNER, View
-from wbc.published.three_arm_walker.machine.rigid import cross
 from wbc.validation import Array
 
 #: What a limit that is not met counts as

@@ -118,3 +118,18 @@ def checked_place(field: str, value: Any) -> Place:
     if (numbers != np.rint(numbers)).any() or not 1 <= numbers[0] <= COLUMNS or not 1 <= numbers[1] <= ROWS:
         raise RangeError(field, value, f"expected whole numbers, T in [1, {COLUMNS}] and A in [1, {ROWS}]")
     return int(numbers[0]), int(numbers[1])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b of two vectors of 3."""
+    x, y, z = a
+    u, v, w = b
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
+def inverse(pose: Array) -> Array:
+    """Of a rigid pose."""
+    out = np.eye(4)
+    out[:3, :3] = pose[:3, :3].T
+    out[:3, 3] = -out[:3, :3] @ pose[:3, 3]
+    return out

@@ -1,6 +1,11 @@
-"""Motion of a hand past poses, cycle by cycle. Units: inch, radian, second.
+"""Motion of a hand past poses, cycle by cycle, and its tracking by velocity commands. Units: inch, radian, second.
 
-The via-point generator is ``wbc.trajectory.via_points``: the rules of ARMPTH and SETPTH, with what they round kept.
+    v_c = v_d + (p_d - p_a) / dt,    w_c = w_d + rotation vector of (R_d R_a^T) / dt                            (5-1)
+
+A hand has arrived once the time of its motion is over and errors and commands are within their tolerances. Via points
+are passed by ``wbc.trajectory.via_points``: the rules of ARMPTH and SETPTH, with what they round kept.
+
+Source: M. R. Patterson's thesis, 5.3.2 and the listing VELCOM; ROERRC, not listed, is a reconstruction.
 """
 
 from __future__ import annotations
@@ -9,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wbc.multibody import pin
 from wbc.published.three_arm_walker.machine.calibration import WalkerCalibration
 from wbc.published.three_arm_walker.machine.grid import INCH
 from wbc.trajectory import via_points
@@ -54,3 +60,32 @@ def _scaled(pose: Array, factor: float) -> Array:
     out = pose.copy()
     out[:3, 3] *= factor
     return out
+
+
+def pose_error(desired: Array, actual: Array) -> Array:
+    """What leads from the actual pose to the desired one, fixed axes: translation, rotation vector; 6."""
+    turn = np.asarray(pin.log3(desired[:3, :3] @ actual[:3, :3].T))
+    return np.concatenate([desired[:3, 3] - actual[:3, 3], turn])
+
+
+def tracking_command(motion: BodyMotion, cycles: int, actual: Array) -> Array:
+    """VELCOM: the hand's twist, fixed axes, some cycles after a motion began [in/s, rad/s]."""
+    desired, twist = motion.at(cycles)
+    return np.asarray(twist + pose_error(desired, actual) / CYCLE)
+
+
+def has_arrived(motion: BodyMotion, cycles: int, actual: Array, command: Array, tolerances: WalkerCalibration) -> bool:
+    """Whether the hand may grasp."""
+    if cycles / RATE < motion.duration:
+        return False
+    error = pose_error(motion.end, actual)
+    return bool(
+        _size(error[:3]) * INCH <= tolerances.grasp_tolerance
+        and _size(error[3:]) <= tolerances.grasp_angle
+        and _size(command[:3]) * INCH <= tolerances.grasp_speed * (1.0 + 1e-9)
+        and _size(command[3:]) <= tolerances.grasp_rate * (1.0 + 1e-9)
+    )
+
+
+def _size(vector: Array) -> float:
+    return float(np.linalg.norm(vector))
