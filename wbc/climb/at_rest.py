@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import reduce
-from itertools import pairwise
 
 import numpy as np
 
 from wbc.climb.climber import Climber
 from wbc.climb.reach import LimbReach
 from wbc.multibody import pin
+from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
 #: Heights of the body that are tried, as parts of the length of its shortest limb
@@ -38,15 +38,14 @@ def standing(climber: Climber) -> Climber:
     body, data, every = climber.body_pose(climber.rest), model.createData(), range(len(climber.limbs))
     middle = climber.center_of_mass(climber.rest)
     pin.forwardKinematics(model, data, climber.rest)
-    tips = [climber.contact_pose(climber.rest, limb) for limb in every]
-    ways = [[*(data.oMi[j].translation.copy() for j in climber.chains[limb]), tips[limb].translation] for limb in every]
-    lengths = [sum(float(np.linalg.norm(b - a)) for a, b in pairwise(way)) for way in ways]
+    lengths = [numbers.length for numbers in reach.table.numbers]
     heights, found = STANDING_HEIGHTS * min(lengths), list[tuple[Array, Array]]()
     for limb in every:
-        below = max(ways[limb][:-1], key=lambda point: float(np.linalg.norm((point - middle)[:2])))
-        wanted = [body.actInv(pin.SE3(_upright(tips[limb]), np.array([*below[:2], middle[2] - h]))) for h in heights]
-        poses = np.array([np.concatenate([pose.rotation.ravel(), pose.translation]) for pose in wanted])
-        angles, solved = reach.postures(limb, poses, count=BRANCHES)
+        joints = [data.oMi[joint].translation for joint in climber.chains[limb]]
+        below = max(joints, key=lambda point: float(np.linalg.norm((point - middle)[:2])))
+        upright = _upright(climber.contact_pose(climber.rest, limb))
+        wanted = [body.actInv(pin.SE3(upright, np.array([*below[:2], middle[2] - height]))) for height in heights]
+        angles, solved = reach.postures(limb, np.array([place(pose) for pose in wanted]), count=BRANCHES)
         worth = np.where(solved, _worth(climber, limb, angles, lengths[limb]), -np.inf)
         best = worth.argmax(axis=1)
         found.append((angles[np.arange(len(best)), best], worth.max(axis=1)))
@@ -74,7 +73,7 @@ def _worth(climber: Climber, limb: int, angles: Array, length: float) -> Array:
     robot, frame, rows = climber.robot, climber.limbs[limb].frame, climber.joints(limb)
     far = np.abs(angles - climber.angles(climber.rest, limb)).max(axis=2)
     bent = np.empty(angles.shape[:2])
-    for place in np.ndindex(*bent.shape):
-        q = climber.with_limb(climber.rest, limb, angles[place])
-        bent[place] = np.linalg.svd(robot.jacobian(q, frame)[:3, rows], compute_uv=False)[-1] / length
+    for posture in np.ndindex(*bent.shape):
+        q = climber.with_limb(climber.rest, limb, angles[posture])
+        bent[posture] = np.linalg.svd(robot.jacobian(q, frame)[:3, rows], compute_uv=False)[-1] / length
     return np.asarray(np.minimum(bent, room) - MIRRORED * far / (2.0 * np.pi))

@@ -40,13 +40,12 @@ def begin_folder(folder: pathlib.Path, request: ClimbRequest) -> None:
         request.climber, robot=str(pathlib.Path(robot).absolute()) if pathlib.Path(robot).suffix else robot
     )
     text = json.dumps(replace(request, mode=mode, climber=climber).plain(), indent=1) + "\n"
-    try:
+    with validation.writing("out", folder, LogFileError):
         folder.mkdir(parents=True, exist_ok=True)
         if scene.suffix:
             save_scene(read_scene(scene, request.scene.gravity), folder / SCENE)
-        _whole(folder / REQUEST, text.encode())
-    except OSError as error:
-        raise LogFileError("out", str(folder), f"cannot be written: {error.strerror}") from error
+        with validation.replacing("out", folder / REQUEST, LogFileError) as fresh:
+            fresh.write_bytes(text.encode())
 
 
 def read_folder(folder: pathlib.Path) -> ClimbRequest:
@@ -96,10 +95,3 @@ def resumed(folder: str | pathlib.Path, at: float | None = None, points: tuple[s
         raise RangeError("at", when, f"expected a time from {t[0]:g} to {t[-1]:g} s")
     mode = replace(request.mode, plan="")
     return replace(request, mode=mode, earlier=EarlierRun(str(place.absolute()), when, passed))
-
-
-def _whole(file: pathlib.Path, content: bytes) -> None:
-    """Beside its place and renamed into it, so that no reader ever meets half of it."""
-    fresh = file.with_name(f".{file.name}")
-    fresh.write_bytes(content)
-    fresh.replace(file)
