@@ -99,6 +99,7 @@ def load(
 
     Raises:
         MissingPackageError: what reads xacro or USD is not installed.
+        DuplicateNameError: two joints of one name, or one with that of the world, ``universe``.
         LoopError: no configuration closes the loops.
         UnknownNameError: no such robot (nearest names first), base, joint or frame.
         RobotFileError: a file that is missing, a directory, unreadable, refused by the parser, or neither URDF,

@@ -65,8 +65,9 @@ def limit_inputs(lower: LimitValues, upper: LimitValues, units: Iterable[str]) -
             continue
         below = "upper" if name == "lower" and upper is not None else None
         start, rate = np.broadcast_to(np.array(value, dtype=np.float64), count).copy(), f"{name}_rate"
-        out.append(Input(name, unit=unit, size=count, default=start, rate=rate, infinite=NO_LIMIT[name], below=below))
-        out.append(Input(rate, unit=per_second, size=count, default=np.zeros(count)))
+        none = NO_LIMIT[name]
+        out.append(Input(name, unit=unit, size=count, default=start, rate=rate, infinite=none, each=True, below=below))
+        out.append(Input(rate, unit=per_second, size=count, default=np.zeros(count), each=True))
     return tuple(out)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -13,8 +14,6 @@ from wbc.tasks.base import Constraint, Row, Rows, SacrificeOrder, Values
 from wbc.tasks.joint_limits import JointLimits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from wbc.robot import Robot
     from wbc.robot.loops import Linkage
     from wbc.validation import Array
@@ -47,8 +46,9 @@ AT_REST = 1e-3
 
 @dataclass(frozen=True)
 class LinkageSpeed(Constraint):
-    """Velocities from which a linkage can stop on its way within the limits of its joints, a row a linkage and one a
-    joint of it with limits of position; made by the stack where they have limits A of acceleration.
+    """Velocities from which a linkage can stop on its way within the limits of its joints, a row a linkage, one more
+    where it has several motions, and one a joint of it with limits of position; made by the stack where they have
+    limits A of acceleration.
 
         s' (v - v0 - c dt) <= s_max - s,    s = |v0 / A|_4,    s' = ds/dv,    r = d log|y| / dt / 2
 
@@ -61,7 +61,10 @@ class LinkageSpeed(Constraint):
     limits. At w the linkage can brake by the rest, TICKS later, until y is infinite, if it grows on as the inverse
     square of what is left of the way: before a dead point, whose weak rows count in y before they do in c. The row asks
     for less speed and not for another direction, in which the linkage would bend less here and come as near to its
-    dead point.
+    dead point. A linkage of several motions may turn to where it bends more, sooner than it can slow down: its second
+    row is the same of |c / A|_4 / SHARE, whose root grows with the length of v,
+
+        s b' (v - v0 - c dt) / (2 b) <= max(s sqrt(SHARE / b), s - D dt) - s,    b = |c / A|_4,    b' = db/dv
 
     The last line says that it stops within the limits of position. Its way x has dx/dl = v / s and d2x/dl2 = c / s^2 by
     the length l, of which braking by E A takes s t. A tick of it leads to v0 (1 - E dt / s) + c dt, and as
@@ -87,10 +90,12 @@ class LinkageSpeed(Constraint):
     limits: JointLimits
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        """One a linkage, named by its loops, then those of its joints with limits of position."""
+        """One or two a linkage, named by its loops, then those of its joints with limits of position."""
         out = list[Row]()
         for linkage in self._limited(robot):
             out.append(Row(linkage.name, "rad/s"))
+            if _turns(linkage):
+                out.append(Row(f"{linkage.name} turning", "rad/s"))
             out += [Row(robot.dof_names[dof], f"{robot.dof_units[dof]}/s") for dof in self._ended(robot, linkage)]
         return tuple(out)
 
@@ -138,12 +143,18 @@ class LinkageSpeed(Constraint):
         slow = 0.5 * (ticks * near + ca.sqrt((ticks * near) ** 2 + 2.0 / BRAKE * near))
         slow = ca.fmax(ca.sqrt(size / SHARE), speed * slow)
         most = ca.dot(along, dt * asked) + ca.fmax(speed / slow, speed - braking) - (rest / speed) ** 3 * rest
-        matrix = ca.SX(1 + len(ended), robot.nv)
-        matrix[0, dofs] = unit * along.T
-        lower, upper = [-ca.SX.inf(1)], [ca.if_else(ca.logic_and(size > SLIGHT, regular), unit * most, ca.inf)]
+        sides = [(along, most)]
+        if _turns(linkage):
+            steeper = 0.5 * speed / size * bend.steeper(asked / weights / size)
+            turned = ca.fmax(speed / ca.sqrt(size / SHARE), speed - braking)
+            sides.append((steeper, ca.dot(steeper, dt * asked) + turned))
+        slowed, first = ca.logic_and(size > SLIGHT, regular), len(sides)
+        matrix = ca.SX(first + len(ended), robot.nv)
+        matrix[:first, dofs] = unit * ca.horzcat(*[row for row, _ in sides]).T
+        lower, upper = [-ca.SX.inf(first)], [ca.if_else(slowed, unit * side, ca.inf) for _, side in sides]
         braked = (1.0 - braking / ca.fmax(speed, braking)) * kin.v[dofs] + dt * asked
         reach = len(dofs) ** 0.25 * dt
-        for k, dof in enumerate(ended, 1):
+        for k, dof in enumerate(ended, first):
             place, v_joint = dofs.index(dof), kin.v[dof]
             begins = kin.q[int(robot.position_index[dof])] + moved * dt * v_joint
             room = ca.if_else(
@@ -171,11 +182,13 @@ class Bend:
         asked: c, by its degrees of freedom.
         rate: r = d log|y| / dt / 2 at v and c [1/s].
         missed: of what is asked for, the part that c is not, |J c + (dJ/dt) v|^2 / |(dJ/dt) v|^2.
+        steeper: x -> sum_i x_i^3 d(c_i / A_i)/dv, by its degrees of freedom.
     """
 
     asked: ca.SX
     rate: ca.SX
     missed: ca.SX
+    steeper: Callable[[ca.SX], ca.SX]
 
 
 def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
@@ -204,8 +217,18 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
         whole[dofs] = along
         growth -= 0.5 * ca.dot(one / weights**2, _bracket(kin.q, tangent, kin.v, whole)[dofs])
     rate = 0.5 * growth / (ca.sumsqr(forces) + LEAST / ca.trace(seen @ seen.T))
+
+    def steeper(parts: ca.SX) -> ca.SX:
+        along = -solve(seen @ parts**3)
+        return ca.substitute(ca.densify(ca.gradient(work, kin.v)), y, along)[dofs]
+
     missed = ca.sumsqr(jacobian @ asked + bias) / (ca.sumsqr(bias) + LEAST**2)
-    return Bend(asked, rate, missed)
+    return Bend(asked, rate, missed, steeper)
+
+
+def _turns(linkage: Linkage) -> bool:
+    """Whether it moves in more ways than one, and may turn to others."""
+    return len(linkage.dofs) - linkage.held > 1
 
 
 def _norm(x: ca.SX, least: ca.SX | float) -> ca.SX:

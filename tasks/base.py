@@ -69,6 +69,7 @@ class Input:
             rotation, nv numbers for a configuration.
         low, high: valid range of each number.
         infinite: the infinity that is a valid number, too: no limit there.
+        each: of a vector, one number is a value, too, and counts for all of its numbers.
         below: name of an input of the same size, with a default like this one, whose numbers this one's never exceed.
         direction: a vector that is kept at unit length; its rate is the derivative of the unit vector.
         sensed: a :class:`Sensor` writes it before every tick; users only read it.
@@ -86,6 +87,7 @@ class Input:
     low: float = -np.inf
     high: float = np.inf
     infinite: float | None = None
+    each: bool = False
     below: str | None = None
     direction: bool = False
     sensed: bool = False
@@ -412,6 +414,10 @@ class Constraint(Item):
         nothing: how far e bends within a tick is made up for, see docs/reach.md. None: rows count as they are at q.
         """
         return None
+
+    def curved(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """:meth:`residual`, or what has its second derivatives along motions that keep it at 0."""
+        return self.residual(robot, kin, inputs)
 
     def bounds(self, robot: Robot, kin: Tracer, inputs: Values, dt: ca.SX) -> Bounds | None:
         """Simple bounds on v, or None; ``kin.v`` is the velocity that accelerations are counted from."""

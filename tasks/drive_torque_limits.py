@@ -96,7 +96,7 @@ class DriveTorqueLimits(Constraint):
         most = np.broadcast_to(np.array(self.torque, dtype=float), count).copy()
         return (
             Input("scale", default=1.0, low=0.0, high=1.0),
-            Input("torque", unit="N m, N", size=count, default=most, low=0.0, infinite=np.inf),
+            Input("torque", unit="N m, N", size=count, default=most, low=0.0, infinite=np.inf, each=True),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

@@ -80,7 +80,7 @@ class FrameVelocityLimit(Constraint):
         for name, unit in (("linear", "m/s"), ("angular", "rad/s")):
             values = [limit for input_name, _, limit in self._limits() if input_name == name]
             if values:
-                out.append(Input(name, unit=unit, size=len(values), default=values, low=0.0))
+                out.append(Input(name, unit=unit, size=len(values), default=values, low=0.0, each=True))
         return tuple(out)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

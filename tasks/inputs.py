@@ -98,8 +98,9 @@ def flat(robot: Robot, field: str, declared: Input, value: Any) -> Array:
         length = math.hypot(*value.tolist())
         if ORDINARY < length < 1.0 / ORDINARY:
             return np.asarray(value / length)
-    shape = (count,) if count else ()
-    numbers = np.atleast_1d(validation.real_array(field, value, shape, finite=declared.infinite is None))
+    alone = not count or (declared.each and validation.dimensions(field, value) == ())
+    given = validation.real_array(field, value, () if alone else (count,), finite=declared.infinite is None)
+    numbers = np.full(max(count, 1), given) if alone else given
     if declared.infinite is not None and not (np.isfinite(numbers) | (numbers == declared.infinite)).all():
         raise NotFiniteError(field, value, f"expected finite numbers, or {declared.infinite:g} for no limit")
     if declared.direction:

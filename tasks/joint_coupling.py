@@ -102,8 +102,8 @@ class JointCoupling(Task):
         count, units = len(self.coefficients), ", ".join(dict.fromkeys(row.unit for row in self.rows(robot)))
         rates = ", ".join(f"{unit}/s" for unit in units.split(", "))
         return (
-            Input("target", unit=units, size=count, default=self.target, rate="feedforward"),
-            Input("feedforward", unit=rates, size=count, default=np.zeros(count)),
+            Input("target", unit=units, size=count, default=self.target, rate="feedforward", each=True),
+            Input("feedforward", unit=rates, size=count, default=np.zeros(count), each=True),
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

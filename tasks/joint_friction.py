@@ -82,7 +82,7 @@ class JointFriction(Load):
             value = getattr(self, name)
             given: NDArray[np.float64] = np.array(known[name])[dofs] if value is None else np.array(value, dtype=float)
             start = np.broadcast_to(given, len(dofs)).copy()
-            out.append(Input(name, unit=unit, size=len(dofs), default=start, low=0.0))
+            out.append(Input(name, unit=unit, size=len(dofs), default=start, low=0.0, each=True))
         return (*out, Input("slow", unit="rad/s, m/s", default=self.slow, low=1e-6))
 
     def load(self, robot: Robot, kin: Kinematics, inputs: Values) -> ca.SX:

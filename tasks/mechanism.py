@@ -78,6 +78,13 @@ class Mechanism(Constraint):
 
     def residual(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
         """e of loops; couplings do not bend."""
+        return self._residual(robot, kin, still=False)
+
+    def curved(self, robot: Robot, kin: Tracer, inputs: Values) -> ca.SX | None:
+        """e of loops along axes that do not turn."""
+        return self._residual(robot, kin, still=True)
+
+    def _residual(self, robot: Robot, kin: Tracer, still: bool) -> ca.SX | None:
         if not robot.loops:
             return None
-        return ca.vertcat(ca.SX(len(robot.couplings) + len(robot.locked_dofs), 1), robot.loops.error(kin))
+        return ca.vertcat(ca.SX(len(robot.couplings) + len(robot.locked_dofs), 1), robot.loops.error(kin, still))

@@ -67,7 +67,7 @@ class RigidGrasp(Contact):
             value = getattr(self, name)
             if value is not None:
                 start = np.broadcast_to(np.array(value, dtype=np.float64), 3).copy()
-                out.append(Input(name, unit=unit, size=3, default=start, low=0.0, infinite=np.inf))
+                out.append(Input(name, unit=unit, size=3, default=start, low=0.0, infinite=np.inf, each=True))
         return tuple(out)
 
     def cone_rows(self, robot: Robot) -> tuple[Row, ...]:

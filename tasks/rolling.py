@@ -210,5 +210,5 @@ def _axis(robot: Robot, joint: int, q: NDArray[np.float64]) -> NDArray[np.float6
     data = robot.model.createData()
     pin.computeJointJacobians(robot.model, data, q)
     column = int(robot.model.idx_vs[joint])
-    jacobian = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL_WORLD_ALIGNED).reshape(6, robot.nv)
+    jacobian = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL_WORLD_ALIGNED)
     return np.array(jacobian[3:, column])

@@ -89,7 +89,7 @@ class TorqueLimits(Constraint):
             return (scale,)
         rates = np.broadcast_to(np.array(self.slew, dtype=float), count).copy()
         last = Input("last", unit="N m, N", size=count, default=np.full(count, NOT_KNOWN), sensed=True)
-        return (scale, Input("slew", unit="N m/s, N/s", size=count, default=rates, low=0.0), last)
+        return (scale, Input("slew", unit="N m/s, N/s", size=count, default=rates, low=0.0, each=True), last)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         efforts = robot.limits.effort

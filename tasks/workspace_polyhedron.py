@@ -92,8 +92,8 @@ class WorkspacePolyhedron(Constraint):
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         count, start = len(self.normals), pin.SE3.Identity() if self.pose is None else self.pose
         return (
-            Input("offsets", unit="m", size=count, default=self.offsets, rate="offsets_rate", infinite=-math.inf),
-            Input("offsets_rate", unit="m/s", size=count, default=np.zeros(count)),
+            Input("offsets", "vector", "m", count, self.offsets, "offsets_rate", infinite=-math.inf, each=True),
+            Input("offsets_rate", "vector", "m/s", count, np.zeros(count), each=True),
             Input("pose", "pose", unit="m, rad", default=start, rate="velocity"),
             Input("velocity", unit="m/s, rad/s", size=6, default=np.zeros(6)),
         )

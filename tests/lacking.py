@@ -24,10 +24,9 @@ OPTIONAL |= {
     "pxr": "usd-core",
     "rerun": "rerun-sdk",
     "torch": "torch",
-    "zenoh": "eclipse-zenoh",
 }
 #: Extras that bring them
-EXTRAS = "foxglove|laws|protobuf|rerun|ros2|torch|usd|zenoh"
+EXTRAS = "foxglove|laws|protobuf|rerun|ros2|torch|usd"
 LACKING = {module: package for module, package in OPTIONAL.items() if find_spec(module) is None}
 #: What an error says in this process or another
 _WANTED = re.compile(

@@ -17,6 +17,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 
 import casadi as ca
 
@@ -74,6 +75,13 @@ def keep(folder: pathlib.Path) -> None:
     toolchain._run = run
     # What was compiled when the package was installed need not be made again for this very processor
     kernel.library = functools.partial(kernel.library, at_once=True)
+    kernel.kernel = functools.partial(_at_once, kernel.kernel)
+
+
+def _at_once(
+    kernel: Callable[..., pathlib.Path], main: pathlib.Path, *folders: pathlib.Path, **_: bool
+) -> pathlib.Path:
+    return kernel(main, *folders, at_once=True)
 
 
 def _made(command: list[str], place: pathlib.Path) -> None:

@@ -30,7 +30,6 @@ EXTRAS = {
     "usd": ("pxr",),
     "viewer": ("viser", "websockets"),
     "xacro": ("xacrodoc",),
-    "zenoh": ("zenoh", "rosbags"),
     "zeromq": ("zmq",),
 }
 

@@ -26,8 +26,7 @@ from bench.harness import machine as host
 from bench.pool import ROOT
 from bench.program import Record, bars, measure, publish
 from bench.sheet import Sheet
-from tests.climb.obstructed import OBSTRUCTED, obstructed
-from tests.climb.structures import FAMILIES, drawn
+from tests.climb.structures import OBSTRUCTED, SCARCE, structure
 from tests.climb.walkers import walker_with
 from wbc.climb import (
     BodyPlace,
@@ -115,11 +114,11 @@ def cases(part: str, count: int, arms: int | None, first: int = 0) -> Iterator[C
             less = remove_fraction(whole, 0.1 + 0.5 * (seed % 10) / 10, seed)
             yield Case(f"layout {seed}", less, _over((13, 6), (13, 18)), 3 * INCH)
     else:
-        families = list(OBSTRUCTED if part == "structures" else FAMILIES)
+        families = list(OBSTRUCTED if part == "structures" else SCARCE)
         for k in range(first, first + count):
             family, seed = families[k % len(families)], k // len(families)
             many = arms or (ARMS[seed % len(ARMS)] if part == "structures" else 3)
-            course = obstructed(family, seed) if part == "structures" else drawn(family, seed)
+            course = structure(family, seed)
             poses = [body_over(walker_with(many), frame) for frame in (course.start, course.goal)]
             yield Case(f"{family} {seed}, {many} arms", course.scene, poses, AMONG, TURNING, many)
 

@@ -57,7 +57,7 @@ def jumping() -> Motion:
 
 def exempt(**changes: Any) -> Any:
     """A sweep with an exemption."""
-    given: dict[str, Any] = {"hand": "hand", "mount": "table", "point": np.zeros(3), "radius": 0.1, **changes}
+    given: dict[str, Any] = {"hand": "hand", "mount": "table", "point": np.zeros(3), "slope": 0.1, **changes}
     return Sweeper(scene()).sweep(still(pin.SE3.Identity()), exemptions=[Exemption(**given)])
 
 
@@ -105,7 +105,7 @@ BAD: list[tuple[Callable[[], Any], type[WbcError], str]] = [
     (lambda: Sweeper(scene()).at(still(pin.SE3.Identity()), 2.0), RangeError, "time"),
     (lambda: exempt(hand="table"), ShapeError, "grasp"),
     (lambda: exempt(mount="hand"), ShapeError, "fixed in the world"),
-    (lambda: exempt(radius=-1.0), RangeError, "radius"),
+    (lambda: exempt(slope=-1.0), RangeError, "slope"),
     (lambda: exempt(depth=np.nan), NotFiniteError, "depth"),
     (lambda: exempt(point=[0, 0]), ShapeError, "point"),
 ]

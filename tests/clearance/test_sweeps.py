@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from math import inf
 
 import numpy as np
@@ -301,7 +302,7 @@ def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds() -> None:
         return Motion.linear(tree, times, np.zeros((5, 0)), np.array([[*place, 0, 0, 0, 1.0] for place in places]))
 
     def clear(motion: Motion, **changes: float) -> bool:
-        numbers = {"radius": 0.05, "depth": 0.005, **changes}
+        numbers = {"slope": 0.05, "depth": 0.005, **changes}
         here = Exemption("hand", "table", np.zeros(3), **numbers)
         return sweeper.sweep(motion, exemptions=[here]).clear
 
@@ -309,7 +310,7 @@ def test_a_hand_may_go_to_its_hold_and_so_deep_while_it_holds() -> None:
     assert clear(down(0.003))
     assert not clear(down(0.006))
     assert not clear(down(0.003), depth=0.002)
-    assert clear(down(0.003, along=0.04))
+    assert clear(down(0.003, along=0.03))
     assert not clear(down(0.003, along=0.06))
     # It comes and goes within 25 mm of the table: 0.0 s to 4.0 s
     assert clear(down(0.003), since=0.0, until=4.0)
@@ -322,10 +323,40 @@ def test_a_grasp_point_that_leaves_its_hold_ends_the_exemption() -> None:
     tree = jointed(pin.JointModelRZ())
     hand = SweptBody("hand", Sphere(0.1), "rod", grasp=np.array([1.0, 0.0, 0.0]))
     scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
-    held = Exemption("hand", "table", np.array([1.0, 0.0, 0.0]), 0.05, 0.2)
+    held = Exemption("hand", "table", np.array([1.0, 0.0, 0.0]), 2.0, 0.2)
     for turn, clear in ((1.0, False), (0.06, False), (0.04, True)):
         motion = Motion.linear(tree, [0.0, 1.0], [[-turn], [turn]])
         assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
+
+
+@pytest.mark.parametrize("seed", range(repeats(6)))
+def test_less_is_enough_by_how_far_a_hand_is_from_its_hold(seed: int) -> None:
+    """Balls with a grasp point go about a table at random, here against instants close to each other."""
+    rng, tree, found = np.random.default_rng(seed), free_tree(), set[bool]()
+    for _ in range(20):
+        radius, grasp, slope, depth = (
+            rng.uniform(0.01, 0.03),
+            rng.normal(scale=0.01, size=3),
+            *rng.uniform(0, [1, 0.03]),
+        )
+        hand = SweptBody("hand", Sphere(radius), "universe", grasp=grasp)
+        scene = SweptScene(tree, [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.02)])
+        turns = [pin.Quaternion(pin.exp3(rng.normal(scale=0.3, size=3))).coeffs() for _ in range(4)]
+        places = rng.normal(scale=0.02, size=(4, 3)) + [0.0, 0.0, radius + 0.02]
+        motion = Motion.linear(tree, np.arange(4.0), np.zeros((4, 0)), np.hstack([places, turns]))
+        swept = Sweeper(scene).sweep(motion, exemptions=[Exemption("hand", "table", np.zeros(3), slope, depth)])
+        least = np.inf
+        for k, part in itertools.product(range(3), np.linspace(0.0, 1.0, 200)):
+            first, last = (pin.XYZQUATToSE3(np.r_[places[i], turns[i]]) for i in (k, k + 1))
+            at = (1.0 - part) * first.translation + part * last.translation
+            turn = first.rotation @ pin.exp3(part * pin.log3(first.rotation.T @ last.rotation))
+            enough = min(0.02, slope * np.linalg.norm(at + turn @ grasp) - depth)
+            least = min(least, at[2] - radius - enough)
+        assert swept.clear == (least > 0.0) or abs(least) < 3e-4
+        near = swept.nearest
+        assert swept.clear or (near is not None and near.distance < near.required)
+        found.add(swept.clear)
+    assert found == {False, True}
 
 
 REST, DEEP = np.full(9, 0.02), np.array([1.0, 1.0, 0.04, 0.02, 0.02, 0.02, 0.04, 1.0, 1.0])
@@ -344,7 +375,7 @@ def test_times_of_an_exemption_are_those_of_the_hold(z: Array, since: float, unt
     scene = SweptScene(free_tree(), [hand, SweptBody("table", HalfSpace())], [Pair("hand", "table", 0.01)])
     poses = np.column_stack([0 * z, 0 * z, z, 0 * z, 0 * z, 0 * z, 0 * z + 1])
     motion = Motion.linear(free_tree(), np.arange(9.0), np.zeros((9, 0)), poses)
-    held = Exemption("hand", "table", np.zeros(3), 0.1, 0.001, since, until)
+    held = Exemption("hand", "table", np.zeros(3), 0.02, 0.001, since, until)
     assert Sweeper(scene).sweep(motion, exemptions=[held]).clear is clear
 
 

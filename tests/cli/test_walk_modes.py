@@ -139,7 +139,7 @@ def test_a_walk_that_asks(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["walk", *arguments], input="1,1\n" + "\n" * 9)
     assert done.exit_code == 0, done.stderr
     err = " ".join(done.stderr.split())
-    moves = len(np.load(tmp_path / "plan.npz")["moves"])
+    moves = len(np.load(tmp_path / "plan.npz")["table:moves"])
     assert err.count("Enter: yes") == moves + 1 > 1  # once more where a foothold was refused
     assert err.count("out of reach") == 1
 

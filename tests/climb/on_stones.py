@@ -22,12 +22,15 @@ def on_stones(
     half of the way each time; at last the body goes back.
     """
     closure = Closure(climber)
-    at = closure.poses(climber.rest)
+    at, kinds = closure.poses(climber.rest), [limb.contact for limb in climber.limbs]
     frames = [
-        frame_on(pose.translation, [0.0, 0.0, 1.0]) if climber.fixed(limb) == "position" else pose
+        frame_on(pose.translation - [0.0, 0.0, kinds[limb].height], [0.0, 0.0, 1.0])
+        if climber.fixed(limb) == "position"
+        else pose
         for limb, pose in enumerate(at)
     ]
-    q, left = closure.closed(climber.rest, dict(enumerate(frames)))
+    held = {limb: kinds[limb].held_at(frame) for limb, frame in enumerate(frames)}
+    q, left = closure.closed(climber.rest, held)
     assert left < 1e-6
     footholds, bodies = list[Foothold](), dict[str, SceneBody]()
 
@@ -53,7 +56,7 @@ def on_stones(
             body = climber.body_pose(stances[-1].q)
             turned = body.rotation @ pin.exp3(rng.uniform(-0.05, 0.05, 3))
             moved = pin.SE3(turned, body.translation + 0.3 * step * rng.uniform(-1.0, 1.0, 3))
-            wanted = {limb: footholds[row].pose for limb, row in enumerate(next_)}
+            wanted = {limb: kinds[limb].held_at(footholds[row].pose) for limb, row in enumerate(next_)}
             q, left = closure.closed(climber.with_body(stances[-1].q, moved), wanted)
             scene = ClimbScene(footholds, bodies, np.zeros(3))
             clear = Clearances(climber, scene)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from tests.distances import coal_distance
+from wbc.climb.contacts import PointFoot
 from wbc.climb.plan import ContactPlan
 from wbc.climb.stance import FREE_LIMB
 from wbc.validation import Array
@@ -35,6 +36,14 @@ def holding(plan: ContactPlan, time: float) -> list[int]:
     return out
 
 
+def off(plan: ContactPlan, limb: int, row: int, q: Array) -> float:
+    """How far a contact frame is from where it holds a foothold [m]: of a ball's centre, its radius over it."""
+    contact, foothold = plan.climber.limbs[limb].contact, plan.scene.footholds[row].pose
+    over = contact.radius if isinstance(contact, PointFoot) else 0.0
+    place = foothold.translation + over * foothold.rotation[:, 2]
+    return float(np.linalg.norm(plan.climber.contact_pose(q, limb).translation - place))
+
+
 def slipped(plan: ContactPlan, times: Array, q: Array) -> float:
     """Farthest that a contact that holds is from its foothold [m]."""
     climber, most = plan.climber, 0.0
@@ -42,7 +51,7 @@ def slipped(plan: ContactPlan, times: Array, q: Array) -> float:
         for limb, row in enumerate(holding(plan, time)):
             if row != FREE_LIMB:
                 pose, foothold = climber.contact_pose(at, limb), plan.scene.footholds[row].pose
-                most = max(most, float(np.linalg.norm(pose.translation - foothold.translation)))
+                most = max(most, off(plan, limb, row, at))
                 if climber.fixed(limb) != "position":
                     most = max(most, float(np.linalg.norm(np.cross(pose.rotation[:, 2], foothold.rotation[:, 2]))))
     return most

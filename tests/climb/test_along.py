@@ -128,18 +128,24 @@ def test_ways_without_footholds_are_refused(walker: Climber) -> None:
 
 
 def test_a_search_that_lacks_memory_says_so() -> None:
-    """In a process of its own with little more than it has: it used to end there."""
+    """In a process of its own, of whose memory all is taken but a little; it used to end there."""
     source = """
-        import resource
+        import ctypes, resource
         from pathlib import Path
         from tests.climb.test_along import BodyTrack, cylinder_grid, machines, over, plan_along
         walker, scene = machines.climber("walker"), cylinder_grid()
         plan_along(walker, scene, BodyTrack((over(13, 8), over(13, 9)), 0.1))
         track = BodyTrack((over(13, 2), over(13, 23)), 0.01)
         track.places, track.twists
-        for more in (1, 2, 3, 4):
-            most = 4096 * int(Path("/proc/self/statm").read_text().split()[0]) + more * 2**20
-            resource.setrlimit(resource.RLIMIT_AS, (most, -1))
+        libc, taken, count = ctypes.CDLL(None), [0] * 100_000, 0
+        libc.malloc.restype, libc.free.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+        resource.setrlimit(resource.RLIMIT_AS, (4096 * int(Path("/proc/self/statm").read_text().split()[0]), -1))
+        while block := libc.malloc(2**16):
+            taken[count], count = block, count + 1
+        for _ in range(8):
+            for block in taken[count - 8 : count]:
+                libc.free(block)
+            count -= 8
             try:
                 plan_along(walker, scene, track)
             except MemoryError as error:

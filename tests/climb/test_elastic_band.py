@@ -108,7 +108,7 @@ def test_a_body_that_stays_is_not_moved_by_what_its_limb_goes_round(still: bool)
     states[:, 12:15] += [0.0, -0.3, 0.0] + (2.0 * x - 1.0) * [0.5, 0.0, 0.0]
     poses = np.tile([place(robot.contact_pose(q, limb)) for limb in range(6)], (11, 1, 1))
     closed = np.tile(np.arange(6) > 0, (11, 1))
-    rows = BandRows(np.zeros((11, 6), dtype=np.int32), poses, closed, closed, np.zeros(6, dtype=np.int32))
+    rows = BandRows(np.zeros((11, 6), dtype=np.int32), poses, closed, np.zeros(6, dtype=np.int32))
     band = ElasticBand(world, still=still).relaxed(states, rows)
     moved = np.abs(band[:, :12] - states[:, :12]).max()
     assert np.abs(band[:, 12:] - states[:, 12:]).max() > 0.01

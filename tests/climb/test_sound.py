@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 from tests.climb.arriving import arrives
-from tests.climb.obstructed import OBSTRUCTED, obstructed
-from tests.climb.referee import between, body_speeds, fastest_share, least_distances, slipped
+from tests.climb.referee import between, body_speeds, fastest_share, least_distances, off, slipped
+from tests.climb.structures import OBSTRUCTED, structure
 from tests.climb.walkers import walker_with
 from tests.repeats import MORE, repeats
 from wbc.climb import (
@@ -70,8 +70,7 @@ def carried_out(plan: ContactPlan) -> None:
     for k, posture in zip(some, between_ticks, strict=True):
         for limb, row in enumerate(contacts[k]):
             if row >= 0 and row == contacts[k + 1, limb]:
-                away = plan.climber.contact_pose(posture, limb).translation - run.scene.positions[row]
-                assert np.linalg.norm(away) < 2e-3
+                assert off(plan, limb, row, posture) < 2e-3
 
 
 def planned(climber: Climber, course: ClimbCourse, share: float, speeds: MotionSpeeds) -> ContactPlan | None:
@@ -126,7 +125,7 @@ def test_what_stands_in_the_way_is_missed(family: str) -> None:
     """Of each family the beginning of the first way that is found; of a long run several whole ones, with more arms."""
     walked, seed = 0, 0
     while walked < (repeats(1) if MORE > 1.0 else 1) and seed < 10 * repeats(1):
-        climber, course = walker_with(ARMS[seed % len(ARMS)]), obstructed(family, seed)
+        climber, course = walker_with(ARMS[seed % len(ARMS)]), structure(family, seed)
         plan = planned(climber, course, 1.0 if MORE > 1.0 else 0.3, MotionSpeeds(0.1, 0.2))
         if plan is not None:
             sound(plan, MotionSpeeds(0.1, 0.2))
@@ -134,14 +133,3 @@ def test_what_stands_in_the_way_is_missed(family: str) -> None:
             walked += 1
         seed += 1
     assert walked > 0
-
-
-@pytest.mark.parametrize("family", OBSTRUCTED)
-def test_obstructed_scenes_are_those_of_their_seeds(family: str) -> None:
-    one, again, other = (obstructed(family, seed) for seed in (0, 0, 1))
-    places = [
-        [each.pose for each in course.scene.footholds] + [body.placement for body in course.scene.bodies.values()]
-        for course in (one, again, other)
-    ]
-    assert places[0] == places[1] != places[2]
-    assert 0.8 < np.linalg.norm(one.goal.translation - one.start.translation) < 4.0

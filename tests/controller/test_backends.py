@@ -61,7 +61,6 @@ CASES = {
     "panda": (("arm", "panda"), aim, repeats(30)),
     "conflicts": (("conflicts",), quarrel, repeats(60)),
     "kinova": (("everything", "kinova"), randomise, repeats(12)),
-    "talos": (("humanoid",), aim, 8),
 }
 
 

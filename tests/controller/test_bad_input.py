@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.backends import COMPILED
 from tests.controller.stacks import DT, robot
 from tests.controller.twins import BACKENDS, POSE, TURN, make, next_ticks, prepare, state
 from tests.repeats import ALL, MORE, covering
@@ -20,7 +21,7 @@ from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, Un
 
 SKEWED = TURN + 1e-3 * np.eye(3)
 #: Of calls before the first tick every so many is tried
-FRESH = 1 if MORE >= ALL else 3
+FRESH = 1 if MORE >= ALL else 9
 NAN, INF = np.full(7, np.nan), np.array([0.0, np.inf, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -255,7 +256,7 @@ def check_running(name: str, backend: str, case: Case) -> None:
 
 def fresh(name: str) -> Controller:
     """One whose values are set, before its first tick."""
-    one = make(name, "native")
+    one = make(name, COMPILED)
     prepare(one, ticks=0)
     return one
 

@@ -128,7 +128,7 @@ def test_what_is_bad_changes_nothing() -> None:
     assert core_of(controller).tick.state.tobytes() == before
 
 
-@pytest.mark.parametrize("backend", [COMPILED, "vm"])
+@pytest.mark.parametrize("backend", sorted({COMPILED, "vm"}))
 @pytest.mark.parametrize(
     ("name", "base", "frame"),
     [("panda", "fixed", "panda_hand"), ("talos", "floating", "base_link"), ("tiago", "planar", "base_link")],

@@ -16,11 +16,20 @@ from tests.controller.stacks import DT, inside, robot
 from tests.controller.twins import BACKENDS, make, next_ticks, state
 from wbc import Stack
 from wbc.controller import core_of
-from wbc.errors import NotFiniteError, RotationError, SolverError
+from wbc.errors import NotFiniteError, RotationError, ShapeError, SolverError
 from wbc.robot import Robot
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import Input, Posture
-from wbc.tasks.base import Row, Task, Values
+from wbc.tasks import (
+    Elbow,
+    FrameVelocityLimit,
+    Input,
+    JointCoupling,
+    Limit,
+    Posture,
+    WorkspaceBox,
+    WorkspacePolyhedron,
+)
+from wbc.tasks.base import Item, Row, Task, Values
 
 KINDS: dict[str, Callable[[np.ndarray], Any]] = {
     "float32": lambda x: x.astype(np.float32),
@@ -72,6 +81,36 @@ def test_whole_numbers_are_welcome(kind: type, backend: str) -> None:
     controller["limits"].mask, twin["limits"].mask = np.ones(7, kind), np.ones(7)
     assert controller.step(q.astype(kind).tolist())._data == twin.step(q.astype(float))._data
     assert controller.step(q.astype(kind))._data == twin.step(q.astype(float))._data
+
+
+@pytest.mark.parametrize(
+    ("item", "name"),
+    [
+        (WorkspaceBox("panda_hand", -2.0, 2.0), "lower"),
+        (WorkspaceBox("panda_hand", -2.0, 2.0), "upper_rate"),
+        (Limit(Elbow("panda_link4"), upper=2.0, only="z"), "upper"),
+        (FrameVelocityLimit("panda_hand", linear=(1.0, np.inf, 2.0)), "linear"),
+        (JointCoupling([{"panda_joint1": 1.0}, {"panda_joint2": 1.0, "panda_joint3": 2.0}]), "target"),
+        (WorkspacePolyhedron("panda_hand", [(0, 0, 1), (1, 0, 0)], -2.0), "offsets"),
+    ],
+    ids=lambda given: given if isinstance(given, str) else type(given).__name__,
+)
+def test_one_number_counts_for_all_where_the_declaration_takes_one(item: Item, name: str) -> None:
+    controller = Stack(robot("panda"), DT).add(item, name="it").add(Posture(), name="posture").compile(backend="vm")
+    controller.reset(robot("panda").neutral)
+    count = controller["it"].get(name).size
+    for one in (0.25, np.float32(0.25), np.array(0.25)):
+        controller["it"].set(**{name: one})
+        assert np.array_equal(controller["it"].get(name), np.full(count, 0.25))
+    batch = controller.batch(3)
+    batch.set(it={name: 0.5})
+    single = controller.clone()
+    single["it"].set(**{name: np.full(count, 0.5)})
+    q = np.array(robot("panda").neutral)
+    assert np.array_equal(batch.step(np.tile(q, (3, 1))).v, np.tile(single.step(q).v, (3, 1)))
+    for wrong in (np.full(count + 1, 0.25), "0.25", np.nan):
+        with pytest.raises((ShapeError, NotFiniteError), match=f"it.{name}"):
+            controller["it"].set(**{name: wrong})
 
 
 # --- before the first configuration -----------------------------------------------------------------

@@ -46,9 +46,8 @@ def path(control: Controller, whole: bool, rng: np.random.Generator) -> list[byt
     return out
 
 
-@pytest.mark.parametrize("backend", ["vm", pytest.param("native", marks=pytest.mark.compiled)])
-def test_both_ways_are_one(backend: str) -> None:
-    one, other = made(backend), made(backend)
+def test_both_ways_are_one() -> None:
+    one, other = made("auto"), made("auto")
     assert path(one, True, np.random.default_rng(7)) == path(other, False, np.random.default_rng(7))
     assert core_of(one).resets == core_of(other).resets > repeats(3), "some ticks were found again with other rows"
 

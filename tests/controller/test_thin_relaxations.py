@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
+from tests.backends import IN_PYTHON, way
 
 
 def test_both_back_ends_find_the_optimum_of_a_thin_rest() -> None:
@@ -16,14 +17,14 @@ def test_both_back_ends_find_the_optimum_of_a_thin_rest() -> None:
     stack.add(wbc.tasks.JointLimits())
     stack.add(wbc.tasks.Hold("panda_link4"), name="hold")
     stack.add(wbc.tasks.FrameVelocityLimit("panda_hand_tcp", linear=0.2, angular=0.5), name="speed")
-    native, vm = stack.compile(backend="auto"), stack.compile(backend="vm")
+    one_call, in_python = stack.compile(backend="auto"), stack.compile(**way(IN_PYTHON))
     rng = np.random.default_rng(0)
     home = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7])
     for _ in range(60):
         q = pin.integrate(robot.model, home, 0.03 * rng.normal(size=robot.nv))
         shift = 0.2 * rng.normal(size=3)
         answers = []
-        for controller in (native, vm):
+        for controller in (one_call, in_python):
             controller.reset(home)
             target = controller["hand"].target.copy()
             target.translation += shift

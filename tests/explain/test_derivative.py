@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import IN_PYTHON, way
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import FRAMES, arm, robot
 from tests.models import placement
 from wbc.api import Controller
@@ -17,7 +17,7 @@ from wbc.tasks import Hold
 STEP = 1e-5
 
 
-@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = arm(posture=0.1).add(Hold(FRAMES["panda"].tip, kind="position"), name="hold")
     controller = stack.compile(**way(request.param))

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import IN_PYTHON, way
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import DT, FRAMES, robot
 from tests.models import frame_jacobian, placement
 from tests.torque.problems import controller
@@ -44,7 +44,7 @@ class Ask(Constraint):
         return Rows(matrix, ca.sqrt(inputs["x"]), ca.SX.inf(1))
 
 
-@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     stack = Stack(robot("panda"), DT)
     stack.add(EndEffector(TIP), name="hand").add(Posture(), name="posture", weight=1e-3)

@@ -17,7 +17,7 @@ from wbc.controller import Policy, Step
 from wbc.explain.reason import Reason
 from wbc.robot import Robot
 from wbc.shapes import Sphere
-from wbc.tasks import EndEffector, JointLimits, Obstacle, Posture, WorkspaceBox
+from wbc.tasks import EndEffector, Expression, JointLimits, Obstacle, Posture, WorkspaceBox
 
 ARMS = ("panda", "ur5", "kinova", "z1")
 DT = 0.005
@@ -103,6 +103,18 @@ def test_far_beyond_reach_the_distance_is_that_of_the_nearest_pose_from_anywhere
     found = reason(tick.step(q))
     assert found.kind == "reach"
     assert found.beyond[0][0] == pytest.approx(2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e7, 1e9])
+def test_out_of_reach_is_said_whatever_a_row_is_counted_in(scale: float) -> None:
+    robot, tip, _ = arm("ur5")
+    z = np.array([0.0, 0.0, 1.0])
+    short = 3.0 - float(robot.pose(farthest(robot, tip, z, 7), tip).translation @ z)
+    height = Expression(lambda kin, p: scale * (kin.position(tip)[2] - 3.0), units="m")
+    tick = Stack(robot, DT).add(height, name="hand").compile(backend="vm")
+    found = reason(tick.step(robot.random(3)))
+    assert found.kind == "reach"
+    assert found.beyond[0][0] == pytest.approx(short * scale, rel=1e-3)
 
 
 def test_the_nearest_pose_is_the_least_of_several_minima() -> None:

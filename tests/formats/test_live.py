@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import websockets
 
 import wbc
@@ -176,85 +175,18 @@ while time.time() < until:
 """
 
 
-ZENOH = """
-import struct, sys, time, zenoh
-
-class Bytes:
-    # What ROS 2 writes, little-endian: a number is at a multiple of its size from the fourth byte on
-    def __init__(self, data=b""):
-        self.data, self.at = bytearray(data), 0
-    def put(self, kind, *numbers):
-        for number in numbers:
-            self.data += bytes(-len(self.data) % struct.calcsize(kind)) + struct.pack("<" + kind, number)
-    def text(self, what):
-        self.put("I", len(what) + 1)
-        self.data += what.encode() + bytes(1)
-    def get(self, kind):
-        self.at += -self.at % struct.calcsize(kind)
-        number, = struct.unpack_from("<" + kind, self.data, self.at)
-        self.at += struct.calcsize(kind)
-        return number
-    def said(self):
-        size = self.get("I")
-        self.at += size
-        return self.data[self.at - size : self.at - 1].decode()
-    def many(self):
-        return [self.get("d") for _ in range(self.get("I"))]
-
-port, domain, names = sys.argv[1], sys.argv[2], sys.argv[3].split(",")
-config = zenoh.Config()
-config.insert_json5("listen/endpoints", f'["tcp/127.0.0.1:{port}"]')
-config.insert_json5("scouting/multicast/enabled", "false")
-session, q, orders = zenoh.open(config), dict.fromkeys(names, 0.1), []
-order = "trajectory_msgs::msg::dds_::JointTrajectory_/"
-order += "RIHS01_179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e"
-state = "sensor_msgs::msg::dds_::JointState_/RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
-
-def told(sample):
-    number, when, size = struct.unpack_from("<qqB", bytes(sample.attachment))
-    assert size == 16 and len(bytes(sample.attachment)) == 33 and number == len(orders) + 1
-    data = bytes(sample.payload)
-    assert data[:4] == bytes([0, 1, 0, 0])
-    given = Bytes(data[4:])
-    given.get("i"), given.get("I"), given.said()
-    joints = [given.said() for _ in range(given.get("I"))]
-    assert given.get("I") == 1
-    positions, velocities = given.many(), given.many()
-    assert given.many() == given.many() == []
-    assert given.get("i") + 1e-9 * given.get("I") > 0.0
-    q.update(zip(joints, positions))
-    orders.append(velocities)
-
-kept = session.declare_subscriber(f"{domain}/joint_trajectory_controller/joint_trajectory/{order}", told)
-said = session.declare_publisher(f"{domain}/joint_states/{state}")
-print("up", flush=True)
-until = time.time() + 60.0
-while time.time() < until:
-    now, turned = Bytes(), [*reversed(names), "gripper"]
-    now.put("i", 1), now.put("I", 2), now.text("")
-    now.put("I", len(turned)), [now.text(name) for name in turned]
-    now.put("I", len(turned)), now.put("d", *(q.get(name, 0.0) for name in turned))
-    now.put("I", 0, 0)
-    said.put(bytes([0, 1, 0, 0]) + bytes(now.data))
-    time.sleep(0.002)
-"""
-
-
-@pytest.mark.parametrize("over", ["dds", "zenoh"])
-def test_a_robot_of_ros2_is_a_plant(over: str, tmp_path: Path) -> None:
+def test_a_robot_of_ros2_is_a_plant(tmp_path: Path) -> None:
     """Its endpoint is another process with definitions of messages of its own."""
-    wheel = __import__({"dds": "cyclonedds"}.get(over, over))
+    wheel = __import__("cyclonedds")
     robot, domain = wbc.robots.load("ur5"), 100 + os.getpid() % 100
-    (tmp_path / "endpoint.py").write_text({"dds": ENDPOINT, "zenoh": ZENOH}[over])
+    (tmp_path / "endpoint.py").write_text(ENDPOINT)
     path = os.pathsep.join([str(Path(wheel.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    port = free_port()
-    asked = [*([str(port)] if over == "zenoh" else []), str(domain), ",".join(robot.joint_names)]
-    command = [sys.executable, str(tmp_path / "endpoint.py"), *asked]
+    command = [sys.executable, str(tmp_path / "endpoint.py"), str(domain), ",".join(robot.joint_names)]
     other = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": path}, stdout=subprocess.PIPE)
     try:
         assert other.stdout is not None
         assert other.stdout.readline() == b"up\n"
-        plant = Ros2Plant(robot, domain=domain, zenoh=f"tcp/127.0.0.1:{port}" if over == "zenoh" else None)
+        plant = Ros2Plant(robot, domain=domain)
         connection = Connection(plant, robot, 0.02)
         state = connection.reset(robot.neutral)
         assert np.allclose(state.q, robot.neutral)

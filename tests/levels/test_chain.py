@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.backends import IN_PYTHON, way
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.test_policy import spread
 from tests.levels import arms
 from tests.models import placement
@@ -17,7 +17,7 @@ from wbc.controller.policy import CHAIN
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def tick(request: pytest.FixtureRequest) -> Controller:
     return arms.levels().compile(**way(request.param))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wbc
-from tests.backends import IN_PYTHON, way
+from tests.backends import COMPILED, IN_PYTHON, way
 from tests.levels import arms
 from tests.repeats import repeats
 from wbc.api import Controller
@@ -20,7 +20,7 @@ STEP = 1e-6
 Q = np.array([0.3, 0.4, -0.2, 0.6, 0.1])
 
 
-@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def calm(request: pytest.FixtureRequest) -> Controller:
     return arms.levels(calm=True, soft=False).compile(**way(request.param))
 
@@ -30,7 +30,7 @@ def plain() -> Controller:
     return arms.levels().compile(solver=IN_PYTHON)
 
 
-@pytest.fixture(scope="module", params=(IN_PYTHON, "native"))
+@pytest.fixture(scope="module", params=(IN_PYTHON, COMPILED))
 def held(request: pytest.FixtureRequest) -> Controller:
     """A hand that is held, and levels that pull at it."""
     controller = holding(lower=True).compile(**way(request.param))

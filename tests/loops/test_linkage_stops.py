@@ -112,17 +112,18 @@ def test_the_row_of_a_joint_says_where_it_stops(seed: int, later: bool) -> None:
         return begins + velocity * time + 0.5 * share * bent.ravel() * (time - DT) ** 2, time
 
     kept, h = robot.limits, 1e-6
+    first = len(matrix) - robot.nv
     for k in range(robot.nv):
         end, row = (kept.position_upper[k], upper) if v[k] > 0.0 else (kept.position_lower[k], lower)
         # The speed at which it would stop at its limit but for the bend, of those that it may reach
         about = STOP * (np.sqrt(DT**2 + 2.0 * abs(end - begins[k]) * speed / abs(v[k]) / STOP) - DT)
         there = v / speed * min(max(about, speed - reach), speed + reach)
         reached, time = stop(there)
-        assert matrix[k + 1] @ there - row[k + 1, 0] == pytest.approx((reached[k] - end) / time, abs=1e-9)
+        assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((reached[k] - end) / time, abs=1e-9)
         slopes = [
             (stop(there + h * unit)[0][k] - stop(there - h * unit)[0][k]) / (2.0 * h) for unit in np.eye(robot.nv)
         ]
-        assert matrix[k + 1] == pytest.approx(np.array(slopes) / time, abs=1e-6)
+        assert matrix[first + k] == pytest.approx(np.array(slopes) / time, abs=1e-6)
 
 
 def size(velocity: Array) -> float:

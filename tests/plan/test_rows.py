@@ -170,5 +170,8 @@ def test_closed_loops_stay_closed(name: str, seed: int) -> None:
     path = stack.plan(start, goal, seed=seed)
     for end, wanted in ((path.q[0], start), (path.q[-1], goal)):
         np.testing.assert_allclose(robot.difference(end, wanted), 0.0, atol=1e-9)
-    for q in samples(path, 100):
+    law = path.law()
+    timed, _ = path.configurations(law, np.linspace(0.0, law.duration, 50))
+    straight = [(1.0 - s) * path.points[:-1] + s * path.points[1:] for s in (0.25, 0.5)]
+    for q in (*samples(path, 100), *timed, *path.coordinates.configuration(np.concatenate(straight))):
         assert max(robot.loop_gaps(q).values()) < 1e-6

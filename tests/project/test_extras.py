@@ -18,7 +18,6 @@ DISTRIBUTIONS = {
     "pxr": "usd-core",
     "py_trees": "py-trees",
     "yaml": "pyyaml",
-    "zenoh": "eclipse-zenoh",
     "zmq": "pyzmq",
 }
 #: What needs each extra; laws of motion need two packages, each for its own kind
@@ -45,7 +44,6 @@ USES = {
     "usd": "open('x.usda', 'w').close(); wbc.robots.load('x.usda')",
     "viewer": "wbc.viewer.show(controller)",
     "xacro": "open('x.xacro', 'w').close(); wbc.robots.load('x.xacro')",
-    "zenoh": "from wbc.formats import Ros2Plant; Ros2Plant(robot, zenoh='')",
     "zeromq": "from wbc.viewer.zeromq import ZeroMqEnd; ZeroMqEnd('tcp://127.0.0.1:0', '', 1.0)",
 }
 URDF = """<robot name="arm">

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -78,38 +77,6 @@ def named(path: Path) -> list[tuple[int, str]]:
     return [(n.lineno, n.value.rstrip(".")) for n in strings if NAMED.fullmatch(n.value)]
 
 
-def files_imported(path: Path, modules: Mapping[str, Path]) -> set[str]:
-    """Modules that a file imports, a name of a package as the module that it is."""
-    out = {module for _, module in imported(path)}
-    for node in telling(path):
-        if isinstance(node, ast.ImportFrom) and node.module in out:
-            inner = {f"{node.module}.{a.name}" for a in node.names} & modules.keys()
-            if inner:
-                out |= inner
-                # The package itself is only on the way where all names are modules of it
-                if len(inner) == len(node.names):
-                    out.discard(node.module)
-    # A package that names itself asks for its data
-    strings = {module for _, module in named(path) if not module_name(path).startswith(f"{module}.")}
-    return (out | strings) & modules.keys()
-
-
-def circles(files: list[Path]) -> Iterator[list[str]]:
-    """Modules that import each other in a circle, each group once."""
-    modules = {module_name(path): path for path in files}
-    steps = {name: files_imported(path, modules) - {name} for name, path in modules.items()}
-    reached = {name: set(targets) for name, targets in steps.items()}
-    for middle in modules:
-        for targets in reached.values():
-            if middle in targets:
-                targets |= reached[middle]
-    left = [name for name in sorted(modules) if name in reached[name]]
-    while left:
-        group = [name for name in left if name == left[0] or (name in reached[left[0]] and left[0] in reached[name])]
-        yield group
-        left = [name for name in left if name not in group]
-
-
 @cache
 def mentioned(path: Path) -> list[tuple[int, str]]:
     """(line, module) of every module that a file imports or names in a string; ``from package import module`` too."""
@@ -166,38 +133,6 @@ def test_imports_point_down() -> None:
     assert [fault for path in PACKAGE_FILES for fault in faults(path)] == []
 
 
-def test_no_two_packages_import_each_other() -> None:
-    """On one floor too."""
-    parts = {part_of(module_name(path)) for path in PACKAGE_FILES} - {ROOF}
-    ways: dict[str, set[str]] = {part: set() for part in parts}
-    for path in PACKAGE_FILES:
-        here = part_of(module_name(path))
-        if here != ROOF:
-            ways[here] |= {part_of(target) for _, target in imported(path)} & parts - {here}
-    both = {tuple(sorted((a, b))) for a in ways for b in ways[a] if a in ways[b]}
-    assert both == set()
-
-
-@pytest.mark.parametrize("package", sorted({part_of(module_name(path)) for path in PACKAGE_FILES} - {ROOF}))
-def test_no_files_of_a_package_import_each_other_in_a_circle(package: str) -> None:
-    files = [path for path in PACKAGE_FILES if part_of(module_name(path)) == package]
-    assert list(circles(files)) == []
-
-
-def test_the_rule_finds_circles_and_names_in_strings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.project.layout.ROOT", tmp_path)
-    room = tmp_path / "wbc" / "stack"
-    room.mkdir(parents=True)
-    a, b, c = (room / f"{name}.py" for name in "abc")
-    a.write_text("def f():\n    from wbc.stack import b\n    return b\n")
-    b.write_text("MODULE = 'wbc.stack.c'\n")
-    c.write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from wbc.stack.a import f\n")
-    assert list(circles([a, b, c])) == [["wbc.stack.a", "wbc.stack.b", "wbc.stack.c"]]
-    d = room / "d.py"
-    d.write_text("MODULE = 'wbc.controller.core'\n")
-    assert faults(d) == ["wbc/stack/d.py:1: wbc.stack imports wbc.controller"]
-
-
 def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.project.layout.ROOT", tmp_path)
     bad = tmp_path / "wbc" / "symbolic" / "bad.py"
@@ -208,6 +143,9 @@ def test_the_rule_finds_an_import_that_points_up(tmp_path: Path, monkeypatch: py
     solver.parent.mkdir(parents=True)
     solver.write_text("from wbc.robot import Robot\nfrom wbc.errors import WbcError\n")
     assert faults(solver) == ["wbc/qp/bad.py:1: wbc.qp imports wbc.robot"]
+    late = tmp_path / "wbc" / "qp" / "late.py"
+    late.write_text("MODULE = 'wbc.controller.core'\n")
+    assert faults(late) == ["wbc/qp/late.py:1: wbc.qp imports wbc.controller"]
 
 
 def test_no_modules_or_packages_side_by_side_import_each_other_in_a_circle() -> None:

@@ -1,4 +1,4 @@
-"""The suite itself: whatever a test starts ends with it, and Ctrl-C can be tested where the shell has it ignored."""
+"""The suite itself: whatever a test starts ends with it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import sys
 import time
 from pathlib import Path
 
-from tests.processes import IN_BACKGROUND
 from tests.project.layout import ROOT
 
 #: Starts with what every file of tests below has: children that tell their numbers, and a short patience with them
@@ -67,35 +66,13 @@ def test_killed():
     os.kill(os.getpid(), signal.SIGKILL)
 """
 
-HEARS = """
-def test_own_process():
-    with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGINT)
 
-def test_child():
-    one = child()
-    told(1)
-    one.send_signal(signal.SIGINT)
-    assert one.wait() != 0
-"""
-
-
-def suite(folder: Path, text: str, deaf: bool = False) -> tuple[str, list[int]]:
+def suite(folder: Path, text: str) -> tuple[str, list[int]]:
     """(output of a pytest that runs these tests, numbers of their processes)."""
     (folder / "test_it.py").write_text(HEAD + text)
-    command = [
-        *(IN_BACKGROUND if deaf else ()),
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "tests.processes",
-        "-p",
-        "no:cacheprovider",
-    ]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "tests.processes", "-p", "no:cacheprovider"]
     done = subprocess.run(
-        [*command, "-p", "no:cacheprovider", "-c", "/dev/null", "--rootdir", str(folder), str(folder)],
+        [*command, "-c", "/dev/null", "--rootdir", str(folder), str(folder)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -128,8 +105,3 @@ def test_nothing_outlives_a_pytest_that_is_killed(tmp_path: Path) -> None:
     while any(map(runs, numbers)):
         assert time.monotonic() < until
         time.sleep(0.05)
-
-
-def test_ctrl_c_reaches_tests_and_their_children_where_the_shell_has_it_ignored(tmp_path: Path) -> None:
-    said, _ = suite(tmp_path, HEARS, deaf=True)
-    assert "2 passed" in said, said

@@ -11,7 +11,7 @@ from tests.evaluation import random_configuration
 from tests.models import Y, arm
 from tests.proximity.world import Referee, buffers, link_bodies, place, robot, set_pose, things
 from wbc.errors import RangeError
-from wbc.proximity import FAR, Body, PairSensor
+from wbc.proximity import FAR, OBSTACLE, Body, PairSensor
 from wbc.robot import Robot
 from wbc.shapes import Box, Capsule, Convex, Cylinder, HalfSpace, Sphere
 from wbc.shapes.convex import CORNERS as HULL_CORNERS, spread
@@ -177,3 +177,25 @@ def test_bad_numbers_of_corners(corners: object) -> None:
     block = Body("block", "world", pin.SE3.Identity(), Box((0.1, 0.1, 0.1)))
     with pytest.raises(RangeError, match="corners"):
         PairSensor(bot, [(hand, block)], 1, buffers(bot, 1), corners=corners)  # type: ignore[arg-type]
+
+
+def test_a_hull_of_many_corners_has_rows_where_it_rolls_to() -> None:
+    """The lowest of its points above a half-space after tilts by 0.1 rad in four directions, by numpy."""
+    bot, rng = robot("ur5"), np.random.default_rng(36)
+    ways = rng.normal(size=(300, 3))
+    hull = Convex(ways / np.linalg.norm(ways, axis=1, keepdims=True) * (0.02, 0.03, 0.06))
+    body = Body("hull", "wrist_3_link", pin.SE3.Identity(), hull)
+    sensing, numbers = made(bot, [(body, Body("ground", OBSTACLE, pin.SE3.Identity(), HalfSpace()))], 1, margin=10.0)
+    referee = Referee(bot)
+    for _ in range(10):
+        q, pose = random_configuration(bot, rng), place(rng, 0.4)
+        set_pose(numbers, pose)
+        sensing.sense(q)
+        pin.framesForwardKinematics(bot.model, referee.data, q)
+        there = pose.actInv(referee.pose(body, pose))
+        points = hull.points @ there.rotation.T + there.translation
+        ways = np.pi * (np.arange(4) + 0.5) / 2.0
+        tilts = np.column_stack([-0.1 * np.cos(ways), -0.1 * np.sin(ways), np.ones(4)])
+        lowest = np.unique(np.argmin(points @ tilts.T, axis=0))
+        found = numbers["distance"][1:]
+        assert np.sort(found[found < FAR / 2]) == pytest.approx(np.sort(points[lowest, 2]), abs=1e-9)

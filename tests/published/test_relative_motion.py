@@ -482,7 +482,7 @@ def test_14_recursion_with_and_without_table() -> None:
     assert_refused(lambda: MasterSlave().run(master, slave[:3], waves), ShapeError, "")
 
 
-@pytest.mark.parametrize("seed", range(repeats(20)))
+@pytest.mark.parametrize("seed", range(repeats(5)))
 def test_14_arms_with_backlash_meet_up_to_a_part_of_it(seed: int) -> None:
     """At rest they are apart by b / (2 A) at most, and nearly that somewhere; each is within its drive's play. Without
     backlash they are where they were without the option, to the last bit.

@@ -6,17 +6,7 @@ with the dimensions of Nguyen and Hughes (1994) for the Space Station arm. Where
 corrected one is tested and the printed one is shown to fail.
 
 Cases A1 to A25 and the misprints stand in this file and in others beside it; docs/task_constraint_published.md names
-the tests of each, and test_task_constraint_table.py sees to it that none is without. Of the cases there are
-
-    here                                  A1, A3, A4, A8, A15, A16, A17, A20 to A23: places, Jacobians, ranks
-    test_task_constraint_motions.py       A2, A4, A5, A6, A7, A9, A11, A18, A25: rates of pairs
-    test_task_constraint_advice.py        A12, A14, A23: which pair where
-    test_task_constraint_searches.py      A16, A21, A23: zeros from random starts
-    test_task_constraint_lengths.py       A17, A22 at any lengths, misprints of rows
-    test_task_constraint_least_squares.py A5, A6 and misprints of appendix B
-    test_task_constraint_trees.py         A24: 15 and 22 joints
-    test_task_constraint_restrictions.py  written restrictions against (4.4) to (4.39)
-    test_rank_analysis.py                 A3, A14 to A16, A20 to A23 by symbols
+the tests of each, and test_task_constraint_table.py sees to it that none is without.
 """
 
 from __future__ import annotations

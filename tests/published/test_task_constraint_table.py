@@ -59,9 +59,3 @@ def test_tests_of_a_case_are_in_its_row() -> None:
     for file in (*HERE.glob("test_task_constraint_*.py"), HERE / "test_rank_analysis.py"):
         for number, name in re.findall(r"^def (?=test_a(\d+)_)(\w+)", file.read_text(), re.M):
             assert name in by_case[f"A{number}"] or name in PAGE.split("## What print has wrong")[1], name
-
-
-def test_the_first_file_names_all_others() -> None:
-    index = ast.get_docstring(ast.parse((HERE / "test_task_constraint_coordinates.py").read_text())) or ""
-    others = {file.name for file in HERE.glob("test_task_constraint_*.py")} - {"test_task_constraint_coordinates.py"}
-    assert {*others, "test_rank_analysis.py"} <= set(re.findall(r"test_\w+\.py", index))

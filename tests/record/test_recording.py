@@ -209,6 +209,19 @@ def test_times_residuals_margins_and_inputs_are_those_of_the_run(builder: str, b
     assert len(table) > wide
 
 
+def test_the_stack_that_was_declared_is_the_one_to_give(tmp_path: Path) -> None:
+    stack = small.stack()
+    one = stack.compile(command="acceleration", backend="vm")
+    with one.record(tmp_path / "run.npz") as made:
+        for k in range(3):
+            one.step(small.Q, np.full(stack.robot.nv, 0.1 * k))
+    for given in (stack, one.stack):
+        found = replay(made.path, given)
+        assert (found.ticks, found.identical) == (3, True)
+    with pytest.raises(RecordingError, match="of another stack"):
+        replay(made.path, small.stack(small.arm(length=0.6)))
+
+
 def test_a_recording_of_an_older_format_is_read_and_says_what_it_lacks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

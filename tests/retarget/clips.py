@@ -21,61 +21,48 @@ ANKLE = 0.08
 THIGH, SHANK, UPPER_ARM, FOREARM = 0.42, 0.41, 0.28, 0.25
 #: Height and depth of a stair [m]
 RISE, RUN = 0.16, 0.30
-#: Joint, parent, offset in the T-pose [m], on the left and in the middle
-BONES: tuple[tuple[str, str, tuple[float, float, float]], ...] = (
+#: Joint, parent, offset
+Bones = tuple[tuple[str, str, tuple[float, float, float]], ...]
+
+
+def both(left: Bones) -> Bones:
+    """Bones of the left, and those of the right."""
+    return left + tuple(
+        (name.replace("Left", "Right"), parent.replace("Left", "Right"), (x, 0.0 - y, z))
+        for name, parent, (x, y, z) in left
+    )
+
+
+#: Joint, parent, offset in the T-pose [m]
+BONES: Bones = (
     ("Hips", "", (0.0, 0.0, ANKLE + THIGH + SHANK + 0.02)),
-    ("LeftUpLeg", "Hips", (0.0, 0.09, -0.02)),
-    ("LeftLeg", "LeftUpLeg", (0.0, 0.0, -THIGH)),
-    ("LeftFoot", "LeftLeg", (0.0, 0.0, -SHANK)),
-    ("LeftToe", "LeftFoot", (0.13, 0.0, 0.02 - ANKLE)),
-    ("LeftToeEnd", "LeftToe", (0.06, 0.0, 0.0)),
-    ("RightUpLeg", "Hips", (0.0, -0.09, -0.02)),
-    ("RightLeg", "RightUpLeg", (0.0, 0.0, -THIGH)),
-    ("RightFoot", "RightLeg", (0.0, 0.0, -SHANK)),
-    ("RightToe", "RightFoot", (0.13, 0.0, 0.02 - ANKLE)),
-    ("RightToeEnd", "RightToe", (0.06, 0.0, 0.0)),
-    ("Spine", "Hips", (0.0, 0.0, 0.10)),
-    ("Spine1", "Spine", (0.0, 0.0, 0.12)),
-    ("Spine2", "Spine1", (0.0, 0.0, 0.12)),
-    ("Neck", "Spine2", (0.0, 0.0, 0.18)),
-    ("Head", "Neck", (0.0, 0.0, 0.10)),
-    ("HeadEnd", "Head", (0.0, 0.0, 0.15)),
-    ("LeftShoulder", "Spine2", (0.0, 0.05, 0.13)),
-    ("LeftArm", "LeftShoulder", (0.0, 0.12, 0.0)),
-    ("LeftForeArm", "LeftArm", (0.0, UPPER_ARM, 0.0)),
-    ("LeftHand", "LeftForeArm", (0.0, FOREARM, 0.0)),
-    ("LeftHandEnd", "LeftHand", (0.0, 0.15, 0.0)),
-    ("RightShoulder", "Spine2", (0.0, -0.05, 0.13)),
-    ("RightArm", "RightShoulder", (0.0, -0.12, 0.0)),
-    ("RightForeArm", "RightArm", (0.0, -UPPER_ARM, 0.0)),
-    ("RightHand", "RightForeArm", (0.0, -FOREARM, 0.0)),
-    ("RightHandEnd", "RightHand", (0.0, -0.15, 0.0)),
-)
+    *both((
+        ("LeftUpLeg", "Hips", (0.0, 0.09, -0.02)), ("LeftLeg", "LeftUpLeg", (0.0, 0.0, -THIGH)),
+        ("LeftFoot", "LeftLeg", (0.0, 0.0, -SHANK)), ("LeftToe", "LeftFoot", (0.13, 0.0, 0.02 - ANKLE)),
+        ("LeftToeEnd", "LeftToe", (0.06, 0.0, 0.0)),
+    )),
+    ("Spine", "Hips", (0.0, 0.0, 0.10)), ("Spine1", "Spine", (0.0, 0.0, 0.12)), ("Spine2", "Spine1", (0.0, 0.0, 0.12)),
+    ("Neck", "Spine2", (0.0, 0.0, 0.18)), ("Head", "Neck", (0.0, 0.0, 0.10)), ("HeadEnd", "Head", (0.0, 0.0, 0.15)),
+    *both((
+        ("LeftShoulder", "Spine2", (0.0, 0.05, 0.13)), ("LeftArm", "LeftShoulder", (0.0, 0.12, 0.0)),
+        ("LeftForeArm", "LeftArm", (0.0, UPPER_ARM, 0.0)), ("LeftHand", "LeftForeArm", (0.0, FOREARM, 0.0)),
+        ("LeftHandEnd", "LeftHand", (0.0, 0.15, 0.0)),
+    )),
+)  # fmt: skip
 #: A dog: the joints of its limbs and trunk, with the offsets of a dog of 0.5 m at the shoulder [m]
-DOG_BONES: tuple[tuple[str, str, tuple[float, float, float]], ...] = (
+DOG_BONES: Bones = (
     ("Hips", "", (0.0, 0.0, 0.47)),
-    ("LeftUpLeg", "Hips", (0.0, 0.08, -0.02)),
-    ("LeftLeg", "LeftUpLeg", (0.0, 0.0, -0.22)),
-    ("LeftFoot", "LeftLeg", (0.0, 0.0, -0.21)),
-    ("LeftFootEnd", "LeftFoot", (0.03, 0.0, 0.0)),
-    ("RightUpLeg", "Hips", (0.0, -0.08, -0.02)),
-    ("RightLeg", "RightUpLeg", (0.0, 0.0, -0.22)),
-    ("RightFoot", "RightLeg", (0.0, 0.0, -0.21)),
-    ("RightFootEnd", "RightFoot", (0.03, 0.0, 0.0)),
-    ("Spine", "Hips", (0.20, 0.0, 0.0)),
-    ("Spine1", "Spine", (0.25, 0.0, 0.0)),
-    ("Neck", "Spine1", (0.08, 0.0, 0.05)),
-    ("Head", "Neck", (0.12, 0.0, 0.15)),
-    ("HeadEnd", "Head", (0.12, 0.0, 0.0)),
-    ("LeftArm", "Spine1", (0.0, 0.08, -0.02)),
-    ("LeftForeArm", "LeftArm", (0.0, 0.0, -0.22)),
-    ("LeftHand", "LeftForeArm", (0.0, 0.0, -0.21)),
-    ("LeftHandEnd", "LeftHand", (0.03, 0.0, 0.0)),
-    ("RightArm", "Spine1", (0.0, -0.08, -0.02)),
-    ("RightForeArm", "RightArm", (0.0, 0.0, -0.22)),
-    ("RightHand", "RightForeArm", (0.0, -0.0, -0.21)),
-    ("RightHandEnd", "RightHand", (0.03, 0.0, 0.0)),
-)
+    *both((
+        ("LeftUpLeg", "Hips", (0.0, 0.08, -0.02)), ("LeftLeg", "LeftUpLeg", (0.0, 0.0, -0.22)),
+        ("LeftFoot", "LeftLeg", (0.0, 0.0, -0.21)), ("LeftFootEnd", "LeftFoot", (0.03, 0.0, 0.0)),
+    )),
+    ("Spine", "Hips", (0.20, 0.0, 0.0)), ("Spine1", "Spine", (0.25, 0.0, 0.0)), ("Neck", "Spine1", (0.08, 0.0, 0.05)),
+    ("Head", "Neck", (0.12, 0.0, 0.15)), ("HeadEnd", "Head", (0.12, 0.0, 0.0)),
+    *both((
+        ("LeftArm", "Spine1", (0.0, 0.08, -0.02)), ("LeftForeArm", "LeftArm", (0.0, 0.0, -0.22)),
+        ("LeftHand", "LeftForeArm", (0.0, 0.0, -0.21)), ("LeftHandEnd", "LeftHand", (0.03, 0.0, 0.0)),
+    )),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from tests.retarget import clips
 from wbc import robots
 from wbc.multibody import pin
-from wbc.retarget import Clip, Skeleton, motion_figures
+from wbc.retarget import Clip, MotionErrors, Skeleton, motion_figures
 from wbc.robot import Robot
 
 
@@ -29,7 +29,7 @@ def motion_of(robot: Robot, clip: Clip | None = None, frames: int = 30, rate: fl
     return SimpleNamespace(
         robot=robot, rate=rate, time=time, q=np.array(q), stance=stance, given_up=("left_leg from 0.1 to 0.2 s: far",),
         notes=("a note",), clip=clip or clips.sit(0, 30.0).clip,
-        errors=SimpleNamespace(points=far, mean=0.01, figures=figures),
+        errors=MotionErrors.of(far, figures),
         body=SimpleNamespace(limbs={"left_leg": SimpleNamespace(end=foot, radius=0.0)}),
     )  # fmt: skip
 

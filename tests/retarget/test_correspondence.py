@@ -12,7 +12,7 @@ from tests.retarget import clips, motions
 from wbc import robots
 from wbc.errors import UnknownNameError
 from wbc.retarget import BodyError, Correspondence, CorrespondenceError, Skeleton
-from wbc.retarget.body import LIMBS, PointTree, find_body
+from wbc.retarget.body import LIMBS, find_body
 from wbc.retarget.correspondence import correspondence
 from wbc.retarget.robot_body import RobotBody, body_of
 from wbc.retarget.words import side_of
@@ -102,8 +102,7 @@ def test_a_person_of_any_proportions_and_any_number_of_vertebrae(seed: int) -> N
 
 def test_a_dog_without_names() -> None:
     plan_of = clips.skeleton(clips.DOG_BONES)
-    tree = PointTree(motions.nameless(plan_of).names, plan_of.parents, plan_of.rest)
-    plan = find_body(tree)
+    plan = find_body(motions.nameless(plan_of))
     assert not plan.upright
     assert [plan_of.names[k] for k in plan.limbs["left_leg"]][:2] == ["LeftUpLeg", "LeftLeg"]
     assert [plan_of.names[k] for k in plan.limbs["right_arm"]][:2] == ["RightArm", "RightForeArm"]
@@ -130,7 +129,7 @@ def test_saved_read_and_corrected(tmp_path) -> None:  # type: ignore[no-untyped-
     assert again.scale == pytest.approx(match.scale, rel=1e-5)
     text = (tmp_path / "match.yaml").read_text()
     assert len(text.splitlines()) < 15
-    assert "left_arm: [left_arm, 'LeftArm', 'LeftForeArm'" in text
+    assert 'left_arm: [left_arm, "LeftArm", "LeftForeArm"' in text
     (tmp_path / "other.yaml").write_text(
         "scale: 0.9\nlimbs:\n  left_arm: [left_arm, LeftShoulder, LeftForeArm, LeftHand, LeftHand]\n"
     )

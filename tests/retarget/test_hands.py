@@ -12,8 +12,8 @@ from tests.retarget.hand_clips import hand
 from wbc import robots
 from wbc.retarget import BodyError, Clip, Retargeter, folders, load_clip
 from wbc.retarget.correspondence import correspondence
-from wbc.retarget.hands import FINGERS, hand_of
-from wbc.retarget.robot_body import body_of
+from wbc.retarget.hands import FINGERS
+from wbc.retarget.robot_body import RestPose, body_of, hand_plan
 from wbc.retarget.sources.layouts import LAYOUTS
 
 #: Points of MANO's order with tips among MediaPipe's
@@ -56,8 +56,8 @@ def test_a_frame_at_a_time_is_the_same(tmp_path: Path) -> None:
 
 def test_orders_of_points_and_what_no_finger_leads(tmp_path: Path) -> None:
     points = hand()[0]
-    body = hand_of(robots.load("allegro_right_hand"))
-    assert body is not None
+    body = body_of(robots.load("allegro_right_hand"))
+    assert body.is_hand
     match = correspondence(body, loaded(tmp_path, points).skeleton)
     tips = {name: points[0, one.tip] for name, one in match.limbs.items()}
     for order, layout in ((MANO, "mano-tips"), (MANO[:16], "mano")):
@@ -69,7 +69,7 @@ def test_orders_of_points_and_what_no_finger_leads(tmp_path: Path) -> None:
     match.save(tmp_path / "match.yaml")
     assert match.read(tmp_path / "match.yaml").limbs == match.limbs
     # Without a ring and a little finger the robot's ring finger has nobody to follow
-    names = [name for name, _ in LAYOUTS["mediapipe-hand"]]
+    names = LAYOUTS["mediapipe-hand"].names
     few = [k for k, name in enumerate(names) if not name.startswith(("ring", "pinky"))]
     np.savez(tmp_path / "few.npz", points=points[:, few], names=[names[k] for k in few], fps=30)
     skeleton = load_clip(tmp_path / "few.npz").skeleton
@@ -77,13 +77,13 @@ def test_orders_of_points_and_what_no_finger_leads(tmp_path: Path) -> None:
 
 
 def test_what_is_no_hand() -> None:
-    body = hand_of(robots.load("allegro_right_hand"))
-    assert body is not None
+    body = body_of(robots.load("allegro_right_hand"))
+    assert body.is_hand
     for bones in (clips.BONES, clips.DOG_BONES):
         with pytest.raises(BodyError, match="no hand"):
             correspondence(body, clips.skeleton(bones))
     for robot in ("panda", "finger_edu", "alex_nub_hands"):
-        assert hand_of(robots.load(robot)) is None
+        assert hand_plan(RestPose(robots.load(robot), {})) is None
     assert "index" not in body_of(robots.load("solo12")).limbs
 
 

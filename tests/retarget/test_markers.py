@@ -18,9 +18,8 @@ from wbc.retarget import load_clip
 from wbc.retarget.correspondence import correspondence
 from wbc.retarget.robot_body import body_of
 from wbc.retarget.sources.axes import TO_Z_UP
-from wbc.retarget.sources.gaps import fill_gaps
 from wbc.retarget.sources.layouts import LAYOUTS
-from wbc.retarget.sources.swaps import mend_swaps
+from wbc.retarget.sources.mending import fill_gaps, mend_swaps
 
 WALK = clips.walk(1, rate=30.0).clip
 NAMES = list(WALK.skeleton.names)
@@ -43,7 +42,7 @@ def test_the_axis_that_is_up_is_found(tmp_path: Path, name: str) -> None:
 def test_gaps_are_filled(name: str, seed: int) -> None:
     clip = clips.MOTIONS[name](seed, 30.0).clip
     points = clips.gappy(clip, seed, longest=6)
-    filled, notes = fill_gaps(points, list(clip.skeleton.parents), list(clip.skeleton.names), clip.rate)
+    filled = fill_gaps(points, clip.skeleton.parents, clip.skeleton.names, clip.rate, notes := [])
     lost = np.isnan(points[:, :, 0])
     assert np.isfinite(filled).all()
     np.testing.assert_array_equal(filled[~lost], points[~lost])
@@ -57,13 +56,13 @@ def test_a_gap_at_an_end_and_a_frame_without_a_point() -> None:
     points[:10, 5] = np.nan
     points[40:43] = np.nan
     points[-4:, 0] = np.nan
-    filled, _ = fill_gaps(points, PARENTS, NAMES, 30.0)
+    filled = fill_gaps(points, PARENTS, NAMES, 30.0)
     assert np.isfinite(filled).all()
     assert np.linalg.norm(filled[40:43] - WALK.points[40:43], axis=2).max() < 0.05
 
 
 def test_no_gaps_leave_the_points_as_they_are() -> None:
-    filled, notes = fill_gaps(WALK.points, PARENTS, NAMES, 30.0)
+    filled = fill_gaps(WALK.points, PARENTS, NAMES, 30.0, notes := [])
     assert filled is WALK.points
     assert notes == []
 
@@ -74,7 +73,7 @@ def test_markers_that_swap_are_mended(name: str, rate: float) -> None:
     for seed in range(2):
         clip = clips.noisy(clips.MOTIONS[name](seed, rate).clip, seed, 0.002)
         points, swaps = clips.swapped(clip, seed)
-        mended, notes = mend_swaps(points, list(clip.skeleton.names), rate)
+        mended = mend_swaps(points, clip.skeleton.names, rate, notes := [])
         np.testing.assert_array_equal(mended, clip.points)
         for one, other, _, _ in swaps:
             assert {clip.skeleton.names[one], clip.skeleton.names[other]} <= set(notes[0].replace(";", "").split())
@@ -84,7 +83,7 @@ def test_markers_that_swap_are_mended(name: str, rate: float) -> None:
 def test_what_did_not_swap_is_left_alone(rate: float) -> None:
     for name, motion in clips.MOTIONS.items():
         clip = clips.noisy(motion(5, rate).clip, 5)
-        mended, notes = mend_swaps(clip.points, list(clip.skeleton.names), rate)
+        mended = mend_swaps(clip.points, clip.skeleton.names, rate, notes := [])
         assert mended is clip.points, name
         assert notes == []
 
@@ -221,10 +220,10 @@ def test_an_array_without_names_is_known_by_its_bones(tmp_path: Path) -> None:
     for layout, joints in LAYOUTS.items():
         if layout not in ("lafan", "lafan-left"):
             continue
-        named = [name.removesuffix("Base") for name, _ in joints]
+        named = [name.removesuffix("Base") for name in joints.names]
         np.save(file, WALK.points[:, [NAMES.index(name) for name in named]])
         clip = load_clip(file, rate=30.0)
-        assert clip.skeleton.names == tuple(name for name, _ in joints)
+        assert clip.skeleton.names == joints.names
         assert repr(layout) in clip.notes[0]
     with pytest.raises(RangeError, match="rate"):
         load_clip(file)

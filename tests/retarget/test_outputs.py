@@ -18,8 +18,7 @@ from tests.retarget.fake import humanoid, motion_of
 from wbc import robots
 from wbc.errors import ClipFileError, RangeError, ShapeError, UnknownNameError
 from wbc.multibody import pin
-from wbc.retarget.outputs.motion import JointColumns
-from wbc.retarget.outputs.writing import write_lerobot, write_motion
+from wbc.retarget.outputs import JointColumns, write_lerobot, write_motion
 from wbc.simulation import mujoco_model
 
 MOTION = motion_of(humanoid())
@@ -104,16 +103,19 @@ def test_the_log_is_read_by_its_reader(tmp_path: Path) -> None:
 
 
 def test_joints_of_all_kinds_become_angles() -> None:
-    robot = robots.load("panda", base="planar")
-    motion = motion_of(robot)
-    columns = JointColumns.of(motion)
-    np.testing.assert_allclose(columns.root_position[:, :2], motion.q[:, :2])
-    yaw = 2.0 * np.arctan2(columns.root_quaternion[:, 2], columns.root_quaternion[:, 3])
-    np.testing.assert_allclose(np.cos(yaw), motion.q[:, 2], atol=1e-12)
-    np.testing.assert_allclose(columns.positions, motion.q[:, 4:])
     fixed = JointColumns.of(motion_of(robots.load("panda")))
-    assert not fixed.root_position.any()
-    assert len(fixed.names) == fixed.positions.shape[1] == len(columns.names)
+    np.testing.assert_array_equal(fixed.root, np.tile([0, 0, 0, 0, 0, 0, 1], (len(fixed.root), 1)))
+    assert len(fixed.names) == fixed.positions.shape[1]
+    # Joints without end, which turn on beyond half a turn
+    robot = robots.load("kinova", base="floating")
+    motion = motion_of(robot)
+    angles = 0.1 * np.arange(len(motion.q))[:, None] * np.arange(1, robot.nv - 5)
+    motion.q = np.array(
+        [pin.integrate(robot.model, pin.neutral(robot.model), np.append(np.zeros(6), a)) for a in angles]
+    )
+    columns = JointColumns.of(motion)
+    assert robot.nq - 7 > robot.nv - 6 == len(columns.names)
+    np.testing.assert_allclose(columns.positions, angles, atol=1e-9)
 
 
 def test_bad_input_changes_nothing(tmp_path: Path) -> None:

@@ -54,6 +54,15 @@ def check(found: Retargeted, depth: float = DEPTH) -> None:
     assert (*breaches, figures["jumps"]) == (0, 0, 0, 0)
 
 
+def test_a_trunk_that_cannot_be_above_the_ground_is_let_into_it(caplog: pytest.LogCaptureFixture) -> None:
+    """The collision body of this one's trunk has a radius of a metre, its legs are 0.7 m long."""
+    found = Retargeter("simple_humanoid").run(motions.part(clips.walk().clip, 0.4, 1.4))
+    assert "simple_humanoid: its trunk reaches below its soles" in caplog.text
+    assert found.errors.mean < 0.06
+    assert found.errors.figures["slide"] < SLIDE
+    assert motions.breaches(found) == (0, 0, 0)
+
+
 @pytest.mark.parametrize(("robot", "most"), [("g1", 0.006), ("talos", 0.02), ("icub", 0.02), ("human", 0.006)])
 def test_a_walk_on_humanoids(robot: str, most: float) -> None:
     found = motion(robot, "walk")
@@ -132,18 +141,24 @@ def test_all_links_of_one_who_crawls_stay_above_ground_as_they_are_drawn() -> No
 
 
 def test_hands_rise_where_forearms_would_sink() -> None:
-    assert motion("talos", "crawl", 0.4, 3.4).errors.figures["penetration"] < DEPTH
+    assert motion("talos", "crawl", 0.4, 3.4).errors.figures["penetration"] < 0.2 * DEPTH
+
+
+def test_hands_of_a_person_with_noise_do_not_sink() -> None:
+    """Noise of 3 mm turns hands by a tenth of a radian a tick."""
+    found = retargeter("talos").run(motions.part(clips.noisy(clips.crawl().clip, 0), 0.4, 2.4))
+    assert found.errors.figures["penetration"] < DEPTH
+    assert motions.breaches(found) == (0, 0, 0)
+    assert max(motions.largest_slide(found, limb) for limb in found.stance) < SLIDE
 
 
 @pytest.mark.parametrize("arm", ["left_arm", "right_arm"])
-def test_an_arm_that_lies_on_the_ground_does_not_rattle(arm: str) -> None:
-    found = motion("g1", "crawl", 0.4, 3.4)
+def test_an_arm_on_the_ground_does_not_roll_from_corner_to_corner(arm: str) -> None:
+    """Its forearm and hand have hundreds of corners: with rows for far ones alone it goes round three of them."""
+    found = motion("talos", "crawl", 0.4, 3.4)
     joints = [int(found.robot.model.idx_qs[joint]) for joint in found.body.limbs[arm].joints]
-    stands = found.stance[arm]
-    lies = stands[:-2] & stands[1:-1] & stands[2:]
-    assert lies.sum() > 20
-    # With rows that let links come down at half a tick's rate they go from corner to corner with 320 rad/s^2
-    assert np.abs(np.diff(found.q[:, joints], 2, axis=0)[lies]).max() * found.rate**2 < 150.0
+    changes = np.diff(found.q[:, joints], 3, axis=0) * found.rate**2
+    assert np.sqrt((changes**2).mean()) < 42.0
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

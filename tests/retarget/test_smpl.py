@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from wbc.errors import ClipFileError
 from wbc.retarget import load_clip
-from wbc.retarget.sources.layouts import LAYOUTS, parents_of
+from wbc.retarget.sources.layouts import LAYOUTS
 
 #: Rest pose of the body as SMPL has it: y up, looking along z, left is x [m]
 REST = {
@@ -31,16 +31,13 @@ def body_model(layout: str, shapes: int = 10) -> tuple[dict[str, Any], np.ndarra
     """A model with one vertex beside each joint, and its joints."""
     random = np.random.default_rng(3)
     joints: list[np.ndarray] = []
-    for name, parent in LAYOUTS[layout]:
-        names = [other for other, _ in LAYOUTS[layout]]
-        joints.append(
-            np.array(REST.get(name, (0, 0, 0)), dtype=float) if name in REST else joints[names.index(parent)] + 0.03
-        )
+    for name, parent in zip(*LAYOUTS[layout], strict=True):
+        joints.append(np.array(REST[name], dtype=float) if name in REST else joints[parent] + 0.03)
     places = np.array(joints)
     shift = random.normal(0.0, 0.01, places.shape)
     template = np.concatenate([places + shift, places - shift])
     regressor = np.concatenate([np.eye(len(places)), np.eye(len(places))], axis=1) / 2.0
-    parents = np.array(parents_of(LAYOUTS[layout]))
+    parents = np.array(LAYOUTS[layout].parents)
     parents[0] = 2**32 - 1
     return {
         "J_regressor": regressor, "v_template": template, "kintree_table": np.array([parents, np.arange(len(places))]),
@@ -83,7 +80,7 @@ def motion(joints: int, frames: int = 40) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("kind", ["npz", "pkl"])
 def test_joints_are_those_of_the_model(tmp_path: Path, layout: str, key: str, kind: str) -> None:
     model, _ = body_model(layout)
-    count = len(LAYOUTS[layout])
+    count = len(LAYOUTS[layout].names)
     poses, trans = motion(count)
     betas = np.random.default_rng(1).normal(size=16)
     data: dict[str, Any] = {"trans": trans, "betas": betas, "mocap_frame_rate": 120.0, "gender": "neutral"}
@@ -102,7 +99,7 @@ def test_joints_are_those_of_the_model(tmp_path: Path, layout: str, key: str, ki
         )
     clip = load_clip(file, body_model=model_file)
     assert clip.rate == 120.0
-    assert clip.skeleton.names == tuple(name for name, _ in LAYOUTS[layout])
+    assert clip.skeleton.names == LAYOUTS[layout].names
     np.testing.assert_allclose(clip.points, expected(model, poses, trans, betas[:10], count), atol=1e-9)
     assert "10 of the clip's 16 shape parameters" in " ".join(clip.notes)
     # Points follow from offsets and turns, which are from a rest pose with z up

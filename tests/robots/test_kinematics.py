@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wbc
+from tests.random_robots import random_inertia, random_pose
 from tests.refusals import assert_refused
 from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
 
@@ -31,6 +34,41 @@ def test_poses_jacobians_and_steps_are_those_of_pinocchio(name: str) -> None:
         np.testing.assert_allclose(robot.difference(q, ahead) / 1e-6, v, atol=1e-8)
         np.testing.assert_array_equal(ahead, robot.configuration("q", ahead))
     np.testing.assert_array_equal(robot.pose(q, "world").homogeneous, np.eye(4))
+
+
+@pytest.mark.parametrize("kind", [pin.JointModelRZ, pin.JointModelPZ])
+def test_a_robot_of_one_joint_has_jacobians_of_one_column_and_torques(kind: type[pin.JointModel]) -> None:
+    """Pinocchio gives a Jacobian of one column without its second dimension, CasADi a row where no number is chosen."""
+    model, rng = pin.Model(), np.random.default_rng(0)
+    model.appendBodyToJoint(model.addJoint(0, kind(), random_pose(rng), "j"), random_inertia(rng), random_pose(rng))
+    model.addFrame(pin.Frame("tip", 1, random_pose(rng), pin.FrameType.OP_FRAME))
+    robot, q, v = wbc.robots.load(model), np.array([0.3]), np.array([0.4])
+    ahead, behind = (robot.pose(robot.integrate(q, [side], 1e-6), "tip") for side in (1.0, -1.0))
+    turn = pin.log3(ahead.rotation @ behind.rotation.T)
+    twist = np.concatenate((ahead.translation - behind.translation, turn)) / 2e-6
+    np.testing.assert_allclose(robot.jacobian(q, "tip"), twist[:, None], atol=1e-8)
+    stack = wbc.Stack(robot, dt=0.01).add(wbc.tasks.EndEffector("tip", kind="position"), name="tip")
+    stack.add(wbc.tasks.TorqueLimits())  # of no joint: the model has no limits of effort
+    controller = stack.add(wbc.tasks.Posture(), name="posture").compile(command="torque", backend="vm")
+    controller.reset(robot.neutral)
+    step = controller.step(q, v)
+    assert step.torque == pytest.approx(pin.rnea(model, model.createData(), q, v, step.a), rel=1e-12)
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_the_world_stands_still_also_where_a_link_has_its_name(base: str, tmp_path: Path) -> None:
+    robot = wbc.robots.load("ur5", base=base)
+    assert not robot.jacobian(robot.random(1), "world").any()
+    file = tmp_path / "named.urdf"
+    file.write_text(
+        '<robot name="named"><link name="world"/><link name="arm"/><joint name="j" type="continuous">'
+        '<parent link="world"/><child link="arm"/></joint></robot>'
+    )
+    robot = wbc.robots.load(file, base=base)
+    q = robot.integrate(robot.neutral, np.full(robot.nv, 0.5), 1.0)
+    np.testing.assert_array_equal(robot.jacobian(q, "world"), np.zeros((6, robot.nv)))
+    np.testing.assert_array_equal(robot.pose(q, "world").homogeneous, np.eye(4))
+    assert ("nothing names the link" in robot.notes.get("world", "")) == (base == "floating")
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])

@@ -11,7 +11,7 @@ import pytest
 
 import wbc
 import wbc.robots
-from wbc.errors import CommandError, RangeError, RobotFileError
+from wbc.errors import CommandError, DuplicateNameError, RangeError, RobotFileError
 from wbc.simulation import mujoco_spec
 
 BODY = (
@@ -34,6 +34,33 @@ def write(folder: Path, *joints: str) -> Path:
     path = folder / "made.urdf"
     path.write_text(f'<robot name="made">{"".join(BODY.format(n) for n in links)}{"".join(joints)}</robot>')
     return path
+
+
+@pytest.mark.parametrize("base", ["floating", "planar"])
+def test_a_joint_may_have_the_name_that_bases_have(base: str, tmp_path: Path) -> None:
+    joints = [joint(name, "revolute", *ends) for name, ends in (("root_joint", "ab"), ("knee", "bc"))]
+    others = [one.replace("root_joint", "hip") for one in joints]
+    robot, other = (wbc.robots.load(write(tmp_path, *some), base=base) for some in (joints, others))
+    assert robot.joint_names == ("root_joint_", "root_joint", "knee")
+    q = other.random(3)
+    assert np.array_equal(robot.pose(q, "c").homogeneous, other.pose(q, "c").homogeneous)
+    masses = [pin.crba(one.model, one.model.createData(), q) for one in (robot, other)]
+    assert np.array_equal(*masses)
+
+
+def test_names_that_cannot_say_which_joint_is_meant_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DuplicateNameError, match=r"name of the world.*'universe'"):
+        wbc.robots.load(write(tmp_path, joint("universe", "revolute", "a", "b")))
+    model = pin.Model()
+    for parent in (0, 1):
+        model.addJoint(parent, pin.JointModelRX(), pin.SE3.Identity(), "hip")
+    with pytest.raises(DuplicateNameError, match=r"two joints have this name.*'hip'"):
+        wbc.robots.load(model)
+
+
+def test_an_axis_whose_length_is_no_number_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RobotFileError, match=r"no direction: its axis is 1e\+200"):
+        wbc.robots.load(write(tmp_path, joint("hip", "revolute", "a", "b", axis="1e200 1e200 0")))
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
@@ -10,9 +11,19 @@ import pytest
 
 import wbc
 from tests.project.layout import ROOT, nodes, relative, sources
-from wbc.errors import RangeError, ShapeError, WbcError
+from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError, WbcError
 from wbc.robot import Robot
-from wbc.simulation import Command, CommandKind, Connection, KinematicPlant, Plant, PlantError, PlantState
+from wbc.simulation import (
+    Command,
+    CommandKind,
+    Connection,
+    KinematicPlant,
+    PinocchioPlant,
+    Plant,
+    PlantError,
+    PlantState,
+    VelocityDrive,
+)
 
 
 @pytest.fixture(scope="module", params=["panda", "talos"])
@@ -38,6 +49,31 @@ def test_a_kinematic_plant_integrates_on_the_manifold(robot: Robot) -> None:
     assert (plant.read().q == q).all()
     plant.advance(0.01)
     assert (plant.read().q == q).all()
+
+
+@pytest.mark.parametrize(
+    "make", [KinematicPlant, PinocchioPlant, lambda robot: VelocityDrive(robot, PinocchioPlant(robot))]
+)
+def test_what_a_plant_cannot_do_is_refused_and_changes_nothing(make: Callable[[Robot], Plant]) -> None:
+    arm = wbc.robots.load("panda")
+    plants = [make(arm), make(arm)]
+    good, other = plants[0].commands, set(CommandKind).difference(plants[0].commands)
+    for plant in plants:
+        plant.reset(arm.neutral, 0.0)
+        plant.apply(Command(next(iter(good)), np.full(arm.nv, 0.1)))
+    refused = [
+        (np.zeros(arm.nv), ShapeError, "command"),
+        *((Command(kind, np.ones(arm.nv)), UnknownNameError, "command.kind") for kind in other),
+        (Command(next(iter(good)), np.full(arm.nv, np.nan)), NotFiniteError, "command.values"),
+        (Command(next(iter(good)), np.zeros(3)), ShapeError, "command.values"),
+    ]
+    for command, error, field in refused:
+        with pytest.raises(error) as caught:
+            plants[0].apply(command)  # type: ignore[arg-type]  # an array is none
+        assert caught.value.field == field
+    for plant in plants:
+        plant.advance(0.01)
+    assert np.array_equal(plants[0].read().q, plants[1].read().q)
 
 
 @pytest.mark.parametrize(

@@ -112,6 +112,11 @@ def test_stack_arguments_are_checked(arguments: dict[str, Any], error: type[WbcE
     assert caught.value.value is arguments[field]
 
 
+def test_a_robot_of_which_nothing_moves_has_no_stack() -> None:
+    with pytest.raises(RangeError, match="nothing of it moves"):
+        Stack(wbc.robots.load("panda", lock="panda_*"), 0.01)
+
+
 @pytest.mark.parametrize("damping", [1e-12, 1e-8, 1.0, 1])
 def test_damping_within_its_range(damping: float) -> None:
     assert Stack(small.arm(), 0.01, damping=damping).damping == damping

@@ -104,15 +104,6 @@ def test_a_killed_study_goes_on_and_loses_nothing(tmp_path: Path) -> None:
     assert trials.read_text().count("\n") == 1 + 8
 
 
-def test_a_lost_worker_loses_no_trial(tmp_path: Path) -> None:
-    """One of two worker processes is ended with SIGKILL in the middle of a trial."""
-    with Kept(tmp_path, squares(tmp_path)) as kept:
-        progress = carry_out(kept, workers=2)
-        assert (tmp_path / "happened").exists()
-        assert (progress.done, progress.failed) == (8, 0)
-        assert kept.table()["square"] == [4.0 + seed for seed in range(8)]
-
-
 def test_workers_that_die_with_results_lose_no_trial(tmp_path: Path) -> None:
     """First both, when they have the results of all trials and one was fetched; then one, at random instants, also
     while it starts.

@@ -100,6 +100,12 @@ def test_the_capture_point_stays_within_where_the_rate_is_that_of_the_pendulum()
     assert least == pytest.approx(plain().margin() * (1.0 - 0.005 * rate) ** 60, rel=0.02)
 
 
+def test_an_arm_that_nothing_limits_lacks_nothing() -> None:
+    arm = robot("panda")
+    tick = Stack(arm, DT).add(Posture(), name="posture").compile(command="torque", backend="vm")
+    assert lacking(tick, arm.neutral) == ()
+
+
 def test_what_is_lacking_is_named_in_newtons() -> None:
     tick, q = standing(), robot("talos").neutral
     weight = 9.81 * pin.computeTotalMass(robot("talos").model)

@@ -70,6 +70,7 @@ CHANGES: list[tuple[Any, dict[str, Any], list[tuple[dict[str, Any], type[WbcErro
             ({"jerk": NAN}, NotFiniteError, "limits.jerk"),
             ({"velocity": [1.0, 1.0, 1.0]}, ShapeError, "limits.velocity"),
             ({"start": [0.0, NAN]}, NotFiniteError, "start"),
+            ({"start": [], "target": []}, ShapeError, "start"),
             ({"target": [0.0]}, ShapeError, "target"),
             ({"start_velocity": [0.0]}, ShapeError, "start_velocity"),
             ({"start_velocity": [0.0, 1.5]}, RangeError, "start_velocity"),

@@ -78,4 +78,9 @@ def test_bad_input_is_refused() -> None:
         many(jerk_limited, 3.0, np.ones((2, 2)), **LIMITS)
     with pytest.raises(RangeError, match="processes"):
         many(jerk_limited, np.zeros((3, 2)), np.ones((3, 2)), processes=0, **LIMITS)
-    assert len(many(jerk_limited, np.zeros((0, 2)), np.ones((0, 2)), **LIMITS)) == 0
+    with pytest.raises(ShapeError, match="law"):
+        many(jerk_limited(0.0, 1.0, **LIMITS), np.zeros((3, 2)))
+    none = many(jerk_limited, np.zeros((0, 2)), np.ones((0, 2)), **LIMITS)
+    assert len(none) == 0
+    with pytest.raises(ShapeError, match="there are none"):
+        none.at(0.0)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from tests.repeats import ALL, MORE
 from wbc.climb.climber import Climber
 from wbc.climb.report.surroundings import stud_triangles
 from wbc.climb.request import ClimberRequest, SceneRequest
@@ -23,6 +24,12 @@ from wbc.viewer.walks import scenery_of
 Stood = tuple[Climber, ClimbScene, Stance]
 #: Robots and scenes: round a cylinder without weight, over stones with it
 PLACES = [("walker", "cylinder_grid", "13,9"), ("hexapod", "stepping_stones", "")]
+
+
+#: What asks nothing of feet and of ground that is stood on is tried with one of them, and with ``REPEATS=3`` with both
+ANYWHERE = pytest.mark.parametrize(
+    "stood", PLACES if MORE >= ALL else PLACES[:1], ids=lambda place: place[0], indirect=True
+)
 
 
 @pytest.fixture(scope="module", params=PLACES, ids=[robot for robot, *_ in PLACES])
@@ -129,6 +136,7 @@ def test_a_foothold_that_was_clicked_is_gone_to(operated: Operated, stood: Stood
     assert not operated.note["reason"]
 
 
+@ANYWHERE
 def test_lifts_wait_for_a_yes_or_another_foothold(operated: Operated) -> None:
     operation, loop = operated.operation, operated.loop
     operated.obey("ask", on=True)
@@ -153,6 +161,7 @@ def test_lifts_wait_for_a_yes_or_another_foothold(operated: Operated) -> None:
     assert loop.approve is None
 
 
+@ANYWHERE
 def test_one_limb_is_moved_alone_and_closes_on_a_foothold(operated: Operated) -> None:
     loop, limb = operated.loop, 1
     name, body, foothold = operated.climber.limbs[1].name, operated.body, loop.scene.footholds[loop.held[1]].id
@@ -188,6 +197,7 @@ def test_one_limb_is_moved_alone_and_closes_on_a_foothold(operated: Operated) ->
     assert operated.note["arm"] == ""
 
 
+@ANYWHERE
 def test_rates_last_until_there_is_a_plan_for_them_and_then_as_long_as_ever(operated: Operated) -> None:
     begin, loop, operation = operated.body, operated.loop, operated.operation
     with operation._aside.lock:
@@ -217,6 +227,7 @@ def test_a_limb_whose_elbow_is_folded_leaves_its_foothold_away_from_the_body() -
     assert np.linalg.norm(operated.tip(0) - begin) > 0.05
 
 
+@ANYWHERE
 @pytest.mark.parametrize("kind", ["hand", "go"])
 def test_limbs_in_the_air_land_before_another_one_is_moved_alone(operated: Operated, kind: str) -> None:
     loop = operated.loop
@@ -259,6 +270,7 @@ def test_a_page_is_told_which_footholds_are_reserved_and_gone_and_how_a_limb_goe
     assert operated.note["gone"] == [free]
 
 
+@ANYWHERE
 @pytest.mark.parametrize(
     ("message", "said"),
     [

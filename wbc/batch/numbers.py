@@ -69,6 +69,8 @@ def flat(robot: Robot, field: str, declared: Input, value: Any, count: int, sing
     value, size = taken(value), inputs.size(robot, declared)
     if declared.kind == "pose":
         return _poses(robot, field, declared, value, count)
+    if declared.each and validation.dimensions(field, value) == ():
+        return np.broadcast_to(single(value), (count, size))
     if inputs.is_plain(declared):
         return rows(field, value, count, size)
     given = validation.real_array(field, value, finite=False)

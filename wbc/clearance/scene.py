@@ -82,18 +82,21 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """A hand may be nearer to what its hold is mounted on: while its grasp point is within ``radius`` [m] of ``point``
-    (the hold's, in the world), a distance of -``depth`` [m] is enough.
+    """A hand may be nearer to what its hold is mounted on. With its grasp point d away from ``point`` (the hold's, in
+    the world) this distance is enough, where it is less than the pair's own:
+
+        slope d - depth
 
     Attributes:
         hand, mount: bodies, the first with a grasp point, the second fixed in the world.
+        slope: [1]. depth: [m].
         since, until: from when to when it holds [s]; taken to the whole knots within.
     """
 
     hand: str
     mount: str
     point: Any
-    radius: float
+    slope: float
     depth: float = 0.0
     since: float = -inf
     until: float = inf
@@ -199,13 +202,13 @@ class SweptScene:
                 names = [f"{self.pairs[k].first} and {self.pairs[k].second}" for k in range(len(self.pairs))]
                 raise UnknownNameError(field, f"{exemption.hand} and {exemption.mount}", names)
             point = validation.real_array(f"{field}.point", exemption.point, (3,))
-            radius = validation.scalar(f"{field}.radius", exemption.radius, low=0.0, unit="m")
+            slope = validation.scalar(f"{field}.slope", exemption.slope, low=0.0)
             depth = validation.scalar(f"{field}.depth", exemption.depth, low=0.0, unit="m")
             since = int(np.searchsorted(times, exemption.since))
             until = int(np.searchsorted(times, exemption.until, side="right")) - 1
             _, on_frame = self._on_frame(self.bodies[hand])
             grasp = on_frame * validation.real_array("grasp", self.bodies[hand].grasp, (3,))
-            numbers = np.concatenate([grasp, point, [radius, depth]])
+            numbers = np.concatenate([grasp, point, [slope, depth]])
             found.append((pair, since, until, int(self.first[pair] != hand), numbers))
         return sorted(found, key=lambda entry: entry[0])
 

@@ -181,6 +181,6 @@ class Compare:
 
         first, second = read_record(self.one), read_record(self.other)
         lines = differences(first, second)
-        for line in lines or [f"the same {len(first.moves)} moves"]:
+        for line in lines or [f"the same {len(first.tables['moves'])} moves"]:
             say(line)
         return int(bool(lines))

@@ -41,10 +41,11 @@ def standing(climber: Climber) -> Climber:
     lengths = [numbers.length for numbers in reach.table.numbers]
     heights, found = STANDING_HEIGHTS * min(lengths), list[tuple[Array, Array]]()
     for limb in every:
-        joints = [data.oMi[joint].translation for joint in climber.chains[limb]]
+        kind, joints = climber.limbs[limb].contact, [data.oMi[joint].translation for joint in climber.chains[limb]]
         below = max(joints, key=lambda point: float(np.linalg.norm((point - middle)[:2])))
         upright = _upright(climber.contact_pose(climber.rest, limb))
-        wanted = [body.actInv(pin.SE3(upright, np.array([*below[:2], middle[2] - height]))) for height in heights]
+        ground = [pin.SE3(np.eye(3), np.array([*below[:2], middle[2] - height])) for height in heights]
+        wanted = [body.actInv(pin.SE3(upright, kind.held_at(pose).translation)) for pose in ground]
         angles, solved = reach.postures(limb, np.array([place(pose) for pose in wanted]), count=BRANCHES)
         worth = np.where(solved, _worth(climber, limb, angles, lengths[limb]), -np.inf)
         best = worth.argmax(axis=1)

@@ -25,10 +25,6 @@ from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
-#: Distances that a tip keeps on its way to a foothold, one after the other, as shares of the clearance
-STAIRS = (1.0, 0.5, 0.25, 0.0)
-#: The last of these steps: at a foothold
-AT_FOOTHOLD = len(STAIRS) - 1
 #: Share of its distance from the foothold that a tip keeps from the body that the foothold is on: it comes down between
 #: parts of that body that are up to 60 degrees steep
 APPROACH = 0.5
@@ -36,14 +32,14 @@ APPROACH = 0.5
 SINK = 2e-3
 #: The same of a contact's point [m]
 POINT_SINK = 2e-4
+#: Before names of bodies of the scene among those of links, which may be the same
+OF_SCENE = "\0"
 #: What is proven may be less by this [m]: a move may begin in a stance that has nothing to spare
 TOLERANCE = 1e-4
 #: Cosine of how far a round tip may be tilted on what it holds, 75 degrees
 TILTED = 0.26
 #: Radius of the ball that stands for a contact's point [m]: small beside what proofs may miss
 POINT = 1e-6
-#: A depth that stands for no requirement [m]
-ANY_DEPTH = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +47,12 @@ class Clearances:
     """Links of a climber against each other and against the bodies of a scene.
 
     Links that move with the last joint of a limb, its tips, touch the body that the limb's foothold is on. While the
-    contact is d away from the foothold, a tip keeps from that body, in steps,
+    contact is d away from the foothold, a tip keeps from that body
 
-        min(clearance, d / 2 - sink)
+        min(clearance, d / 2 - deepest)
 
-    with sink how far the tip's form goes beyond the contact's frame, as a round foot that tilts does.
+    with deepest as of :class:`SunkTip`: how far the tip's form goes beyond the contact's frame, as a round foot that
+    tilts does, and rounding.
 
     All within 0.1 mm, which proofs may miss.
 
@@ -100,22 +97,16 @@ class Clearances:
             v: velocities there ``(n, nv)``, with cubics between; None: even between knots.
             within: of each of the contacts from when to when the limb comes, holds and leaves; None: all the time.
         """
-        motion = self._motion(times, q, v)
-        exempt = [
-            replace(entry, since=since, until=until)
-            for limb, rows in enumerate(contacts)
-            for row, since, until in (
-                [(row, -np.inf, np.inf) for row in set(rows)]
-                if within is None
-                else [(row, *when) for row, when in zip(rows, within[limb], strict=True)]
-            )
-            for entry in self._exempt(limb, row, AT_FOOTHOLD if len(set(rows)) == 1 else 0)
-        ]
-        swept = self._sweeper.sweep(motion, self._chosen(contacts, motion), exempt, aim="any", tolerance=TOLERANCE)
+        motion, exempt = self._motion(times, q, v), list[Exemption]()
+        for limb, rows in enumerate(contacts):
+            for k, row in enumerate(rows):
+                since, until = (-np.inf, np.inf) if within is None else within[limb][k]
+                exempt += [replace(entry, since=since, until=until) for entry in self._exempt(limb, row)]
+        swept = self._sweeper.sweep(motion, self._chosen(motion), exempt, aim="any", tolerance=TOLERANCE)
         if swept.clear:
             return None
         near = swept.nearest
-        return near and replace(near, first=_plain_name(near.first), second=_plain_name(near.second))
+        return near and replace(near, first=near.first.strip(OF_SCENE), second=near.second.strip(OF_SCENE))
 
     def blur(self, times: Array, q: Array, v: Array) -> float:
         """How far links may be between knots from where :meth:`moving` measures them, as the base goes evenly there and
@@ -141,59 +132,38 @@ class Clearances:
             slack.append(float((4.0 / 27.0 * span[:, 0] * change).max()))
         return replace(motion, free_slack=np.array([slack]))
 
-    def _chosen(self, contacts: Sequence[Sequence[int]], motion: Motion) -> NDArray[np.intp]:
+    def _chosen(self, motion: Motion) -> NDArray[np.intp]:
         """Pairs of links, and links with bodies that are as near as the robot is large."""
         base = motion.poses[0, :, 9:]
         middle = (base.min(axis=0) + base.max(axis=0)) / 2
         reach = self._size + float(np.linalg.norm(base - middle, axis=1).max()) + self.clearance
         near = np.append(np.linalg.norm(self._centers - middle, axis=1) - self._radii <= reach, True)
-        # Tips that hold are at their footholds all the time: the steps on the way there say nothing of them
-        begin = np.full((len(contacts) + 1, len(near)), len(STAIRS))
-        names = list(self.scene.bodies)
-        for limb, rows in enumerate(contacts):
-            for on in {self.scene.footholds[row].on for row in rows if row != FREE_LIMB} - {""}:
-                begin[limb, names.index(on)] = AT_FOOTHOLD if len(set(rows)) == 1 else 0
-        body_of, limb_of, stair = self._pairs[1]
-        step = begin[limb_of, body_of]
-        return np.flatnonzero(near[body_of] & ((stair >= step) | ((stair <= 0) & (step == len(STAIRS)))))
+        return np.flatnonzero(near[self._pairs[1]])
 
-    def _exempt(self, limb: int, row: int, since: int) -> list[Exemption]:
+    def _exempt(self, limb: int, row: int) -> list[Exemption]:
+        """What tips of a limb keep less at a foothold."""
         if row == FREE_LIMB or not self.scene.footholds[row].on:
             return []
-        foothold, out = self.scene.footholds[row], list[Exemption]()
-        mount, point = _scene_name(foothold.on), foothold.pose.translation
-        for body, sink, deepest in sunk_tips(self.climber)[limb]:
-            if why_apart(body.shape, self.scene.bodies[foothold.on].shape):
-                continue
-            for stair, share in list(enumerate(STAIRS))[since:]:
-                radius = (share * self.clearance + sink) / APPROACH
-                depth = ANY_DEPTH if share else deepest
-                out.append(
-                    Exemption(_stair_name(body.name, stair), mount, point, radius if share else radius + SINK, depth)
-                )
-        return out
+        foothold = self.scene.footholds[row]
+        point = self.climber.limbs[limb].contact.held_at(foothold.pose).translation
+        mount, shape = OF_SCENE + foothold.on, self.scene.bodies[foothold.on].shape
+        return [
+            Exemption(tip.body.name, mount, point, APPROACH, tip.deepest + TOLERANCE)
+            for tip in sunk_tips(self.climber)[limb]
+            if not why_apart(tip.body.shape, shape)
+        ]
 
     @cached_property
-    def _pairs(self) -> tuple[list[Pair], tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
-        """All pairs; of each the body of the scene (the last: none), the limb (the last: none) and the stair."""
+    def _pairs(self) -> tuple[list[Pair], NDArray[np.intp]]:
+        """All pairs, and the body of the scene of each; the last: none."""
         pairs = self_pairs(self.climber.robot, self.apart - TOLERANCE)
-        none = len(self.scene.bodies), len(self.climber.limbs)
-        told = [(none[0], none[1], -1)] * len(pairs)
-        limb_of = {body.name: limb for limb, tips in enumerate(sunk_tips(self.climber)) for body, *_ in tips}
-        mounts = {foothold.on for foothold in self.scene.footholds}
+        told = [len(self.scene.bodies)] * len(pairs)
         for k, (name, placed) in enumerate(self.scene.bodies.items()):
             for body in climber_bodies(self.climber):
-                if why_apart(body.shape, placed.shape):
-                    continue
-                limb = limb_of.get(body.name, none[1])
-                steps = STAIRS if name in mounts and limb < none[1] else STAIRS[:1]
-                for stair, share in enumerate(steps):
-                    pairs.append(
-                        Pair(_stair_name(body.name, stair), _scene_name(name), share * self.clearance - TOLERANCE)
-                    )
-                    told.append((k, limb, stair))
-        columns = np.array(told, dtype=np.intp).reshape(-1, 3).T
-        return pairs, (columns[0], columns[1], columns[2])
+                if not why_apart(body.shape, placed.shape):
+                    pairs.append(Pair(body.name, OF_SCENE + name, self.clearance - TOLERANCE))
+                    told.append(k)
+        return pairs, np.array(told, dtype=np.intp)
 
     @cached_property
     def _sweeper(self) -> Sweeper:
@@ -203,10 +173,8 @@ class Clearances:
             contact = model.frames[frame_index(model, limb.frame)].placement * limb.placement.translation
             for body, *_ in tips:
                 grasp = model.frames[frame_index(model, body.link)].placement.actInv(contact)
-                for stair in range(len(STAIRS)):
-                    name = _stair_name(body.name, stair)
-                    bodies[name] = SweptBody(name, body.shape, body.link, body.placement, grasp)
-        world = [SweptBody(_scene_name(name), b.shape, placement=b.placement) for name, b in self.scene.bodies.items()]
+                bodies[body.name] = replace(body, grasp=grasp)
+        world = [SweptBody(OF_SCENE + name, b.shape, placement=b.placement) for name, b in self.scene.bodies.items()]
         return Sweeper(SweptScene(Tree.of_model(model), [*bodies.values(), *world], self._pairs[0]))
 
     @cached_property
@@ -269,7 +237,7 @@ def sunk_tips(climber: Climber) -> list[list[SunkTip]]:
             if on.parentJoint != chain[-1]:
                 continue
             placed = PlacedShape(body.shape, on.placement * (body.placement or pin.SE3.Identity()))  # type: ignore[arg-type]  # links have solids
-            sink = _beyond(placed, contact, tilts)
+            sink = max(0.0, _beyond(placed, contact, tilts) - limb.contact.height)
             tips.append(SunkTip(body, sink, sink + SINK))
             point = placed.placement.actInv(contact.translation)
             off = min(off, float(segments_from(placed.shape, point, point)))
@@ -289,19 +257,6 @@ def climber_bodies(climber: Climber) -> list[SweptBody]:
 def stray_of(climber: Climber) -> float:
     """How far contacts may be off their curves near footholds [m]: half of how deep any tip may sink in there."""
     return min((tip.deepest - tip.sink for tips in sunk_tips(climber) for tip in tips), default=SINK) / 2.0
-
-
-def _scene_name(body: str) -> str:
-    """Of a body of the scene among links, whose names may be the same."""
-    return f"\0{body}"
-
-
-def _stair_name(body: str, stair: int) -> str:
-    return body + "\1" * stair
-
-
-def _plain_name(name: str) -> str:
-    return name.strip("\0\1")
 
 
 def _beyond(placed: PlacedShape, contact: pin.SE3, tilts: bool) -> float:

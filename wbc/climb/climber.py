@@ -145,6 +145,12 @@ class Climber:
         names = [limb.name for limb in self.limbs]
         return names.index(validation.one_of("limb", name, names))
 
+    def carrier(self, frame: str) -> int:
+        """Row of the limb whose joints move a frame of the robot; -1: none do."""
+        model = self.robot.model
+        support = set(model.supports[model.frames[frame_index(model, frame)].parentJoint])
+        return next((limb for limb, chain in enumerate(self.chains) if support & set(chain)), -1)
+
     def body_pose(self, q: Array) -> pin.SE3:
         """Pose of the link of the floating base in the world."""
         return self._root * pin.XYZQUATToSE3(np.asarray(q[:7]))

@@ -16,14 +16,12 @@ from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
-#: Largest error of a contact after closing [m, rad]
+#: Largest error of a contact after closing [m], turns times the length of its limb
 CLOSED = 1e-9
 #: Newton's steps at most: from an error of 0.1 m, convergence takes 4 to 6
 STEPS = 12
 #: A body that goes where it is asked to be: 1 rad of a joint weighs as much as this way of it [m, rad]
 HEAVY_BODY = 0.03
-#: A body that goes wherever limbs take it [m, rad]
-FREE_BODY = 1e3
 #: A body that yields, as where limbs pass a singular posture [m, rad]
 LIGHT_BODY = 0.3
 
@@ -44,7 +42,7 @@ class Closure:
     def closed(
         self, q: Array, contacts: Mapping[int, pin.SE3], body: float = HEAVY_BODY, turned: bool = True
     ) -> tuple[Array, float]:
-        """The configuration near q with contact frames of limbs where they hold, and the largest error left [m, rad].
+        """The configuration near q with contact frames of limbs where they hold, and the largest error left.
 
         Args:
             contacts: limb -> pose of its contact frame in the world; only the rows that its kind fixes count.
@@ -57,7 +55,8 @@ class Closure:
     def bring(
         self, q: Array, poses: Mapping[int, Array], body: float = HEAVY_BODY, turned: bool = True, steps: int = STEPS
     ) -> Array:
-        """Closes configurations ``(n, nq)`` in place; the largest errors left ``(n)`` [m, rad].
+        """Closes configurations ``(n, nq)`` in place; the largest errors of a contact left ``(n)`` [m], turns
+        times the length of its limb.
 
         Args:
             poses: limb -> poses of its contact frame in the world ``(n, 12)``, rotation row by row, then position.
@@ -87,8 +86,6 @@ class Closure:
         Args:
             turned: whether rows of turns count; else only positions do.
         """
-        if limb in self.short and turned:
-            return 0
         states, wanted = self.climber.states(q), np.empty_like(poses)
         rotation = np.swapaxes(states[:, :9].reshape(-1, 3, 3), 1, 2)
         wanted[:, :9] = (rotation @ poses[:, :9].reshape(-1, 3, 3)).reshape(-1, 9)

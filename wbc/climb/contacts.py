@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from wbc import validation
+from wbc.multibody import pin
 from wbc.validation import Array
 
 #: Rows that a contact fixes: the position; position and the axis z (free about it); the whole pose
@@ -51,6 +52,15 @@ class ContactKind(ABC):
         """Fields of a shorter sole."""
         return {}
 
+    @property
+    def height(self) -> float:
+        """How far the contact frame is over a foothold that it holds, along the normal [m]."""
+        return 0.0
+
+    def held_at(self, foothold: pin.SE3) -> pin.SE3:
+        """Pose of the contact frame at a foothold: ``height`` over it."""
+        return foothold * pin.SE3(np.eye(3), np.array([0.0, 0.0, self.height])) if self.height else foothold
+
     @abstractmethod
     def cone(self) -> tuple[Array, Array]:
         """A ``(rows, 6)`` and b ``(rows)`` of the class's inequality."""
@@ -58,24 +68,34 @@ class ContactKind(ABC):
 
 @dataclass(frozen=True)
 class PointFoot(ContactKind):
-    """A point on a surface with friction: |(f_x, f_y)| <= friction f_z within a pyramid of 8 faces, no moment.
+    """A point on a surface with friction: |(f_x, f_y)| <= friction f_z within a pyramid of 8 faces, no moment there; or
+    a ball, about whose centre the moment is (r f_y, -r f_x, 0).
 
     Attributes:
         friction: Coulomb's coefficient [1].
         most: largest normal force [N].
+        radius: r of the ball whose centre is the contact frame's origin [m]; 0: that is the point itself.
     """
 
     fixed: ClassVar[Fixed] = "position"
 
     friction: float = 0.5
     most: float = math.inf
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
-        _positive(self, "friction", "most")
+        _positive(self, "friction", "most", "radius")
+
+    @property
+    def height(self) -> float:
+        """The radius."""
+        return self.radius
 
     def cone(self) -> tuple[Array, Array]:
-        """Rows: friction, normal, then no moments."""
-        return _pressing(self.friction, self.most, np.vstack([_MOMENTS, -_MOMENTS]))
+        """Rows: friction, normal, then no moments where it touches."""
+        ties = _MOMENTS.copy()
+        ties[0, 1], ties[1, 0] = -self.radius, self.radius
+        return _pressing(self.friction, self.most, np.vstack([ties, -ties]))
 
 
 @dataclass(frozen=True)

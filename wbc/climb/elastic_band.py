@@ -59,14 +59,13 @@ class BandRows:
     Attributes:
         near: places near which tips of limbs may be ``(n, limbs)``.
         poses: of contacts in the world ``(n, limbs, 12)``.
-        closed: which contacts are there ``(n, limbs)``. at_first: which are in the first iterations ``(n, limbs)``.
+        closed: which contacts are there ``(n, limbs)``; on curves those of a limb that is anywhere are all.
         bears: contacts that bear the robot ``(limbs)``.
     """
 
     near: NDArray[np.int32]
     poses: Array
     closed: NDArray[np.bool_]
-    at_first: NDArray[np.bool_]
     bears: NDArray[np.int32]
 
 
@@ -82,7 +81,7 @@ class ElasticBand:
         world: the climber and what it climbs.
         balance: in which slack is told; None: it does not count. slack: that there is to be at least [weights].
         aside: how much further apart than they have to be links are led, in parts of ``ASIDE``.
-        still: whether the body stays where it is.
+        still: whether the body stays where it is. on_curves: whether limbs in the air are on their curves at first.
     """
 
     world: ClimbWorld
@@ -90,6 +89,7 @@ class ElasticBand:
     slack: float = 0.0
     aside: float = 1.0
     still: bool = False
+    on_curves: bool = True
 
     def relaxed(self, states: Array, rows: BandRows) -> Array:
         """The band from a first one, whose ends stay.
@@ -98,7 +98,7 @@ class ElasticBand:
             states: rows of :meth:`ClimbWorld.state_of` ``(n, ...)``.
         """
         descent = _BandDescent(self, states, rows)
-        return descent.run(descent.run(states, False), True)
+        return descent.run(descent.run(states, False) if self.on_curves else states, True)
 
 
 class _Look(NamedTuple):
@@ -120,6 +120,7 @@ class _BandDescent:
     def __init__(self, band: ElasticBand, states: Array, rows: BandRows) -> None:
         self._band, self._rows, self._bounds = band, rows, np.empty((0, 4))
         self._count, self._size = len(states) - 2, states.shape[1] - 6
+        self._on_curves = np.broadcast_to(rows.closed.any(axis=0), rows.closed.shape)
         length, table, ends = band.world.length, band.world.limbs, states[[0, -1], 12:]
         self._scale = np.concatenate([np.full(3, 1.0 / length**2), np.ones(self._size - 3)])
         self._stretch, self._bend = (np.diff(np.eye(len(states)), n=k, axis=0)[:, 1:-1] for k in (1, 2))
@@ -155,7 +156,7 @@ class _BandDescent:
 
     def _look(self, states: Array, free: bool) -> _Look:
         band, rows = self._band, self._rows
-        closed, aside = (rows.closed, band.aside * ASIDE) if free else (rows.at_first, -1.0)
+        closed, aside = (rows.closed, band.aside * ASIDE) if free else (self._on_curves, -1.0)
         aims = SampleAims(rows.near, closed, rows.poses)
         H, g, cost, clear, left, centers = band.world.band(
             aims, self._bounds, band.slack + MORE_SLACK, aside * band.world.length, states

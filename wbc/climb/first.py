@@ -8,12 +8,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbc.climb.climber import Climber
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import StanceOptions, counted, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.world import TURNS, ClimbWorld, PostureOutcome
+from wbc.validation import Array
 
 #: Footholds that are tried of each limb, nearest first
 NEAREST = 6
@@ -50,7 +52,7 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         near = [(float(cost[k]), int(k)) for k in order if cost[k] < 1.0 and world.hold[k] in holds]
         choices.append(near or [(1.0, FREE_LIMB)])
     state, best, tried, outcomes = world.state_of(at), -np.inf, 0, Counter[PostureOutcome]()
-    stands, least, touching = list[Stance](), len(choices) + 1, Counter[str]()
+    stands, least, touching = list[Stance](), 2 * len(choices) + 1, Counter[str]()
     for places in cheapest_first(choices):
         held = [int(world.hold[place]) for place in places if place >= 0]
         if len(set(held)) < len(held):
@@ -61,14 +63,14 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
         contacts = world.contacts(places)
         how, found, slack = world.stand(contacts, contacts, given.margin, state, followed=False)
         outcomes[how] += 1
-        if how == PostureOutcome.STANDS and (stuck := world.stuck(contacts, found)) < least:
+        if how == PostureOutcome.STANDS and (stuck := _stuck(world, contacts, found, given.margin)) < least:
             rows = tuple(int(world.hold[place]) if place >= 0 else FREE_LIMB for place in places)
             stands, least = [Stance(rows, world.q_of(found))], stuck
             if not stuck:
                 break
         best = max(best, slack if how == PostureOutcome.NOT_BORNE else -np.inf)
-        if how == PostureOutcome.TOUCHES and (close := world.first_touch(contacts[None], found[None])):
-            touching[close.names] += 1
+        if how == PostureOutcome.TOUCHES:
+            touching[world.look(contacts, found)[1]] += 1
     if stands:
         return stands[0]
     reason = f"none of {min(tried, STANCES)} stances on the footholds nearest to it can be stood on"
@@ -79,6 +81,13 @@ def first_stance(climber: Climber, scene: ClimbScene, q: Any, options: StanceOpt
     if world.numbers.weightless and not any(limb.contact.pulls for limb in climber.limbs):
         reason += "; nothing weighs, and feet that only press hold it where they press against each other alone"
     raise no_stances("q", at[:3].round(3).tolist(), reason, "start")
+
+
+def _stuck(world: ClimbWorld, contacts: NDArray[np.int32], state: Array, margin: float) -> int:
+    """How many limbs cannot lift off, as links touch, or the others do not bear the robot within reach."""
+    others = [np.where(np.arange(len(contacts)) == limb, FREE_LIMB, contacts) for limb in np.flatnonzero(contacts >= 0)]
+    lifts = [world.lift(contacts, kept.astype(np.int32), margin, state)[0] for kept in others]
+    return world.stuck(contacts, state) + len(lifts) - lifts.count(PostureOutcome.STANDS)
 
 
 def cheapest_first(choices: list[list[tuple[float, int]]]) -> Iterator[list[int]]:

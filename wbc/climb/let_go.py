@@ -109,4 +109,5 @@ def _frame(climber: Climber, scene: ClimbScene, start: Stance, limb: int) -> pin
     if climber.fixed(limb) != "position":
         return pose
     nearest = int(np.linalg.norm(scene.positions - pose.translation, axis=1).argmin())
-    return frame_on(pose.translation, scene.normals[nearest])
+    normal = scene.normals[nearest]
+    return frame_on(pose.translation - climber.limbs[limb].contact.height * normal, normal)

@@ -60,7 +60,7 @@ def plan_limb_work(
     if (slack := balance.margin(others, start.q)) < 0.0:
         lack = f"they lack {-slack:.3g} of its weight" if np.isfinite(slack) else "what they hold leaves the body free"
         raise InfeasibleError("limb", limb, f"without it the others do not bear the robot: {lack}")
-    reach, stances = LimbReach(climber), [start]
+    reach, stances, kind = LimbReach(climber), [start], climber.limbs[row].contact
     for k, target in enumerate(targets):
         field = f"targets[{k}]"
         at = scene.row(target) if isinstance(target, str) else FREE_LIMB
@@ -69,7 +69,7 @@ def plan_limb_work(
             if at in others or (allowed and limb not in allowed):
                 holder = climber.limbs[others.index(at)].name if at in others else ", ".join(allowed)
                 raise RangeError(field, target, f"it is for {holder}")
-        pose = scene.footholds[at].pose if at != FREE_LIMB else validation.pose(field, target)
+        pose = validation.pose(field, target) if at == FREE_LIMB else kind.held_at(scene.footholds[at].pose)
         angles = _nearest(climber, reach, row, pose, stances[-1].q)
         if angles is None:
             away = float(np.linalg.norm(climber.contact_pose(start.q, row).translation - pose.translation))

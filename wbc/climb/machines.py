@@ -15,6 +15,7 @@ from wbc.climb.scene import FLIP
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robots.catalogue import load
+from wbc.robots.feet import ball_radius, sole_of
 from wbc.robots.limbed import arms_on_body, limbed
 from wbc.robots.pairs import find_self_pairs
 from wbc.robots.walker_masses import hold_rating, with_masses
@@ -64,11 +65,10 @@ def _limbed(contact: ContactKind) -> Callable[[str], Climber]:
     return make
 
 
-def _table(frames: Sequence[str], shapes: str, acceleration: float, contact: ContactKind) -> Callable[[str], Climber]:
+def _table(frames: Sequence[str], shapes: str, acceleration: float) -> Callable[[str], Climber]:
     def make(name: str) -> Climber:
         robot = ready(load(name, shapes=shapes, acceleration=acceleration))
-        limbs = [ClimbLimb(robot.frames[frame], contact) for frame in frames]
-        return Climber(robot, limbs, name=name)
+        return Climber(robot, [point_foot(robot, robot.frames[frame]) for frame in frames], name=name)
 
     return make
 
@@ -111,6 +111,25 @@ def _talos(*hands: str) -> Callable[[str], Climber]:
     return make
 
 
+def point_foot(robot: Robot, frame: str, friction: float = FRICTION) -> ClimbLimb:
+    """A limb that stands on the ball about a frame, or on the frame's origin where there is none."""
+    if radius := ball_radius(robot, frame):
+        log.info("%s: %s is the centre of a ball of %.4g m, on which it stands", robot.name, frame, radius)
+    return ClimbLimb(frame, PointFoot(friction, radius=radius))
+
+
+def flat_foot(robot: Robot, frame: str, friction: float = FRICTION) -> ClimbLimb:
+    """A limb that stands on the sole of the links about a frame, which says nothing of where that is.
+
+    Raises:
+        ShapeError: there is no such sole; why, in numbers.
+    """
+    sole = sole_of(robot, frame)
+    at, (x, y) = sole.placement.translation, sole.half_lengths
+    log.info("%s: %s stands on %.3g by %.3g m about %.3g, %.3g, %.3g m", robot.name, frame, 2 * x, 2 * y, *at)
+    return ClimbLimb(frame, FlatFoot(sole.half_lengths, friction), sole.placement)
+
+
 def ready(robot: Robot) -> Robot:
     """The robot with pairs of links that must not touch, where it has shapes."""
     if robot.self_pairs is not None or not robot.shapes:
@@ -141,10 +160,10 @@ _MADE: dict[str, Callable[[str], Climber]] = {
     "truss_climber": _limbed(GripHand()),
     "hexapod": _limbed(PointFoot(FRICTION)),
     "hexapod_grips": _limbed(GripHand(300.0, 20.0)),
-    "anymal_c": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
-    "solo12": _table(_FEET, "fit", QUICK, PointFoot(FRICTION)),
-    "a1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
-    "go1": _table(_FEET, "exact", QUICK, PointFoot(FRICTION)),
+    "anymal_c": _table(_FEET, "exact", QUICK),
+    "solo12": _table(_FEET, "fit", QUICK),
+    "a1": _table(_FEET, "exact", QUICK),
+    "go1": _table(_FEET, "exact", QUICK),
     "talos": _talos(),
     "talos_hand": _talos("right_hand"),
     "talos_hands": _talos("left_hand", "right_hand"),

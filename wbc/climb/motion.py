@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -14,7 +13,7 @@ import numpy as np
 from wbc import validation
 from wbc.clearance import Nearest
 from wbc.climb.balance import Equilibrium
-from wbc.climb.clear import TOLERANCE, Clearances
+from wbc.climb.clear import TOLERANCE, Clearances, climber_bodies
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.elastic_band import ElasticBand
@@ -55,7 +54,7 @@ class MoveError(InfeasibleError):
         move: row of the stance from which it goes.
         nearest: the two bodies that are nearer than they may be on the way that came furthest; None: there are none.
         standing: whether one of the two stances is itself impossible.
-        limbs: rows of limbs whose links are nearer than they may be, as far as that is known.
+        limbs: rows of limbs whose links are nearer than they may be on a way.
     """
 
     move: int = 0
@@ -117,12 +116,11 @@ class MotionOptions:
         validation.instance("MotionOptions.speeds", self.speeds, MotionSpeeds, "MotionSpeeds")
 
 
-@dataclass(frozen=True, eq=False)
 class Mover:
     """Moves of a climber from stance to stance in a scene.
 
-    Attributes:
-        climber, scene, options: as given.
+    Args:
+        climber, scene: what moves where. options: default: ``MotionOptions()``.
         balance: what says whether contacts bear the robot; None: it is not asked, as where there is no gravity.
         watch: the clock of the plan that moves are for; once its time is over no other way is tried.
 
@@ -130,26 +128,16 @@ class Mover:
         what :class:`Clearances` and :class:`PathTiming` raise.
     """
 
-    climber: Climber
-    scene: ClimbScene
-    options: MotionOptions = field(default_factory=MotionOptions)
-    balance: Equilibrium | None = None
-    watch: PlanWatch = field(default_factory=PlanWatch, repr=False)
-
-    def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "closure", Closure(self.climber))
-        set_(self, "clearances", Clearances(self.climber, self.scene, self.options.clearance, self.options.apart))
-        set_(self, "timing", PathTiming(self.climber, self.options.speeds))
-        shortest = size_of(self.climber)
-        set_(self, "lift", self.options.lift or shortest / 16.0)
-
-    closure: Closure = field(init=False)
-    clearances: Clearances = field(init=False)
-    timing: PathTiming = field(init=False)
-    lift: float = field(init=False)
-    checked: WeakSet[Stance] = field(init=False, default_factory=WeakSet, repr=False)
-    _made: dict[bytes, tuple[TimedMove, float | None]] = field(init=False, default_factory=dict, repr=False)
+    def __init__(
+        self, climber: Climber, scene: ClimbScene, options: MotionOptions | None = None,
+        balance: Equilibrium | None = None, watch: PlanWatch | None = None,
+    ) -> None:  # fmt: skip
+        given = options or MotionOptions()
+        self.climber, self.scene, self.options, self.balance = climber, scene, given, balance
+        self.watch, self.closure = watch or PlanWatch(), Closure(climber)
+        self.clearances = Clearances(climber, scene, given.clearance, given.apart)
+        self.timing, self.lift = PathTiming(climber, given.speeds), given.lift or size_of(climber) / 16.0
+        self._checked, self._made = WeakSet[Stance](), dict[bytes, tuple[TimedMove, float | None]]()
 
     def moved(self, one: Stance, other: Stance, row: int = 0) -> tuple[TimedMove, float | None]:
         """The motion from a stance to the next one, from rest to rest, and its least margin of equilibrium.
@@ -170,17 +158,13 @@ class Mover:
 
     def _found(self, one: Stance, other: Stance, row: int) -> tuple[TimedMove, float | None]:
         for stance, which in ((one, row), (other, row + 1)):
-            if stance not in self.checked:
+            if stance not in self._checked:
                 self._check(stance, which, row)
-                self.checked.add(stance)
+                self._checked.add(stance)
         refusals = list[tuple[float, float, MoveError]]()
-        look = None if self.closure.short else functools.partial(self._look, one, other, row)
         for shape in self._shapes(one, other, row, refusals):
             try:
-                path = move_path(self.closure, one, other, shape, self._normals, look=look)
-            except MoveError as error:
-                refusals.append((1.0, -float(error.value), error))
-                continue
+                path = move_path(self.closure, one, other, shape, self._normals)
             except InfeasibleError as error:
                 refusals.append((0.0, 0.0, _passed_on(row, error)))
                 continue
@@ -200,46 +184,33 @@ class Mover:
         """Straight, then along elastic bands while the time lasts, at first with the body still where both stances have
         it at one place; those that contacts cannot follow are refused.
         """
-        weighs, short = bool(np.any(self.scene.gravity)), bool(self.closure.short)
+        weighs = bool(np.any(self.scene.gravity))
         balance = self.balance.world if weighs and self.balance is not None else None
         band = ElasticBand(self._world, balance, self._needed(one, other))
         swings = [k for k, (a, b) in enumerate(zip(one.contacts, other.contacts, strict=True)) if a != b]
-        begins = [(SwingShape(f * self.lift), aside) for f in (HEIGHTS if swings else HEIGHTS[:1]) for aside in ASIDES]
-        begins += [(SwingShape(self.lift, evenly=True), aside) for aside in ASIDES if swings]
+        heights, begins = (HEIGHTS, (True, False)) if swings else (HEIGHTS[:1], (False,))
         bodies = [self.climber.body_pose(stance.q) for stance in (one, other)]
-        stays = not short and bodies[0].isApprox(bodies[1], ONE_PLACE)
-        for still in (True, False) if stays else (False,):
-            for lean in LEANS if swings else LEANS[:1]:
-                if still or not stays:
-                    yield SwingShape(self.lift, lean)
-                if not still and not short:
-                    yield SwingShape(self.lift, lean, yields=True)
-            for first, aside in begins:
-                if self.watch.passed:
-                    return
-                shape, pulled = replace(first, still=still), replace(band, aside=aside, still=still)
-                try:
-                    guide = band_path(self.closure, one, other, shape, self._normals, pulled)
-                except InfeasibleError as error:
-                    refusals.append((0.0, 0.0, _passed_on(row, error)))
-                else:
-                    yield replace(shape, guide=guide)
+        stays = not self.closure.short and bodies[0].isApprox(bodies[1], ONE_PLACE)
+        for lean, yields in itertools.product(LEANS if swings else LEANS[:1], (False, True)):
+            if not yields or not (stays or self.closure.short):
+                yield SwingShape(self.lift, lean, yields)
+        stills = (True, False) if stays else (False,)
+        for still, on_curves, height, aside in itertools.product(stills, begins, heights, ASIDES):
+            if self.watch.passed:
+                return
+            shape = SwingShape(height * self.lift, still=still)
+            pulled = replace(band, aside=aside, still=still, on_curves=on_curves)
+            try:
+                guide = band_path(self.closure, one, other, shape, self._normals, pulled)
+            except InfeasibleError as error:
+                refusals.append((0.0, 0.0, _passed_on(row, error)))
+            else:
+                yield replace(shape, guide=guide)
 
     def _needed(self, one: Stance, other: Stance) -> float:
         """Slack at rest that contacts keep from stance to stance, where something weighs [weights]."""
         # A limb that lifts next, or has just landed, need not bear, and slack counts it with the others
         return max(LEAST, (SHIFTED if one.contacts == other.contacts else 1.0) * self.options.margin)
-
-    def _look(self, one: Stance, other: Stance, row: int, s: Array, q: Array) -> None:
-        """Refuses a path in whose samples links are nearer than they may be, before more is spent on it."""
-        places = [self._world.places_of(stance.contacts) for stance in (one, other)]
-        contacts = np.repeat(places, [len(q) // 2, len(q) - len(q) // 2], axis=0)
-        if (touch := self._world.first_touch(contacts, self.climber.states(q))) is not None:
-            part = 100.0 * float(s[touch.row])
-            text = f"{touch.names}: are {1e3 * touch.lacks:.3f} mm nearer than they may be at {part:.0f} % of the way"
-            error = _refused(row, touch.lacks, text, None)
-            error.limbs = touch.limbs
-            raise error
 
     @cached_property
     def _world(self) -> ClimbWorld:
@@ -248,6 +219,11 @@ class Mover:
         return ClimbWorld(
             self.climber, self.scene, clear=given.clearance, apart=given.apart, margin=0.0, spare=-TOLERANCE
         )
+
+    @cached_property
+    def _limb_of(self) -> dict[str, int]:
+        """Bodies of the robot, by name, and the limbs that move them."""
+        return {body.name: self.climber.carrier(body.link) for body in climber_bodies(self.climber)}
 
     @property
     def _normals(self) -> dict[int, Array]:
@@ -259,10 +235,11 @@ class Mover:
             foothold = stance.contacts[limb]
             if foothold == FREE_LIMB:
                 continue
-            off = float(np.linalg.norm(pose.translation - self.scene.positions[foothold]))
+            own, hold = self.climber.limbs[limb], self.scene.footholds[foothold]
+            off = float(np.linalg.norm(pose.translation - own.contact.held_at(hold.pose).translation))
             if off > AT:
-                name, at = self.climber.limbs[limb].name, self.scene.footholds[foothold].id
-                raise _refused(row, off, f"in stance {which + 1} {name} is {off:.3g} m off foothold {at}", None, True)
+                text = f"in stance {which + 1} {own.name} is {off:.3g} m off foothold {hold.id}"
+                raise _refused(row, off, text, None, True)
         if worst := beyond_limits(self.climber.robot, stance.q[None]):
             text = f"in stance {which + 1} {worst[0]} is {worst[1]:.3g} rad or m beyond its limit"
             raise _refused(row, worst[1], text, None, True)
@@ -285,7 +262,9 @@ class Mover:
                 break
         if nearest is not None:
             text = f"{_told(nearest)} at {100.0 * nearest.time:.0f} % of the way"
-            return _refused(row, nearest.distance, text, nearest), None, None
+            refusal = _refused(row, nearest.distance, text, nearest)
+            refusal.limbs = frozenset(self._limb_of.get(name, -1) for name in (nearest.first, nearest.second)) - {-1}
+            return refusal, None, None
         if self.balance is None:
             return None, None, None
         held = tuple(a if a == b else FREE_LIMB for a, b in contacts)

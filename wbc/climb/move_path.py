@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from wbc.climb.clear import stray_of
-from wbc.climb.closure import CLOSED, FREE_BODY, HEAVY_BODY, LIGHT_BODY, Closure
+from wbc.climb.closure import CLOSED, HEAVY_BODY, LIGHT_BODY, Closure
 from wbc.climb.elastic_band import BandRows, ElasticBand
 from wbc.climb.joint_values import beyond_limits, joint_values, with_joint_values
 from wbc.climb.stance import FREE_LIMB, Stance
@@ -23,7 +23,7 @@ from wbc.validation import Array
 
 #: Share of a path in which a limb lifts, and in which it lands
 LIFTING = 0.2
-#: Share of a path in which a limb keeps its turn as it lifts, and as it lands, where it cannot keep it all the way
+#: Share of a path in which a limb keeps its turn as it lifts, and as it lands
 ALIGNED = 0.1
 #: Share of a path along a guide in which a limb that lifts or lands is on its curve: then it goes over to the guide
 ON_CURVE = 0.15
@@ -45,10 +45,8 @@ class SwingShape:
     Attributes:
         height: how far the contact is lifted along the normal that it leaves, and along the one that it lands on [m].
         lean: how much of that goes towards where the limb's contact is at rest, at most this share of the height [1].
-        yields: the body yields to limbs that hold, which go as evenly in their joints as they can; of paths without a
-            guide, on which limbs in the air turn freely between lift and land where they cannot keep their turn.
+        yields: without a guide the body yields to limbs that hold, which go as evenly in their joints as they can.
         still: the body stays where it is, as both stances have it.
-        evenly: bands begin evenly in the joints; else limbs in the air are on their curves at first.
         guide: a path that body and limbs follow, but for what contacts need; None: the body goes straight and evenly,
             contacts in the air on their curves.
     """
@@ -57,7 +55,6 @@ class SwingShape:
     lean: float = 0.0
     yields: bool = False
     still: bool = False
-    evenly: bool = False
     guide: MovePath | None = None
 
 
@@ -134,14 +131,12 @@ class MovePath:
 
 
 def move_path(
-    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array],
-    *, look: Callable[[Array, Array], None] | None = None,
+    closure: Closure, one: Stance, other: Stance, shape: SwingShape, normals: Mapping[int, Array]
 ) -> MovePath:  # fmt: skip
     """The path from a stance to the next one: contacts that both have stay closed.
 
     Args:
         normals: row of a foothold -> outward normal in the world ``(3)``, of footholds that are left or landed on.
-        look: is called with s and q of the coarsest samples, and raises where there is no need for finer ones.
 
     Raises:
         InfeasibleError: held contacts cannot stay closed on the way, a joint has to jump, or it leaves its limits.
@@ -150,8 +145,6 @@ def move_path(
     while True:
         moving = _Moving(closure, one, other, shape, normals)
         path = moving.path(count)
-        if look is not None and count == FEWEST:
-            look(path.s, path.q)
         if path.error < HELD and moving.strayed(path) < stray_of(closure.climber):
             return path
         count *= 2
@@ -178,16 +171,12 @@ def band_path(
     for limb in moving.held:
         poses[:, limb] = place(held_pose(closure.climber, band.world.scene, limb, one.contacts[limb], one.q))
         closed[:, limb] = True
-    at_first = closed.copy()
     for limb, curve in curves.items():
-        poses[:, limb], closed[:, limb], at_first[:, limb] = curve, ends, ends if shape.evenly else True
-    if shape.evenly:
-        # The body goes where limbs that hold take it
-        closure.bring(q, moving._places(s), FREE_BODY)
+        poses[:, limb], closed[:, limb] = curve, ends
     contacts = [band.world.places_of(stance.contacts) for stance in (one, other)]
     near = np.repeat(contacts, [len(s) // 2, len(s) - len(s) // 2], axis=0)
     bears = np.where(contacts[0] == contacts[1], contacts[0], FREE_LIMB).astype(np.int32)
-    rows = BandRows(near, poses, closed, at_first, bears)
+    rows = BandRows(near, poses, closed, bears)
     q = closure.climber.with_states(q, band.relaxed(closure.climber.states(q), rows))
     moving.close_ends(s, q)
     q[0], q[-1] = one.q, other.q
@@ -239,44 +228,35 @@ class _Moving:
             self.even = self._steps(q)
             self.close_ends(s, q)
         else:
-            q, curves = self.evenly(s), self.curves(s)
-            if self.closure.short.intersection([*self.held, *curves]):
-                # The body goes where limbs that hold with more rows than they have joints take it
-                self._close(s, q, self._places(s) | curves, HEAVY_BODY)
+            q, held, curves = self.evenly(s), self._places(s), self.curves(s)
+            if self.closure.short.intersection([*held, *curves]):
+                # The body goes where limbs that fix more rows than they have joints take it
+                self._close(s, q, held | curves, HEAVY_BODY)
             else:
-                self._close(s, q, self._places(s), LIGHT_BODY if self.shape.yields else HEAVY_BODY)
+                self._close(s, q, held, LIGHT_BODY if self.shape.yields else HEAVY_BODY)
                 self._by_curves(s, q, curves)
         q[0], q[-1] = self.one.q, self.other.q
         self._check(q, count)
         return MovePath(self.closure, self.held, s, q)
 
     def _by_curves(self, s: Array, q: Array, curves: Mapping[int, Array]) -> None:
-        """Limbs in the air go on their curves. Where they cannot with their turns, as from branch to branch or past a
-        singular wrist, these are free in between: joints go evenly but for what positions on the curves need.
+        """Limbs in the air go on their curves, and keep their turns as they lift and land; in between these are free,
+        as branches and singular wrists lie there: joints go evenly but for what positions on the curves need.
         """
-        kept = q.copy()
-        try:
-            self._close(s, q, curves, 0.0)
-            self._check(q, len(s) - 1)
-        except InfeasibleError:
-            if all(self.climber.fixed(limb) == "position" for limb in curves):
-                raise
-            q[:] = kept
-            up, down = (int(k) for k in np.flatnonzero((s > ALIGNED - 1e-9) & (s < 1.0 - ALIGNED + 1e-9))[[0, -1]])
-            for part in (slice(up + 1), slice(down, None)):
-                self._close(s[part], q[part], {limb: poses[part] for limb, poses in curves.items()}, 0.0)
-            between, x = slice(up + 1, down), np.linspace(0.0, 1.0, down - up + 1)[:, None]
-            for limb in curves:
-                first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
-                slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
-                free = q[up : down + 1]
-                free[:] = self.climber.with_limb(free, limb, _cubic(x, first[1], last[0], *slopes))
-            self.even = self._steps(q)
-            self.even[:up], self.even[down:] = 0.0, 0.0
-            for limb in self.held:
-                self.even[:, self.climber.joints(limb) - 6] = 0.0
-            at = {limb: poses[between] for limb, poses in curves.items()}
-            self._close(s[between], q[between], at, 0.0, turned=False)
+        up, down = (int(k) for k in np.flatnonzero((s > ALIGNED - 1e-9) & (s < 1.0 - ALIGNED + 1e-9))[[0, -1]])
+        for part in (slice(up + 1), slice(down, None)):
+            self._follow(s[part], q[part], {limb: poses[part] for limb, poses in curves.items()})
+        between, x = slice(up + 1, down), np.linspace(0.0, 1.0, down - up + 1)[:, None]
+        for limb in curves:
+            first, last = ([self.climber.angles(row, limb) for row in q[k : k + 2]] for k in (up - 1, down))
+            slopes = (first[1] - first[0]) * (down - up), (last[1] - last[0]) * (down - up)
+            free = q[up : down + 1]
+            free[:] = self.climber.with_limb(free, limb, _cubic(x, first[1], last[0], *slopes))
+        self.even = self._steps(q)
+        self.even[:up], self.even[down:] = 0.0, 0.0
+        for limb in self.held:
+            self.even[:, self.climber.joints(limb) - 6] = 0.0
+        self._follow(s[between], q[between], {limb: poses[between] for limb, poses in curves.items()}, turned=False)
 
     def close_ends(self, s: Array, q: Array) -> None:
         """Brings contacts that hold, and those that lift or land, to where they have to be, in place."""
@@ -329,24 +309,25 @@ class _Moving:
         out[:, :9] = (start.rotation @ exponential(turn)).reshape(-1, 9)
         return out
 
-    def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float, turned: bool = True) -> None:
-        """Brings contacts to poses in the world, ``(samples, 12)``, or to their positions only; the body as well, where
-        limbs cannot follow, or where it is light.
-        """
-        reached = [self.closure.followed(k, q, p, turned) for k, p in wanted.items()] if body < LIGHT_BODY else [0]
-        if min(reached, default=len(s)) == len(s):
-            return
-        if body == 0.0:
-            name = f"contact of {self.climber.limbs[list(wanted)[int(np.argmin(reached))]].name}"
-            part = float(s[min(reached)])
-            raise InfeasibleError(name, part, f"is out of reach at {100.0 * part:.0f} % of the way to the next stance")
-        left = self.closure.bring(q, wanted, body, turned)
+    def _close(self, s: Array, q: Array, wanted: Mapping[int, Array], body: float) -> None:
+        """Brings contacts to poses in the world, ``(samples, 12)``; the body as well, where that is not 0."""
+        left = self.closure.bring(q, wanted, body)
         for k in np.flatnonzero(left > 1e3 * CLOSED)[:1]:
             at, size, here = float(s[k]), float(left[k]), slice(k, k + 1)
             away = {limb: self.closure.error(q[here], {limb: poses[here]}) for limb, poses in wanted.items()}
             limb = max(away, key=lambda limb: away[limb])
             reason = f"is off by {size:.3g} m or rad at {100.0 * at:.0f} % of the way to the next stance"
             raise InfeasibleError(f"contact of {self.climber.limbs[limb].name}", size, reason)
+
+    def _follow(self, s: Array, q: Array, wanted: Mapping[int, Array], turned: bool = True) -> None:
+        """Brings contacts to poses in the world ``(samples, 12)``, or to their positions only, one limb after the other
+        from sample to sample, the body as it is.
+        """
+        for limb, poses in wanted.items():
+            if (reached := self.closure.followed(limb, q, poses, turned)) < len(s):
+                part, name = float(s[reached]), self.climber.limbs[limb].name
+                reason = f"is out of reach at {100.0 * part:.0f} % of the way to the next stance"
+                raise InfeasibleError(f"contact of {name}", part, reason)
 
     def _steps(self, q: Array) -> Array:
         """Of joints from sample to sample [m, rad]."""

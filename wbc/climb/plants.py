@@ -168,7 +168,7 @@ class RigidClimbPlant(PinocchioPlant):
 class ClimbPlant(GrippingMujocoPlant):
     """Feet touch the scene's bodies in MuJoCo, with the friction of their limbs; limbs that pull are grips.
 
-    A point foot is a ball of 2 mm, a flat foot a box; no other part of the robot touches anything.
+    A point foot is its ball, or one of 2 mm, a flat foot a box; no other part of the robot touches anything.
 
     Args:
         climber: what climbs. scene: what it climbs, its gravity too. errors: None: none. faults: that come in time.
@@ -250,10 +250,12 @@ class ClimbPlant(GrippingMujocoPlant):
 
 
 def _foot(climber: Climber, limb: ClimbLimb) -> PlacedShape:
-    """What touches, in the contact frame: its lowest point is the frame's origin, as the robot stands at rest."""
+    """What touches, in the contact frame: of a ball itself; else its lowest point is the frame's origin at rest."""
     if isinstance(limb.contact, FlatFoot):
         x, y = limb.contact.half_lengths
         sole = pin.SE3(np.eye(3), np.array([0.0, 0.0, SOLE_THICKNESS / 2]))
         return PlacedShape(Box((2 * x, 2 * y, SOLE_THICKNESS)), sole)
+    if radius := limb.contact.height:
+        return PlacedShape(Sphere(radius), pin.SE3.Identity())
     turn = climber.contact_pose(climber.rest, climber.row(limb.name)).rotation
     return PlacedShape(Sphere(BALL), pin.SE3(np.eye(3), BALL * turn[2]))

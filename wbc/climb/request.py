@@ -34,7 +34,8 @@ class ClimberRequest:
         robot: a name of ``wbc.climb.machines``, or a URDF or MJCF file.
         arms: of the published walker, 2 to 6; with more than three its body is larger.
         set: NAME=VALUE of the published walker's data, in SI; may be repeated.
-        limbs: of a file, frames at the tips of its limbs; their z axes point out of what they hold.
+        limbs: of a file, frames at the tips of its limbs; their z axes point out of what they hold. A point may be the
+            centre of a ball; of flat feet any frames of their links.
         hold: of a file, how its limbs hold.
         friction: of a file's feet [1].
     """

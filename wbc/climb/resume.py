@@ -49,7 +49,7 @@ def stance_in(log: Log, climber: Climber, scene: ClimbScene, at: float | None = 
     for limb, aim in enumerate(log.array("aim")[row].astype(int).tolist()):
         if aim == FREE_LIMB or aim >= len(scene.footholds) or aim in contacts:
             continue
-        off = climber.contact_pose(q, limb).translation - scene.footholds[aim].pose.translation
+        off = climber.contact_pose(q, limb).translation - held_pose(climber, scene, limb, aim, q).translation
         if np.linalg.norm(off) < COME_TO:
             contacts[limb] = aim
     held = {limb: held_pose(climber, scene, limb, hold, q) for limb, hold in enumerate(contacts) if hold != FREE_LIMB}

@@ -79,10 +79,13 @@ def placed(climber: Climber, frame: pin.SE3) -> Array:
     body, every = climber.body_pose(climber.rest), list(range(len(climber.limbs)))
     limbs = [limb for limb in every if not climber.limbs[limb].contact.pulls] or every
     contacts = {limb: climber.contact_pose(climber.rest, limb) for limb in limbs}
-    points = [body.actInv(pose.translation) for pose in contacts.values()]
     up = [
         body.rotation.T @ (Z if climber.fixed(limb) == "position" else pose.rotation[:, 2])
         for limb, pose in contacts.items()
+    ]
+    points = [
+        body.actInv(pose.translation) - climber.limbs[limb].contact.height * normal
+        for (limb, pose), normal in zip(contacts.items(), up, strict=True)
     ]
     normal = np.mean(up, axis=0)
     normal = normal / np.linalg.norm(normal)

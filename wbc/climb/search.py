@@ -55,6 +55,8 @@ DEAR = 6.0
 ATTEMPTS = 3
 #: What a move costs more whose like could not be made, once [steps]
 LATE = 8.0
+#: Of the robot's length, and of directions: moves that differ by less are alike [1]
+ALIKE = 0.05
 #: What a limb in the air costs [steps]
 IN_THE_AIR = 2.0
 #: How far a limb may be from its foothold at the start [m]
@@ -262,6 +264,10 @@ class StanceSearch:
         self._again: deque[tuple[_Node, NDArray[np.int32], int]] = deque()
         self._late: set[LateMove] = set()
         self._delayed: set[tuple[int, bytes]] = set()
+        #: Moves whose like was out of reach when it was looked at last
+        self._beyond: set[tuple[Any, ...]] = set()
+        self._known_apart: dict[tuple[int, int], bytes] = {}
+        self._down = np.asarray(self.world.numbers.down)
         #: Stances that are come to by a forbidden move, and other moves to known stances
         self._removed: dict[int, _Node] = {}
         self._other: defaultdict[bytes, list[tuple[float, _Node, NDArray[np.int32]]]] = defaultdict(list)
@@ -305,7 +311,7 @@ class StanceSearch:
                 raise self._refusal("limit")
             if self._forbidden(node.contacts, after):
                 continue
-            if attempt == 0 and self._comes_late(node, after):
+            if attempt == 0 and (self._comes_late(node, after) or self._put_off(node, after)):
                 self._push(node, iter([(cost + LATE, after)]))
                 continue
             if after.tobytes() in self._known:
@@ -370,6 +376,34 @@ class StanceSearch:
             self._delayed.add(key)
         return late
 
+    def _put_off(self, node: _Node, after: NDArray[np.int32]) -> bool:
+        """Whether the like of a move was out of reach when it was looked at last; each is put off once."""
+        key = id(node), after.tobytes()
+        if key in self._delayed or self._alike(node.contacts, after) not in self._beyond:
+            return False
+        self._delayed.add(key)
+        return True
+
+    def _alike(self, contacts: NDArray[np.int32], after: NDArray[np.int32]) -> tuple[Any, ...]:
+        """What moves are told apart by in how far limbs reach: which limbs move, and where they and those that stay are
+        from the first that stays.
+        """
+        rows = list(zip(contacts.tolist(), after.tolist(), strict=True))
+        first = next((at for was, at in rows if was == at >= 0), FREE_LIMB)
+        return tuple((was == at, self._apart(first, at)) for was, at in rows)
+
+    def _apart(self, first: int, other: int) -> bytes:
+        """How one place is from another, in its axes and in steps of ``ALIKE``, with which way is down there."""
+        if min(first, other) < 0:
+            return b""
+        if (first, other) not in self._known_apart:
+            one, there = self.world.places[[first, other]]
+            turn = one[:9].reshape(3, 3).T
+            parts = turn @ (there[9:] - one[9:]) / self.world.length, turn @ there[:9].reshape(3, 3), turn @ self._down
+            numbers = np.concatenate([np.ravel(part) for part in parts]) / ALIKE
+            self._known_apart[first, other] = numbers.round().astype(np.int16).tobytes()
+        return self._known_apart[first, other]
+
     def _moved(self, node: _Node, after: NDArray[np.int32], attempt: int, cost: float) -> _Node | None:
         """The stance after a move, if there is one."""
         kept = np.where(node.contacts == after, after, FREE_LIMB).astype(np.int32)
@@ -391,6 +425,9 @@ class StanceSearch:
         if how == PostureOutcome.STANDS and not self._driven(kept, land):
             how = PostureOutcome.NOT_BORNE
         self.tried[how] += 1
+        if attempt == 0:
+            learn = self._beyond.add if how == PostureOutcome.NOT_REACHED else self._beyond.discard
+            learn(self._alike(node.contacts, after))
         if how != PostureOutcome.STANDS:
             return None
         return _Node(after, land, node.steps + 1, min(before, slack), node, cost, lift if moves else None)

@@ -19,7 +19,7 @@ from wbc.climb import machines, scenes
 from wbc.climb.at_rest import standing
 from wbc.climb.checker import CheckRules, ClimbReport, check
 from wbc.climb.climber import Climber, ClimbLimb
-from wbc.climb.contacts import ContactKind, FlatFoot, GripHand, PointFoot, SuctionPad
+from wbc.climb.contacts import GripHand, SuctionPad
 from wbc.climb.faults import PlantFault
 from wbc.climb.folder import PART, begin_folder, read_folder
 from wbc.climb.grids import GRID_ENDS, GRIDS, remove_columns, remove_fraction, remove_rows
@@ -143,17 +143,19 @@ def climber_of(request: ClimberRequest) -> Climber:
     frames = [name.strip() for text in request.limbs for name in text.split(",") if name.strip()]
     if len(frames) < 2:
         raise ShapeError("limbs", request.limbs, "give the frames at the tips of two limbs or more, with commas")
-    robot = robots.load(str(path), base="floating", shapes="fit")
-    robot = machines.with_rates(robot)
-    kinds: dict[str, ContactKind] = {
-        "point": PointFoot(request.friction), "flat": FlatFoot(friction=request.friction), "grip": GripHand(),
-        "rolling-grip": GripHand(rolls=True), "suction": SuctionPad(friction=request.friction),
-    }  # fmt: skip
-    climber = Climber(
-        machines.ready(robot), [ClimbLimb(frame, kinds[request.hold]) for frame in frames], name=path.stem
-    )
+    # Soles are parts of links, and what is between the legs of humanoids is tight for capsules
+    shapes = "convex" if request.hold == "flat" else "fit"
+    robot = machines.with_rates(robots.load(str(path), base="floating", shapes=shapes))
+    make: dict[str, Callable[[str], ClimbLimb]] = {
+        "point": lambda frame: machines.point_foot(robot, frame, request.friction),
+        "flat": lambda frame: machines.flat_foot(robot, frame, request.friction),
+        "grip": lambda frame: ClimbLimb(frame, GripHand()),
+        "rolling-grip": lambda frame: ClimbLimb(frame, GripHand(rolls=True)),
+        "suction": lambda frame: ClimbLimb(frame, SuctionPad(friction=request.friction)),
+    }
+    climber = Climber(machines.ready(robot), [make[request.hold](frame) for frame in frames], name=path.stem)
     # A state of the description may be anything that its maker calls so, but zeros are none
-    stands = kinds[request.hold].pulls or not robot.notes.get("neutral", "").startswith("zero")
+    stands = climber.limbs[0].contact.pulls or not robot.notes.get("neutral", "").startswith("zero")
     return climber if stands else standing(climber)
 
 

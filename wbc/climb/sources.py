@@ -36,6 +36,8 @@ from wbc.multibody import pin
 from wbc.track.target_file import read_targets
 from wbc.validation import Array
 
+#: More moves than are looked at in any time
+ALL_MOVES = 2**31 - 1
 #: A body so near to the end of its way is there [m]
 THERE = 1e-3
 
@@ -90,7 +92,9 @@ class ClimbSetup:
         mode = self.request.mode
         if not isinstance(mode, PathRequest):
             return options
-        options = replace(options, seconds=mode.planning_time, told=self.told)
+        # What is asked for is a limit of time
+        stances = replace(options.stances, moves=ALL_MOVES)
+        options = replace(options, stances=stances, seconds=mode.planning_time, told=self.told)
         if not mode.speed:
             return options
         speeds = replace(options.motion.speeds, speed=mode.speed, turn_rate=mode.turn_rate)
@@ -243,7 +247,7 @@ def _worked(setup: ClimbSetup, mode: LimbRequest) -> PlanSource:
         for what, given in steps:
             if what == "hold":
                 targets.append(given)
-                pose = scene.footholds[scene.row(given)].pose
+                pose = climber.limbs[row].contact.held_at(scene.footholds[scene.row(given)].pose)
                 continue
             if what == "rate":
                 leaving = leaving if targets else len(moved_by(pose, *given)) - 1

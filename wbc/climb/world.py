@@ -47,19 +47,6 @@ class PostureOutcome(IntEnum):
     BREAKS = 4
 
 
-class CloseLinks(NamedTuple):
-    """Links that are nearer than they may be.
-
-    Attributes:
-        row: of the state. names: of both. limbs: of which they are. lacks: how far they are to be further apart [m].
-    """
-
-    row: int
-    names: str
-    limbs: frozenset[int]
-    lacks: float
-
-
 class SampleAims(NamedTuple):
     """What contacts of some states are to be.
 
@@ -95,14 +82,9 @@ class SlackCone:
         """
         A, b = (np.asarray(part, dtype=np.float64) for part in kind.cone())
         A, b = A[np.isfinite(b)], b[np.isfinite(b)]
-        opposite = [
-            any(np.abs(row + other).max() < TINY and abs(b[i] + b[j]) < TINY for j, other in enumerate(A))
-            for i, row in enumerate(A)
-        ]
-        tied = np.array(opposite, dtype=bool)
+        tied = np.array([(np.abs(A + row) < TINY).all(axis=1).any() for row in A], dtype=bool) & (np.abs(b) < TINY)
         _, sizes, basis = np.linalg.svd(np.vstack([A[tied], np.zeros((1, 6))]))
-        rank = int((sizes > TINY).sum())
-        N, A, b = _tidy(basis[rank:].T), A[~tied], b[~tied]
+        N, A, b = _tidy(basis[int((sizes > TINY).sum()) :].T), A[~tied], b[~tied]
         forces, moments = np.linalg.norm(A[:, :3], axis=1), np.linalg.norm(A[:, 3:], axis=1)
         pure = forces < TINY
         lever = 0.0
@@ -160,7 +142,6 @@ class ClimbWorld:
         self._cones, self.cone_of = self._shapes_of_cones(turns, friction)
         pieces, links, shapes, poses, pairs = self._bodies(spare)
         self.links, self.bodies = links, names
-        self._piece_limbs = [int(piece.limb) for piece in pieces]
         self._shape_table = ShapeTable(shapes)
         self._held: list[Any] = [on, pieces, poses, pairs]
         self.touch = self._at_rest()
@@ -295,21 +276,6 @@ class ClimbWorld:
         how = call(self._world, *given, _at(out), _at(slack))
         return PostureOutcome(how), out, float(slack[0])
 
-    def first_touch(self, contacts: NDArray[np.int32], states: Array) -> CloseLinks | None:
-        """The first of some states ``(n, ...)`` with contacts ``(n, limbs)`` in which links are nearer than they may
-        be; None: in none.
-        """
-        contacts, states = np.ascontiguousarray(contacts, dtype=np.int32), np.ascontiguousarray(states)
-        which, lacks = np.zeros(4, dtype=np.int32), np.zeros(1)
-        row = self._code.wbc_first_touch(
-            self._world, ctypes.c_long(len(states)), _at(contacts), _at(states), _at(which), _at(lacks)
-        )
-        if row == len(states):
-            return None
-        pieces = [which[0]] if which[1] >= 0 else [which[0], -1 - which[1]]
-        limbs = frozenset(self._piece_limbs[k] for k in pieces) - {-1}
-        return CloseLinks(int(row), self.touching(which), limbs, float(lacks[0]))
-
     def band(
         self, aims: SampleAims, bounds: Array, slack: float, aside: float, states: Array
     ) -> tuple[Array, Array, float, Array, Array, Array]:  # fmt: skip
@@ -357,17 +323,18 @@ class ClimbWorld:
     def places_of(self, contacts: Sequence[int] | NDArray[np.int32]) -> NDArray[np.int32]:
         """The first place of each foothold, of rows of these."""
         rows = np.asarray(contacts)
-        return np.where(rows >= 0, np.searchsorted(self.hold, rows), rows).astype(np.int32)
+        return np.where(rows >= 0, self._first[self._level, rows], rows).astype(np.int32)
 
     def touching(self, which: NDArray[np.int32]) -> str:
         """The names of two bodies that touch."""
         other = int(which[1])
         return f"{self.links[which[0]]} and {self.bodies[other] if other >= 0 else self.links[-1 - other]}"
 
-    def _all_places(self, start: Stance | None) -> tuple[Array, NDArray[np.int32], Array, tuple[int, ...]]:
+    def _all_places(self, start: Stance | None) -> tuple[Array, NDArray[np.int32], NDArray[np.bool_], tuple[int, ...]]:
         """Poses of all places, their footholds, which of them limbs of fixed turn alone hold, and those of the start.
 
-        Footholds that say nothing of turns are held at ``TURNS`` of them where a limb fixes its turn.
+        Footholds that say nothing of turns are held at ``TURNS`` of them where a limb fixes its turn. Limbs whose
+        contact frames are at different heights over footholds have places of their own.
         """
         climber, holds = self.climber, self.scene.footholds
         fixes = [climber.fixed(limb) == "pose" for limb in range(len(climber.limbs))]
@@ -380,22 +347,26 @@ class ClimbWorld:
         spun = given.copy()
         spun[:, :, 0] = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * beside
         spun[:, :, 1] = np.cos(angle)[:, None] * beside - np.sin(angle)[:, None] * across
-        contacts, turned = list[int](), list[int]()
-        for limb, k in enumerate(() if start is None else start.contacts):
-            if k >= 0 and fixes[limb]:
-                contacts.append(len(each) + len(turned))
-                turned.append(limb)
-            else:
-                contacts.append(int(np.searchsorted(each, k)) if k >= 0 else FREE_LIMB)
-        poses = np.hstack([spun.reshape(-1, 9), self.scene.positions.reshape(-1, 3)[each]])
-        if start is not None and turned:
-            rows = [start.contacts[limb] for limb in turned]
-            held = [place(held_pose(climber, self.scene, limb, start.contacts[limb], start.q)) for limb in turned]
+        heights, self._level = np.unique([limb.contact.height for limb in climber.limbs], return_inverse=True)
+        levels = np.repeat(np.arange(len(heights)), len(each))
+        self._first = np.searchsorted(each, np.arange(len(holds))) + len(each) * np.arange(len(heights))[:, None]
+        over = self.scene.positions[each] + heights[:, None, None] * self.scene.normals[each]
+        poses = np.hstack([np.tile(spun.reshape(-1, 9), (len(heights), 1)), over.reshape(-1, 3)])
+        each, turn = np.tile(each, len(heights)), np.tile(turn, len(heights))
+        first = [FREE_LIMB] * len(climber.limbs) if start is None else list(start.contacts)
+        contacts, turned = self.places_of(first).tolist(), list[tuple[int, int, Array]]()
+        for limb, k in enumerate(first):
+            if start is not None and k >= 0 and fixes[limb]:
+                contacts[limb] = len(each) + len(turned)
+                turned.append((limb, k, place(held_pose(climber, self.scene, limb, k, start.q))))
+        if turned:
+            limbs, rows, held = zip(*turned, strict=True)
             poses, each = np.vstack([poses, held]), np.append(each, rows)
-        moved = np.append(turn > 0, np.ones(len(turned), dtype=bool))
-        return np.ascontiguousarray(poses), each.astype(np.int32), moved, tuple(contacts)
+            levels, turn = np.append(levels, self._level[list(limbs)]), np.append(turn, np.ones(len(rows), dtype=int))
+        self._levels = levels
+        return np.ascontiguousarray(poses), each.astype(np.int32), turn > 0, tuple(contacts)
 
-    def _shapes_of_cones(self, turned: Array, share: float) -> tuple[Any, NDArray[np.int32]]:
+    def _shapes_of_cones(self, turned: NDArray[np.bool_], share: float) -> tuple[Any, NDArray[np.int32]]:
         """Each cone once, and which of them each limb has at each place, -1 where it may not hold."""
         limbs, holds = self.climber.limbs, self.scene.footholds
         table = np.full((len(limbs), len(holds)), FREE_LIMB, dtype=np.int32)
@@ -416,6 +387,7 @@ class ClimbWorld:
             row.N, row.A, row.b, row.s = (a.ctypes.data for a in arrays)
         table = table[:, self.hold]
         for limb in range(len(limbs)):
+            table[limb, self._levels != self._level[limb]] = FREE_LIMB
             if self.climber.fixed(limb) != "pose":
                 table[limb, turned] = FREE_LIMB
         return numbers, np.ascontiguousarray(table)
@@ -484,8 +456,8 @@ def _pieces_of(climber: Climber, margin: float) -> _Pieces:
 
 
 def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: Array) -> pin.SE3:
-    """A foothold's pose, turned about its normal as a limb that fixes its turn is in a configuration."""
-    given = scene.footholds[max(foothold, 0)].pose
+    """Pose of a limb's contact frame at a foothold; that of limbs that fix their turn is turned as they are."""
+    given = climber.limbs[limb].contact.held_at(scene.footholds[max(foothold, 0)].pose)
     if foothold < 0 or climber.fixed(limb) != "pose":
         return given
     about = pin.log3(given.rotation.T @ climber.contact_pose(q, limb).rotation)[2]

@@ -238,10 +238,15 @@ class Step:
 
     @property
     def relaxed(self) -> tuple[Slack, ...]:
-        """Rows that gave way because not all could hold."""
-        slack = self._part("slack")
+        """Rows that gave way because not all could hold; limits of joints where closed loops left them no way."""
+        slack, beyond, context = self._part("slack"), self._part("beyond"), self._context
         out = []
-        for i in np.flatnonzero(slack):
+        for i in np.flatnonzero(beyond).tolist():
+            label, unit = context.variable(i), rate_unit(context.stack.robot.dof_units[i], context.command)
+            owners = [int(self._part(name)[i]) for name in ("owner_low", "owner_high")]
+            name = context.bounds[max(owners)].entry.name if max(owners) >= 0 else "bounds"
+            out.append(Slack(name, label, float(beyond[i]), unit))
+        for i in np.flatnonzero(slack).tolist():
             block, row = self._context.general[i]
             unit = rate_unit(block.rows[row].unit, self._context.command)
             out.append(Slack(block.entry.name, block.rows[row].label, float(slack[i]), unit))

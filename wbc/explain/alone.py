@@ -153,7 +153,7 @@ class Alone:
 
     def descend(self, q: Array, limited: bool = True, own: bool = False) -> tuple[Array, Array]:
         """(configuration, error) where Levenberg and Marquardt's method from q ends:
-        d = -(J'J + mu I)^-1 J'e in the steps that limits and equality rows leave.
+        d = -(J'J + mu |J|^2 I)^-1 J'e in the steps that limits and equality rows leave.
         """
         q = self._within(q) if limited else q
         here, mu = self.at(q, own), 1e-3
@@ -171,7 +171,10 @@ class Alone:
             if not J.size or (np.linalg.norm(J.T @ here.e) < 1e-9 and np.abs(back).max() < 1e-9):
                 break
             step = back.copy()
-            step[free] -= kernel @ np.linalg.solve(J.T @ J + mu * np.eye(J.shape[1]), J.T @ here.e)
+            left, sizes, right = np.linalg.svd(J, full_matrices=False)
+            if sizes[0] > 0.0:  # mu counts in J's own size, whatever the rows are counted in
+                part = sizes / sizes[0]
+                step[free] -= kernel @ (right.T @ (part / (part**2 + mu) * (left.T @ here.e))) / sizes[0]
             step *= min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
             there_q = self.moved(q, step)
             there_q = self._within(there_q) if limited else there_q

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from wbc import lazy
 
 if TYPE_CHECKING:
-    from wbc.formats.conversion import FORMATS as FORMATS, convert as convert, follow as follow, recorded as recorded
+    from wbc.formats.conversion import FORMATS as FORMATS, convert as convert, recorded as recorded
     from wbc.formats.errors import FormatError as FormatError
-    from wbc.formats.motion import PlayedPlant as PlayedPlant, RecordedMotion as RecordedMotion, answered as answered
+    from wbc.formats.motion import PlayedPlant as PlayedPlant, RecordedMotion as RecordedMotion
     from wbc.formats.motion_file import read_motion as read_motion
     from wbc.formats.ros2_plant import Ros2Plant as Ros2Plant
 else:

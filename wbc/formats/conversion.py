@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Iterator
 
 from wbc import extras, validation
 from wbc.api import Controller
-from wbc.errors import WbcError
 from wbc.formats.errors import FormatError
 from wbc.formats.run import RATE, Piece, Run, Wait
 from wbc.formats.writers import serve, write_csv, write_lerobot, write_mcap, write_npz, write_rerun
@@ -89,48 +88,39 @@ def _place_of(run: pathlib.Path, to: str, out: str | os.PathLike[str] | None, ov
 
 
 @contextlib.contextmanager
-def follow(run: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> Iterator[pathlib.Path]:
-    """Copies a run into another format while it is recorded, in a process of its own: the loop is not slowed.
-
-        with follow("ticks.npz", "mcap") as copy, controller.record("ticks.npz"):
-
-    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed; where
-    the block ends it has all that is written. Arguments and errors are those of :func:`convert`; the recorder's file
-    may begin later.
-
-    Raises:
-        FormatError: at the end, too: it could not be written, and why.
-    """
-    _writer_of(to)
-    source = validation.file_path("run", run)
-    place = _place_of(source, to, out)
-    command = [sys.executable, "-m", __name__, str(source), to, str(place)]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        yield place
-    finally:
-        _, said = process.communicate()
-    if process.returncode:
-        raise FormatError("run", str(place), f"its copy ended early: {said.strip().splitlines()[-1:]}")
-
-
-@contextlib.contextmanager
 def recorded(
     controller: Controller, run: str | os.PathLike[str], to: str = "mcap", *, overwrite: bool = False
 ) -> Iterator[Recorder]:
-    """Record every tick of a controller, and beside the recording the same in another format while the loop runs.
+    """Record every tick of a controller, and beside the recording the same in another format, which a process of its
+    own writes while the loop runs: the loop is not slowed.
 
-    Arguments and errors are those of :meth:`wbc.Controller.record` and :func:`convert`.
+        with wbc.formats.recorded(controller, "ticks.npz", "mcap"):
+            ...                                             # step as usual
+
+    The copy is as far as the file, but for a chunk, and goes on to the end where the loop's process is killed; where
+    the block ends it has all that is written. Arguments and errors are those of :meth:`wbc.Controller.record` and
+    :func:`convert`.
+
+    Raises:
+        FormatError: at the end, too: the copy could not be written, and why.
     """
     _writer_of(to)
     copy = _place_of(validation.file_path("run", run), to, None, overwrite)
-    # Closed before its copy is
-    with controller.record(run, overwrite=overwrite) as recorder, follow(recorder.path, to, copy), recorder:
-        yield recorder
+    with controller.record(run, overwrite=overwrite) as recorder:
+        command = [sys.executable, "-m", __name__, str(recorder.path), to, str(copy)]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            # Closed before its copy is
+            with recorder:
+                yield recorder
+        finally:
+            _, said = process.communicate()
+    if process.returncode:
+        raise FormatError("run", str(copy), f"its copy ended early: {said.strip().splitlines()[-1:]}")
 
 
 def main(run: str, to: str, out: str) -> None:
-    """What a process of :func:`follow` does."""
+    """What a process of :func:`recorded` does."""
     # Ctrl-C is of the loop, whose recording is then closed
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     ended = False
@@ -141,14 +131,7 @@ def main(run: str, to: str, out: str) -> None:
         going_on, ended = not ended, bool(select.select([sys.stdin], [], [], LOOK)[0])
         return going_on
 
-    while True:
-        try:
-            source = Run(run)
-            break
-        except WbcError:
-            if not wait():
-                raise
-    convert(source, to, out, wait=wait)
+    convert(run, to, out, wait=wait)
 
 
 if __name__ == "__main__":

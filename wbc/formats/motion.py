@@ -5,20 +5,16 @@ from __future__ import annotations
 import fnmatch
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wbc import validation
-from wbc.api import Controller
 from wbc.formats.errors import FormatError
-from wbc.log import Log
 from wbc.multibody import pin
-from wbc.record.recorder import names
 from wbc.robot.robot import Robot, checked_robot
-from wbc.simulation import Command, CommandKind, KinematicPlant, PlantState
-from wbc.tick.outcome import Status
+from wbc.simulation import CommandKind, KinematicPlant, PlantState
 from wbc.validation import Array
 
 log = logging.getLogger("wbc")
@@ -107,10 +103,7 @@ class RecordedMotion:
 
 
 class PlayedPlant(KinematicPlant):
-    """A plant that moves as was recorded, whatever it is commanded; commands are kept.
-
-    Attributes:
-        given: the commands, with their times [s].
+    """A plant that moves as was recorded, whatever it is commanded.
 
     Args:
         robot: whose joints they are. motion: what was recorded, two states or more.
@@ -126,7 +119,6 @@ class PlayedPlant(KinematicPlant):
         if len(motion.t) < 2:
             raise FormatError("motion", len(motion.t), "expected two joint states or more")
         self._robot, self._t, self._recorded = robot, motion.t, motion.configurations(robot, ignored)
-        self.given = list[tuple[float, Command]]()
         super().__init__(robot)
 
     def reset(self, q: Array, time: float) -> None:
@@ -141,46 +133,14 @@ class PlayedPlant(KinematicPlant):
         q = self._robot.integrate(self._recorded[k], v, float(np.clip(now, t[k], t[k + 1]) - t[k]))
         return PlantState(q, v, now + self._shift, valid=bool(now <= t[-1] + AT_ONCE))
 
-    def apply(self, command: Command) -> None:
-        self.given.append((self._time + self._shift, Command(command.kind, command.values.copy())))
-
     def advance(self, dt: float) -> None:
         self._time += dt
 
-
-def answered(
-    controller: Controller,
-    motion: RecordedMotion,
-    aim: Callable[[Controller, float], None] | None = None,
-    *,
-    ignored: Sequence[str] = (),
-) -> Log:
-    """What a stack would have commanded at every state of a recorded motion.
-
-    The log has ``t``, ``q.*``, ``v.*`` (as recorded), ``command.*``, and ``status``, a place in ``list(wbc.Status)``.
-
-    Args:
-        aim: sets values of the controller before the tick at a time [s] of the recording.
-        ignored: as of :meth:`wbc.formats.RecordedMotion.configurations`.
-
-    Raises:
-        FormatError, UnknownNameError: as of :class:`PlayedPlant`. WbcError: as of :meth:`wbc.Controller.step`.
-    """
-    validation.instance("controller", controller, Controller, "a wbc Controller")
-    robot, said, statuses, rows = controller.stack.robot, names(controller), list(Status), list[Array]()
-    plant = PlayedPlant(robot, motion, ignored)
-    rates = [(name, f"{unit}/s") for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)]
-    groups = {"q": said["q"], "v": rates, "command": said["v"]}
-    units = {"t": "s", "status": ""}
-    units |= {f"{group}.{name}": unit for group, members in groups.items() for name, unit in members}
-    plant.reset(robot.neutral, float(motion.t[0]))
-    controller.reset(plant.read().q)
-    while (state := plant.read()).valid:
-        if aim is not None:
-            aim(controller, state.time)
-        step = controller.step(state.q, state.v)
-        rows.append(np.concatenate([[state.time, statuses.index(step.status)], state.q, state.v, step.command]))
-        plant.advance(controller.stack.dt)
-    columns = dict(zip(units, np.array(rows).T, strict=True))
-    columns["status"] = columns["status"].astype(int)
-    return Log(columns, units, {"robot": robot.name, "dt": controller.stack.dt})
+    def states(self, dt: float) -> Iterator[PlantState]:
+        """The states that were recorded, every ``dt`` [s] from the first one on, at the times of the recording: steps
+        of a controller there are what its stack would have done.
+        """
+        self.reset(self._recorded[0], float(self._t[0]))
+        while (state := self.read()).valid:
+            yield state
+            self.advance(dt)

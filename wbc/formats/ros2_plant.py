@@ -1,16 +1,10 @@
-"""A robot of ROS 2 as a plant, over DDS or Zenoh and without ROS, by the types of messages that rosbags knows."""
+"""A robot of ROS 2 as a plant, over DDS and without ROS, by the types of messages that rosbags knows."""
 
 from __future__ import annotations
 
-import itertools
-import json
 import math
-import os
-import struct
 import time as clock
-import weakref
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,8 +28,6 @@ THERE = 1e-2
 KEPT = 64
 STATE = "sensor_msgs/msg/JointState"
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-#: What rmw_zenoh sends beside a message: its number, time [ns], and length and bytes of who sends
-ATTACHMENT = struct.Struct("<qqB16s")
 
 
 class Ros2Plant:
@@ -43,15 +35,14 @@ class Ros2Plant:
     joint_trajectory_controller of ros2_control takes them.
 
     A command of velocities is the position to which it leads within the next tick. Times are of this machine's clock.
+    Messages are those of ROS 2 over DDS as it is by default: XCDR 1, topics under ``rt/``.
 
     Args:
         robot: with joints of one coordinate each; what messages say of other joints is not looked at.
         states, commands: names of topics. domain: ``ROS_DOMAIN_ID``, to 232.
-        zenoh: in place of DDS over Zenoh as rmw_zenoh speaks it: the router or peer, such as ``tcp/127.0.0.1:7447``, or
-            "" for peers that are found by multicast.
 
     Raises:
-        MissingPackageError: cyclonedds, or eclipse-zenoh, is not installed.
+        MissingPackageError: cyclonedds is not installed.
         RangeError: joints with several coordinates, or no domain. FormatError: no connection.
     """
 
@@ -65,15 +56,28 @@ class Ros2Plant:
         commands: str = "joint_trajectory_controller/joint_trajectory",
         *,
         domain: int = 0,
-        zenoh: str | None = None,
     ) -> None:
         self._robot = checked_robot(robot)
         if robot.nq != robot.nv:
             raise RangeError("robot", robot.name, "has joints with several coordinates, which JointState has not")
         self.nq, self.nv = robot.nq, robot.nv
-        topics = {STATE: states.strip("/"), TRAJECTORY: commands.strip("/")}
         validation.integer("domain", domain, high=232)
-        self._link = _DdsLink(topics, domain) if zenoh is None else _ZenohLink(topics, domain, zenoh)
+        extras.require("ros2", "a robot of ROS 2")
+        from cyclonedds import core, pub, sub, topic
+        from cyclonedds.domain import DomainParticipant
+        from cyclonedds.qos import Policy, Qos
+
+        plain = Policy.History.KeepLast(1), Policy.DataRepresentation(use_cdrv0_representation=True)
+        heard, sent = Qos(Policy.Reliability.BestEffort, *plain), Qos(Policy.Reliability.Reliable(NANO), *plain)
+        # Names of ROS 2 -> classes of messages in Cyclone
+        self._messages = dict[str, Any]()
+        state, order = _idl(ros2_types(), STATE, self._messages), _idl(ros2_types(), TRAJECTORY, self._messages)
+        try:
+            me = DomainParticipant(domain)
+            self._reader = sub.DataReader(me, topic.Topic(me, f"rt/{states.strip('/')}", state), qos=heard)
+            self._writer = pub.DataWriter(me, topic.Topic(me, f"rt/{commands.strip('/')}", order), qos=sent)
+        except core.DDSException as error:
+            raise FormatError("domain", domain, f"DDS does not connect: {error}") from error
         self._q, self._v, self._heard = np.full(self.nq, math.nan), np.zeros(self.nv), -math.inf
         self._now, self._due, self._command = 0.0, 0.0, Command(CommandKind.VELOCITY, np.zeros(self.nv))
 
@@ -101,8 +105,9 @@ class Ros2Plant:
 
     def read(self) -> PlantState:
         """The last message with all joints, invalid where it is older than half a second."""
-        for message in self._link.take():
-            places = {name: k for k, name in enumerate(message.name)}
+        for message in self._reader.take(KEPT):
+            # What is said of an endpoint that is gone has no names
+            places = {name: k for k, name in enumerate(getattr(message, "name", ()))}
             if places.keys() >= set(self._robot.joint_names) and len(message.position) == len(places):
                 order, self._heard = [places[name] for name in self._robot.joint_names], clock.monotonic()
                 self._q = np.array(message.position)[order]
@@ -127,79 +132,11 @@ class Ros2Plant:
 
     def _send(self, q: Array, v: Array, seconds: float) -> None:
         """A trajectory of one point: be at q with v in so many seconds."""
-        made, none = self._link.types.types, np.zeros(0)
+        made = self._messages
         span = made["builtin_interfaces/msg/Duration"](int(seconds), round(seconds % 1.0 * NANO))
-        point = made["trajectory_msgs/msg/JointTrajectoryPoint"](q, v, none, none, span)
+        point = made["trajectory_msgs/msg/JointTrajectoryPoint"](q.tolist(), v.tolist(), [], [], span)
         header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](0, 0), "")
-        message = made[TRAJECTORY](header, list(self._robot.joint_names), [point])
-        self._link.put(bytes(self._link.types.serialize_cdr(message, TRAJECTORY)))
-
-
-class _DdsLink:
-    """Hears states and sends trajectories over Cyclone DDS as ROS 2 does by default: XCDR 1, topics under ``rt/``."""
-
-    def __init__(self, topics: dict[str, str], domain: int) -> None:
-        extras.require("ros2", "a robot of ROS 2")
-        from cyclonedds.core import DDSException
-        from cyclonedds.domain import DomainParticipant
-        from cyclonedds.pub import DataWriter
-        from cyclonedds.qos import Policy, Qos
-        from cyclonedds.sub import DataReader
-        from cyclonedds.topic import Topic
-
-        self.types, known = ros2_types(), dict[str, Any]()
-        plain = Policy.History.KeepLast(1), Policy.DataRepresentation(use_cdrv0_representation=True)
-        heard, sent = Qos(Policy.Reliability.BestEffort, *plain), Qos(Policy.Reliability.Reliable(NANO), *plain)
-        try:
-            me = DomainParticipant(domain)
-            state, order = (Topic(me, f"rt/{name}", _idl(self.types, kind, known)) for kind, name in topics.items())
-            self._reader, self._writer = DataReader(me, state, qos=heard), DataWriter(me, order, qos=sent)
-        except DDSException as error:
-            raise FormatError("domain", domain, f"DDS does not connect: {error}") from error
-        self._order = known[TRAJECTORY]
-
-    def take(self) -> Iterable[Any]:
-        # What is said of an endpoint that is gone has no names
-        return (message for message in self._reader.take(KEPT) if hasattr(message, "name"))
-
-    def put(self, data: bytes) -> None:
-        self._writer.write(self._order.deserialize(data))
-
-
-class _ZenohLink:
-    """The same over Zenoh, with keys and attachments of rmw_zenoh, but not its tokens, of which it lists topics."""
-
-    def __init__(self, topics: dict[str, str], domain: int, locator: str) -> None:
-        extras.require("zenoh", "a robot of ROS 2 over Zenoh")
-        import zenoh
-
-        self.types, config, came = ros2_types(), zenoh.Config(), deque[bytes](maxlen=KEPT)
-        if locator:
-            config.insert_json5("connect/endpoints", json.dumps([locator]))
-        self._came, self._sent, self._sender = came, itertools.count(1), os.urandom(16)
-        hashes = {kind: self.types.hash_rihs01(kind) for kind in topics}
-        states, commands = (f"{domain}/{name}/{_dds_name(kind)}/{hashes[kind]}" for kind, name in topics.items())
-        try:
-            session = zenoh.open(config)
-            # An open one keeps the program from ending
-            weakref.finalize(self, session.close)
-            self._subscriber = session.declare_subscriber(states, lambda sample: came.append(bytes(sample.payload)))
-            self._publisher = session.declare_publisher(commands)
-        except zenoh.ZError as error:
-            raise FormatError("zenoh", locator, f"Zenoh does not connect: {error}") from error
-
-    def take(self) -> Iterable[Any]:
-        return [self.types.deserialize_cdr(self._came.popleft(), STATE) for _ in range(len(self._came))]
-
-    def put(self, data: bytes) -> None:
-        attachment = ATTACHMENT.pack(next(self._sent), clock.time_ns(), 16, self._sender)
-        self._publisher.put(data, attachment=attachment)
-
-
-def _dds_name(kind: str) -> str:
-    """``sensor_msgs/msg/JointState`` as DDS and Zenoh call it."""
-    package, _, name = kind.split("/")
-    return f"{package}::msg::dds_::{name}_"
+        self._writer.write(made[TRAJECTORY](header, list(self._robot.joint_names), [point]))
 
 
 def _idl(types: Any, kind: str, known: dict[str, Any]) -> Any:
@@ -215,5 +152,6 @@ def _idl(types: Any, kind: str, known: dict[str, Any]) -> Any:
 
     if kind not in known:
         fields = {name: of(*field) for name, field in types.fielddefs[kind][1]}
-        known[kind] = annotations.final(make_idl_struct(kind.rpartition("/")[2], _dds_name(kind), fields))
+        package, _, name = kind.split("/")
+        known[kind] = annotations.final(make_idl_struct(name, f"{package}::msg::dds_::{name}_", fields))
     return known[kind]

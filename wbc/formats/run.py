@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -73,7 +74,7 @@ class Run:
         place, trust = validation.existing("run", path, FormatError), validation.flag("trust", trust)
         self.path = recording_in(place) or place
         file = next((self.path / name for name in FILES if (self.path / name).is_file()), self.path)
-        self.remarks, self.bodies = list[str](), dict[str, DrawnMesh]()
+        self.remarks, self._obstacles = list[str](), dict[str, DrawnMesh]()
         self._controller: Controller | None = None
         self._placed, self._said, self._said_at = dict[str, tuple[str, str]](), tuple[str, ...](), -np.inf
         self._chunks: Callable[[Wait | None], Iterable[tuple[Log, Array]]]
@@ -88,8 +89,12 @@ class Run:
             self.about, self.units, self._chunks = recording.about, recording.column_units, recording.logs
             self._read_stack(recording, trust)
         self._robot = self._own_robot() if self._controller is None else self._controller.stack.robot
-        if self._robot is not None:
-            self.bodies |= {f"robot/{link}": mesh for link, mesh in robot_meshes(self._robot).items()}
+
+    @cached_property
+    def bodies(self) -> Mapping[str, DrawnMesh]:
+        """Read when they are asked for: meshes take most of the time of what a table is made of."""
+        links = {} if self._robot is None else robot_meshes(self._robot)
+        return self._obstacles | {f"robot/{link}": mesh for link, mesh in links.items()}
 
     def _read_stack(self, recording: Recording, trust: bool) -> None:
         try:
@@ -104,7 +109,7 @@ class Run:
                 self._placed[f"target/{name}"] = name, "target"
             if isinstance(item, Obstacle):
                 self._placed[f"obstacle/{name}"] = name, "pose"
-                self.bodies[f"obstacle/{name}"] = shape_mesh(item.parts)
+                self._obstacles[f"obstacle/{name}"] = shape_mesh(item.parts)
 
     def _own_robot(self) -> Robot | None:
         """The robot of a run without a stack: by name, where the run has its whole configuration."""
@@ -136,19 +141,15 @@ class Run:
             model, data, body = self._robot.model, self._robot.model.createData(), pin.FrameType.BODY
             pin.framesForwardKinematics(model, data, q)
             places = zip(model.frames, data.oMf, strict=True)
-            poses = {f"robot/{frame.name}": _seven(place) for frame, place in places if frame.type == body}
+            poses = {f"robot/{frame.name}": pin.SE3ToXYZQUAT(place) for frame, place in places if frame.type == body}
         if self._controller is None:
             return SeenTick(t, poses)
         # One tick alone: from no active set the answer is the same to rounding
         tick = Tick(self._controller, SharedTick(0, t, state_of(self._again(row, True))))
         placed = {frame: tick.world_pose(*value) for frame, value in self._placed.items()}
-        poses |= {frame: _seven(pose) for frame, pose in placed.items() if pose is not None}
+        poses |= {frame: pin.SE3ToXYZQUAT(pose) for frame, pose in placed.items() if pose is not None}
         step, why = tick.step, ""
         binding = (*map(str, step.binding), *(f"gave way: {slack}" for slack in step.relaxed))
         if (said := (str(step.status), *binding)) != self._said and t >= self._said_at + EXPLAINED:
             self._said, self._said_at, why = said, t, " ".join(sentences(step.explain()))
         return SeenTick(t, poses, str(step.status), binding, why)
-
-
-def _seven(pose: pin.SE3) -> Array:
-    return np.array(pin.SE3ToXYZQUAT(pose))

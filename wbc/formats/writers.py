@@ -128,9 +128,6 @@ def write_npz(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None:
 def write_lerobot(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None:
     """A dataset of LeRobot, version 3.0, of one episode without images, in a folder: ``observation.state`` is the
     configuration, ``action`` the command of each tick.
-
-    Raises:
-        FormatError: no ticks, none at whole frames a second, or no command.
     """
     log, robot = joined([log for log, _ in pieces], run.units, run.about), str(run.about.get("robot", ""))
     t = log["t"]
@@ -150,13 +147,8 @@ def write_lerobot(run: Run, pieces: Iterable[Piece], path: pathlib.Path) -> None
 
 
 def serve(run: Run, pieces: Iterable[Piece], address: pathlib.Path) -> None:
-    """A server that Foxglove connects to, of a run at the speed at which it was, or as it is written.
-
-    Args:
-        address: ``HOST:PORT``, or nothing for 127.0.0.1 and port 8765, which Foxglove proposes.
-
-    Raises:
-        FormatError: the address cannot be served on.
+    """A server that Foxglove connects to, of a run at the speed at which it was, or as it is written; its address is
+    ``HOST:PORT``, or nothing for 127.0.0.1 and port 8765, which Foxglove proposes.
     """
     import foxglove
 

@@ -7,6 +7,7 @@ conventions and order of coordinates.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import sys
@@ -32,6 +33,10 @@ T = TypeVar("T")
 CONVERTED = " in Pinocchio"
 #: Components of an axis this much apart are the same
 _ALIGNED = 1e-15
+#: Functions (model, ...) of Pinocchio that give a Jacobian, of one degree of freedom without its second dimension
+_JACOBIANS = (
+    "computeFrameJacobian", "getFrameJacobian", "computeJointJacobians", "getJointJacobian", "jacobianCenterOfMass",
+)  # fmt: skip
 #: The least URDF with a continuous joint of an axis
 _ENDLESS = (
     '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
@@ -48,7 +53,17 @@ class _AtFirstUse(ModuleType):
         chosen = importlib.import_module("pinocchio") if PINOCCHIO else own
         # From here on a name costs what it costs of a module
         vars(self).update({key: value for key, value in vars(chosen).items() if not key.startswith("__")})
-        return getattr(chosen, name)
+        vars(self).update({key: _in_two_dimensions(getattr(chosen, key)) for key in _JACOBIANS})
+        return vars(self)[name] if name in _JACOBIANS else getattr(chosen, name)
+
+
+def _in_two_dimensions(jacobian: Callable[..., NDArray[np.float64]]) -> Callable[..., NDArray[np.float64]]:
+    @functools.wraps(jacobian)
+    def of(*given: Any) -> NDArray[np.float64]:
+        out = jacobian(*given)
+        return out if out.ndim == 2 else out.reshape(-1, 1)
+
+    return of
 
 
 if not TYPE_CHECKING:

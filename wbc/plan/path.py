@@ -22,8 +22,10 @@ from wbc.validation import Array
 ROUNDED = 0.1
 #: and by no less than this: then the law rests at the corners
 LEAST_ROUNDED = 1e-4
-#: Equality rows hold within this on a smooth path [rad, m], where points between its points may be projected
+#: Equality rows hold within this on a path [rad, m], where points between its points may be projected
 KEPT = 1e-6
+#: Samples may be off by this part of it, as rows are off by more between them
+SEEN = 0.9
 #: Points of a path that are nearer to another one are none of its smooth path [rad or m]
 CLOSE = 1e-3
 #: Rounds at most in which points are added to a smooth path
@@ -46,8 +48,8 @@ class PlannedPath:
 
     Attributes:
         coordinates: in which it was planned; the laws are of these.
-        points: [points, n], straight between them; with equality rows so near to each other that these are met.
-        length: sum of their distances [rad, or characteristic lengths].
+        corners: points that the search left [corners, n].
+        length: sum of the distances of corners [rad, or characteristic lengths].
         seconds: what planning took [s].
         shortening: processor time that went into making paths shorter [s].
         nodes: of the two trees of the last search.
@@ -56,15 +58,42 @@ class PlannedPath:
     coordinates: PlanningCoordinates = field(repr=False)
     native: NativePlanner = field(repr=False)
     stack: Declaration = field(repr=False)
-    points: Array = field(repr=False)
+    corners: Array = field(repr=False)
     length: float
     seconds: float
     shortening: float
     nodes: tuple[int, int]
 
+    @cached_property
+    def points(self) -> Array:
+        """Straight between them the path is clear, and equality rows hold within 1e-6: as near to each other as these
+        want it [points, n].
+
+        Raises:
+            InfeasibleError: points on the rows are not clear, or there are none.
+        """
+        points = self.corners
+        while self.native.path_rows.equalities:
+            middle = 0.5 * (points[:-1] + points[1:])
+            off = np.flatnonzero([self.native.broken(x) > SEEN * KEPT for x in middle])
+            if not off.size:
+                if len(points) > len(self.corners) and (fault := self.fault(joint_polyline(points))) is not None:
+                    raise InfeasibleError("path", *fault)
+                break
+            if len(points) > MOST_POINTS:
+                raise InfeasibleError("path", len(points), "the rows bend too much for straight pieces between points")
+            points = np.insert(points, off + 1, [self._onto_rows(middle[k]) for k in off], axis=0)
+        return points
+
+    def _onto_rows(self, x: Array) -> Array:
+        projected = self.native.projected(x)
+        if projected is None:
+            raise InfeasibleError("path", x.tolist(), "a point between two of the path finds no way onto the rows")
+        return projected
+
     @property
     def q(self) -> Array:
-        """The configurations [points, nq]."""
+        """The configurations of :attr:`points` [points, nq]."""
         return self.coordinates.configuration(self.points)
 
     @cached_property
@@ -74,10 +103,10 @@ class PlannedPath:
         Raises:
             InfeasibleError: a spline that keeps the equality rows is not clear.
         """
-        if len(self.points) < 2 or self.length == 0.0:
-            return standing_path(self.points[0])
+        if len(self.corners) < 2 or self.length == 0.0:
+            return standing_path(self.corners[0])
         rolling = self.coordinates.rolling
-        runs = [self.points] if rolling is None else rolling.runs(self.points)
+        runs = [self.corners] if rolling is None else rolling.runs(self.corners)
         smoothed = self._spline if self.native.path_rows.equalities else self._rounded
         return PolynomialPath.joined([smoothed(run) for run in runs])
 
@@ -102,22 +131,16 @@ class PlannedPath:
             middle = 0.5 * (path.knots[:-1] + path.knots[1:])
             if len(path.knots) != len(points):
                 points = path.evaluate(path.knots)
-            between, more = path.evaluate(middle), []
-            off = np.array([self.native.broken(x) for x in between])
-            bad = off > KEPT
+            off = np.array([self.native.broken(x) for x in path.evaluate(middle)])
+            bad = off > SEEN * KEPT
             if not bad.any():
                 fault = self.fault(path)
                 if fault is None:
                     return path
                 why, bad = fault[1], np.ones(len(bad), dtype=bool)
-            for k in np.flatnonzero(bad):
-                x = self.native.projected(0.5 * (points[k] + points[k + 1]))
-                if x is None:
-                    raise InfeasibleError(
-                        "path", float(middle[k]), "a point between two of the path finds no way onto the rows"
-                    )
-                more.append((k + 1, x))
-            points = np.insert(points, [k for k, _ in more], [x for _, x in more], axis=0)
+            more = np.flatnonzero(bad)
+            between = [self._onto_rows(0.5 * (points[k] + points[k + 1])) for k in more]
+            points = np.insert(points, more + 1, between, axis=0)
         raise InfeasibleError(
             "path", len(points), f"no spline keeps the rows and is clear: {why or 'the rows bend too much'}"
         )
@@ -139,7 +162,7 @@ class PlannedPath:
             share = (np.arange(SAMPLES) + 0.5) / SAMPLES
             s = (path.knots[:-1, None] + share * np.diff(path.knots)[:, None]).ravel()
             off = [self.native.broken(x) for x in path.evaluate(s)]
-            if max(off) > KEPT:
+            if max(off) > SEEN * KEPT:
                 return max(off), f"a row is broken at s = {s[int(np.argmax(off))]:.4g}"
         return None
 

@@ -183,14 +183,14 @@ class MotionPlanner(Handles):
             coordinates=self.coordinates,
             native=search.native,
             stack=self.stack,
-            points=points if rolling is None else rolling.rolled(points, self._wheels),
+            corners=points if rolling is None else rolling.rolled(points, self._wheels),
             length=length,
             seconds=perf_counter() - search.begin,
             shortening=search.shortening,
             nodes=search.nodes,
         )
         # Wheels that are not round, or have limits
-        if self._wheels and path.length > 0.0 and (fault := path.fault(joint_polyline(path.points))) is not None:
+        if self._wheels and path.length > 0.0 and (fault := path.fault(joint_polyline(path.corners))) is not None:
             raise InfeasibleError("path", *fault)
         return path
 

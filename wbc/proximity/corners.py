@@ -10,8 +10,9 @@ is a corner (the centre of a ball, for round ends) and b its nearest point of B,
 that is close the nearest of these have rows; for other pairs they are too far to matter (``native/corners.h``).
 
 Corners are those of boxes and hulls, the centres of the balls at a capsule's ends, and points on a cylinder's rims;
-spheres have none. Hulls are not the other body of a corner: that is a sphere, capsule, box, cylinder or half-space,
-whose nearest point has a closed form.
+spheres have none. Of a hull with many, in front of a half-space, they are those that a tilt by 0.1 rad in one of four
+directions makes the lowest: to these the nearest point goes as the hull rolls. Hulls are not the other body of a
+corner: that is a sphere, capsule, box, cylinder or half-space, whose nearest point has a closed form.
 """
 
 from __future__ import annotations

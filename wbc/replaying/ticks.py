@@ -159,6 +159,7 @@ def replay(
 
     Raises:
         RecordingError: damaged, of another format, version, stack or layout.
+        CommandError: an item of the stack that is given has no meaning for what was commanded.
         PicklingError: the stack in it cannot be read without ``trust``. CompileError: ``native`` without a compiler.
     """
     source = recording if isinstance(recording, Recording) else Recording(recording)
@@ -193,6 +194,8 @@ def compiled(
     chosen = given["backend"] if backend is None else validation.one_of("backend", backend, BACKENDS)
     if stack is None:
         stack = _own_stack(recording, trust)
+    elif stack.command == "velocity":
+        stack = stack.commanding(given.get("command", stack.command))
     if declaration_key(stack) != given["declaration"]:
         items = [[e.name, type(e.item).__name__] for e in stack.entries]
         reason = f"is of another stack: {given['robot']} with {given['items']}, not {stack.robot.name} with {items}"

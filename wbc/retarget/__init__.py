@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wbc.retarget.holding_forces import Support as Support, held as held
     from wbc.retarget.live import LiveRetargeter as LiveRetargeter
     from wbc.retarget.options import RetargetOptions as RetargetOptions, RetargetWeights as RetargetWeights
-    from wbc.retarget.outputs.writing import write_lerobot as write_lerobot, write_motion as write_motion
+    from wbc.retarget.outputs import write_lerobot as write_lerobot, write_motion as write_motion
     from wbc.retarget.report import save_motion_film as save_motion_film, write_report as write_report
     from wbc.retarget.retargeted import GivenUp as GivenUp, MotionErrors as MotionErrors, Retargeted as Retargeted
     from wbc.retarget.retargeter import Retargeter as Retargeter

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbc.errors import WbcError
-from wbc.retarget.clip import Array, ancestors
-from wbc.retarget.words import FRONT, HIND, side_of, words
+from wbc.retarget.clip import Array, Skeleton, ancestors
+from wbc.retarget.words import FRONT, HIND, side_of
 
 #: Limbs by name, in the order in which they are shown
 LIMBS = ("left_leg", "right_leg", "left_arm", "right_arm")
@@ -41,58 +41,18 @@ class BodyError(WbcError):
 
 
 @dataclass(frozen=True)
-class PointTree:
-    """Points at rest as a tree, parents first.
-
-    Attributes:
-        names: of the points. parents: number of each one's parent; -1 at the root.
-        points: positions at rest [points, 3] [m].
-    """
-
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    points: Array
-
-    def children(self) -> list[list[int]]:
-        """Numbers of each point's children."""
-        below: list[list[int]] = [[] for _ in self.names]
-        for child, parent in enumerate(self.parents):
-            if parent >= 0:
-                below[parent].append(child)
-        return below
-
-    def path(self, start: int, end: int) -> tuple[int, ...]:
-        """Points from one to another along the tree, both included."""
-        up, down = ancestors(self.parents, start), ancestors(self.parents, end)
-        meeting = next(point for point in up if point in down)
-        return (*up[: up.index(meeting) + 1], *reversed(down[: down.index(meeting)]))
-
-    def bones(self, chain: Sequence[int]) -> Array:
-        """Lengths from point to point of a chain [m]."""
-        return np.asarray(np.linalg.norm(np.diff(self.points[list(chain)], axis=0), axis=1))
-
-    def length(self, chain: Sequence[int]) -> float:
-        """Of a chain [m]."""
-        return float(self.bones(chain).sum())
-
-    def said(self, chains: Sequence[Sequence[int]]) -> set[str]:
-        """Words of the names of chains' points."""
-        return {word for chain in chains for point in chain for word in words(self.names[point])}
-
-
-@dataclass(frozen=True)
 class BodyPlan:
-    """Limbs, trunk and head of a tree of points.
+    """Limbs, trunk and head of a skeleton.
 
     Attributes:
-        tree: the points. limbs: name of :data:`LIMBS` -> points from the first below the trunk to the end.
+        tree: the skeleton. limbs: name of :data:`LIMBS` -> points from the first below the trunk to the end.
         pelvis, chest: points that carry legs and arms; equal where one rigid body carries both.
         head: points of the chain without a partner beyond the arms, or ().
         axes: forward, left and up of the rest pose, as columns [3, 3].
         upright: whether the trunk stands on its legs; False: it lies on four.
     """
 
-    tree: PointTree
+    tree: Skeleton
     limbs: dict[str, tuple[int, ...]]
     pelvis: int
     chest: int
@@ -111,8 +71,8 @@ class _LimbPair:
     middle: Array
 
 
-def find_body(tree: PointTree, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0) -> BodyPlan:
-    """The plan of a tree of points.
+def find_body(tree: Skeleton, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0) -> BodyPlan:
+    """The plan of a skeleton.
 
     Args:
         field: what a refusal names. arms: a single pair of limbs is arms, not legs.
@@ -121,56 +81,52 @@ def find_body(tree: PointTree, *, field: str = "skeleton", arms: bool = False, s
     Raises:
         BodyError: no pair of limbs.
     """
-    pairs = _pairs(tree)
-    if not pairs:
+    every = _pairs(tree)
+    if not every:
         raise BodyError(field, ", ".join(tree.names[:8]), "no two chains of equal bones: there are no limbs to find")
-    up = _up(tree, pairs)
-    legs, fore, upright = pairs[0], None, True
-    if len(pairs) > 1:
-        legs, *_, fore = sorted(pairs, key=lambda pair: float(pair.middle @ up))
-        if len(pairs) > 2:
-            # Of more than two pairs those that reach farthest up and down
-            legs = min(pairs, key=lambda pair: np.mean([tree.points[chain[-1]] @ up for chain in pair.chains]))
-        trunk = fore.middle - legs.middle
-        upright = bool(abs(trunk @ up) > UPRIGHT * np.linalg.norm(trunk))
-    across = _across(tree, pairs, up, straight)
-    if not upright and fore is not None:
-        legs, fore = _hind_and_fore(tree, (legs, fore), up)
-    left = _left(tree, (legs, fore), across, up, upright)
+    up = _up(tree, every)
+    # Legs, and where there are more limbs those that carry the shoulders
+    pairs = sorted(every, key=lambda pair: float(pair.middle @ up))[:: max(len(every) - 1, 1)]
+    if len(every) > 2:
+        # Of more than two pairs those that reach farthest up and down
+        pairs[0] = min(every, key=lambda pair: np.mean([tree.rest[chain[-1]] @ up for chain in pair.chains]))
+    trunk = pairs[-1].middle - pairs[0].middle
+    upright = len(pairs) == 1 or bool(abs(trunk @ up) > UPRIGHT * np.linalg.norm(trunk))
+    across = _across(tree, every, up, straight)
+    if not upright and _fore_first(tree, pairs, up):
+        pairs.reverse()
+    left = _left(tree, pairs, across, up, upright)
     limbs: dict[str, tuple[int, ...]] = {}
-    for kind, pair in (("leg", legs), ("arm", fore)):
-        if pair is not None:
-            feet = kind == "leg" or not upright
-            chains = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
-            apart = abs(float((tree.points[chains[0][0]] - tree.points[chains[1][0]]) @ left))
-            side = 0 if apart >= SHORT * pair.reach else -1
-            chains.sort(key=lambda chain: -float(tree.points[chain[side]] @ left))
-            limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
-    if arms and fore is None:
-        limbs = {name.replace("leg", "arm"): chain for name, chain in limbs.items()}
-    chest = legs.carrier if fore is None else fore.carrier
+    for kind, pair in zip(("leg", "arm"), pairs, strict=False):
+        feet = kind == "leg" or not upright
+        chains = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
+        apart = abs(float((tree.rest[chains[0][0]] - tree.rest[chains[1][0]]) @ left))
+        side = 0 if apart >= SHORT * pair.reach else -1
+        chains.sort(key=lambda chain: -float(tree.rest[chain[side]] @ left))
+        kind = "arm" if arms and len(pairs) == 1 else kind
+        limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
     axes = np.stack([np.cross(left, up), left, up], axis=1)
-    return BodyPlan(tree, limbs, legs.carrier, chest, _head(tree, legs, fore, up), axes, upright)
+    return BodyPlan(tree, limbs, pairs[0].carrier, pairs[-1].carrier, _head(tree, pairs, up), axes, upright)
 
 
-def longest_chain(tree: PointTree, first: int) -> tuple[int, ...]:
+def longest_chain(tree: Skeleton, first: int) -> tuple[int, ...]:
     """Points from one to the end of the longest branch below it."""
-    children, reach, chain = tree.children(), _reaches(tree), [first]
+    children, reach, chain = tree.children, _reaches(tree), [first]
     while children[here := chain[-1]]:
         chain.append(max(children[here], key=lambda child: reach[child] + tree.length((here, child))))
     return tuple(chain)
 
 
-def _lowest_branch(tree: PointTree, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
+def _lowest_branch(tree: Skeleton, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
     """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest."""
     ends = [k for k in reversed(range(len(tree.names))) if chain[0] in ancestors(tree.parents, k)]
-    lowest = min(set(ends) - {*tree.parents}, key=lambda point: (float(tree.points[point] @ up), -point))
-    if float((tree.points[chain[-1]] - tree.points[lowest]) @ up) > LOWER * tree.length(chain):
+    lowest = min(set(ends) - {*tree.parents}, key=lambda point: (float(tree.rest[point] @ up), -point))
+    if float((tree.rest[chain[-1]] - tree.rest[lowest]) @ up) > LOWER * tree.length(chain):
         return tree.path(chain[0], lowest)
     return chain
 
 
-def _reaches(tree: PointTree) -> Array:
+def _reaches(tree: Skeleton) -> Array:
     """Length of the longest branch below each point."""
     reach = np.zeros(len(tree.names))
     for point in range(len(tree.names) - 1, 0, -1):
@@ -180,9 +136,9 @@ def _reaches(tree: PointTree) -> Array:
     return reach
 
 
-def _pairs(tree: PointTree) -> list[_LimbPair]:
+def _pairs(tree: Skeleton) -> list[_LimbPair]:
     """Pairs of limbs on the trunk."""
-    children = tree.children()
+    children = tree.children
     pairs: list[_LimbPair] = []
     waiting = [point for point, parent in enumerate(tree.parents) if parent < 0]
     while waiting:
@@ -192,14 +148,14 @@ def _pairs(tree: PointTree) -> list[_LimbPair]:
         for _, bones, a, b in costs:
             if bones < UNLIKE and a in rest and b in rest:
                 pair = rest.pop(a), rest.pop(b)
-                middle = np.asarray(np.mean([tree.points[a], tree.points[b]], axis=0))
+                middle = np.asarray(np.mean([tree.rest[a], tree.rest[b]], axis=0))
                 pairs.append(_LimbPair(point, pair, min(map(tree.length, pair)), middle))
         waiting += rest
     longest = max((pair.reach for pair in pairs), default=0.0)
     return [pair for pair in pairs if pair.reach > LEAST_LIMB * longest and min(map(len, pair.chains)) >= 2]
 
 
-def _unlike(tree: PointTree, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[float, float]:
+def _unlike(tree: Skeleton, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[float, float]:
     """(by which of several partners the nearest and likest comes first, how much the bones of two chains differ)."""
     first, second = tree.bones(a), tree.bones(b)
     length = max(float(first.sum()), float(second.sum()))
@@ -213,19 +169,19 @@ def _unlike(tree: PointTree, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[fl
     return bones + APART * tree.length((a[0], b[0])) / length + NAMED * sides, bones
 
 
-def _up(tree: PointTree, pairs: Sequence[_LimbPair]) -> Array:
+def _up(tree: Skeleton, pairs: Sequence[_LimbPair]) -> Array:
     """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings."""
     chains = np.array([(chain[0], chain[-1]) for pair in pairs for chain in pair.chains])
-    rise = (tree.points[chains[:, 0]] - tree.points[chains[:, 1]]).sum(axis=0)
+    rise = (tree.rest[chains[:, 0]] - tree.rest[chains[:, 1]]).sum(axis=0)
     axis = int(np.argmax(np.abs(rise)))
     return np.asarray(np.eye(3)[axis] * (np.sign(rise[axis]) or 1.0))
 
 
-def _across(tree: PointTree, pairs: Sequence[_LimbPair], up: Array, straight: float) -> Array:
+def _across(tree: Skeleton, pairs: Sequence[_LimbPair], up: Array, straight: float) -> Array:
     """The line from right to left, of unknown sign; a coordinate axis where it is as near to one as ``straight``."""
     out = np.zeros(3)
     for pair in pairs:
-        a, b = (tree.points[list(chain)].mean(axis=0) for chain in pair.chains)
+        a, b = (tree.rest[list(chain)].mean(axis=0) for chain in pair.chains)
         line = a - b
         out += line if line @ out >= 0.0 else -line
     out -= (out @ up) * up
@@ -236,22 +192,19 @@ def _across(tree: PointTree, pairs: Sequence[_LimbPair], up: Array, straight: fl
     return np.eye(3)[axis] * np.sign(out[axis]) if abs(out[axis]) > straight * size else out / size
 
 
-def _left(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair | None], across: Array, up: Array, upright: bool) -> Array:
+def _left(tree: Skeleton, pairs: Sequence[_LimbPair], across: Array, up: Array, upright: bool) -> Array:
     """The direction to the left; :data:`AHEAD` is forward where neither names, nor a lying trunk, nor toes say it."""
-    legs, fore = pairs
-    votes = 0.0
-    for chain in (*legs.chains, *(fore.chains if fore is not None else ())):
+    legs, votes = pairs[0], 0.0
+    for chain in [chain for pair in pairs for chain in pair.chains]:
         said = side_of(tree.names[chain[0]]) or side_of(tree.names[chain[-1]])
-        votes += said * float(np.sign((tree.points[list(chain)].mean(axis=0) - legs.middle) @ across))
+        votes += said * float(np.sign((tree.rest[list(chain)].mean(axis=0) - legs.middle) @ across))
     if votes:
         return np.asarray(across * np.sign(votes))
-    forward = np.zeros(3)
-    if not upright and fore is not None:
-        forward = fore.middle - legs.middle
-    elif min(map(len, legs.chains)) >= 4:
+    forward = pairs[-1].middle - legs.middle if not upright else np.zeros(3)
+    if upright and min(map(len, legs.chains)) >= 4:
         # Toes point forward
         for chain in legs.chains:
-            before, toe = np.diff(tree.points[list(chain[-3:])], axis=0)
+            before, toe = np.diff(tree.rest[list(chain[-3:])], axis=0)
             forward += toe + (before if abs(before @ up) < 0.5 * np.linalg.norm(before) else 0.0)
     ahead = np.cross(across, up)
     vote = float(forward @ ahead)
@@ -260,24 +213,21 @@ def _left(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair | None], across: Ar
     return np.asarray(across * np.sign(vote))
 
 
-def _hind_and_fore(tree: PointTree, pairs: tuple[_LimbPair, _LimbPair], up: Array) -> tuple[_LimbPair, _LimbPair]:
-    """Of two pairs under a lying trunk the hind legs and the front legs."""
-    a, b = pairs
+def _fore_first(tree: Skeleton, pairs: Sequence[_LimbPair], up: Array) -> bool:
+    """Whether the first of two pairs under a lying trunk is that of the front legs."""
     first, second = (len(said & FRONT) - len(said & HIND) for said in (tree.said(pair.chains) for pair in pairs))
     if first != second:
-        return (b, a) if first > second else (a, b)
-    head = _head(tree, a, b, up)
-    if head:
-        end = tree.points[head[-1]]
-        return (b, a) if np.linalg.norm(end - a.middle) < np.linalg.norm(end - b.middle) else (a, b)
-    return (a, b) if float((b.middle - a.middle) @ AHEAD) >= 0.0 else (b, a)
+        return first > second
+    if head := _head(tree, pairs, up):
+        near, far = (np.linalg.norm(tree.rest[head[-1]] - pair.middle) for pair in pairs)
+        return bool(near < far)
+    return float((pairs[1].middle - pairs[0].middle) @ AHEAD) < 0.0
 
 
-def _head(tree: PointTree, legs: _LimbPair, fore: _LimbPair | None, up: Array) -> tuple[int, ...]:
+def _head(tree: Skeleton, pairs: Sequence[_LimbPair], up: Array) -> tuple[int, ...]:
     """The chain without a partner that reaches highest, beyond the trunk."""
-    pairs = [pair for pair in (legs, fore) if pair is not None]
     no_head = {*tree.path(pairs[0].carrier, pairs[-1].carrier), *(chain[0] for pair in pairs for chain in pair.chains)}
-    children, carriers = tree.children(), {pair.carrier for pair in pairs}
-    chains = [longest_chain(tree, child) for carrier in carriers for child in children[carrier] if child not in no_head]
-    chains = [chain for chain in chains if float((tree.points[chain[-1]] - legs.middle) @ up) > 0.0]
-    return max(chains, key=lambda chain: float(tree.points[chain[-1]] @ up), default=())
+    first = {child for pair in pairs for child in tree.children[pair.carrier]} - no_head
+    chains = [longest_chain(tree, child) for child in first]
+    chains = [chain for chain in chains if float((tree.rest[chain[-1]] - pairs[0].middle) @ up) > 0.0]
+    return max(chains, key=lambda chain: float(tree.rest[chain[-1]] @ up), default=())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from wbc.retarget.words import words
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.bool_]
@@ -14,7 +17,7 @@ Marks = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Joints of a person or an animal as a tree, in an order in which parents come first.
+    """Joints of a person, an animal or a robot as a tree, in an order in which parents come first.
 
     Attributes:
         names: of the joints; of markers and key points without a hierarchy, theirs.
@@ -28,10 +31,41 @@ class Skeleton:
     offsets: Array
     ends: tuple[bool, ...]
 
-    @property
+    @cached_property
     def rest(self) -> Array:
         """Positions at rest [joints, 3] [m]."""
-        return rest_places(self.parents, self.offsets)
+        places = np.array(self.offsets, dtype=float)
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                places[joint] += places[parent]
+        return places
+
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """Numbers of each joint's children."""
+        below: list[list[int]] = [[] for _ in self.names]
+        for child, parent in enumerate(self.parents):
+            if parent >= 0:
+                below[parent].append(child)
+        return below
+
+    def path(self, start: int, end: int) -> tuple[int, ...]:
+        """Joints from one to another along the tree, both included."""
+        up, down = ancestors(self.parents, start), ancestors(self.parents, end)
+        meeting = next(joint for joint in up if joint in down)
+        return (*up[: up.index(meeting) + 1], *reversed(down[: down.index(meeting)]))
+
+    def bones(self, chain: Sequence[int]) -> Array:
+        """Lengths from joint to joint of a chain at rest [m]."""
+        return np.asarray(np.linalg.norm(np.diff(self.rest[list(chain)], axis=0), axis=1))
+
+    def length(self, chain: Sequence[int]) -> float:
+        """Of a chain at rest [m]."""
+        return float(self.bones(chain).sum())
+
+    def said(self, chains: Sequence[Sequence[int]]) -> set[str]:
+        """Words of the names of chains' joints."""
+        return {word for chain in chains for joint in chain for word in words(self.names[joint])}
 
 
 @dataclass(frozen=True)
@@ -58,21 +92,17 @@ class Clip:
     notes: tuple[str, ...] = ()
 
 
-def rest_places(parents: Sequence[int], offsets: Array) -> Array:
-    """Positions of a tree at rest, of offsets from the parents [joints, 3]."""
-    places = np.array(offsets, dtype=float)
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            places[joint] += places[parent]
-    return places
-
-
 def ancestors(parents: Sequence[int], joint: int) -> list[int]:
     """A joint and all above it, up to the root."""
     chain = [joint]
     while parents[chain[-1]] >= 0:
         chain.append(parents[chain[-1]])
     return chain
+
+
+def nearest_above(parents: Sequence[int], joint: int, there: Container[int]) -> int:
+    """The nearest of some joints above one; -1 where there is none."""
+    return next((above for above in ancestors(parents, joint)[1:] if above in there), -1)
 
 
 def intervals(marks: Marks) -> list[tuple[int, int]]:

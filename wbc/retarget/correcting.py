@@ -51,7 +51,7 @@ class CorrespondenceEditor:
         body = match.body
         robot, data = body.robot, body.robot.model.createData()
         pin.forwardKinematics(robot.model, data, robot.neutral)
-        turned = (match.rest - match.rest[match.pelvis]) @ match.axes @ body.axes.T * match.scale
+        turned = (match.skeleton.rest - match.skeleton.rest[match.pelvis]) @ match.axes @ body.axes.T * match.scale
         size = float(np.linalg.norm(np.ptp(turned, axis=0)))
         self.points = turned + body.places[0] + SKELETON_ASIDE * size * body.axes[:, 1]
         #: item -> frame of the robot, and number of the point that leads it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,9 +13,9 @@ import numpy as np
 
 from wbc import validation
 from wbc.extras import require
-from wbc.retarget.body import LIMBS, BodyError, BodyPlan, PointTree, find_body
+from wbc.retarget.body import LIMBS, BodyError, BodyPlan, find_body
 from wbc.retarget.clip import Array, Skeleton
-from wbc.retarget.hands import FINGERS, bent, find_hand, handedness
+from wbc.retarget.hands import FINGERS, find_hand, handedness
 from wbc.retarget.robot_body import RobotBody, RobotLimb
 from wbc.retarget.words import ARM_WORDS, side_of
 
@@ -58,7 +59,7 @@ class Correspondence:
     """A skeleton beside a robot.
 
     Attributes:
-        body: of the robot. skeleton: whose points lead it. rest: its points at rest [joints, 3] [m].
+        body: of the robot. skeleton: whose points lead it.
         limbs: robot's limb -> points that lead it. pelvis, chest, head: points of the trunk; -1 without a head.
         axes: forward, left and up of the skeleton at rest, as columns. upright: whether it stands on two legs there.
         scale: metres of the robot to one of the skeleton.
@@ -69,7 +70,6 @@ class Correspondence:
 
     body: RobotBody
     skeleton: Skeleton
-    rest: Array
     limbs: dict[str, LimbMatch]
     pelvis: int
     chest: int
@@ -82,38 +82,27 @@ class Correspondence:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        names, model = self.skeleton.names, self.body.robot.model
-        rows: list[tuple[str, ...]] = [("", "base", "middle", "end", "tip")]
+        """A short YAML, with the robot's joints beside the points that lead them."""
+        names, model = [json.dumps(n, ensure_ascii=False) for n in self.skeleton.names], self.body.robot.model
+        lines = [f"robot: {self.body.robot.name}", f"scale: {self.scale:.6g}"]
+        lines.append(f"all_fours: {str(self.all_fours).lower()}")
+        lines += [f"{part}: {names[k]}" for part in TRUNK if (k := int(getattr(self, part))) >= 0]
+        lines.append("limbs:  # base, middle, end, tip")
         for limb, match in self.limbs.items():
-            mine = self.body.limbs[limb]
+            mine, points = self.body.limbs[limb], ", ".join(names[k] for k in match.chain)
             frames = [model.frames[int(model.getFrameId(frame))] for frame in (mine.middle, mine.wrist) if frame]
             joints = [str(model.names[joint]) for joint in (mine.joints[0], *(frame.parentJoint for frame in frames))]
-            joints += ["contact"] * (3 - len(joints))
-            rows.append((f"{limb} of {self.body.robot.name}", *joints, mine.contact))
-            rows.append((f"  {match.source}", *(names[k] for k in match.chain)))
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        lines.append(", ".join(f"{part} {name}" for part, name in self._trunk().items()) + f"; scale {self.scale:.3f}")
-        return "\n".join([*lines, *self.notes])
-
-    def _trunk(self) -> dict[str, str]:
-        return {part: self.skeleton.names[k] for part in TRUNK if (k := int(getattr(self, part))) >= 0}
+            lines.append(f"  {limb}: [{match.source}, {points}]  # {', '.join(joints)}, {mine.contact}")
+        return "\n".join([*lines, *(f"# {note}" for note in self.notes)])
 
     def save(self, file: str | os.PathLike[str]) -> None:
-        """Write it as a short YAML, which :meth:`read` takes after it was edited.
+        """Write its text, which :meth:`read` takes after it was edited.
 
         Raises:
             CorrespondenceError: the file cannot be written.
         """
-        lines = [f"robot: {self.body.robot.name}", f"scale: {self.scale:.6g}"]
-        lines.append(f"all_fours: {str(self.all_fours).lower()}")
-        lines += [f"{part}: {_quoted(name)}" for part, name in self._trunk().items()]
-        lines.append("limbs:  # base, middle, end, tip")
-        for limb, match in self.limbs.items():
-            points = ", ".join(_quoted(self.skeleton.names[k]) for k in match.chain)
-            lines.append(f"  {limb}: [{match.source}, {points}]")
         with validation.writing("correspondence", file, CorrespondenceError), open(file, "w", encoding="utf-8") as out:
-            out.write("\n".join(lines) + "\n")
+            out.write(f"{self}\n")
 
     def read(self, file: str | os.PathLike[str]) -> Correspondence:
         """This correspondence with what a file says in place of what was found.
@@ -150,17 +139,13 @@ class Correspondence:
                 changes[key] = validation.flag("all_fours", value)
         limbs = dict(self.limbs)
         for limb, row in validation.mapping("limbs", given.get("limbs", {}), "limbs to points").items():
-            validation.one_of("limbs", limb, self.body.limbs)
-            field, points = f"limbs.{limb}", validation.strings(f"limbs.{limb}", row)
+            field = f"limbs.{validation.one_of('limbs', limb, self.body.limbs)}"
+            points = validation.strings(field, row)
             if len(points) != 5:
                 raise CorrespondenceError(field, row, "expected a limb and four points: base, middle, end, tip")
             source = validation.one_of(field, points[0], (*LIMBS, *FINGERS))
             limbs[limb] = LimbMatch(source, *(names.index(validation.one_of(field, k, names)) for k in points[1:]))
         return replace(self, limbs=limbs, **changes)
-
-
-def _quoted(name: str) -> str:
-    return "'" + name.replace("'", "''") + "'"
 
 
 def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = False) -> Correspondence:
@@ -172,13 +157,12 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
     Raises:
         CorrespondenceError: no limbs in the skeleton, or none that the robot needs: a robot that walks needs legs.
     """
-    rest, robot, some = skeleton.rest, body.robot, ", ".join(skeleton.names[:8])
-    tree, hand = PointTree(skeleton.names, skeleton.parents, rest), "index" in body.limbs
-    if hand:
-        plan = find_hand(tree, side_of(robot.name))
+    robot, some = body.robot, ", ".join(skeleton.names[:8])
+    if body.is_hand:
+        plan = find_hand(skeleton, side_of(robot.name))
         limbs = {name: _finger(name, chain, body.limbs.get(name)) for name, chain in plan.limbs.items()}
     else:
-        plan = find_body(tree)
+        plan = find_body(skeleton)
         limbs = {name: _hinges(plan, chain, name, skeleton.ends) for name, chain in plan.limbs.items()}
     if "left_arm" not in limbs and plan.tree.said([*plan.limbs.values()]) & ARM_WORDS:
         renamed = {name.replace("leg", "arm"): match for name, match in limbs.items()}
@@ -200,12 +184,12 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
         raise CorrespondenceError("skeleton", some, f"has no limb that {robot.name!r} has")
     guessed = [limb for limb, own in body.limbs.items() if own.guessed]
     notes += [f"{limb}: the size of its end is not in the robot's file and is assumed" for limb in guessed]
-    mirrored = hand and handedness(plan, rest) * handedness(body.plan, bent(body)) < 0.0
+    mirrored = body.is_hand and handedness(plan, skeleton.rest) * handedness(body.plan, body.bent) < 0.0
     notes += ["a hand leads one of the other side: it is mirrored"] if mirrored else []
     head = plan.head[min(1, len(plan.head) - 1)] if plan.head else -1
     return Correspondence(
-        body, skeleton, rest, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright,
-        _scale(body, rest, pairs, plan), all_fours, mirrored, tuple(notes),
+        body, skeleton, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright,
+        _scale(body, skeleton.rest, pairs, plan), all_fours, mirrored, tuple(notes),
     )  # fmt: skip
 
 

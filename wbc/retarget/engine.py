@@ -45,16 +45,16 @@ NEAR_ENOUGH = 1e-5
 THIN = 2e-4
 #: Links besides feet that have rows of the ground at a time; of arms two a limb more
 NEAREST = 4
-#: The ground's rows begin this far above it: links that roll lower another corner within a tick [m]
+#: The ground's rows begin this far above it: paths are curved [m]
 ABOVE = 3e-4
+#: Those of arms, which roll and lower another corner within a tick [m]
+ARMS_ABOVE = 1e-3
 #: What a foot that goes below the ground costs, see docs/soft.md
 GROUND_PRICE = 1e5
 #: Item whose rows keep hands and arms above the ground
 ARMS = "arms above ground"
-#: How fast feet and legs come down to the ground's rows, as share of one over the time of a tick
+#: How fast links come down to the ground's rows, as share of one over the time of a tick
 GROUND_RATE = 0.5
-#: The same of hands and arms that lie on the ground: faster ones rattle from corner to corner [1]
-LINK_RATE = 0.1
 #: A foot whose stance is younger than this gives way to those that stand [s]
 LANDING = 0.1
 #: After so many ticks it is tried again
@@ -155,7 +155,7 @@ class Engine:
             self._add_ground()
         self.controller: Controller = stack.compile()
         for item in self._ground:
-            self.controller[item].rate = (LINK_RATE if item == ARMS else GROUND_RATE) / dt
+            self.controller[item].rate = GROUND_RATE / dt
         inputs = [(f.item, part, None) for f in followers for part in ("target", "feedforward")[: 1 if f.stands else 2]]
         self._ticks = RowTicks(self.controller, inputs, ARMS if ARMS in self._ground else "")
         self._places = tuple(dict.fromkeys(("pelvis", *(f.place for f in followers if f.place))))
@@ -215,9 +215,9 @@ class Engine:
         groups = {item: [ends.pop(name)] for name, item in self._own_ground.items()}
         arms = [ends.pop(name) for name in [*ends] if not self.body.is_foot(name)] + self._arms
         groups |= {"above ground": [*ends.values(), *self._links], ARMS: arms}
-        pose = pin.SE3(np.eye(3), np.array([0.0, 0.0, ABOVE]))
         for item, links in groups.items():
             if links:
+                pose = pin.SE3(np.eye(3), np.array([0.0, 0.0, ARMS_ABOVE if item == ARMS else ABOVE]))
                 closest = NEAREST + 2 * len(self.body.limbs) * (item == ARMS)
                 ground = tasks.Obstacle(HalfSpace(), links=tuple(links), pose=pose, closest=closest)
                 self._stack.add(ground, name=item, soft=GROUND_PRICE)

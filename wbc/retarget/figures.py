@@ -46,24 +46,22 @@ def motion_figures(
         their limits; ``penetration``: deepest point below the ground [m]; ``penetration_frames``: with more than 1 mm
         of it; ``slide``: largest motion along the ground of a point of a sole while it stands [m]; ``slides``: by foot.
     """
-    model, first = robot.model, robot.base_nv
+    model, first, limits = robot.model, robot.base_nv, robot.limits
     steps = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(q)]).reshape(-1, robot.nv)
     velocity = steps[:, first:] * rate
     acceleration = np.diff(velocity, axis=0) * rate
-    limits = robot.limits
-    index = robot.position_index[first:]
-    known = index >= 0
-    values = q[:, index[known]]
-    low, high = limits.position_lower[first:][known], limits.position_upper[first:][known]
-    outside = (values < low - TOLERANCE) | (values > high + TOLERANCE)
-    out: dict[str, Any] = {"frames": len(q), "rate": rate, "position_breaches": int(outside.any(axis=1).sum())}
+    known = np.flatnonzero(robot.position_index[first:] >= 0) + first
+    values = q[:, robot.position_index[known]]
+    low, high = limits.position_lower[known] - TOLERANCE, limits.position_upper[known] + TOLERANCE
+    outside = ((values < low) | (values > high)).any(axis=1)
+    out: dict[str, Any] = {"frames": len(q), "rate": rate, "position_breaches": int(outside.sum())}
     for name, moves, limit, share in (
         ("velocity", velocity, limits.velocity[first:], "fastest"),
         ("acceleration", acceleration, limits.acceleration[first:], "quickest"),
     ):
         part = np.abs(moves) / np.where(limit > 0.0, limit, np.inf)
-        out[f"{name}_breaches"] = int((part > 1.0 + TOLERANCE).any(axis=1).sum()) if part.size else 0
-        out[share] = float(part.max()) if part.size else 0.0
+        out[f"{name}_breaches"] = int((part > 1.0 + TOLERANCE).any(axis=1).sum())
+        out[share] = float(part.max(initial=0.0))
     out["jumps"] = int((np.abs(acceleration) > JUMP).any(axis=1).sum())
     surfaces, feet = surface_points(robot), [frame for frame in stance if frame in robot.frame_names]
     names = tuple({*surfaces, *feet})
@@ -84,15 +82,12 @@ def motion_figures(
 
 def _own_points(robot: Robot, foot: str, surfaces: Mapping[str, Array]) -> Array:
     """Points of what the foot's joint moves, in the foot's frame; the frame's origin where it has no surface [n, 3]."""
-    model = robot.model
-    own = model.frames[model.getFrameId(foot)]
-    out = []
-    for link, points in surfaces.items():
-        other = model.frames[model.getFrameId(link)]
-        if other.parentJoint == own.parentJoint:
-            place = own.placement.actInv(other.placement)
-            out.append(points @ place.rotation.T + place.translation)
-    return np.concatenate(out) if out else np.zeros((1, 3))
+    frames = {name: robot.model.frames[robot.model.getFrameId(name)] for name in (foot, *surfaces)}
+    joint, placement = frames[foot].parentJoint, frames[foot].placement
+    own = [link for link in surfaces if frames[link].parentJoint == joint]
+    places = [placement.actInv(frames[link].placement) for link in own]
+    moved = [surfaces[link] @ at.rotation.T + at.translation for link, at in zip(own, places, strict=True)]
+    return np.concatenate(moved or [np.zeros((1, 3))])
 
 
 def _slide(track: Array, stands: Marks) -> float:

@@ -57,8 +57,8 @@ class ClipJob:
         """What a finished clip must have been asked for to be left as it is: plain data."""
         plain: dict[str, Any] = {name: getattr(self, name) for name in ("robot", "loading", "options", "formats")}
         plain |= {"support": True} if self.support else {}
-        if self.correspondence is not None:
-            plain["correspondence"] = self.correspondence.read_text(encoding="utf-8")
+        file = self.correspondence
+        plain |= {} if file is None else {"correspondence": file.read_text(encoding="utf-8")}
         return dict(json.loads(json.dumps(plain, default=str, sort_keys=True)))
 
     @property
@@ -90,14 +90,11 @@ def find_clips(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[pathlib.Pa
     taken = Counter[pathlib.Path]()
     for given in paths:
         path = validation.existing("clip", given, ClipFileError)
-        files, top = [path], path.parent
-        if path.is_dir():
-            top = path
-            files = sorted(file for file in path.rglob("*") if file.suffix.lower() in CLIP_SUFFIXES and file.is_file())
-            if not files:
-                raise ClipFileError("clip", str(path), f"the folder has no clip ({', '.join(CLIP_SUFFIXES)})")
-        for file in files:
-            place = file.relative_to(top).with_suffix("")
+        below = [file for file in path.rglob("*") if file.suffix.lower() in CLIP_SUFFIXES and file.is_file()]
+        if path.is_dir() and not below:
+            raise ClipFileError("clip", str(path), f"the folder has no clip ({', '.join(CLIP_SUFFIXES)})")
+        for file in sorted(below) or [path]:
+            place = file.relative_to(path if below else path.parent).with_suffix("")
             taken[place] += 1
             # walk.bvh and walk.c3d, or the same name from two folders
             out.append((file, place if taken[place] == 1 else place.with_name(f"{place.name}-{taken[place]}")))
@@ -114,21 +111,13 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
         workers: processes; 1: all is done in this one. client: of a Dask cluster, whose workers take them instead.
     """
     jobs = list(jobs)
-    if client is not None:
-        from distributed import as_completed as ended_of
-
-        for future in ended_of([client.submit(retarget_job, job, pure=False) for job in jobs]):
-            yield future.result()
-    elif workers == 1 or len(jobs) < 2:
+    if client is None and (workers == 1 or len(jobs) < 2):
         yield from map(retarget_job, jobs)
-    else:
-        yield from _in_processes(jobs, workers)
-
-
-def _in_processes(jobs: list[ClipJob], workers: int) -> Iterator[ClipDone]:
+        return
     # Forks of a process with threads may hang; Ctrl-C goes to all processes of a terminal, and the first one ends them
     context, deaf = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(min(workers, len(jobs)), context, initializer=signal.signal, initargs=deaf) as pool:
+    own = ProcessPoolExecutor(min(workers, len(jobs)), context, signal.signal, deaf) if client is None else None
+    with own or client.get_executor(pure=False) as pool:
         waiting = {pool.submit(retarget_job, job): job for job in jobs}
         try:
             for future in as_completed(waiting):
@@ -139,7 +128,9 @@ def _in_processes(jobs: list[ClipJob], workers: int) -> Iterator[ClipDone]:
         except BaseException:
             # Those that are busy would be waited for, and are forgotten by a pool that was shut down
             busy = list((getattr(pool, "_processes", None) or {}).values())
-            pool.shutdown(wait=False, cancel_futures=True)
+            for future in waiting:
+                future.cancel()
+            pool.shutdown(wait=False)
             for process in busy:
                 process.terminate()
             raise
@@ -172,16 +163,17 @@ def retargeter_of(robot: str, options: tuple[tuple[str, Any], ...], file: pathli
     """A retargeter for all clips of this process, since its stack is made once; the same for the same arguments."""
     # Imported for clips that can be read
     from wbc.retarget.body import BodyError
-    from wbc.retarget.hands import hand_of
     from wbc.retarget.options import RetargetOptions
     from wbc.retarget.retargeter import Retargeter
+    from wbc.retarget.robot_body import RestPose, hand_plan
 
     own, given = robots.load(robot), RetargetOptions(**dict(options))
-    walks = own if own.base == "floating" or hand_of(own) else robots.load(robot, base="floating")
+    stands = own.base == "floating" or hand_plan(RestPose(own, {})) is not None
     try:
+        walks = own if stands else robots.load(robot, base="floating")
         return Retargeter(walks, None, given, correspondence=file)
     except BodyError:
-        if own is walks:
+        if stands:
             raise
         # Arms without legs stand where they are
         return Retargeter(own, None, given, correspondence=file)

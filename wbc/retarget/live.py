@@ -64,7 +64,7 @@ class LiveRetargeter:
         self._match, self._engine, self._every = match, engine, every
         self._joints = len(skeleton.names)
         self._mapper = Mapper(match)
-        rest = match.rest
+        rest = match.skeleton.rest
         legs = [m for m in match.limbs.values() if m.source.endswith("leg")] or list(match.limbs.values())
         self._leg = float(np.mean([np.linalg.norm(rest[m.base] - rest[m.end]) for m in legs]))
         self.reset()

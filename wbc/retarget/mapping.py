@@ -85,18 +85,23 @@ class Mapper:
 
     def __init__(self, match: Correspondence) -> None:
         self.match = match
-        body, rest, axes = match.body, match.rest, match.body.axes
-        bases = [limb.base for limb in match.limbs.values()]
-        #: points of left and right hip, of shoulders where the skeleton has no legs
-        self._hips = self._pair("leg") or self._pair("arm") or (bases[0], bases[-1])
-        self._shoulders = self._pair("arm") if "left_arm" in match.limbs and body.plan.upright else None
+        body, rest, axes = match.body, match.skeleton.rest, match.body.axes
+        bases = {limb.source: limb.base for limb in match.limbs.values()}
+        legs, arms = ([bases[k] for k in (f"left_{kind}", f"right_{kind}") if k in bases] for kind in ("leg", "arm"))
+        both = [pair for pair in (legs, arms, list(bases.values())) if len(pair) > 1] or [list(bases.values()) * 2]
+        #: points of left and right hip, of shoulders where the skeleton has no legs; and of shoulders that lead arms
+        self._hips = [both[0][0], both[0][-1]]
+        leads = "left_arm" in match.limbs and body.plan.upright and len(arms) > 1
+        self._shoulders = arms if leads else self._hips
+        #: what is above the hips
+        self._top = arms if leads else [match.chest]
         self._trunk = self._trunk_frames(rest[None])
         #: knees, elbows and wrists follow the skeleton and may meet the ground
         self._lies = body.plan.upright and body.robot.base != "fixed"
-        hips = rest[list(self._hips)].mean(axis=0)
+        hips = rest[self._hips].mean(axis=0)
         waist = body.places[0] if body.waist is None else body.waist
         #: from the pelvis to the waist, in the body's axes [m]
-        self._waist = np.zeros(3) if body.waist is None else (waist - body.places[0]) @ axes
+        self._waist = (waist - body.places[0]) @ axes
         #: hip or shoulder of each robot's limb from the pelvis, or from the waist, in the body's axes [m]
         self._bases: dict[str, Array] = {}
         #: heights of the robot's ankles, or of the centres of point feet, above the ground that they stand on [m]
@@ -125,22 +130,10 @@ class Mapper:
         """Whether the chest carries a robot's limb."""
         return self.match.body.plan.upright and name.endswith("arm")
 
-    def _pair(self, kind: str) -> tuple[int, int] | None:
-        """Hips or shoulders of the skeleton."""
-        bases = {limb.source: limb.base for limb in self.match.limbs.values()}
-        left, right = bases.get(f"left_{kind}"), bases.get(f"right_{kind}")
-        return None if left is None or right is None else (left, right)
-
-    def _trunk_frames(self, points: Array) -> tuple[Array, Array]:
+    def _trunk_frames(self, points: Array) -> list[Array]:
         """Rotations of pelvis and chest as the points show them [frames, 3, 3]."""
-        left, right = (points[:, k] for k in self._hips)
-        middle = 0.5 * (left + right)
-        if self._shoulders is None:
-            across = frames_of(left - right, points[:, self.match.chest] - middle)
-            return across, across
-        first, second = (points[:, k] for k in self._shoulders)
-        ahead = 0.5 * (first + second) - middle
-        return frames_of(left - right, ahead), frames_of(first - second, ahead)
+        ahead = points[:, self._top].mean(axis=1) - points[:, self._hips].mean(axis=1)
+        return [frames_of(points[:, a] - points[:, b], ahead) for a, b in (self._hips, self._shoulders)]
 
     def places(self, points: Array, turns: Array | None, ankle: dict[str, float]) -> Places:
         """Targets of frames.
@@ -159,7 +152,7 @@ class Mapper:
         lying = match.all_fours and match.upright and not body.plan.upright
         turned = LYING_TRUNK if lying else np.eye(3)
         pelvis, chest = pelvis @ turned, chest @ turned
-        hips = 0.5 * (points[:, self._hips[0]] + points[:, self._hips[1]])
+        hips = points[:, self._hips].mean(axis=1)
         if body.robot.base == "fixed":
             # The robot's trunk stands where it stands: arms move as seen from the pelvis
             mirror = np.array([-1.0 if match.mirrored else 1.0, 1.0, 1.0])
@@ -219,7 +212,7 @@ class Mapper:
         self, match: LimbMatch, points: Array, turns: Array | None, trunk: Places, foot: bool
     ) -> Array | None:
         """Of the foot or hand, in the body's axes at rest."""
-        axes, rest = self.match.axes, self.match.rest
+        axes, rest = self.match.axes, self.match.skeleton.rest
         if turns is not None:
             return np.asarray(turns[:, match.end] @ axes)
         if not foot:

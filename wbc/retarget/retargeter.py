@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from wbc import robots, validation
 from wbc.errors import NotFiniteError, ShapeError
-from wbc.retarget.clip import Array, Clip, Marks, Skeleton, intervals
+from wbc.retarget.clip import Array, Clip, Skeleton
 from wbc.retarget.correspondence import Correspondence, CorrespondenceError, correspondence
 from wbc.retarget.engine import Engine
-from wbc.retarget.hands import hand_of
 from wbc.retarget.live import LiveRetargeter
 from wbc.retarget.mapping import Mapper
 from wbc.retarget.options import RetargetOptions
-from wbc.retarget.plan import MotionPlan, plan_motion
-from wbc.retarget.poses import frame_poses
-from wbc.retarget.retargeted import GivenUp, Retargeted
+from wbc.retarget.plan import plan_motion
+from wbc.retarget.retargeted import Retargeted, served
 from wbc.retarget.robot_body import RobotBody, body_of
 from wbc.retarget.stances import Stances, find_stances
 from wbc.robot import Robot
 
-#: A stance counts from where its contact is this near to its place [m]
-LANDED = 4e-5
-#: A contact that comes to stand so much later than the skeleton's is reported [s]
-LATE = 0.05
-#: A key point farther than this from its target is reported [m]
-FAR = 0.1
-#: If it stays there for longer than this [s]
-LONG = 0.1
 #: Hands of a person lead front legs where they are on the ground for this share of the clip
 ON_HANDS = 0.3
-#: Times in which something is not served are one where they are less apart than this [s]
-TOGETHER = 0.05
 #: Shortest leg of a skeleton, so that speeds count [m]
 LEAST_LEG = 0.05
 
@@ -70,7 +57,7 @@ class Retargeter:
     ) -> None:
         loaded = robot if isinstance(robot, Robot) else robots.load(os.fspath(robot))
         self.options = validation.instance("options", options or RetargetOptions(), RetargetOptions, "RetargetOptions")
-        self.body: RobotBody = hand_of(loaded) or body_of(loaded)
+        self.body: RobotBody = body_of(loaded)
         self.skeleton, self._file = skeleton, correspondence
         self._matches: dict[Any, Correspondence] = {}
         self._engines: dict[Any, Engine] = {}
@@ -117,14 +104,11 @@ class Retargeter:
         plan = plan_motion(self.body, places, marks, clip.rate, times)
         engine = self.engine(tuple(match.limbs), dt, head=plan.head is not None)
         all_q, gave = engine.run(plan)
-        offsets = _offsets(engine.robot, self.body, plan, all_q)
-        landed = _landed(engine.robot, plan, offsets)
-        given_up = (*_gave_way(gave, plan), *_not_served(plan, offsets, landed))
+        landed, given_up = served(engine.robot, self.body, plan, all_q, gave)
         return Retargeted(
-            robot=engine.robot, rate=rate, time=times[::every], q=all_q[::every],
-            stance={name: marks_[::every] for name, marks_ in landed.items()},
-            given_up=tuple(sorted(given_up, key=lambda given: (given.start, given.name))),
-            notes=(*clip.notes, *match.notes), clip=clip, body=self.body, plan=plan, every=every, all_q=all_q,
+            robot=engine.robot, rate=rate, time=times[::every], q=all_q[::every], given_up=given_up,
+            stance={name: stands[::every] for name, stands in landed.items()}, notes=(*clip.notes, *match.notes),
+            clip=clip, body=self.body, plan=plan, every=every, all_q=all_q,
         )  # fmt: skip
 
     def live(self, rate: float = 50.0) -> LiveRetargeter:
@@ -167,7 +151,7 @@ def stances_of(match: Correspondence, clip: Clip) -> Stances:
     ends = {limb.source: clip.points[:, [limb.end, limb.tip]] for limb in match.limbs.values()}
     feet = {source: points for source, points in ends.items() if source.endswith("leg")}
     hands = {source: points for source, points in ends.items() if source not in feet}
-    lengths = [limb.length(match.rest) for limb in match.limbs.values() if limb.source in feet]
+    lengths = [limb.length(match.skeleton.rest) for limb in match.limbs.values() if limb.source in feet]
     return find_stances(feet, hands, clip.rate, max(float(np.mean(lengths)) if lengths else 1.0, LEAST_LEG))
 
 
@@ -187,68 +171,3 @@ def _check(clip: Clip, skeleton: Skeleton | None) -> None:
         raise NotFiniteError("clip.points", points[frame, joint], f"{clip.skeleton.names[joint]} at frame {frame}")
     if skeleton is not None and clip.skeleton.names != skeleton.names:
         raise CorrespondenceError("clip.skeleton", clip.name, "its points are not those of the skeleton that was given")
-
-
-def _offsets(robot: Robot, body: RobotBody, plan: MotionPlan, q: Array) -> dict[str, tuple[Array, Array]]:
-    """Limb -> distances of its contact, a sole's at the corner that is farthest off, and of its wrist or its contact,
-    from their targets [ticks] [m].
-    """
-    frames = {name: (body.limbs[name].end, body.limbs[name].wrist) for name in plan.limbs}
-    names = tuple(dict.fromkeys(frame for pair in frames.values() for frame in pair if frame))
-    rotations, positions = frame_poses(robot, names, q)
-    out = {}
-    for name, (end, wrist) in frames.items():
-        limb, k = plan.limbs[name], names.index(end)
-        away = (positions[:, k] - limb.end)[:, None]
-        if limb.rotation is not None and body.limbs[name].contact == "flat":
-            away = away + body.limbs[name].corners @ np.swapaxes(rotations[:, k] - limb.rotation, 1, 2)
-        own = np.linalg.norm(away, axis=2).max(axis=1)
-        hand = wrist and name.endswith("arm") and body.plan.upright
-        out[name] = own, np.linalg.norm(positions[:, names.index(wrist)] - limb.wrist, axis=1) if hand else own
-    return out
-
-
-def _landed(robot: Robot, plan: MotionPlan, offsets: dict[str, tuple[Array, Array]]) -> dict[str, Marks]:
-    """Limb -> whether its contact is at its place: of each stance the longest time for which nothing slips [ticks]."""
-    out = {}
-    for name, limb in plan.limbs.items():
-        marks = np.zeros(plan.ticks, dtype=bool)
-        for a, b in intervals(limb.stands) if robot.base != "fixed" else ():
-            still = intervals(offsets[name][0][a:b] <= LANDED)
-            if still:
-                first, last = max(still, key=lambda run: run[1] - run[0])
-                marks[a + first : a + last] = True
-        out[name] = marks
-    return out
-
-
-def _gave_way(gave: list[tuple[int, tuple[str, ...]]], plan: MotionPlan) -> Iterator[GivenUp]:
-    """Rows that gave way in their ticks, by name."""
-    for name in dict.fromkeys(name for _, names in gave for name in names):
-        ticks = [tick for tick, names in gave if name in names]
-        for a, b in _joined(np.isin(np.arange(plan.ticks), ticks), plan.dt):
-            yield GivenUp(name, a * plan.dt, b * plan.dt, "gave way to limits of the joints")
-
-
-def _not_served(
-    plan: MotionPlan, offsets: dict[str, tuple[Array, Array]], landed: dict[str, Marks]
-) -> Iterator[GivenUp]:
-    """Contacts that come late or are not held, and limbs far from their targets."""
-    dt = plan.dt
-    for name, limb in plan.limbs.items():
-        for a, b in intervals(limb.stands):
-            late = int(np.argmax(landed[name][a:b])) if landed[name][a:b].any() else b - a
-            if late * dt > LATE:
-                yield GivenUp(name, a * dt, (a + late) * dt, "comes to stand later than the skeleton")
-        for a, b in _joined(offsets[name][1] > FAR, dt):
-            if (b - a) * dt > LONG:
-                yield GivenUp(name, a * dt, b * dt, f"is more than {FAR} m from its target: out of reach")
-
-
-def _joined(marks: Marks, dt: float) -> list[tuple[int, int]]:
-    """Runs of true, those less than :data:`TOGETHER` apart as one."""
-    out: list[tuple[int, int]] = []
-    for a, b in intervals(marks):
-        start = out.pop()[0] if out and (a - out[-1][1]) * dt < TOGETHER else a
-        out.append((start, b))
-    return out

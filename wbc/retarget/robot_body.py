@@ -1,20 +1,24 @@
-"""The body of a robot: limbs, hinges and soles, found from the joints' axes, the lengths of links and their bodies."""
+"""The body of a robot: limbs or fingers, hinges and soles, found from axes of joints and bodies of links."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from wbc.multibody import pin
-from wbc.retarget.body import BodyError, BodyPlan, PointTree, find_body
-from wbc.retarget.clip import Array, ancestors
+from wbc.retarget.body import BodyError, BodyPlan, find_body
+from wbc.retarget.clip import Array, Skeleton, ancestors
+from wbc.retarget.hands import find_hand
 from wbc.retarget.solids import LinkBalls, balls_of_joints
-from wbc.retarget.words import ARM_WORDS, LEG_WORDS
+from wbc.retarget.words import ARM_WORDS, LEG_WORDS, side_of
 from wbc.robot import Robot
+
+log = logging.getLogger("wbc")
 
 #: Balls no farther from each other are at one place [m]: descriptions are rounded to less
 SAME_PLACE = 1e-4
@@ -50,27 +54,26 @@ BALL = 1.4
 CORNERS = 500
 #: Fewer do where they are within this of it [m]
 EXACT = 1e-5
-#: Where a sole begins and ends before the ankle and beside it, of which no body is known [m]
-GUESSED_SOLE = ((-0.04, 0.10), (-0.03, 0.03))
-
-Contact = Literal["flat", "point"]
+#: Where a sole of which no body is known begins and ends: before the ankle and to its left [m]
+GUESSED_SOLE = ((-0.04, -0.03), (0.10, 0.03))
+#: Fingers are no longer than this [m]
+LONGEST_FINGER = 0.25
 
 
 @dataclass(frozen=True)
 class RobotLimb:
-    """A leg or an arm of a robot.
+    """A leg or an arm of a robot, or a finger, whose knuckles are base, middle and wrist.
 
     Positions are in the world at ``robot.neutral``.
 
     Attributes:
         joints: numbers of its joints from the trunk on.
-        base: hip or shoulder: where the axes before the middle hinge meet.
         middle: frame at the hinge of knee or elbow.
         wrist: frame at the ankle or wrist; "" where the last bone ends in the contact point itself.
         end: frame of the contact: of a flat foot below the ankle in the sole, forward, left and up at rest; of a point
             foot, and of a hand, at the centre of its ball.
         places: base, middle, wrist, end [4, 3].
-        contact: flat or point. radius: of the ball; 0 of a flat foot [m].
+        radius: of the ball; 0 of a flat foot [m].
         corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
         surface: corners of the hull of what the end is made of, in the contact frame [corners, 3] [m].
         thickness: height of middle, wrist and end above the ground where the limb lies on it [m].
@@ -80,18 +83,31 @@ class RobotLimb:
     """
 
     joints: tuple[int, ...]
-    base: Array
     middle: str
     wrist: str
     end: str
     places: Array
-    contact: Contact
-    radius: float
-    corners: Array
-    surface: Array
-    thickness: tuple[float, float, float]
-    pitch: tuple[float, float]
-    guessed: bool
+    radius: float = TIP
+    corners: Array = field(default_factory=lambda: np.zeros((1, 3)))
+    surface: Array = field(default_factory=lambda: np.zeros((1, 3)))
+    thickness: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pitch: tuple[float, float] = (0.0, 0.0)
+    guessed: bool = False
+
+    @property
+    def base(self) -> Array:
+        """Hip or shoulder: where the axes before the middle hinge meet [3]."""
+        return np.asarray(self.places[0])
+
+    @property
+    def contact(self) -> Literal["flat", "point"]:
+        """How its end stands."""
+        return "flat" if len(self.corners) > 1 else "point"
+
+    @property
+    def reach(self) -> float:
+        """Base to the end along the limb [m]."""
+        return float(np.linalg.norm(np.diff(self.places, axis=0), axis=1).sum())
 
     @cached_property
     def lengths(self) -> tuple[float, float]:
@@ -106,12 +122,13 @@ class RobotBody:
 
     Attributes:
         robot: with the frames of pelvis, chest, feet and hands added.
-        plan: of its joints. limbs: by name of :data:`wbc.retarget.body.LIMBS`.
-        pelvis, chest: frames at the middle of hips and of shoulders, with the body's axes at rest.
+        plan: of its joints. limbs: by name of :data:`wbc.retarget.body.LIMBS`, or :data:`wbc.retarget.hands.FINGERS`.
+        pelvis, chest: frames at the middle of hips and of shoulders, with the body's axes at rest; of a hand at its
+            palm.
         places: of the two at rest [2, 3]. waist: where the axes between them meet; None where one link is both.
         head: frame of the head, with the body's axes at rest; "" without a neck.
         height: of the pelvis above the ground where the robot stands as at rest [m].
-        balls: what links are made of, by the number of the joint that carries them, in its frame.
+        balls: what links are made of, by the number of the joint that carries them, in its frame; {} of a hand.
     """
 
     robot: Robot
@@ -130,9 +147,27 @@ class RobotBody:
         """Forward, left and up at rest in the world, as columns [3, 3]."""
         return self.plan.axes
 
+    @property
+    def is_hand(self) -> bool:
+        """Whether its limbs are fingers."""
+        return "index" in self.limbs
+
+    @cached_property
+    def bent(self) -> Array:
+        """Points of the plan's tree where joints are in the middle of their ranges, as fingers bend [points, 3] [m]."""
+        robot, points = self.robot, self.plan.tree.rest.copy()
+        data, v = robot.model.createData(), 0.5 * (robot.limits.position_lower + robot.limits.position_upper)
+        pin.forwardKinematics(robot.model, data, pin.integrate(robot.model, pin.neutral(robot.model), v))
+        points[: robot.model.njoints] = [pose.translation for pose in data.oMi]
+        return points
+
     def is_foot(self, name: str) -> bool:
         """Whether a limb walks."""
         return _is_foot(name, self.plan, self.robot.base == "fixed")
+
+
+#: Frame -> the joint that carries it, and its pose in the world at rest
+Frames = dict[str, tuple[int, pin.SE3]]
 
 
 class RestPose:
@@ -140,19 +175,17 @@ class RestPose:
 
     Attributes:
         poses: of its joints. axes: directions of the joints in the world, zero of those of several degrees of freedom
-            [joints, 3]. balls: of :func:`~wbc.retarget.solids.balls_of_joints`, or others. tree: of its joints, with
-            one more point at the end of each last link.
+            [joints, 3]. balls: of its links, by joint. tree: of its joints, with one more at the end of each last link.
     """
 
-    def __init__(self, robot: Robot, balls: dict[int, LinkBalls] | None = None) -> None:
+    def __init__(self, robot: Robot, balls: dict[int, LinkBalls]) -> None:
         model, data = robot.model, robot.model.createData()
         pin.forwardKinematics(model, data, robot.neutral)
         pin.updateFramePlacements(model, data)
         pin.computeJointJacobians(model, data, robot.neutral)
-        self.robot, self.fixed, self._data = robot, robot.base == "fixed", data
-        self.balls = balls_of_joints(robot) if balls is None else balls
+        self.robot, self.fixed, self.balls, self._data = robot, robot.base == "fixed", balls, data
         self.poses, self.axes = list(data.oMi), np.array([self._axis(joint) for joint in range(model.njoints)])
-        names, parents = [str(name) for name in list(model.names)], [-1, *list(model.parents)[1:]]
+        names, parents = [str(name) for name in list(model.names)], [-1, *map(int, list(model.parents)[1:])]
         points = [np.array(pose.translation) for pose in self.poses]
         if not self.fixed:
             # The world is no part of a body that moves in it
@@ -161,20 +194,17 @@ class RestPose:
             names.append(f"{names[joint]} end")
             points.append(self._tip(joint, ancestors(parents, joint)[:-1]))
             parents.append(joint)
-        self.points = np.array(points)
-        self.tree = PointTree(tuple(names), tuple(map(int, parents)), self.points)
-
-    @cached_property
-    def plan(self) -> BodyPlan:
-        """Limbs and trunk of its tree; BodyError: no pair of limbs."""
-        return find_body(self.tree, field="robot", arms=self.fixed, straight=STRAIGHT)
+        offsets = [
+            point - points[parent] if parent >= 0 else point for point, parent in zip(points, parents, strict=True)
+        ]
+        self.tree = Skeleton(tuple(names), tuple(parents), np.array(offsets), (False,) * len(names))
+        self.points = self.tree.rest
 
     def _axis(self, joint: int) -> Array:
         model = self.robot.model
         if int(model.nvs[joint]) != 1:
             return np.zeros(3)
-        column = np.asarray(pin.getJointJacobian(model, self._data, joint, pin.WORLD)).reshape(6, self.robot.nv)
-        twist = column[:, int(model.idx_vs[joint])]
+        twist = pin.getJointJacobian(model, self._data, joint, pin.WORLD)[:, int(model.idx_vs[joint])]
         return np.asarray(twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3])
 
     def _tip(self, joint: int, chain: list[int]) -> Array:
@@ -199,6 +229,10 @@ class RestPose:
         side = NEAR * start + np.einsum("jab,jb->a", across, self.points[joints])
         return np.asarray(np.linalg.solve(NEAR * np.eye(3) + across.sum(axis=0), side))
 
+    def lowest(self, joint: int, up: Array) -> float:
+        """The least height of a link along a direction [m]; that of its joint without bodies."""
+        return float(self.points[joint] @ up) - self.reach(joint, -up)
+
     def reach(self, joint: int, way: Array) -> float:
         """How far a link stands out from its joint along a direction [m]; 0 without bodies."""
         balls = self.balls.get(joint) if joint else None
@@ -208,41 +242,51 @@ class RestPose:
 
 
 def body_of(robot: Robot) -> RobotBody:
-    """Find limbs, trunk and soles of a robot.
+    """Find limbs, trunk and soles of a robot, or the fingers of one that is a hand.
 
     Raises:
         BodyError: it has no pair of limbs.
     """
-    rest = RestPose(robot)
-    plan, fixed, count = rest.plan, rest.fixed, robot.model.njoints
     if robot.base not in ("fixed", "floating"):
         raise BodyError("robot", robot.name, f"its base is {robot.base}; load it with base='floating' or 'fixed'")
+    rest = RestPose(robot, {})
+    plan, fill = hand_plan(rest), _finger
+    if plan is None:
+        rest, fill = RestPose(robot, balls_of_joints(robot)), _limb
+        plan = find_body(rest.tree, field="robot", arms=rest.fixed, straight=STRAIGHT)
     said = plan.tree.said([*plan.limbs.values()])
-    if not fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
+    if not rest.fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
-    limbs, new = dict[str, RobotLimb](), robot
+    limbs, frames = dict[str, RobotLimb](), Frames()
     for name in plan.limbs:
-        limbs[name], placed = _limb(name, rest)
-        for frame, (joint, placement) in placed.items():
-            new = with_frame(new, frame, joint, placement)
-    pelvis, chest = (
-        np.asarray(0.5 * (limbs[f"left_{kind}"].base + limbs[f"right_{kind}"].base))
-        for kind in ("arm" if fixed else "leg", "arm" if "left_arm" in limbs else "leg")
-    )
+        limbs[name], own = fill(name, rest, plan)
+        frames |= own
+    places = []
+    for kind in ("arm" if rest.fixed else "leg", "arm"):
+        # Of a hand between the first and the last finger
+        bases = [limb.base for name, limb in limbs.items() if name.endswith(kind)] or [k.base for k in limbs.values()]
+        places.append(np.asarray(0.5 * (bases[0] + bases[-1])))
+    pelvis, chest = places
     carriers = {"pelvis": (plan.pelvis, pelvis), "chest": (plan.chest, chest)}
     if plan.head and plan.upright:
-        carriers["head"] = (max(joint for joint in plan.head if joint < count), rest.points[plan.head[0]])
-    for name, (joint, place) in carriers.items():
-        new = with_frame(new, f"retarget_{name}", joint, rest.poses[joint].actInv(pin.SE3(plan.axes, place)))
-    waist = None
+        carriers["head"] = (max(joint for joint in plan.head if joint < robot.model.njoints), rest.points[plan.head[0]])
+    frames |= {f"retarget_{name}": (joint, pin.SE3(plan.axes, place)) for name, (joint, place) in carriers.items()}
+    new, waist, up = robot, None, plan.axes[:, 2]
+    for frame, (joint, pose) in frames.items():
+        new = with_frame(new, frame, joint, rest.poses[joint].actInv(pose))
     if plan.chest != plan.pelvis:
-        between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < count]
+        between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < robot.model.njoints]
         waist = rest.meeting(between[:MEETING], np.mean(rest.points[between], axis=0))
-    heights = [limb.places[3] @ plan.axes[:, 2] - limb.radius for k, limb in limbs.items() if _is_foot(k, plan, fixed)]
+    feet = [limb for name, limb in limbs.items() if _is_foot(name, plan, rest.fixed)]
+    balls = rest.balls
+    if feet and rest.lowest(plan.pelvis, up) < min(limb.base @ up - limb.reach for limb in feet):
+        log.warning("%s: its trunk reaches below its soles wherever they are, and is let into the ground", robot.name)
+        balls = {joint: own for joint, own in balls.items() if joint != plan.pelvis}
+    heights = [limb.places[3] @ up - limb.radius for limb in feet]
     return RobotBody(
         robot=new, plan=plan, limbs=limbs, pelvis="retarget_pelvis", chest="retarget_chest",
-        places=np.array([pelvis, chest]), waist=waist, head="retarget_head" if "head" in carriers else "",
-        height=float(pelvis @ plan.axes[:, 2] - min(heights, default=0.0)), balls=rest.balls,
+        places=np.array(places), waist=waist, head="retarget_head" if "head" in carriers else "",
+        height=float(pelvis @ up - min(heights, default=0.0)), balls=balls,
     )  # fmt: skip
 
 
@@ -259,10 +303,32 @@ def _is_foot(name: str, plan: BodyPlan, fixed: bool) -> bool:
     return not fixed and (name.endswith("leg") or not plan.upright)
 
 
-def _limb(name: str, rest: RestPose) -> tuple[RobotLimb, dict[str, tuple[int, pin.SE3]]]:
-    """A limb, and its frames: in which joint, and where."""
-    plan, points, frame = rest.plan, rest.points, f"retarget_{name}"
-    chain, foot = plan.limbs[name], _is_foot(name, plan, rest.fixed)
+def hand_plan(rest: RestPose) -> BodyPlan | None:
+    """The fingers of a robot that is a hand; None where it is none."""
+    try:
+        plan = find_hand(rest.tree, side_of(rest.robot.name))
+    except BodyError:
+        return None
+    longest = max(rest.tree.length(chain) for chain in plan.limbs.values())
+    return plan if rest.fixed and longest <= LONGEST_FINGER else None
+
+
+def _finger(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]:
+    """A finger, and its frames."""
+    chain, frame = plan.limbs[name], f"retarget_{name}"
+    places = rest.points[list(chain)]
+    joints = tuple(k for k in plan.tree.path(plan.pelvis, chain[-1])[1:] if k < rest.robot.model.njoints)
+    parts = {f"{frame}_middle": (chain[1], places[1]), frame: (joints[-1], places[-1])}
+    wrist = f"{frame}_wrist" * (len(chain) > 3)
+    if wrist:
+        parts[wrist] = (chain[2], places[2])
+    limb = RobotLimb(joints, f"{frame}_middle", wrist, frame, places if wrist else places[[0, 1, 2, 2]])
+    return limb, {part: (joint, pin.SE3(plan.axes, place)) for part, (joint, place) in parts.items()}
+
+
+def _limb(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]:
+    """A leg or an arm, and its frames."""
+    points, frame, chain, foot = rest.points, f"retarget_{name}", plan.limbs[name], _is_foot(name, plan, rest.fixed)
     joints, tip = tuple(joint for joint in chain if joint < rest.robot.model.njoints), points[chain[-1]]
     last, size = joints[-1], float(np.linalg.norm(tip - points[joints[0]]))
     middle = _middle_hinge(rest, joints, tip)
@@ -271,15 +337,14 @@ def _limb(name: str, rest: RestPose) -> tuple[RobotLimb, dict[str, tuple[int, pi
     if float(np.linalg.norm(points[before] - base, axis=1).min()) > OFF * size:
         base = points[before[0]]
     wrist = _wrist(rest, joints, middle, tip)
-    ankle = points[wrist] if wrist else tip
-    own = rest.balls.get(last)
+    ankle, own = points[wrist] if wrist else tip, rest.balls.get(last)
     if own is not None and float(np.linalg.norm(own.middle)) > size:
         own = None
-    balls_there = None if own is None else own.moved(rest.poses[last])
-    end, contact, radius, corners, guessed = _end(balls_there, plan.axes, ankle, tip, size, foot=foot)
-    guess = LinkBalls(corners, np.full(len(corners), radius))
-    surface = (guess if own is None else own.moved(end.actInv(rest.poses[last]))).corners(CORNERS, EXACT)
-    if foot and contact == "point" and radius > 0.0:
+    there = None if own is None else own.moved(rest.poses[last])
+    end, radius, corners = _end(there, plan.axes, ankle, tip, size, foot=foot)
+    solid = LinkBalls(corners, np.full(len(corners), radius)) if there is None else there.moved(end.inverse())
+    surface = solid.corners(CORNERS, EXACT)
+    if foot and len(corners) == 1 and radius > 0.0:
         # Its ball covers what is drawn of the foot, beyond the ball's middle as seen from the knee
         far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
         radius = float(np.clip(np.linalg.norm(far, axis=1).max(initial=radius), radius, BALL * radius))
@@ -287,17 +352,17 @@ def _limb(name: str, rest: RestPose) -> tuple[RobotLimb, dict[str, tuple[int, pi
     # A knee lies on its front, an elbow on its back: the outer sides of their bends
     outer = plan.axes[:, 0] if name.endswith("leg") else -plan.axes[:, 0]
     limb = RobotLimb(
-        joints, base, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, contact, radius, corners,
-        surface, (rest.reach(middle, outer), rest.reach(wrist, outer), radius),
-        _pitch(rest, joints[joints.index(middle) + 1 :], places), guessed,
+        joints, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, radius, corners, surface,
+        (rest.reach(middle, outer), rest.reach(wrist, outer), radius),
+        _pitch(rest, plan.axes, joints[joints.index(middle) + 1 :], places), there is None,
     )  # fmt: skip
-    placed = {frame: (last, rest.poses[last].actInv(end)), limb.middle: (middle, pin.SE3.Identity())}
-    return limb, placed | ({limb.wrist: (wrist, pin.SE3.Identity())} if wrist else {})
+    frames = {frame: (last, end), limb.middle: (middle, rest.poses[middle])}
+    return limb, frames | ({limb.wrist: (wrist, rest.poses[wrist])} if wrist else {})
 
 
-def _pitch(rest: RestPose, joints: tuple[int, ...], places: Array) -> tuple[float, float]:
+def _pitch(rest: RestPose, axes: Array, joints: tuple[int, ...], places: Array) -> tuple[float, float]:
     """Least and most turn of an end against its last bone about the axis to the left [rad]."""
-    robot, axes = rest.robot, rest.plan.axes
+    robot = rest.robot
     forward, _, up = (places[1] - places[2]) @ axes
     least = most = -float(np.arctan2(forward, up))
     for joint in joints:
@@ -339,34 +404,36 @@ def _wrist(rest: RestPose, joints: tuple[int, ...], middle: int, tip: Array) -> 
 
 def _end(
     balls: LinkBalls | None, axes: Array, ankle: Array, tip: Array, size: float, *, foot: bool
-) -> tuple[pin.SE3, Contact, float, Array, bool]:
-    """Pose of the contact frame in the world, its kind and radius, corners in it, and whether it was guessed.
+) -> tuple[pin.SE3, float, Array]:
+    """Pose of the contact frame in the world, the radius of its ball, and corners in it.
 
     Args:
-        balls: of the last link, in the world.
+        balls: of the last link, in the world; None where it has none.
     """
-    jointed = float(np.linalg.norm(ankle - tip)) > 1e-9
+    flat, point = foot and float(np.linalg.norm(ankle - tip)) > 1e-9, np.zeros((1, 3))
     if balls is None:
-        if foot and jointed:
-            corners = np.array([[x, y, 0.0] for x in GUESSED_SOLE[0] for y in GUESSED_SOLE[1]])
-            return pin.SE3(axes, ankle - ANKLE * size * axes[:, 2]), "flat", 0.0, corners, True
-        return pin.SE3(axes, tip), "point", TIP, np.zeros((1, 3)), True
-    local = balls.centers @ axes
+        if flat:
+            return pin.SE3(axes, ankle - ANKLE * size * axes[:, 2]), 0.0, _rectangle(*np.array(GUESSED_SOLE))
+        return pin.SE3(axes, tip), TIP, point
+    local, radii = balls.centers @ axes, balls.radii[:, None]
     heights = local[:, 2] - balls.radii
     low = heights < heights.min() + SOLE
-    sole, round_ = local[low, :2], balls.radii[low, None]
-    if foot and jointed and bool((np.ptp(sole, axis=0) > FLAT).all()):
+    if flat and bool((np.ptp(local[low, :2], axis=0) > FLAT).all()):
         place = np.array([*(ankle @ axes)[:2], heights.min()])
-        lower, upper = (sole - round_).min(axis=0) - place[:2], (sole + round_).max(axis=0) - place[:2]
-        corners = np.array([[x, y, 0.0] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])])
-        return pin.SE3(axes, axes @ place), "flat", 0.0, corners, False
-    if not foot:
-        # A hand is a ball as wide as it is, neither as long nor as thick
-        middle = LinkBalls(local, balls.radii).middle
-        half = (np.abs(local - middle) + balls.radii[:, None]).max(axis=0)
-        return pin.SE3(axes, axes @ middle), "point", float(np.median(half)), np.zeros((1, 3)), False
-    center, radius = _ball(balls.centers, balls.radii, tip)
-    return pin.SE3(axes, center), "point", radius, np.zeros((1, 3)), False
+        lower, upper = (local - radii)[low, :2].min(axis=0), (local + radii)[low, :2].max(axis=0)
+        return pin.SE3(axes, axes @ place), 0.0, _rectangle(lower - place[:2], upper - place[:2])
+    if foot:
+        center, radius = _ball(balls.centers, balls.radii, tip)
+        return pin.SE3(axes, center), radius, point
+    # A hand is a ball as wide as it is, neither as long nor as thick
+    middle = LinkBalls(local, balls.radii).middle
+    half = (np.abs(local - middle) + radii).max(axis=0)
+    return pin.SE3(axes, axes @ middle), float(np.median(half)), point
+
+
+def _rectangle(lower: Array, upper: Array) -> Array:
+    """Corners at the height 0 [4, 3]."""
+    return np.array([[x, y, 0.0] for x in (lower[0], upper[0]) for y in (lower[1], upper[1])])
 
 
 def _ball(centers: Array, radii: Array, tip: Array) -> tuple[Array, float]:

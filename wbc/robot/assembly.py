@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import BoundsError, RangeError, ShapeError, UnsupportedJointError
+from wbc.errors import BoundsError, DuplicateNameError, RangeError, ShapeError, UnsupportedJointError
 from wbc.multibody import algebra, pin
 from wbc.robot.frames import make_frames_unique
 from wbc.robot.limits import Limits
@@ -20,6 +20,7 @@ from wbc.robot.recipe import Recipe, expand
 from wbc.robot.robot import Coupling, Robot, changed
 from wbc.robot.sources.description import Description, Mimic, finite_or_unlimited
 from wbc.symbolic.joints import symbolic_joint
+from wbc.symbolic.kinematics import WORLD
 from wbc.validation import Array
 
 #: Two values of a joint this close are one [rad or m]
@@ -42,6 +43,7 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     """The robot of a description, made as the recipe says; ``states`` are named configurations to choose from.
 
     Raises:
+        DuplicateNameError: two joints of one name, or one with that of the world, ``universe``.
         UnknownNameError: a joint, frame or state of the recipe that the description does not have.
         UnsupportedJointError: a joint that moves and that the symbolic kinematics do not cover; joints of a branch that
             do not come one after another.
@@ -49,6 +51,7 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
     """
     notes = dict(description.notes)
     model = description.model
+    _check_names(model)
     _check_order(model)
     mimics, standing = resolve_mimics(description.mimics, model)
     q, remarks = neutral_configuration(model, mimics, recipe, states)
@@ -73,6 +76,9 @@ def assemble(description: Description, recipe: Recipe, states: Mapping[str, Mapp
         notes["frames"] = "joints' frames that share a link's name: " + ", ".join(
             f"{old} is now {new}" for old, new in renamed.items()
         )
+    if any(str(frame.name) == WORLD and frame.parentJoint > 0 for frame in model.frames):
+        notes["world"] = f"the link {WORLD!r} moves, and this name is that of the fixed world: nothing names the link"
+        log.warning("%s: %s", description.source or model.name, notes["world"])
     for j in range(1, model.njoints):
         if "Mimic" not in model.joints[j].shortname():  # a joint without coordinates of its own
             symbolic_joint(model.joints[j], str(model.names[j]))
@@ -165,6 +171,14 @@ def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
     away = float(locked[loop.leader][0]) - loop.origin[1]
     value = float(np.polynomial.polynomial.polyval(away, loop.coefficients))
     return replace(loop, leader=None, coefficients=(value,))
+
+
+def _check_names(model: pin.Model) -> None:
+    world, *names = map(str, model.names)
+    for k, name in enumerate(names):
+        if name == world or name in names[:k]:
+            reason = "a joint has the name of the world" if name == world else "two joints have this name"
+            raise DuplicateNameError("robot", name, reason)
 
 
 def _check_order(model: pin.Model) -> None:

@@ -70,10 +70,13 @@ class Loop:
         """A label a row; those of rotations begin with r."""
         return LABELS[self.kind]
 
-    def error(self, kin: Tracer) -> ca.SX:
-        """e of the class, a row a label [m, rad]."""
+    def error(self, kin: Tracer, still: bool = False) -> ca.SX:
+        """e of the class, a row a label [m, rad]; ``still``: positions along axes that do not turn with a, where e = 0
+        keeps origins together. Along motions of the closed loop its second derivatives are those of e, and simpler.
+        """
         first, second = kin.pose(self.first), kin.pose(self.second)
-        gap = first.rotation.T @ (second.position - first.position)
+        axes = kin.held(first.rotation) if still and self.kind != "slide" else first.rotation
+        gap = axes.T @ (second.position - first.position)
         if self.kind == "connect":
             return gap
         if self.kind == "hinge":
@@ -118,8 +121,8 @@ class JointCurve:
         """That of its one row."""
         return (self.follower,)
 
-    def error(self, kin: Tracer) -> ca.SX:
-        """e of the class, one row.
+    def error(self, kin: Tracer, still: bool = False) -> ca.SX:
+        """e of the class, one row, which nothing turns.
 
         Raises:
             UnknownNameError: no such joint with one coordinate.
@@ -210,9 +213,9 @@ class LoopRows:
             out[list(linkage.rows), list(linkage.dofs)] = matrix[list(linkage.rows), list(linkage.dofs)]
         return ca.sparsify(out)
 
-    def error(self, kin: Tracer) -> ca.SX:
-        """Residuals of all rows [m, rad]."""
-        parts = [ca.DM(basis) @ loop.error(kin) for loop, basis in zip(self.loops, self.bases, strict=True)]
+    def error(self, kin: Tracer, still: bool = False) -> ca.SX:
+        """Residuals of all rows [m, rad]; ``still``: see :meth:`Loop.error`."""
+        parts = [ca.DM(basis) @ loop.error(kin, still) for loop, basis in zip(self.loops, self.bases, strict=True)]
         return ca.SX(ca.vertcat(*parts))
 
 

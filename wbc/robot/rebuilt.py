@@ -22,8 +22,6 @@ def on_joint(model: pin.Model, joint: pin.JointModel, name: str) -> pin.Model:
     """The model with its world on a joint; reference configurations have that joint in its neutral one."""
     library = algebra(model)
     root = library.Model()
-    while model.existJointName(name):
-        name += "_"
     root.addJointFrame(root.addJoint(0, joint, library.SE3.Identity(), name))
     return _appended(root, model, library.neutral(model), ())
 

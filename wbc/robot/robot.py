@@ -196,9 +196,9 @@ class Robot:
     @cached_property
     def dof_units(self) -> tuple[str, ...]:
         """``"rad"`` or ``"m"`` for each degree of freedom."""
-        # A column's angular part is as long in every frame; Pinocchio gives a single one without its second dimension
+        # A column's angular part is as long in every frame
         jacobian = algebra(self.tree).computeJointJacobians(self.tree, self.tree.createData(), self.neutral)
-        turning = np.linalg.norm(jacobian.reshape(6, self.nv)[3:], axis=0)
+        turning = np.linalg.norm(jacobian[3:], axis=0)
         return tuple("rad" if length > 1e-9 else "m" for length in turning)
 
     @cached_property
@@ -291,7 +291,10 @@ class Robot:
         Raises:
             UnknownNameError: no such frame. ShapeError, NotFiniteError, RotationError: no configuration.
         """
-        q, index = self.configuration("q", q), frame_index(self.model, self.check_frame("frame", frame))
+        q, named = self.configuration("q", q), self.check_frame("frame", frame)
+        if named == WORLD:
+            return np.zeros((6, self.nv))
+        index = frame_index(self.model, named)
         axes, data = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, self.model.createData()
         return np.asarray(pin.computeFrameJacobian(self.model, data, q, index, axes))
 

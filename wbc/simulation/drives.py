@@ -11,7 +11,7 @@ from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.simulation.plant import Command, CommandKind, Plant, PlantState
+from wbc.simulation.plant import Command, CommandKind, Plant, PlantState, numbers_of
 from wbc.validation import Array
 
 #: How fast errors of the reference decay [1/s], twice
@@ -59,7 +59,7 @@ class VelocityDrive:
 
     def apply(self, command: Command) -> None:
         """Take velocities, for the next period."""
-        self._next = validation.real_array("command.values", command.values, (self.nv,))
+        self._next = numbers_of(command, self.commands, self.nv)
 
     def advance(self, dt: float) -> None:
         """A period: a torque for each time step of the plant."""

@@ -16,7 +16,7 @@ from wbc.robot import Robot
 from wbc.simulation.dynamics import Grip, Slip
 from wbc.simulation.momentum import Balance
 from wbc.simulation.motors import MotorState, PlantMotors
-from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState
+from wbc.simulation.plant import Command, CommandKind, GripKind, PlantState, numbers_of
 from wbc.validation import Array
 
 #: How far from its hold a frame may be when it is grasped [m]
@@ -64,10 +64,9 @@ class Gripping(ABC):
         """Take torques ``[nv]``.
 
         Raises:
-            UnknownNameError: another kind of command. ShapeError, NotFiniteError: no numbers.
+            UnknownNameError: another kind of command. ShapeError, NotFiniteError: no command, no numbers.
         """
-        validation.one_of("command.kind", str(command.kind), [str(kind) for kind in self.commands])
-        self._state.command = validation.real_array("command.values", command.values, (self.nv,))
+        self._state.command = numbers_of(command, self.commands, self.nv)
 
     def _motors_on(self, v: Array) -> Array:
         """What the motors give over the next time step ``[nv]``."""

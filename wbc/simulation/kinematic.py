@@ -9,7 +9,7 @@ import numpy as np
 from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
-from wbc.simulation.plant import Command, CommandKind, PlantState
+from wbc.simulation.plant import Command, CommandKind, PlantState, numbers_of
 from wbc.validation import Array
 
 
@@ -38,7 +38,7 @@ class KinematicPlant:
         return PlantState(self._q, self._v, self._time)
 
     def apply(self, command: Command) -> None:
-        self._v = command.values.copy()
+        self._v = numbers_of(command, self.commands, self.nv)
 
     def advance(self, dt: float) -> None:
         self._q = pin.integrate(self._model, self._q, self._v * dt)

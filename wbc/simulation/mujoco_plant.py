@@ -16,8 +16,8 @@ from wbc.robot.mujoco_joints import MujocoJoints
 from wbc.robot.robot import checked_robot
 from wbc.robot.sources.mjactuators import control, force_ends, gears, joint_actuators
 from wbc.robot.sources.mjnames import BALL, FREE
-from wbc.simulation.plant import Command, CommandKind, PlantError, PlantState
-from wbc.validation import Array, one_of, real_array
+from wbc.simulation.plant import Command, CommandKind, PlantError, PlantState, numbers_of
+from wbc.validation import Array
 
 if TYPE_CHECKING:
     import mujoco
@@ -131,10 +131,9 @@ class MujocoPlant:
         Raises:
             UnknownNameError: no actuator takes such commands. ShapeError, NotFiniteError: no numbers.
         """
-        one_of("command.kind", str(command.kind), [str(kind) for kind in self._actuators])
+        places = getattr(command, "kind", None) is CommandKind.POSITION
+        values = numbers_of(command, self._actuators, self.nq if places else self.nv)
         actuators, dofs, scale = self._actuators[command.kind]
-        places = command.kind is CommandKind.POSITION
-        values = real_array("command.values", command.values, (self.nq if places else self.nv,))
         if places:
             values = pin.difference(self._robot.model, pin.neutral(self._robot.model), values)
         self.data.ctrl[actuators] = scale * values[dofs]

@@ -267,7 +267,7 @@ class PinocchioPlant(Gripping):
     def _check_mass(self, q: Array) -> None:
         mass = self._dynamics.reduced(pin.crba(self.model, self._dynamics.data, q))
         values, vectors = np.linalg.eigh(mass)
-        if not values[0] > SINGULAR * values[-1]:
+        if self.nv and not values[0] > SINGULAR * values[-1]:
             dof = self.robot.dof_names[self._dynamics.free[int(np.abs(vectors[:, 0]).argmax())]]
             raise RangeError(
                 "robot", self.robot.name, f"its mass matrix is singular: nothing that {dof} moves has inertia"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, runtime_checkable
 
+from wbc import validation
 from wbc.errors import WbcError
 from wbc.multibody import pin
 from wbc.validation import Array
@@ -40,6 +41,17 @@ class Command:
 
     kind: CommandKind
     values: Array
+
+
+def numbers_of(command: Command, kinds: Iterable[CommandKind], size: int) -> Array:
+    """A copy of a command's numbers.
+
+    Raises:
+        UnknownNameError: of none of these kinds. ShapeError, NotFiniteError: no command, or no ``size`` numbers.
+    """
+    validation.instance("command", command, Command, "a wbc.simulation.Command of kind and values")
+    validation.one_of("command.kind", str(command.kind), [str(kind) for kind in kinds])
+    return validation.real_array("command.values", command.values, (size,))
 
 
 @dataclass(slots=True, eq=False)

@@ -123,6 +123,8 @@ class Declaration:
         calm: bool = True,
     ) -> None:
         self._robot = checked_robot(robot)
+        if not robot.nv:
+            raise RangeError("robot", robot.name, "nothing of it moves: it has no degree of freedom")
         self._dt = validation.scalar("dt", dt, low=0.0, open_low=True, unit="s")
         self._damping = validation.scalar("damping", damping, low=LEAST_DAMPING, high=1.0)
         chosen = robot.characteristic_length if length is None else length

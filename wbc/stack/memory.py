@@ -82,6 +82,7 @@ REPORT = (
     Field("lost", ("MC",), "what equality rows lose until v has been held for dt: their residual bends", True),
     Field("owner_low", ("NV",), "number of the bound that sets each lower bound of v, -1: none"),
     Field("owner_high", ("NV",), "the same for the upper bound"),
+    Field("beyond", ("NV",), "by how much bounds of v gave way to closed loops"),
 )
 #: Of strict levels
 LEVEL_REPORT = (

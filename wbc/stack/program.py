@@ -296,7 +296,7 @@ class _ProgramBuilder:
         robot, tracer, inputs = self.stack.robot, self.tracer(block), self.values(block)
         count = len(block.rows)
         if block.form == "rows":
-            if (kept := self.residual(block, tracer)) is not None and self.layout.leading:
+            if self.layout.leading and (kept := self.residual(block, tracer, curved=True)) is not None:
                 start = self.layout.task_rows + block.start
                 self.forces += tracer.forces(ca.dot(self.force[start : start + count], kept))
             rows = item.velocity_rows(robot, tracer, inputs, self.dt)
@@ -328,13 +328,16 @@ class _ProgramBuilder:
         rows = Rows(matrix, -rate * margin - drift, ca.SX.inf(count))
         return rows, margin, factor
 
-    def residual(self, block: Block, tracer: Tracer) -> ca.SX | None:
-        """What equality rows keep at 0; None for others and for those that may give way at a price."""
+    def residual(self, block: Block, tracer: Tracer, curved: bool = False) -> ca.SX | None:
+        """What equality rows keep at 0; None for others and for those that may give way at a price. ``curved``: for its
+        second derivatives.
+        """
         item = block.entry.item
         assert isinstance(item, Constraint)
         if self.stack.command != "velocity" or not bends(block.entry):
             return None
-        kept = item.residual(self.stack.robot, tracer, self.values(block))
+        find = item.curved if curved else item.residual
+        kept = find(self.stack.robot, tracer, self.values(block))
         return None if kept is None else self.column(block, "residual", kept)
 
     def lost(self, block: Block) -> ca.SX:

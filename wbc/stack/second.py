@@ -130,7 +130,7 @@ class SecondOrder:
             return Rows(wide, cone.lower, cone.upper), None, None
         torques = item.torque_rows(robot, inputs, self._b.dt)
         if torques is not None:
-            still, moving = self._still[list(torques.dofs)], self._dynamics[list(torques.dofs), :]
+            still, moving = (part[list(torques.dofs), :] for part in (self._still, self._dynamics))
             if torques.drives is not None:
                 drives = ca.SX(ca.DM(torques.drives))
                 still, moving = drives @ still, drives @ moving
@@ -353,7 +353,8 @@ class SecondOrder:
         tau = ca.substitute(dynamics.inverse_dynamics, dynamics.a, self.x[:nv])
         for jacobian, span in zip(self._contacts(), self._layout.forces.values(), strict=True):
             tau -= jacobian.T @ self.x[span]
-        tau -= self._loops.T @ self.x[self._layout.loop_forces]
+        if self._layout.loop_rows:  # of a single variable none are not a column
+            tau -= self._loops.T @ self.x[self._layout.loop_forces]
         tau = self._driven @ (tau - self._loads)
         for block in self._layout.of_form("margins", "rows"):
             item = block.entry.item
@@ -362,7 +363,7 @@ class SecondOrder:
                 if isinstance(item, Constraint)
                 else None
             )
-            if limits is None or isinstance(item, Unactuated):
+            if limits is None or not limits.dofs or isinstance(item, Unactuated):
                 continue
             dofs, on = list(limits.dofs), enabled[block.span]
             low, high = (ca.if_else(on, end, s * NO_LIMIT) for end, s in ((limits.lower, -1.0), (limits.upper, 1.0)))

@@ -179,6 +179,8 @@ def lacking(controller: CompiledStack, q: Any) -> tuple[Lacking, ...]:
 def least_lack(found: Statics, q: Any) -> tuple[Lacking, ...]:
     """See :func:`lacking`, of any rows."""
     count, rows = found.A.shape[1], len(found.lower)
+    if not rows:
+        return ()
     wide = found.A * found.scale / found.sizes[:, None]
     price = np.concatenate([np.zeros(count), np.where(found.base, BASE_PRICE, 1.0)])
     sides, limits = [], []

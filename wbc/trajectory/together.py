@@ -66,8 +66,10 @@ class Laws(Sequence[Law]):
         ended stands.
 
         Raises:
-            WbcError: why a motion has no law. NotFiniteError, ShapeError: no times.
+            WbcError: why a motion has no law. NotFiniteError, ShapeError: no times, or no laws.
         """
+        if not len(self):
+            raise ShapeError("laws", len(self), "there are none")
         states = [law.at(time) for law in self]
         return State(*(np.stack(parts) for parts in zip(*states, strict=True)))
 
@@ -92,9 +94,11 @@ def many(law: Callable[..., Law], *motions: Any, processes: int | None = None, *
         common: arguments of all.
 
     Raises:
-        ShapeError: arguments of different n, or none. RangeError: no number of processes.
+        ShapeError: no function; arguments of different n, or none. RangeError: no number of processes.
         MissingPackageError: the law needs a package that is not installed.
     """
+    if not callable(law):
+        raise ShapeError("law", law, "expected a function that makes a law")
     if not motions:
         raise ShapeError("motions", motions, "expected arrays with an axis of motions first")
     count = len(motions[0]) if hasattr(motions[0], "__len__") else -1

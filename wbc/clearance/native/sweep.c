@@ -14,8 +14,8 @@ static void ready(sweep_t *s, int b) {
 }
 
 /* What counts of a pair at the present place: its distance less what is required; where an exemption holds from the one time to
- * the other [knots], less is */
-static double margin(const sweep_t *s, int p, double from, double to, double gap) {
+ * the other [knots], less is. `proven`: in parts by which it changes no faster than the bodies move */
+static double margin(const sweep_t *s, int p, double from, double to, double gap, int proven) {
     double most = gap - s->required[p];
     for (int e = s->exempt_start[p]; e < s->exempt_start[p + 1]; e++) {
         if (from < s->exempt_from[e] || to > s->exempt_to[e]) continue;
@@ -27,7 +27,7 @@ static double margin(const sweep_t *s, int p, double from, double to, double gap
         turn(A, x, a);
         turn(B, x + 3, b);
         for (int k = 0; k < 3; k++) a[k] += A[9 + k] - b[k] - B[9 + k];
-        most = fmax(most, fmin(gap + x[7], x[6] - sqrt(dot3(a, a))));
+        most = fmax(most, (gap + x[7] - x[6] * sqrt(dot3(a, a))) / (proven ? 1.0 + x[6] : 1.0));
     }
     return most;
 }
@@ -73,8 +73,8 @@ static int look(sweep_t *s, int p, const piece_t *piece, int last) {
     answer_t found;
     distance_of(s, i, j, &found);
     s->measured++;
-    const double here = margin(s, p, middle, middle, found.gap);
-    const double all = margin(s, p, whole(piece) ? piece->i : middle, whole(piece) ? piece->j : middle, found.gap);
+    const double here = margin(s, p, middle, middle, found.gap, 1);
+    const double all = margin(s, p, whole(piece) ? piece->i : middle, whole(piece) ? piece->j : middle, found.gap, 1);
     if (here < s->high[p]) {
         s->high[p] = here;
         s->when[p] = middle;
@@ -128,5 +128,5 @@ void wbc_sweep_at(sweep_t *s, int p, double time, double *out) {
     out[0] = found.gap;
     copy3(found.point, out + 1);
     along3(found.point, found.gap, found.normal, out + 4);
-    out[7] = margin(s, p, time, time, found.gap);
+    out[7] = margin(s, p, time, time, found.gap, 0);
 }

@@ -46,7 +46,7 @@ typedef struct {
     const double *required;
     /* where less is allowed: from exempt_start[k] to exempt_start[k + 1] of pair k */
     const int *exempt_start, *exempt_from, *exempt_to, *exempt_side;
-    const double *exempt_point; /* point on the one, point on the other, radius, depth: 8 each */
+    const double *exempt_point; /* point on the one, point on the other, slope, depth: 8 each */
     double *low, *high, *when;
     int *chosen, *list;
     /* the node at hand; `even`: whether `drift` says something */

@@ -11,14 +11,14 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from wbc import validation
 from wbc.climb.along.body_track import BodyTrack
-from wbc.climb.along.search import AlongSearch, Standing, SwingLimits
+from wbc.climb.along.search import AlongSearch, Standing
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.joint_values import joint_values, with_joint_values
 from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.reach import LIMIT_MARGIN
-from wbc.climb.scene import ClimbScene, size_of
+from wbc.climb.scene import ClimbScene
 from wbc.climb.search import counted_words, no_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.time_law import cubics_need, fastest, law_knots
@@ -31,10 +31,6 @@ from wbc.validation import Array
 #: How many times slower than asked a way is planned, and how many standings the search keeps of each number of swings,
 #: one after the other
 TRIED = ((1.0, 8), (1.0, 16), (1.0, 40), (1.2, 40), (1.5, 40), (2.0, 40), (4.0, 40))
-#: Postures of a limb at a foothold
-POSTURES = 2
-#: A contact rises by this share of the shortest limb's reach
-RISE = 1.0 / 20.0
 #: Time between knots where the way is slow [s]
 SLOW = 0.055
 #: Change of speed, as a part of the asked one, over an interval without knots inside [1]; over n parts n^2 times that
@@ -95,7 +91,6 @@ def plan_along(
     validation.instance("track", track, BodyTrack, "a BodyTrack")
     motion = given.motion
     world = ClimbWorld(climber, scene, start, given.limits, motion.clearance, motion.apart)
-    limits = SwingLimits(motion.lift or RISE * size_of(climber), motion.speeds.share, motion.speeds.acceleration_share)
     clearances = Clearances(climber, scene, motion.clearance, motion.apart)
     first = None if start is None else _begun(climber, track, start)
     furthest, said = 0.0, ""
@@ -103,7 +98,7 @@ def plan_along(
     for slower, width in TRIED:
         if slower not in searches:
             slow = replace(track, speed=track.speed / slower, turn_rate=track.turn_rate / slower)
-            search = AlongSearch(world, track if slower == 1.0 else slow, limits, POSTURES, given.margin)
+            search = AlongSearch(world, track if slower == 1.0 else slow, motion, given.margin)
             searches[slower] = search, () if first is None else _rows(search, first)
         search, rows = searches[slower]
         if -1 in rows and first is not None:
@@ -120,8 +115,12 @@ def plan_along(
             if timed.stands:
                 said = said or "joints would have to stop on the way"
                 break
-            if timed.proven(clearances):
+            wrong = timed.wrong(clearances)
+            if wrong is None:
                 return timed.contact_plan()
+            if not wrong:
+                break
+            search.refuse(wrong)
         if search.furthest >= furthest:
             furthest, said = search.furthest, counted_words(search.outcomes) or said
     reason = f"no footholds lead along the way: all limbs can hold to {100.0 * furthest:.0f} % of it"
@@ -146,7 +145,7 @@ def _rows(search: AlongSearch, start: Stance) -> tuple[int, ...]:
     rows, world = [], search.world
     for limb, place in enumerate(world.start):
         foothold = world.scene.footholds[start.contacts[limb]]
-        off = world.climber.contact_pose(start.q, limb).translation - foothold.pose.translation
+        off = world.climber.contact_pose(start.q, limb).translation - world.places[place, 9:]
         if np.linalg.norm(off) > AT_BEGINNING:
             raise RangeError("start.q", foothold.id, f"{world.climber.limbs[limb].name} is not at this foothold")
         rows.append(search.begun(limb, place, world.climber.angles(start.q, limb)))
@@ -259,8 +258,10 @@ class _TimedWay:
             twists[k] = first + u * (2.0 * square + 3.0 * u * cubic)
         return q, twists
 
-    def proven(self, clearances: Clearances) -> bool:
-        """Whether links are proven clear all the way; if not, the search is told what may not be."""
+    def wrong(self, clearances: Clearances) -> int | None:
+        """The standing to which a swing was under way, or had led, where links are too near, 0 for the first one; None:
+        they are proven clear all the way.
+        """
         times, knot, stays = self.times, self._knot, [[0.0] for _ in self.climber.limbs]
         contacts = [[row] for row in self._footholds(self.chain[0])]
         for standing in self.chain[1:]:
@@ -270,12 +271,8 @@ class _TimedWay:
         within = [list(zip([0.0, *some[2::2]], [*some[1::2], float(times[-1])], strict=True)) for some in stays]
         near = clearances.moving(contacts, times, self.q, self.v, within)
         if near is None:
-            return True
-        number = sum(float(times[knot[standing.now]]) < near.time for standing in self.chain[1:])
-        after = self.chain[number + 1 :]
-        swings = bool(after) and near.time >= float(times[knot[after[0].lift]])
-        self.search.refuse(number + int(swings), swings)
-        return False
+            return None
+        return sum(float(times[knot[standing.lift]]) <= near.time for standing in self.chain[1:])
 
     def _footholds(self, standing: Standing) -> tuple[int, ...]:
         return tuple(int(self.search.world.hold[place]) for place in standing.places)

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from wbc.climb.along.body_track import BodyTrack
 from wbc.climb.chain import address_of as _at, library
 from wbc.climb.first import cheapest_first
+from wbc.climb.motion import MotionOptions
+from wbc.climb.scene import size_of
 from wbc.climb.world import ClimbWorld
 from wbc.validation import Array
 
@@ -27,25 +29,15 @@ COARSE = 0.05
 RATES = 0.9
 #: Time of a swing at least [s]
 LEAST = 0.5
+#: Postures of a limb at a foothold
+POSTURES = 2
+#: A contact rises by this share of the shortest limb's reach
+RISE = 1.0 / 20.0
 #: Why standings are none, as ``native/along.h`` counts them
 WHYS = ("not borne", "too slow", "no swing", "links touch")
 
 #: Said where memory runs out
 LACKING = "a search along a way"
-
-
-@dataclass(frozen=True)
-class SwingLimits:
-    """What swings keep.
-
-    Attributes:
-        height: of contacts over what they leave and land on [m].
-        rate: share of the joints' velocities. acceleration: share of their accelerations.
-    """
-
-    height: float
-    rate: float
-    acceleration: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +67,13 @@ class AlongSearch:
     those at which the other is come to. The contact's turn is free on the way.
 
     Args:
-        world: climber and scene. track: way of the body. limits: of swings.
-        postures: of a limb at a foothold, at most. margin: least slack of equilibrium of limbs that hold.
+        world: climber and scene. track: way of the body. motion: lift, and shares of the joints' limits, of swings.
+        margin: least slack of equilibrium of limbs that hold.
     """
 
-    def __init__(
-        self, world: ClimbWorld, track: BodyTrack, limits: SwingLimits, postures: int, margin: float
-    ) -> None:  # fmt: skip
+    def __init__(self, world: ClimbWorld, track: BodyTrack, motion: MotionOptions, margin: float) -> None:
         self.world, self.track, self.end = world, track, len(track.instants) - 1
-        robot, climber = world.climber.robot, world.climber
+        robot, climber, speeds = world.climber.robot, world.climber, motion.speeds
         joints = [climber.joints(limb) for limb in range(len(climber.limbs))]
         instant = float(track.instants[1])
         ahead, turned = np.abs(track.twists[:, :3]).max(), np.abs(track.twists[:, 3:]).max()
@@ -94,20 +84,21 @@ class AlongSearch:
             part
             for rows in joints
             for part in (
-                instant * limits.rate * robot.limits.velocity[rows],
-                instant**2 * limits.acceleration * robot.limits.acceleration[rows],
+                instant * speeds.share * robot.limits.velocity[rows],
+                instant**2 * speeds.acceleration_share * robot.limits.acceleration[rows],
             )
         ]
         self._kept = (
             np.ascontiguousarray(world.touch), np.ascontiguousarray(track.places),
-            np.array([limits.height, np.ceil(LEAST / instant), margin]), np.concatenate(steps), np.concatenate(most),
+            np.array([motion.lift or RISE * size_of(climber), np.ceil(LEAST / instant), margin]), np.concatenate(steps),
+            np.concatenate(most),
         )  # fmt: skip
         self._code = library()
         self._code.wbc_along.restype = ctypes.c_void_p
         rest, body, numbers, step, rates = map(_at, self._kept)
         self._search = ctypes.c_void_p(
             self._code.wbc_along(
-                ctypes.byref(world.numbers), rest, self.end, body, every, numbers, step, rates, postures
+                ctypes.byref(world.numbers), rest, self.end, body, every, numbers, step, rates, POSTURES
             )
         )
         if not self._search:
@@ -143,9 +134,9 @@ class AlongSearch:
         rows = out[:count].tolist()
         return ([Standing(row[0], row[1], row[2], tuple(row[3:])) for row in rows], angles) if count else None
 
-    def refuse(self, number: int, swing: bool) -> None:
-        """What leads to one of the standings of the way found may not be so: its swing, or else that all hold there."""
-        _enough(self._code.wbc_along_refuse(self._search, number, int(swing)))
+    def refuse(self, number: int) -> None:
+        """The swing that leads to one of the standings of the way found may not be so."""
+        self._code.wbc_along_refuse(self._search, number)
 
     @property
     def furthest(self) -> float:

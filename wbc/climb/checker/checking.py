@@ -96,7 +96,7 @@ def _check_contacts(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> No
                 continue
             foothold, t = climbed.scene.footholds[row], climbed.t[first:last]
             where = f"{limb.name} on {foothold.id}"
-            off = np.linalg.norm(places[first:last, k] - foothold.pose.translation, axis=1)
+            off = np.linalg.norm(places[first:last, k] - limb.contact.held_at(foothold.pose).translation, axis=1)
             tally.add("closed contact off its foothold", off, t, where)
             moved = np.linalg.norm(places[first:last, k] - places[first, k], axis=1)
             # A grip that closes draws itself to its foothold: that is no slip

@@ -170,12 +170,12 @@ def _lower_near(
     """
     link, body, limb = what
     row, first, last = way
-    pose = climbed.scene.footholds[row].pose
-    offs, normal = pose.translation - climbed.tips[0][first:last, limb], pose.rotation[:, 2]
+    held = climbed.climber.limbs[limb].contact.held_at(climbed.scene.footholds[row].pose)
+    offs, normal = held.translation - climbed.tips[0][first:last, limb], held.rotation[:, 2]
     beside = ASIDE + rules.hold_distance
     for k in around.nearer(link, body, first + np.flatnonzero(offs @ normal <= rules.depth), rules.clearance):
-        held = around.distance(link, body, k, offs[k - first])
-        lowest = held + RISES * max(float(np.linalg.norm(offs[k - first])) - beside, 0.0) - rules.depth
+        there = around.distance(link, body, k, offs[k - first])
+        lowest = there + RISES * max(float(np.linalg.norm(offs[k - first])) - beside, 0.0) - rules.depth
         floor[k] = min(floor[k], lowest)
 
 

@@ -66,7 +66,7 @@ class LimbMachine:
         limb: which. parts: of the loop.
 
     Attributes:
-        state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
+        item: its contact in the stack. state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
         frame: name of its contact frame. moves: those of the plan that are not over.
     """
 
@@ -79,7 +79,7 @@ class LimbMachine:
         self._contact, self._swing = items[f"{self.name} contact"], items[f"{self.name} swing"]
         self._force = items[f"{self.name} contact force"] if parts.torques else None
         self._bearing = 0.0 if self._force is None else self._force.weight
-        self._item: FootholdContact = parts.stack[f"{self.name} contact"].item
+        self.item: FootholdContact = parts.stack[f"{self.name} contact"].item
         fields = ("target", "feedforward", *(["acceleration"] * parts.torques))
         self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
         self._glide = InputGroup(core_of(items), [(f"{self.name} contact", "feedforward", None)])
@@ -311,7 +311,7 @@ class LimbMachine:
                 above = max(0.0, float(normal @ (pose.translation - target.translation)))
                 turn = target.rotation if self._kind.fixed == "position" else pose.rotation
                 target = pin.SE3(turn, pose.translation - above * normal)
-            slopes, bounds = self._item.numbers(self._footholds[foothold].friction, self._parts.options.friction)
+            slopes, bounds = self.item.numbers(self._footholds[foothold].friction, self._parts.options.friction)
             inputs = {"slopes": slopes, "bounds": bounds}
             if self.state is LimbState.LATCHING:
                 # It has no load yet: a force that nothing answers would throw the limb at what it is to hold
@@ -338,7 +338,7 @@ class LimbMachine:
 
     def _at(self, foothold: int, time: float) -> pin.SE3:
         """The contact pose at a foothold: its place and normal, and the turn about it that the plan has."""
-        pose = self._footholds[foothold].pose
+        pose = self._kind.held_at(self._footholds[foothold].pose)
         if self._kind.fixed == "position":
             return pin.SE3(pose)
         z, x = pose.rotation[:, 2], self._pose(self._reference.q(time)).rotation[:, 0]

@@ -544,8 +544,7 @@ class ClimbLoop:
         out = np.zeros((len(self._limbs), len(WRENCH)))
         for row, limb in enumerate(self._limbs):
             if limb.state in CLOSED:
-                force = forces[f"{limb.name} contact"]
-                out[row, : len(force)] = force
+                out[row] = forces[f"{limb.name} contact"] @ limb.item.borne
         return out.ravel()
 
     # ------------------------------------------------------------------ limbs

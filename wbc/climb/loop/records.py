@@ -12,6 +12,7 @@ from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.log import FileWriter, Log, TickRecorder
 from wbc.multibody import pin
+from wbc.robot import Robot
 from wbc.validation import Array
 
 #: Components of a wrench in the log, in the axes of the foothold
@@ -43,6 +44,12 @@ def _digest(scene: ClimbScene, text: list[str], poses: list[pin.SE3]) -> str:
     return hashlib.sha256("\n".join(text).encode() + numbers.tobytes()).hexdigest()[:32]
 
 
+def motion_units(robot: Robot) -> dict[str, str]:
+    """Columns of configurations and velocities in a log -> their units."""
+    rates = {f"v.{name}": f"{unit}/s" for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)}
+    return {f"q.{k}": "m, rad" for k in range(robot.nq)} | rates
+
+
 class ClimbRecorder:
     """The log of a climb. A row, the first one of the start:
 
@@ -66,8 +73,7 @@ class ClimbRecorder:
         climber, robot = plan.climber, plan.climber.robot
         names, units = robot.dof_names, robot.dof_units
         columns = {"t": ("s", "f8"), "path_time": ("s", "f8")}
-        columns |= {f"q.{k}": ("m, rad", "f8") for k in range(robot.nq)}
-        columns |= {f"v.{name}": (f"{unit}/s", "f8") for name, unit in zip(names, units, strict=True)}
+        columns |= {name: (unit, "f8") for name, unit in motion_units(robot).items()}
         force = {"m": "N", "rad": "N m"}
         columns |= {
             f"u.{name}": (force[unit] if torques else f"{unit}/s", "f8")

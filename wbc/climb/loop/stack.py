@@ -86,7 +86,16 @@ class FootholdContact(Contact):
     def unit_wrenches(self, inputs: Values, rotation: ca.SX, twist: ca.SX) -> ca.SX:
         """Along the axes of the foothold."""
         turn = (rotation.T @ inputs["target"].rotation).T
-        return ca.SX(ca.diagcat(turn, turn)[list(self.axes), :])
+        return ca.SX(ca.sparsify(ca.SX(self.borne)) @ ca.diagcat(turn, turn))
+
+    @cached_property
+    def borne(self) -> Array:
+        """Wrenches in the axes of the foothold that each component is the size of ``(components, 6)``: forces are those
+        where the contact touches, below its frame's origin.
+        """
+        wrenches = np.eye(6)
+        wrenches[0, 4], wrenches[1, 3] = -self.kind.height, self.kind.height
+        return wrenches[list(self.axes)]
 
     def limits(self) -> tuple[Input, ...]:
         """``feedforward``, and ``slopes`` and ``bounds`` of the kind."""
@@ -115,17 +124,17 @@ class FootholdContact(Contact):
     def numbers(self, friction: float, share: float = 1.0) -> tuple[Array, Array]:
         """``slopes`` and ``bounds`` on a surface of a friction, and with a share as of ``ContactKind.lower``."""
         a, b = self.kind.lower(friction, share).cone()
-        return a[self._borne][:, list(self.axes)][self._pattern], b[self._borne]
+        return (a @ self.borne.T)[self._rows][self._pattern], b[self._rows]
 
     @cached_property
-    def _borne(self) -> Array:
+    def _rows(self) -> Array:
         """Rows of A that are not about components which the motion leaves free."""
-        return np.asarray(self.kind.cone()[0][:, list(self.axes)].any(axis=1))
+        return np.asarray((self.kind.cone()[0] @ self.borne.T).any(axis=1))
 
     @cached_property
     def _pattern(self) -> Array:
         """Where A is not zero."""
-        return np.asarray(self.kind.cone()[0][self._borne][:, list(self.axes)] != 0.0)
+        return np.asarray((self.kind.cone()[0] @ self.borne.T)[self._rows] != 0.0)
 
 
 def contact_frame(limb: ClimbLimb) -> str:

@@ -86,7 +86,7 @@ typedef struct {
     int spans, span_room;
     level_t *level;
     int levels, level_room;
-    int (*forbidden)[2], forbiddens, (*barred)[MOST_LIMBS], barreds;
+    int (*forbidden)[2], forbiddens;
     char *trunk;
     block_t *blocks;
     double *work;
@@ -365,8 +365,6 @@ static int is_forbidden(const along_t *a, int from, int onto) {
 
 /* Whether a standing can be, and until when */
 static int holds(along_t *a, standing_t *s) {
-    for (int k = 0; k < a->barreds; k++)
-        if (!memcmp(a->barred[k], s->row, sizeof(int) * a->climb->limbs)) return 0;
     s->until = until(a, s->row, s->now, -1);
     if (s->until < s->now) a->why[LINKS_TOUCH]++;
     return s->until >= s->now;
@@ -713,17 +711,11 @@ static int along_way(along_t *a, long most, double *out) {
     return 0;
 }
 
-/* Refuses the swing that leads to a standing of the way found, or else that all hold there */
-static void refuse_found(along_t *a, int level, int swings) {
+/* Refuses the swing that leads to a standing of the way found */
+static void refuse_found(along_t *a, int level) {
     standing_t *chain[a->levels];
     chain_of(a, arrived(a), chain);
-    if (swings) {
-        chain[level]->refused |= 1 << chain[level]->shape;
-        return;
-    }
-    a->barred = got(a, realloc(a->barred, sizeof *a->barred * ((size_t)a->barreds + 1)));
-    memcpy(a->barred[a->barreds++], chain[level]->row, sizeof *a->barred);
-    refuse(a, level, chain[level], REFUSED);
+    chain[level]->refused |= 1 << chain[level]->shape;
 }
 
 /* Fills in the spans of all limbs, with at most so many postures at a place */
@@ -745,7 +737,7 @@ void wbc_along_forget(along_t *a) {
         free(a->blocks);
         a->blocks = next;
     }
-    free(a->span), free(a->level), free(a->forbidden), free(a->barred), free(a->trunk), free(a->work), free(a->placed), free(a);
+    free(a->span), free(a->level), free(a->forbidden), free(a->trunk), free(a->work), free(a->placed), free(a);
 }
 
 #endif

@@ -229,24 +229,7 @@ void wbc_along_told(const along_t *a, long *out) {
     memcpy(out, a->why, sizeof a->why);
 }
 
-int wbc_along_refuse(along_t *a, int level, int swings) {
-    if (setjmp(a->no_memory)) return -2;
-    refuse_found(a, level, swings);
-    return 0;
-}
-
-/* The first of n configurations in which links are nearer than they may be, n for none; `which`: what touches there, `lacks`: by
- * how much */
-long wbc_first_touch(climb_t *c, long n, const int *contact, const double *state, int *which, double *lacks) {
-    placed_t placed[MOST_LIMBS];
-    double center[3];
-    for (long k = 0; k < n; k++) {
-        const double *at = state + k * (12 + c->offset[c->limbs]);
-        place_all(c, at, at + 12, placed, center);
-        if ((*lacks = -link_clearance(c, contact + k * c->limbs, at, placed, which)) > 0.0) return k;
-    }
-    return n;
-}
+void wbc_along_refuse(along_t *a, int level) { refuse_found(a, level); }
 
 /* Weight of pairs that are too near and of slack that lacks in bands: they come to rest where these still push */
 #define PUSH 3e2
@@ -279,14 +262,20 @@ void wbc_band(climb_t *c, long n, const int *contact, const char *closed, const 
     }
 }
 
-/* Of n states of a body and its limbs' angles the contacts of some limbs at poses in the world, 12 each: closed in at most `steps`
- * steps of `close_once`; the largest errors that are left */
+/* Of n states of a body and its limbs' angles the contacts of some limbs at poses in the world, 12 each, of which turns count or not:
+ * closed in at most `steps` steps of `close_once`; the largest errors that are left */
 void wbc_close(const limb_t *limbs, const int *offset, int size, int contacts, const int *which, const double *wanted, int turned,
                double body, double enough, int steps, long n, double *state, double *left) {
+    limb_t limb[MOST_LIMBS];
+    const climb_t c = {.length = 1.0, .limb = limb, .offset = offset};
+    for (int k = 0; k < contacts; k++) {
+        limb[which[k]] = limbs[which[k]];
+        if (!turned) limb[which[k]].rows = 3;
+    }
     for (long k = 0; k < n; k++) {
         double *at = state + k * size;
         for (int step = 0; step <= steps; step++) {
-            left[k] = close_once(limbs, offset, contacts, which, wanted + k * contacts * 12, turned, body, step < steps ? enough : 1e300, at);
+            left[k] = close_once(&c, size - 6, contacts, which, wanted + k * contacts * 12, body, step < steps ? enough : 1e300, at);
             if (!(left[k] >= enough) || !(left[k] < 1e3)) break;
         }
     }

@@ -29,10 +29,10 @@
 /* How much clearer of bodies postures are than they have to be, where that can be [lengths of the robot] */
 #define CLEARER 7e-3
 
-/* What is wanted: the slack of a support (0: none), and the body at a pose by weights of place and turn */
+/* What is wanted: the slack of a support (0: none), which `more` is aimed at above, and the body at a pose by weights of place and turn */
 typedef struct {
     support_t *support;
-    double slack, place, turn, rest, pose[12];
+    double slack, more, place, turn, rest, pose[12];
     int avoided, avoid[AVOIDED][2]; /* pairs, as of link_clearance, that are kept apart */
     double aside;                   /* how much further than ASIDE [m] */
 } wish_t;
@@ -199,7 +199,7 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
         for (int i = 0; i < 3; i++) H[(3 + i) * (n + 1)] += wish->turn, g[3 + i] -= wish->turn * by[i];
     }
     for (int b = 0; wish->support && b < wish->support->bounds; b++)
-        add_bound(c, wish->support->bound[b], wish->slack, center, base, placed, start, BEARS, n, H, g);
+        add_bound(c, wish->support->bound[b], wish->slack + wish->more, center, base, placed, start, BEARS, n, H, g);
     for (int k = 0; k < wish->avoided; k++)
         add_avoided(c, contact, 0, wish->avoid[k], ASIDE * c->length + wish->aside, base, placed, start, BEARS, n, H, g);
     /* Angles at a limit against which they are pulled stay there */
@@ -294,7 +294,11 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
         *slack = slack_of(c, wish->support, center, wish->slack);
         how = NOT_BORNE;
         if (*slack == -INFINITY) return how;
-        if (*slack < wish->slack) continue;
+        if (*slack < wish->slack) {
+            /* What pulls at a bound takes the same again once the aim is beyond it by as much */
+            more.more += fmin(wish->slack - *slack, BEYOND);
+            continue;
+        }
         const double clear = c->clear;
         c->clear += CLEARER * c->length;
         const double far = link_clearance(c, contact, base, placed, which);

@@ -176,8 +176,8 @@ static void place_piece(const climb_t *c, int k, const double *base, const place
     compose(p->limb < 0 ? base : placed[p->limb].pose[p->step], p->place, out);
 }
 
-/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold: wbc/climb/clear.py proves
- * it in steps, which are below it between the instants looked at too */
+/* The distance that a tip keeps from what its limb holds while the contact is `off` away from the foothold, as wbc/climb/clear.py
+ * proves it */
 static double tip_distance(const climb_t *c, const piece_t *p, double off) {
     return fmin(c->clear, 0.5 * off - p->depth);
 }

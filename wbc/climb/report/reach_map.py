@@ -43,7 +43,7 @@ def footholds_in_reach(climber: Climber, scene: ClimbScene, poses: Sequence[pin.
                 continue
             turns = (foothold.rolls or TURNS) if turning else 1
             spins = [pin.SE3(pin.utils.rotate("z", 2.0 * np.pi * k / turns), np.zeros(3)) for k in range(turns)]
-            wanted += [foothold.pose * spin for spin in spins]
+            wanted += [own.contact.held_at(foothold.pose) * spin for spin in spins]
             rows += [row] * turns
         for body in poses if wanted else ():
             _, solved = reach.postures(limb, np.array([place(body.actInv(pose)) for pose in wanted]))

@@ -94,7 +94,7 @@ class _PartFinder:
         columns = [int(model.idx_vs[j]) for j in joints]
         out = np.empty((len(self._states), 6, len(joints)))
         for n, q in enumerate(self._states):
-            J = pin.computeFrameJacobian(model, self._data, q, index, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)
+            J = pin.computeFrameJacobian(model, self._data, q, index, pin.LOCAL_WORLD_ALIGNED)
             out[n] = J[:, columns]
         slides = np.array([self.robot.dof_units[c] == "m" for c in columns])
         length = self.robot.characteristic_length
@@ -289,8 +289,6 @@ def _axis(robot: Robot, joint: int) -> Array | None:
     """Axis of a turning joint in its own frame; None for one that slides."""
     data = robot.model.createData()
     pin.computeJointJacobians(robot.model, data, robot.neutral)
-    column = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL).reshape(6, robot.nv)[
-        3:, robot.model.idx_vs[joint]
-    ]
+    column = pin.getJointJacobian(robot.model, data, joint, pin.LOCAL)[3:, robot.model.idx_vs[joint]]
     size = float(np.linalg.norm(column))
     return None if size < ROUNDING else np.asarray(column / size)

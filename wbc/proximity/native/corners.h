@@ -10,10 +10,14 @@
 #define MOST_CORNERS 48
 /* Corners of a hull that are nearer to each other than this part of its bounding sphere's radius count as one */
 #define TOGETHER 0.3
+/* By how much a hull with more corners than these is tilted to find what comes down first [rad] */
+#define TILT 0.1
+/* In so many directions */
+#define TILTS 4
 
 typedef struct {
     double gap, line[6], place[3];
-    int own;
+    int own, rolls;
 } corner_t;
 
 static void line_through(const double *point, const double *normal, double *line) {
@@ -21,14 +25,33 @@ static void line_through(const double *point, const double *normal, double *line
     cross3(point, normal, line + 3);
 }
 
+/* Whether it is a hull with more corners than are listed, in front of a half-space */
+static int rolls(const scene_t *s, int own, int other) {
+    const shape_t *shape = s->shape + own;
+    return s->shape[other].kind == PLANE && shape->kind == HULL && shape->count >= s->corner_count[own] + LANES;
+}
+
+/* The point of a hull that is lowest above a half-space after tilt number c */
+static void lowest_tilted(const scene_t *s, int own, int other, int c, double *out) {
+    const double *O = s->body_pose + 12 * own, *T = s->body_pose + 12 * other, way = 2.0 * M_PI * (c + 0.5) / TILTS;
+    const double down[3] = {TILT * cos(way), TILT * sin(way), -1.0};
+    double world[3], local[3];
+    turn(T, down, world);
+    turn_back(O, world, local);
+    support(s->shape + own, local, out);
+}
+
 /* Corner number c of body `own` against body `other`; the normal times sign */
 static void corner_row(const scene_t *s, int own, int other, int c, double sign, corner_t *out) {
     const double *O = s->body_pose + 12 * own, *T = s->body_pose + 12 * other;
     const shape_t *shape = s->shape + other;
-    double point[3], offset[3], local[3], core[3], normal[3];
+    double corner[3], point[3], offset[3], local[3], core[3], normal[3];
     out->gap = s->far;
     memset(out->line, 0, sizeof out->line);
-    turn(O, s->corner + 3 * (own * s->width + c), point);
+    copy3(s->corner + 3 * (own * s->width + c), corner);
+    out->rolls = rolls(s, own, other);
+    if (out->rolls) lowest_tilted(s, own, other, c, corner);
+    turn(O, corner, point);
     for (int k = 0; k < 3; k++) point[k] += O[9 + k];
     copy3(point, out->place);
     out->own = own;
@@ -57,7 +80,8 @@ static int corners_of(const scene_t *s, int pair, corner_t *found) {
     for (int side = 0; side < 2; side++) {
         const int own = bodies[side], other = bodies[1 - side];
         if (s->shape[other].kind != SUM && s->shape[other].kind != PLANE) continue;
-        for (int c = 0; c < s->corner_count[own]; c++) {
+        const int all = rolls(s, own, other) ? TILTS : s->corner_count[own];
+        for (int c = 0; c < all; c++) {
             corner_row(s, own, other, c, side ? -1.0 : 1.0, found + count);
             if (found[count].gap < s->far / 2) found[count++].gap += more;
         }
@@ -72,7 +96,7 @@ static int next_corner(const scene_t *s, const corner_t *found, int count, signe
         if (!taken[k] && (best < 0 || found[k].gap < found[best].gap)) best = k;
     if (best < 0) return best;
     const shape_t *shape = s->shape + found[best].own;
-    const double apart = shape->kind == HULL ? TOGETHER * shape->size[5] : 0.0;
+    const double apart = shape->kind == HULL ? (found[best].rolls ? FLAT : TOGETHER) * shape->size[5] : 0.0;
     taken[best] = 1;
     for (int k = 0; apart > 0.0 && k < count; k++) {
         double off[3];

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from functools import cached_property
 
 import numpy as np
 
-from wbc.retarget.body import BodyError, PointTree, find_body
-from wbc.retarget.clip import Array, ancestors, rest_places
+from wbc.retarget.body import BodyError, find_body
+from wbc.retarget.clip import Array, ancestors
 from wbc.retarget.sources.layouts import side_sines
 from wbc.retarget.sources.recorded import Recorded
 from wbc.retarget.words import numbers_of
@@ -49,103 +50,93 @@ STANDING_SPEED = 0.12
 FRAMES = 600
 
 
-def find_up(clip: Recorded) -> str:
-    """The axis of the file that is up; a note says it where it is not z, or not sure.
+class FileAxes:
+    """What the points of a clip without gaps say of its file's axes and unit.
 
-    Each axis has a cost: how far what stands still is spread along it and lies above the lowest points, as shares of
-    the body's size, and how far the head is from being above the feet. What is usual in the format decides near ties.
+    Attributes:
+        clip: whose points they are. size: median over the frames of the diagonal of a box round them, in the file's
+            unit. rest: the skeleton's points in its rest pose; None where there is none.
     """
-    points, size = clip.points, _size(clip) or 1.0
-    head, feet = _head_and_feet(clip)
-    standing = _standing(clip, feet, size)
-    above = np.zeros(3)
-    if head and feet:
-        above = np.nanmean(np.nanmean(points[:, head], axis=1) - np.nanmean(points[:, feet], axis=1), axis=0)
-        above = above / max(float(np.linalg.norm(above)), 1e-9)
-    rest = said_by_rest(clip)
-    costs: dict[str, float] = {}
-    for name, to_world in TO_Z_UP.items():
-        up = to_world[2]
-        cost = NOT_ABOVE * (1.0 - float(above @ up))
-        if len(standing):
-            here = standing @ up
-            cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(points @ up, 2.0))) / size
-        costs[name] = cost + NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (rest not in ("", name))
-    best, second = sorted(costs, key=lambda name: costs[name])[:2]
-    doubt = "" if costs[second] - costs[best] > UNSURE else ", which is not sure: give up= where that is wrong"
-    clip.notes += [f"{best} is up in the file{doubt}"] if best != "z" or doubt else []
-    return best
 
+    def __init__(self, clip: Recorded) -> None:
+        self.clip, skeleton = clip, clip.skeleton
+        spans = np.nanmax(clip.points, axis=1) - np.nanmin(clip.points, axis=1)
+        self.size = float(np.nanmedian(np.linalg.norm(spans, axis=1)))
+        self.rest = None if skeleton is None else skeleton.rest
+        #: numbers of points of head and feet, by name, else by the limbs of the rest pose
+        self._head, self._feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
+        if skeleton is not None and not (self._head and self._feet):
+            with contextlib.suppress(BodyError):
+                plan = find_body(skeleton)
+                legs = [chain[-1] for name, chain in plan.limbs.items() if name.endswith("leg")]
+                self._head, self._feet = self._head or list(plan.head[-1:]), self._feet or legs
 
-def _size(clip: Recorded) -> float:
-    """Median over the frames of the diagonal of a box round the points, in the file's unit."""
-    return float(np.nanmedian(np.linalg.norm(np.nanmax(clip.points, axis=1) - np.nanmin(clip.points, axis=1), axis=1)))
+    @cached_property
+    def rest_up(self) -> str:
+        """The axis of the rest pose along which the head is above the feet; "" where that is not clear."""
+        if self.rest is None or not self._head or not self._feet:
+            return ""
+        between = self.rest[self._head].mean(axis=0) - self.rest[self._feet].mean(axis=0)
+        best = max(TO_Z_UP, key=lambda name: float(TO_Z_UP[name][2] @ between))
+        return best if float(TO_Z_UP[best][2] @ between) > 0.9 * float(np.linalg.norm(between)) > 0.0 else ""
 
+    def find_up(self) -> str:
+        """The axis of the file that is up; a note says it where it is not z, or not sure.
 
-def _head_and_feet(clip: Recorded) -> tuple[list[int], list[int]]:
-    """Numbers of points of head and feet, by name, else by the limbs of the rest pose."""
-    head, feet = numbers_of(clip.names, "head"), numbers_of(clip.names, "foot")
-    if clip.offsets is not None and not (head and feet):
-        with contextlib.suppress(BodyError):
-            plan = find_body(PointTree(tuple(clip.names), tuple(clip.parents), rest_places(clip.parents, clip.offsets)))
-            legs = [chain[-1] for name, chain in plan.limbs.items() if name.endswith("leg")]
-            head, feet = head or list(plan.head[-1:]), feet or legs
-    return head, feet
+        Each axis has a cost: how far what stands still is spread along it and lies above the lowest points, as shares
+        of the body's size, and how far the head is from being above the feet. What is usual in the format decides near
+        ties.
+        """
+        clip, points, size = self.clip, self.clip.points, self.size or 1.0
+        above = np.zeros(3)
+        if self._head and self._feet:
+            head, feet = (np.nanmean(points[:, numbers], axis=1) for numbers in (self._head, self._feet))
+            above = np.nanmean(head - feet, axis=0)
+            above = above / max(float(np.linalg.norm(above)), 1e-9)
+        # Places of feet, or of all points where no feet are known, while they stand still
+        low = points[:, self._feet or list(range(len(clip.names)))]
+        lag, every = max(1, min(len(low) - 1, round(STANDING_TIME * clip.rate))), max(1, len(low) // FRAMES)
+        speed = np.linalg.norm(low[lag::every] - low[:-lag:every], axis=2) * clip.rate / lag
+        standing = low[:-lag:every][speed < STANDING_SPEED * size]
+        costs: dict[str, float] = {}
+        for name, to_world in TO_Z_UP.items():
+            up = to_world[2]
+            cost = NOT_ABOVE * (1.0 - float(above @ up))
+            if len(standing):
+                here = standing @ up
+                cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(points @ up, 2.0))) / size
+            unlikely = NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (self.rest_up not in ("", name))
+            costs[name] = cost + unlikely
+        best, second = sorted(costs, key=lambda name: costs[name])[:2]
+        doubt = "" if costs[second] - costs[best] > UNSURE else ", which is not sure: give up= where that is wrong"
+        clip.notes += [f"{best} is up in the file{doubt}"] if best != "z" or doubt else []
+        return best
 
+    def is_mirrored(self, up: str) -> bool:
+        """Whether left and right are the wrong way round: a file of left-handed axes."""
+        sines = side_sines(self.clip.names, self.clip.points, TO_Z_UP[up][2])
+        sines = sines[np.isfinite(sines)]
+        # In nearly all frames: hips and feet may be across each other for a moment
+        return bool(sines.size and np.mean(sines < -0.5) > 0.9)
 
-def said_by_rest(clip: Recorded) -> str:
-    """The axis of the rest pose along which the head is above the feet; "" where that is not clear."""
-    head, feet = _head_and_feet(clip)
-    if clip.offsets is None or not head or not feet:
-        return ""
-    places = rest_places(clip.parents, clip.offsets)
-    between = places[head].mean(axis=0) - places[feet].mean(axis=0)
-    best = max(TO_Z_UP, key=lambda name: float(TO_Z_UP[name][2] @ between))
-    return best if float(TO_Z_UP[best][2] @ between) > 0.9 * float(np.linalg.norm(between)) > 0.0 else ""
+    def find_unit(self, up: str) -> tuple[str, float]:
+        """Name of the file's unit, "" where none makes it a body's size, and the size of the body in it."""
+        heights, along = self.clip.points @ TO_Z_UP[up][2], self._head_to_feet()
+        tall = float(np.nanmax(np.nanmax(heights, axis=1) - np.nanmin(heights, axis=1)))
+        if self.rest is not None and self.rest_up:
+            tall = max(tall, float(np.ptp(self.rest @ TO_Z_UP[self.rest_up][2])))
+        if along and tall > UPRIGHT * along:
+            return next((name for name, (_, _, (low, high)) in UNITS.items() if low <= along < high), ""), along
+        name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(self.size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
+        return name if 0.1 < self.size * UNITS[name][0] / OTHER_SIZE < 10.0 else "", self.size
 
-
-def _standing(clip: Recorded, feet: list[int], size: float) -> Array:
-    """Places of feet, or of all points where no feet are known, while they stand still [n, 3]."""
-    points = clip.points[:, feet or list(range(len(clip.names)))]
-    lag, every = max(1, min(len(points) - 1, round(STANDING_TIME * clip.rate))), max(1, len(points) // FRAMES)
-    before, after = points[:-lag:every], points[lag::every]
-    speed = np.linalg.norm(after - before, axis=2) * clip.rate / lag
-    return np.asarray(before[speed < STANDING_SPEED * size])
-
-
-def mirrored(names: list[str], points: Array) -> bool:
-    """Whether left and right are the wrong way round in points with z up: a file of left-handed axes."""
-    sines = side_sines(names, points, TO_Z_UP["z"][2])
-    sines = sines[np.isfinite(sines)]
-    # In nearly all frames: hips and feet may be across each other for a moment
-    return bool(sines.size and np.mean(sines < -0.5) > 0.9)
-
-
-def find_unit(clip: Recorded, up: str) -> tuple[str, float]:
-    """Name of the file's unit, "" where none makes it a body's size, and the size of the body in it."""
-    size, heights = _size(clip), clip.points @ TO_Z_UP[up][2]
-    tall = float(np.nanmax(np.nanmax(heights, axis=1) - np.nanmin(heights, axis=1)))
-    along = _head_to_feet(clip)
-    if clip.offsets is not None and (rest := said_by_rest(clip)):
-        tall = max(tall, float(np.ptp(rest_places(clip.parents, clip.offsets) @ TO_Z_UP[rest][2])))
-    if along and tall > UPRIGHT * along:
-        return next((name for name, (_, _, (low, high)) in UNITS.items() if low <= along < high), ""), along
-    name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
-    return name if 0.1 < size * UNITS[name][0] / OTHER_SIZE < 10.0 else "", size
-
-
-def _head_to_feet(clip: Recorded) -> float:
-    """Length of the bones from head to foot, or how far they are apart where bones are not known; 0 without them."""
-    points, parents = clip.points, clip.parents
-
-    def median(a: int, b: int) -> float:
-        return float(np.nanmedian(np.linalg.norm(points[:, a] - points[:, b], axis=1)))
-
-    longest = 0.0
-    for head, foot in itertools.product(*_head_and_feet(clip)):
-        above, below = set(ancestors(parents, head)), set(ancestors(parents, foot))
-        apart = [median(k, parents[k]) for k in above ^ below] if above & below else []
-        if not apart:
-            apart = [float(np.nanmax(np.linalg.norm(points[:, head] - points[:, foot], axis=1)))]
-        longest = max(longest, sum(apart))
-    return longest
+    def _head_to_feet(self) -> float:
+        """Length of bones from head to foot, or how far these are apart without bones; 0 where they are not known."""
+        points, parents, longest = self.clip.points, self.clip.parents, 0.0
+        for head, foot in itertools.product(self._head, self._feet):
+            above, below = set(ancestors(parents, head)), set(ancestors(parents, foot))
+            bones = [points[:, k] - points[:, parents[k]] for k in above ^ below] if above & below else []
+            apart = sum(float(np.nanmedian(np.linalg.norm(bone, axis=1))) for bone in bones)
+            between = np.linalg.norm(points[:, head] - points[:, foot], axis=1)
+            longest = max(longest, apart if bones else float(np.nanmax(between)))
+        return longest

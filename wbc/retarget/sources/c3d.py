@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from wbc import extras
-from wbc.retarget.sources.layouts import parents_by_name
-from wbc.retarget.sources.recorded import Recorded, no_clip, unlike
+from wbc.retarget.sources.keypoints import of_points
+from wbc.retarget.sources.recorded import Recorded, no_clip
 
 #: The first bytes of a C3D file: any block of parameters, and 80 in the second byte
 KEY = 0x50
@@ -41,26 +41,24 @@ def read_c3d(path: pathlib.Path) -> Recorded:
         points = np.moveaxis(np.asarray(data["data"]["points"], dtype=float)[:3], 0, 2).swapaxes(0, 1)
         # A parameter holds 255 labels: LABELS2 goes on where it ends
         more = itertools.takewhile(lambda key: key in about, (f"LABELS{k}" for k in itertools.count(2)))
-        labels = [label for key in ("LABELS", *more) for label in about[key]["value"]]
+        labels = [label.strip() for key in ("LABELS", *more) for label in about[key]["value"]]
         units = about["UNITS"]["value"]
         rate = float(np.ravel(about["RATE"]["value"])[0])
     except (OSError, RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
         raise no_clip(path, f"no C3D file that can be read, or it is cut off: {error}") from error
+    names = [labels[k] if k < len(labels) and labels[k] else f"marker{k + 1}" for k in range(points.shape[1])]
+    # A marker that is lost is NaN, or all zeros where the software wrote no residual
+    clip = of_points(path, np.where((points == 0.0).all(axis=2, keepdims=True), np.nan, points), names)
+    clip.rate, clip.usual = rate, "z"
+    clip.unit = LENGTHS.get(units[0].strip().lower(), 0.0) if units else 0.0
     # ezc3d counts the frames that are there; the header has the numbers of the first and last one
     used, analog, first, last, _, scale, block = struct.unpack("<HHHHHfH", start[2:18])
-    frames, count = len(points), points.shape[1]
-    if count == 0 or frames < 2:
-        raise no_clip(path, f"{frames} frames of {count} markers: no clip")
-    cut = last < MOST and frames < last - first + 1
-    notes = [f"the file is cut off: it has {frames} of {last - first + 1} frames"] if cut else []
-    frame = (4 * used + analog) * (4 if scale < 0.0 else 2)
-    room = (size - BLOCK * block) // max(1, frame)
+    frames = len(points)
+    if last < MOST and frames < last - first + 1:
+        clip.notes.append(f"the file is cut off: it has {frames} of {last - first + 1} frames")
+    room = (size - BLOCK * block) // max(1, (4 * used + analog) * (4 if scale < 0.0 else 2))
     if last == MOST and room > frames:
-        notes.append(f"the file has some {room} frames, of which ezc3d reads {frames}: the rest is not in the clip")
-    names = [label.strip() for label in labels[:count]]
-    names = [name or f"marker{k + 1}" for k, name in enumerate([*names, *[""] * (count - len(names))])]
-    names = unlike(names, notes)
-    # A marker that is lost is NaN, or all zeros where the software wrote no residual
-    points = np.where((points == 0.0).all(axis=2, keepdims=True), np.nan, points)
-    unit = LENGTHS.get(units[0].strip().lower(), 0.0) if units else 0.0
-    return Recorded(names, parents_by_name(names), points, rate, unit=unit, usual="z", notes=notes)
+        clip.notes.append(
+            f"the file has some {room} frames, of which ezc3d reads {frames}: the rest is not in the clip"
+        )
+    return clip

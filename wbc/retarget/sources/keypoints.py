@@ -13,7 +13,8 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.retarget.clip import Array, listed
-from wbc.retarget.sources.layouts import LAYOUTS, best_layout, parents_by_name, parents_of
+from wbc.retarget.sources.axes import UNITS
+from wbc.retarget.sources.layouts import LAYOUTS, best_layout, parents_by_name
 from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in, text_of, unlike
 
 #: Keys of an npz with points
@@ -26,8 +27,6 @@ NAMES = ("names", "joint_names", "labels", "joints_names", "marker_names", "bone
 PARENTS = ("parents", "joint_parents", "parent_indices")
 #: The end of a column's name that says which coordinate it is
 COLUMN = re.compile(r"^(.*?)[\s_.:\-\[(]*([xyzXYZ])[\])]?\s*(?:[\[(](mm|cm|m)[\])])?$")
-#: Units of columns [m]
-COLUMN_UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0}
 #: Columns of time
 TIMES = ("t", "time", "time [s]", "time_s", "timestamp", "seconds")
 #: Columns that are left out
@@ -46,9 +45,7 @@ def read_npz(path: pathlib.Path, data: dict[str, Any], names: Names) -> Recorded
     if points is None:
         there = ", ".join(data) or "nothing"
         raise no_clip(path, f"no points: it has {there}, and points are called {', '.join(POINTS)}")
-    if names is None and named is not None:
-        names = [str(name) for name in np.ravel(named)]
-    clip = of_points(path, points, names)
+    clip = of_points(path, points, list(map(str, np.ravel(named))) if names is None and named is not None else names)
     clip.rate = rate_in(data)
     if parents is not None:
         given = np.ravel(parents)
@@ -63,51 +60,45 @@ def read_npz(path: pathlib.Path, data: dict[str, Any], names: Names) -> Recorded
 
 def read_csv(path: pathlib.Path, names: Names) -> Recorded:
     """A table whose header names the columns, such as ``LeftFoot_x``, ``LeftFoot_y``, ``LeftFoot_z``, and a time."""
-    text = text_of(path)
-    title = text.partition("\n")[0]
+    lines = text_of(path).splitlines()
     try:
-        rows = [row for row in csv.reader(text.splitlines(), delimiter=max(",;\t", key=title.count)) if row]
+        rows = list(csv.reader(lines, delimiter=max(",;\t", key="".join(lines[:1]).count)))
     except csv.Error as error:
         raise no_clip(path, f"no table: {error}") from error
-    if not rows:
-        raise no_clip(path, "the file is empty")
-    header = [cell.strip() for cell in rows.pop(0)]
-    columns: dict[str, dict[str, int]] = {}
-    other: list[str] = []
-    unit, clock = 0.0, -1
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    columns, other, clock, unit = dict[str, dict[str, int]](), list[str](), list[int](), 0.0
     for number, title in enumerate(header):
         match = COLUMN.match(title)
         if match and match[1].strip():
-            axes = columns.setdefault(match[1].strip(), {})
-            if axes.setdefault(match[2].lower(), number) != number:
+            if columns.setdefault(match[1].strip(), {}).setdefault(match[2].lower(), number) != number:
                 raise no_clip(path, f"two columns {title}")
-            unit = COLUMN_UNITS.get(match[3] or "", unit)
+            unit = UNITS[match[3]][0] if match[3] else unit
         elif title.lower() in TIMES:
-            clock = number if clock < 0 else clock
+            clock.append(number)
         elif title.lower() not in COUNTERS:
             other.append(title)
-    joints = [name for name, places in columns.items() if set(places) == {"x", "y", "z"}]
+    joints = [name for name, axes in columns.items() if len(axes) == 3]
     other += [name for name in columns if name not in joints]
     if not joints:
         raise no_clip(path, f"no header with names such as LeftFoot_x, LeftFoot_y, LeftFoot_z: {', '.join(header[:6])}")
-    cut = len(rows) > 1 and len(rows[-1]) < len(header)
-    used = [*(columns[name][axis] for name in joints for axis in "xyz"), *([clock] if clock >= 0 else [])]
-    table = np.full((len(rows) - cut, len(used)), np.nan)
-    for frame, row in enumerate(rows[: len(table)]):
-        for place, column in enumerate(used):
-            try:
-                table[frame, place] = float(row[column].strip() or "nan") if column < len(row) else np.nan
-            except ValueError as error:
-                raise no_clip(path, f"line {frame + 2}, column {header[column]!r}: {error}") from error
-    clip = of_points(path, table[:, : 3 * len(joints)], joints if names is None else names)
+    used, table = [columns[name][axis] for name in joints for axis in "xyz"] + clock[:1], list[list[float]]()
+    given = [(number, row) for number, row in enumerate(rows[1:], 2) if row]
+    cut = len(given) > 1 and len(given[-1][1]) < len(header)
+    for number, row in given[: len(given) - cut]:
+        try:
+            table.append([float(row[k].strip() or "nan") if k < len(row) else np.nan for k in used])
+        except ValueError as error:
+            raise no_clip(path, f"line {number}: {error}") from error
+    values = np.array(table).reshape(-1, len(used))
+    clip = of_points(path, values[:, : 3 * len(joints)], joints if names is None else names)
     clip.notes += [f"columns that are no points: {listed(other, 6)}"] if other else []
     clip.notes += ["the file is cut off: its last line is left out"] if cut else []
     clip.unit = unit
-    if clock >= 0:
-        steps = np.diff(table[:, -1])
+    if clock:
+        steps = np.diff(values[:, -1])
         step = float(np.nanmedian(steps)) if np.isfinite(steps).any() else np.nan
         if not step > 0.0 or np.nanmax(np.abs(steps - step)) > 0.5 * step:
-            raise no_clip(path, f"times of column {header[clock]!r} do not rise in equal steps")
+            raise no_clip(path, f"times of column {header[clock[0]]!r} do not rise in equal steps")
         clip.rate = 1.0 / step
     return clip
 
@@ -135,20 +126,20 @@ def of_points(path: pathlib.Path, points: Array, names: Names) -> Recorded:
     if len(given) < 2:
         raise no_clip(path, f"the file has {len(given)} frames: a clip has at least 2")
     count = given.shape[1]
-    clip = Recorded([], [], np.where(np.isfinite(given), given, np.nan).astype(np.float64), 0.0)
+    clip = Recorded([], [], np.where(np.isfinite(given), given, np.nan).astype(np.float64))
     if names is None:
         names = best_layout(clip.points)
         if not names:
-            counts = ", ".join(map(str, sorted({len(joints) for joints in LAYOUTS.values()})))
+            counts = ", ".join(map(str, sorted({len(layout.names) for layout in LAYOUTS.values()})))
             raise no_clip(path, f"{count} joints without names; give names= (known are layouts of {counts} joints)")
         clip.notes.append(f"names and parents are those of the layout {names!r}")
     if isinstance(names, str):
-        layout = LAYOUTS[validation.one_of("names", names, LAYOUTS)]
-        if len(layout) != count:
-            raise ShapeError("names", names, f"this layout has {len(layout)} joints, the file {count}")
-        clip.names, clip.parents = [name for name, _ in layout], parents_of(layout)
+        own, parents = LAYOUTS[validation.one_of("names", names, LAYOUTS)]
+        if len(own) != count:
+            raise ShapeError("names", names, f"this layout has {len(own)} joints, the file {count}")
+        clip.names, clip.parents = list(own), list(parents)
     else:
-        clip.names = unlike(list(validation.strings("names", names)), clip.notes)
+        clip.names = unlike(validation.strings("names", names), clip.notes)
         if len(clip.names) != count:
             raise ShapeError("names", names, f"expected {count} names, one a joint, not {len(clip.names)}")
         clip.parents = parents_by_name(clip.names)

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from wbc.retarget.clip import Array
+from wbc.retarget.clip import Array, nearest_above
 from wbc.retarget.words import numbers_of
 
-#: A name and its parent's, "" for a root
-Layout = tuple[tuple[str, str], ...]
 #: Share of names that must be those of a layout for its parents to hold
 KNOWN = 0.8
+
+
+class JointOrder(NamedTuple):
+    """Names of joints, and numbers of their parents, -1 at roots."""
+
+    names: tuple[str, ...]
+    parents: list[int]
+
+
 #: SMPL's joints
 _BODY = (
     "pelvis, pelvis > left_hip, pelvis > right_hip, pelvis > spine1, left_hip > left_knee, right_hip > right_knee",
@@ -29,14 +37,16 @@ _SPINE = "Hips > Spine Spine1 Spine2 Neck Head"
 _FINGERS = "index middle pinky ring thumb"
 
 
-def _tree(*branches: str) -> Layout:
+def _tree(*branches: str) -> JointOrder:
     """Of branches between commas, each of a parent, ``>``, and joints one below the other; the first one has none."""
-    out: list[tuple[str, str]] = []
+    names, parents = list[str](), list[int]()
     for branch in ", ".join(branches).split(", "):
-        parent, _, names = branch.rpartition(" > ")
-        chain = names.split()
-        out += zip(chain, (parent, *chain[:-1]), strict=True)
-    return tuple(out)
+        above, _, chain = branch.rpartition(" > ")
+        for name in chain.split():
+            parents.append(names.index(above) if above else -1)
+            names.append(name)
+            above = name
+    return JointOrder(tuple(names), parents)
 
 
 def _hand(wrist: str, side: str, fingers: str = _FINGERS) -> str:
@@ -47,7 +57,7 @@ def _hand(wrist: str, side: str, fingers: str = _FINGERS) -> str:
 _HANDS = (_hand("left_wrist", "left_"), _hand("right_wrist", "right_"))
 _LEGS = {side: _LEG.format(side) for side in ("Left", "Right")}
 #: Well-known orders, by name
-LAYOUTS: dict[str, Layout] = {
+LAYOUTS = {
     "smpl-body": _tree(*_BODY),
     "smpl": _tree(*_BODY, "left_wrist > left_hand, right_wrist > right_hand"),
     "smplh": _tree(*_BODY, *_HANDS),
@@ -97,21 +107,22 @@ LAYOUTS: dict[str, Layout] = {
 
 
 def best_layout(points: Array) -> str:
-    """The layout with as many joints whose bones change their lengths least; "" where none has as many.
-
-    Of two that differ in left and right alone it is the one whose person is no mirror image.
+    """The layout with as many joints whose bones change their lengths least, as a share of the longest; "" where none
+    has as many. Of two that differ in left and right alone it is the one whose person is no mirror image.
     """
     frames = points[:: max(1, len(points) // 200)]
-    fitting = [name for name, layout in LAYOUTS.items() if len(layout) == points.shape[1]]
 
     def cost(name: str) -> tuple[float, bool]:
-        names = [joint for joint, _ in LAYOUTS[name]]
+        names, parents = LAYOUTS[name]
+        bones = [(joint, parent) for joint, parent in enumerate(parents) if parent >= 0]
+        lengths = np.stack([np.linalg.norm(frames[:, a] - frames[:, b], axis=1) for a, b in bones], axis=1)
+        spread = np.nanmean(np.nanstd(lengths, axis=0)) + 1e-3 * np.nanmean(lengths)
         up = [frames[:, numbers].mean(axis=1) for part in ("head", "hindfoot") if (numbers := numbers_of(names, part))]
         sines = side_sines(names, frames, up[0] - up[1]) if len(up) == 2 else np.zeros(0)
         mirrored = bool(np.isfinite(sines).any() and np.nanmean(sines) < 0.0)
-        return round(_stretch(frames, parents_of(LAYOUTS[name])), 6), mirrored
+        return round(float(spread / max(float(np.nanmax(lengths)), 1e-9)), 6), mirrored
 
-    return min(fitting, key=cost, default="")
+    return min((name for name in LAYOUTS if len(LAYOUTS[name].names) == points.shape[1]), key=cost, default="")
 
 
 def side_sines(names: Sequence[str], points: Array, up: Array) -> Array:
@@ -134,40 +145,16 @@ def side_sines(names: Sequence[str], points: Array, up: Array) -> Array:
     return np.asarray(np.sum(np.cross(level(feet[0] + feet[1]), level(left - right)) * z, axis=1))
 
 
-def parents_of(layout: Layout) -> list[int]:
-    """Numbers of the parents, -1 at roots."""
-    names = [name for name, _ in layout]
-    return [names.index(parent) if parent else -1 for _, parent in layout]
-
-
 def parents_by_name(names: Sequence[str]) -> list[int]:
     """Numbers of the parents of joints whose names a layout has; all -1 where no layout has most of them."""
-    plain = [_plain(name) for name in names]
-    best: list[int] = [-1] * len(names)
-    most = KNOWN * len(names)
+    plain = ["".join(filter(str.isalnum, name.rpartition(":")[2].lower())) for name in names]
+    best, most = [-1] * len(names), KNOWN * len(names)
     for layout in LAYOUTS.values():
-        parents = {_plain(name): _plain(parent) for name, parent in layout}
-        shared = sum(name in parents for name in plain)
+        # Of joints that are written alike the last one
+        known = {"".join(filter(str.isalnum, name.lower())): joint for joint, name in enumerate(layout.names)}
+        there = {known[name]: plain.index(name) for name in plain if name in known}
+        shared = sum(name in known for name in plain)
         if shared >= most:
-            best, most = [_nearest_ancestor(name, parents, plain) for name in plain], shared + 1
+            above = [nearest_above(layout.parents, known[name], there) if name in known else -1 for name in plain]
+            best, most = [there.get(joint, -1) for joint in above], shared + 1
     return best
-
-
-def _plain(name: str) -> str:
-    return "".join(letter for letter in name.rpartition(":")[2].lower() if letter.isalnum())
-
-
-def _nearest_ancestor(name: str, parents: dict[str, str], there: Sequence[str]) -> int:
-    """Number of the nearest ancestor that is there."""
-    name = parents.get(name, "")
-    while name and name not in there:
-        name = parents.get(name, "")
-    return there.index(name) if name else -1
-
-
-def _stretch(frames: Array, parents: list[int]) -> float:
-    """Mean change of the lengths of bones, as a share of the body's size."""
-    bones = [(joint, parent) for joint, parent in enumerate(parents) if parent >= 0]
-    lengths = np.stack([np.linalg.norm(frames[:, a] - frames[:, b], axis=1) for a, b in bones], axis=1)
-    spread = np.nanmean(np.nanstd(lengths, axis=0)) + 1e-3 * np.nanmean(lengths)
-    return float(spread / max(float(np.nanmax(lengths)), 1e-9))

@@ -10,13 +10,16 @@ import numpy as np
 
 from wbc import validation
 from wbc.errors import RangeError, UnknownNameError
-from wbc.retarget.clip import Array, Clip, Skeleton, ancestors, listed
-from wbc.retarget.sources import axes
-from wbc.retarget.sources.gaps import fill_gaps
+from wbc.retarget.clip import Array, Clip, Skeleton, listed, nearest_above
+from wbc.retarget.sources import arrays
+from wbc.retarget.sources.axes import TO_Z_UP, UNITS, FileAxes
+from wbc.retarget.sources.bvh import read_bvh
+from wbc.retarget.sources.c3d import read_c3d
 from wbc.retarget.sources.keypoints import Names, of_points, read_csv, read_npz
 from wbc.retarget.sources.markers import joined
+from wbc.retarget.sources.mending import fill_gaps, mend_swaps
 from wbc.retarget.sources.recorded import Recorded, no_clip
-from wbc.retarget.sources.swaps import mend_swaps
+from wbc.retarget.sources.smpl import has_poses, read_smpl
 
 #: Suffixes of files that are read
 CLIP_SUFFIXES = (".bvh", ".c3d", ".npz", ".npy", ".csv", ".pkl", ".pt")
@@ -92,23 +95,13 @@ def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: 
         raise no_clip(file, validation.no_such(file))
     if file.stat().st_size == 0:
         raise no_clip(file, "the file is empty")
-    # Readers are imported for their own files only
-    if kind == ".bvh":
-        from wbc.retarget.sources.bvh import read_bvh
-
-        return read_bvh(file)
-    if kind == ".c3d":
-        from wbc.retarget.sources.c3d import read_c3d
-
-        return read_c3d(file)
     if kind == ".csv":
         return read_csv(file, names)
-    from wbc.retarget.sources import arrays, smpl
-
+    if kind in (".bvh", ".c3d"):
+        return read_bvh(file) if kind == ".bvh" else read_c3d(file)
     data = arrays.load(file)
-    if kind == ".pkl" or smpl.has_poses(data):
-        model = None if body_model is None else validation.file_path("body_model", body_model)
-        return smpl.read_smpl(file, data, model)
+    if kind == ".pkl" or has_poses(data):
+        return read_smpl(file, data, None if body_model is None else validation.file_path("body_model", body_model))
     return read_npz(file, data, names) if isinstance(data, dict) else of_points(file, data, names)
 
 
@@ -130,31 +123,28 @@ def _rate(given: float | None, recorded: Recorded) -> float:
 def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float | None) -> Clip:
     """The clip with z up, in metres, with all points."""
     _without_unseen(recorded, name)
-    notes, names, parents, rate = recorded.notes, recorded.names, recorded.parents, recorded.rate
+    notes, names, parents, rate, turns = (
+        recorded.notes, recorded.names, recorded.parents, recorded.rate, recorded.turns,
+    )  # fmt: skip
     # Axes and units are looked for in points without gaps
-    whole = replace(recorded, points=fill_gaps(recorded.points, parents, names, rate)[0])
-    up = axes.find_up(whole) if up is None else validation.one_of("up", up, axes.TO_Z_UP)
-    length = _unit(whole, up, unit)
-    to_world, mirror = axes.TO_Z_UP[up], np.eye(3)
-    points, turns = recorded.points @ to_world.T * length, recorded.turns
-    if axes.mirrored(names, whole.points @ to_world.T):
+    axes = FileAxes(replace(recorded, points=fill_gaps(recorded.points, parents, names, rate)))
+    up = axes.find_up() if up is None else validation.one_of("up", up, TO_Z_UP)
+    length, to_world, mirror = _unit(axes, up, unit), TO_Z_UP[up], np.eye(3)
+    if axes.is_mirrored(up):
         mirror = np.diag([1.0, -1.0, 1.0])
-        points = points @ mirror
         notes.append("the file has left-handed axes: left and right are put right")
+    points = recorded.points @ (mirror @ to_world).T * length
     if turns is None:
-        points, said = mend_swaps(points, names, rate)
-        notes += said
+        points = mend_swaps(points, names, rate, notes)
     seen = recorded.seen if recorded.seen is not None else np.asarray(np.isfinite(points).all(axis=2))
-    points, said = fill_gaps(points, parents, names, rate)
-    points = _on_the_ground(points, notes := [*notes, *said])
-    apart = turns is None and sum(parent < 0 for parent in parents) > 1
-    if apart and (made := joined(names, points, seen)) is not None:
+    points = _on_the_ground(fill_gaps(points, parents, names, rate, notes), notes)
+    if turns is None and parents.count(-1) > 1 and (made := joined(names, points, seen)) is not None:
         names, parents, points, seen = made
         notes.append("hips, knees and all other joints are in the middle of markers of theirs")
     if recorded.offsets is None or turns is None:
         offsets = _offsets(points, parents)
     else:
-        of_rest = mirror @ axes.TO_Z_UP[recorded.rest_up or axes.said_by_rest(whole) or up]
+        of_rest = mirror @ TO_Z_UP[recorded.rest_up or axes.rest_up or up]
         offsets = recorded.offsets @ of_rest.T * length
         turns = mirror @ to_world @ turns @ of_rest.T
     sizes = np.linalg.norm(offsets, axis=1)
@@ -164,42 +154,38 @@ def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float |
     return Clip(Skeleton(tuple(names), tuple(parents), offsets, ends), rate, points, turns, seen, name, tuple(notes))
 
 
-def _unit(recorded: Recorded, up: str, given: str | float | None) -> float:
+def _unit(axes: FileAxes, up: str, given: str | float | None) -> float:
     """Length of the file's unit [m]."""
     if isinstance(given, str):
-        return axes.UNITS[validation.one_of("unit", given, axes.UNITS)][0]
+        return UNITS[validation.one_of("unit", given, UNITS)][0]
     if given is not None:
         return validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
-    said, (name, size) = recorded.unit, axes.find_unit(recorded, up)
-    length, whole_name, _ = axes.UNITS[name or "m"]
+    said, (name, size) = axes.clip.unit, axes.find_unit(up)
+    length, whole_name, _ = UNITS[name or "m"]
     if not (name or said):
-        reason = "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft"
-        raise RangeError("unit", size, reason)
+        raise RangeError("unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft")
     # Some files say a unit that they are not in; neighbours in size are left as they say
     if said and (not name or max(length / said, said / length) <= OTHER_UNIT):
         return said
     if said:
         wrong = f"the file says units of {said:g} m, which makes a body of {size * said:.3g} m"
-        recorded.notes.append(f"{wrong}: taken as {whole_name}")
+        axes.clip.notes.append(f"{wrong}: taken as {whole_name}")
     elif name != "m":
-        recorded.notes.append(f"its unit is {whole_name}: the body is {size:.4g} of them")
+        axes.clip.notes.append(f"its unit is {whole_name}: the body is {size:.4g} of them")
     return length
 
 
 def _without_unseen(recorded: Recorded, name: str) -> None:
     """Take out joints without a point in any frame; their children hang from their parents."""
-    never = np.asarray(~np.isfinite(recorded.points).all(axis=2).any(axis=0))
-    if never.all():
+    there = np.asarray(np.isfinite(recorded.points).all(axis=2).any(axis=0))
+    if not there.any():
         raise no_clip(name, "no point in any frame")
-    if not never.any():
-        return
-    kept, parents = np.flatnonzero(~never).tolist(), recorded.parents
-    chains = [[joint for joint in ancestors(parents, old)[1:] if not never[joint]] for old in kept]
-    gone = [joint for joint, lost in zip(recorded.names, never, strict=True) if lost]
-    recorded.parents = [kept.index(chain[0]) if chain else -1 for chain in chains]
-    recorded.names = [recorded.names[old] for old in kept]
-    recorded.points = recorded.points[:, kept]
-    recorded.notes.append(f"never seen, and left out: {listed(gone, JOINTS_NAMED)}")
+    kept = np.flatnonzero(there).tolist()
+    if gone := [joint for joint, seen in zip(recorded.names, there, strict=True) if not seen]:
+        above = [nearest_above(recorded.parents, joint, kept) for joint in kept]
+        recorded.parents = [kept.index(joint) if joint >= 0 else -1 for joint in above]
+        recorded.names, recorded.points = [recorded.names[joint] for joint in kept], recorded.points[:, kept]
+        recorded.notes.append(f"never seen, and left out: {listed(gone, JOINTS_NAMED)}")
 
 
 def _on_the_ground(points: Array, notes: list[str]) -> Array:

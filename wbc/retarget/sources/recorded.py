@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from wbc.errors import ClipFileError
-from wbc.retarget.clip import Array, Marks
-from wbc.retarget.sources.gaps import between
+from wbc.retarget.clip import Array, Marks, Skeleton
+from wbc.retarget.sources.mending import between
 
 #: Keys of frames a second in files of arrays
 RATES = ("rate", "fps", "mocap_framerate", "mocap_frame_rate", "frequency", "sample_rate")
@@ -40,7 +40,7 @@ class Recorded:
     names: list[str]
     parents: list[int]
     points: Array
-    rate: float
+    rate: float = 0.0
     offsets: Array | None = None
     turns: Array | None = None
     ends: list[bool] = field(default_factory=list)
@@ -50,48 +50,52 @@ class Recorded:
     rest_up: str = ""
     notes: list[str] = field(default_factory=list)
 
+    @property
+    def skeleton(self) -> Skeleton | None:
+        """In its rest pose, along its axes; None where there is none."""
+        if self.offsets is None:
+            return None
+        return Skeleton(tuple(self.names), tuple(self.parents), self.offsets, tuple(self.ends))
 
-def place(clip: Recorded, path: pathlib.Path, own: Array, moves: dict[int, Array]) -> Recorded:
-    """The clip with points and rotations of its tree; numbers that are missing are filled in between their neighbours.
+    def place(self, path: pathlib.Path, own: Array, moves: dict[int, Array]) -> Recorded:
+        """Points and rotations of its tree; numbers that are missing are filled in between their neighbours.
 
-        R_j = R_parent R_own,j        p_j = p_parent + R_parent d_j
+            R_j = R_parent R_own,j        p_j = p_parent + R_parent d_j
 
-    Args:
-        own: rotations in the parent's axes [frames, joints, 3, 3]; NaN where they are missing.
-        moves: joint -> d_j of each frame [frames, 3]; elsewhere it is the joint's offset.
+        Args:
+            own: rotations in the parent's axes [frames, joints, 3, 3]; NaN where they are missing.
+            moves: joint -> d_j of each frame [frames, 3]; elsewhere it is the joint's offset.
 
-    Raises:
-        ClipFileError: a joint without numbers in any frame.
-    """
-    assert clip.offsets is not None
-    steps = np.broadcast_to(clip.offsets, own.shape[:3]).copy()
-    for joint, move in moves.items():
-        steps[:, joint] = move
-    seen = np.asarray(np.isfinite(own).all(axis=(2, 3)) & np.isfinite(steps).all(axis=2))
-    if not seen.all():
-        lacking = f"{int((~seen.all(axis=1)).sum())} of {len(own)} frames"
-        clip.notes.append(f"numbers are missing in {lacking}: filled in between their neighbours")
-    for joint in np.flatnonzero(~seen.all(axis=0)).tolist():
-        good = np.flatnonzero(np.isfinite(own[:, joint]).all(axis=(1, 2)))
-        if not good.size or not np.isfinite(steps[:, joint]).all(axis=1).any():
-            raise no_clip(path, f"a channel of {clip.names[joint]} has no number in any frame")
-        steps[:, joint] = between(steps[:, joint])
-        if good.size < len(own):
-            # A last rotation once more, since one alone has nothing between
-            turns = Rotation.from_matrix(own[[*good, good[-1]], joint])
-            inside = np.clip(np.arange(len(own)), good[0], good[-1])
-            own[:, joint] = Slerp([*good, good[-1] + 1], turns)(inside).as_matrix()
-    clip.points, clip.turns, clip.seen = steps.copy(), own.copy(), seen
-    for joint, parent in enumerate(clip.parents):
-        if parent >= 0:
-            above = clip.turns[:, parent]
-            clip.turns[:, joint] = above @ own[:, joint]
-            clip.points[:, joint] = clip.points[:, parent] + np.einsum("fij,fj->fi", above, steps[:, joint])
-            seen[:, joint] &= seen[:, parent]
-    return clip
+        Raises:
+            ClipFileError: a joint without numbers in any frame.
+        """
+        points = np.broadcast_to(np.asarray(self.offsets), own.shape[:3]).copy()
+        for joint, move in moves.items():
+            points[:, joint] = move
+        turns, seen = own.copy(), np.isfinite(own).all(axis=(2, 3)) & np.isfinite(points).all(axis=2)
+        if not seen.all():
+            lacking = f"{int((~seen.all(axis=1)).sum())} of {len(own)} frames"
+            self.notes.append(f"numbers are missing in {lacking}: filled in between their neighbours")
+        for joint, parent in enumerate(self.parents):
+            good = np.flatnonzero(seen[:, joint])
+            if not good.size:
+                raise no_clip(path, f"a channel of {self.names[joint]} has no number in any frame")
+            if good.size < len(own):
+                points[:, joint] = between(points[:, joint])
+                # A last rotation once more, since one alone has nothing between
+                known = Rotation.from_matrix(own[[*good, good[-1]], joint])
+                inside = np.clip(np.arange(len(own)), good[0], good[-1])
+                turns[:, joint] = Slerp([*good, good[-1] + 1], known)(inside).as_matrix()
+            if parent >= 0:
+                above = turns[:, parent]
+                turns[:, joint] = above @ turns[:, joint]
+                points[:, joint] = points[:, parent] + np.einsum("fij,fj->fi", above, points[:, joint])
+                seen[:, joint] &= seen[:, parent]
+        self.points, self.turns, self.seen = points, turns, seen
+        return self
 
 
-def unlike(names: list[str], notes: list[str]) -> list[str]:
+def unlike(names: Sequence[str], notes: list[str]) -> list[str]:
     """Names of which none is twice: a second one gets a number, which a note says."""
     out: list[str] = []
     for name in names:

@@ -11,8 +11,8 @@ from wbc import rotations, validation
 from wbc.errors import ClipFileError
 from wbc.retarget.clip import Array
 from wbc.retarget.sources import arrays
-from wbc.retarget.sources.layouts import LAYOUTS, parents_of
-from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, place, rate_in
+from wbc.retarget.sources.layouts import LAYOUTS
+from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in
 
 #: Keys of rotation vectors of all joints one after the other
 POSES = ("poses", "smpl_poses", "fullpose", "pose")
@@ -58,7 +58,7 @@ def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) ->
     if used < count or used < len(joints):
         notes.append(f"the clip has {count} joints and the body model {len(joints)}: the {BODY} of the body are used")
     layout, parents = LAYOUTS[OF_SIZE.get(used, "smpl-body")], parents[:used]
-    if parents != parents_of(layout)[:used]:
+    if parents != layout.parents[:used]:
         raise no_clip(body_model, "its joints are no tree of SMPL, SMPL-H or SMPL-X")
     offsets = joints[:used] - np.where(np.array(parents)[:, None] < 0, 0.0, joints[parents])
     own = rotations.exponential(poses[:, :used].reshape(-1, 3)).reshape(frames, used, 3, 3)
@@ -66,12 +66,11 @@ def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) ->
     moves = moves.reshape(-1, 3) / float(np.ravel(data.get("smpl_scaling", 1.0))[0])
     if len(moves) != frames:
         raise no_clip(path, f"{len(moves)} places of the root for {frames} frames")
-    names = [name for name, _ in layout]
     clip = Recorded(
-        names, parents, moves, rate_in(data), offsets, ends=[False] * used, unit=1.0, usual="z", rest_up="y",
-        notes=notes,
+        list(layout.names), parents, moves, rate_in(data), offsets, ends=[False] * used, unit=1.0, usual="z",
+        rest_up="y", notes=notes,
     )  # fmt: skip
-    return place(clip, path, own, {0: offsets[0] + moves})
+    return clip.place(path, own, {0: offsets[0] + moves})
 
 
 def _poses(path: pathlib.Path, data: dict[str, Any]) -> Array:

@@ -73,7 +73,7 @@ class Descent:
         gradient = np.zeros(model.nv)
         for sign, joint, point in zip((-1.0, 1.0), joints, points, strict=True):
             if joint > 0:
-                jacobian = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
+                jacobian = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
                 moment = pin.skew(point - data.oMi[joint].translation) @ normal
                 gradient += sign * (normal @ jacobian[:3] + moment @ jacobian[3:])
         for coupling in self._robot.couplings:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -109,7 +109,15 @@ def with_base(model: pin.Model, base: str | None, q: Array | None = None) -> tup
         if model.parents[j] == 0 and moving_freely(model, j) != "fixed":
             reason = f"the joint {str(model.names[j])!r} at the root of the description moves freely already"
             raise RobotFileError("base", base, reason)
-    return on_joint(model, joint, ROOT), base
+    return on_joint(model, joint, root_name(model.names)), base
+
+
+def root_name(taken: Collection[str]) -> str:
+    """A name for the joint of a base beside the joints of a description."""
+    name = ROOT
+    while name in taken:
+        name += "_"
+    return name
 
 
 def finite_or_unlimited(array: Array) -> Array:

@@ -14,7 +14,7 @@ from wbc.errors import RobotFileError
 from wbc.multibody import own, single_joint
 from wbc.robot.loops import Kind, Loop
 from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, with_base
-from wbc.robot.sources.urdf_checks import SHORTEST_AXIS, Remarks
+from wbc.robot.sources.urdf_checks import Remarks, has_direction, shown
 from wbc.validation import Array
 
 #: Joints of the format that a tree can have -> the loop that they are where both of their links hang on others already
@@ -220,8 +220,8 @@ class _Reader:
         pose, axis = self._pose(element, ()), np.zeros(3)
         if kind not in ("ball", "fixed"):
             axis = self._numbers(element.findtext("axis/xyz") or "0 0 1", 3, f"axis of {name}")
-            if not np.linalg.norm(axis) > SHORTEST_AXIS:
-                raise self._error(f"joint {name!r} has no direction: its axis is 0")
+            if not has_direction(axis):
+                raise self._error(f"joint {name!r} has no direction: its axis is {shown(axis)}")
             xyz, flag = element.find("axis/xyz"), (element.findtext("axis/use_parent_model_frame") or "").strip()
             seen_from = xyz.get("expressed_in", "") if xyz is not None else ""
             in_model = self._axes_in_model if not flag else flag in ("1", "true")

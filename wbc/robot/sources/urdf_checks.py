@@ -17,7 +17,9 @@ log = logging.getLogger("wbc")
 SINGLE = ("revolute", "continuous", "prismatic")
 _ENDS = ("parent", "child")
 #: A shorter axis is what is left of one that was meant to be 0
-SHORTEST_AXIS = 1e-6
+_SHORTEST = 1e-6
+#: The square of a longer one is no number
+_LONGEST = 1e150
 #: Principal moments that break a rule by less than so much of the largest are rounded numbers of a body
 MOMENT_DIGITS = 1e-2
 #: What is less than so much of the largest moment in the file moves nothing otherwise: 1e-6 kg m^2 of empty links
@@ -63,6 +65,11 @@ def axis_of(joint: ElementTree.Element) -> Array:
         return np.ones(3)  # for the parser to refuse
 
 
+def has_direction(axis: Array) -> bool:
+    """Whether an axis can be made a unit vector."""
+    return bool(_SHORTEST < np.abs(axis).max(initial=0.0) < _LONGEST)
+
+
 def check_tree(path: pathlib.Path, tree: ElementTree.Element) -> None:
     """Every link hangs on one joint and in the end on the root; joints that move have an axis.
 
@@ -77,8 +84,8 @@ def check_tree(path: pathlib.Path, tree: ElementTree.Element) -> None:
             reason = f"link {child!r} hangs on two joints, {above[child][0]!r} and {name!r}: a closed chain is no tree"
             raise RobotFileError("robot", str(path), reason)
         moves = joint.get("type") in (*SINGLE, "planar")
-        if moves and not np.linalg.norm(axis := axis_of(joint)) > SHORTEST_AXIS:
-            reason = f"joint {name!r} has no direction: its axis is {_shown(axis)}"
+        if moves and not has_direction(axis := axis_of(joint)):
+            reason = f"joint {name!r} has no direction: its axis is {shown(axis)}"
             raise RobotFileError("robot", str(path), reason)
     hangs: dict[str, bool] = {}  # whether a link's way up ends
     for link in above:
@@ -113,11 +120,12 @@ def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks)
     for name, m in zip(names, moments, strict=True):
         excess = max(-m[0], m[2] - m[0] - m[1])
         if excess > MOMENT_DIGITS * np.abs(m).max():
-            (wrong if excess > FELT * largest else slightly).append(f"link {name!r} {_shown(m)}")
+            (wrong if excess > FELT * largest else slightly).append(f"link {name!r} {shown(m)}")
     for links, loud in ((wrong, True), (slightly, False)):
         if links:
             remarks.add("inertia", f"principal moments that no body has [kg m^2]: {'; '.join(links)}", loud=loud)
 
 
-def _shown(values: Array) -> str:
+def shown(values: Array) -> str:
+    """Numbers of a file in a sentence."""
     return ", ".join(f"{x:.6g}" for x in values)

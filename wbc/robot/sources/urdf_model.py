@@ -16,7 +16,7 @@ import numpy as np
 from wbc.errors import RobotFileError
 from wbc.multibody import own, single_joint
 from wbc.quick_dataclasses import dataclass
-from wbc.robot.sources.description import ROOT
+from wbc.robot.sources.description import root_name
 from wbc.robot.sources.urdf_checks import SINGLE, Remarks
 from wbc.validation import Array
 
@@ -211,7 +211,8 @@ def build_model(elements: UrdfElements, base: own.JointModel | None) -> own.Mode
     out.name = elements.name
     joint, frame = 0, 0
     if base is not None:
-        joint = out.addJoint(0, base, own.SE3.Identity(), ROOT)
+        moving = [joint.name for joints in elements.below.values() for joint in joints if joint.kind != "fixed"]
+        joint = out.addJoint(0, base, own.SE3.Identity(), root_name(moving))
         frame = out.addJointFrame(joint, 0)
         limits.add(None, out, joint)
     for made, parent, at in _depth_first(elements):

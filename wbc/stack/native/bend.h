@@ -6,8 +6,8 @@
 
 /* A residual may bend by so much [rad, or characteristic lengths, per second]; at a gain of 10/s a tenth of that remains */
 #define BENDS 1e-3
-/* Rows that are exact may miss 0 at q (+) v dt by so much [rad, or characteristic lengths] */
-#define EXACT 1e-10
+/* Exact rows that miss 0 at q (+) v dt by more give way [rad, or characteristic lengths] */
+#define OPENED 1e-9
 /* Where joints that are stopped by bounds are to be left out of account, as others make up for them in one tick more than their
  * Jacobians say: as above */
 #define STRETCHED 2e-2
@@ -17,6 +17,9 @@
 #define REFINED 24
 #define SHORTER 3
 #define STEEPER 100.0
+/* Corrections in full; later ones are half of what is missed, as next to where rows nearly depend on each other two sets of bounds
+ * take turns, each by what the other misses */
+#define IN_FULL 6
 /* A joint that moves at this rate and moved at it the other way in the last tick turns round [rad, or characteristic lengths, per
  * second]: where rows bend it is not their tasks that want it */
 #define TURNING 1.0
@@ -82,12 +85,13 @@ EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
 }
 
 #if BENDING > 0
-/* How far rows are from what is allowed: `worst` of those that bend, and what exact ones miss; above 1 where they are */
-static double bent_by(const wbc_tick *t, double worst) {
+/* How far rows are from what is allowed: `worst` of those that bend, and what exact ones miss, which may be `most`; above 1 where they
+ * are */
+static double bent_by(const wbc_tick *t, double worst, double most) {
     double opened = 0.0;
     for (int k = 0; k < MC; k++)
         if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
-    return larger(worst / BENDS, opened / EXACT);
+    return larger(worst / BENDS, opened / most);
 }
 #endif
 
@@ -165,12 +169,12 @@ static int same_rows(const wbc_tick *t) {
 }
 
 /* The same where equality rows are taken out: the sides of exact ones, by what they lose */
-static int bend_reduced(wbc_tick *t) {
+static int bend_reduced(wbc_tick *t, double share) {
     double change[WIDE], opened = 0.0;
     wbc_tick_find_lost(t, 1);
     for (int n = 0; n < t->reduced; n++) {
         const int k = t->equal_row[n];
-        change[n] = bent[k] == 2 ? t->report.lost[k] / t->dt : 0.0;
+        change[n] = bent[k] == 2 ? share * t->report.lost[k] / t->dt : 0.0;
         if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
     }
     if (opened <= EXACT) return 0;
@@ -184,14 +188,14 @@ static int bend_reduced(wbc_tick *t) {
     return 1;
 }
 
-/* Exact rows make up for what they lose at the command, with the factors of the rows that hold it: M dy = change of the sides, and
+/* Exact rows make up for a share of what they lose at the command, with the factors of the rows that hold it: M dy = change of the sides, and
  * multipliers as they follow. 0 where other rows would hold it, and the search is to go on with the sides as they are then */
-static int make_up(wbc_tick *t) {
+static int make_up(wbc_tick *t, double share) {
     DAQPWorkspace *work = &t->daqp;
-    if (!t->factored || (work->n_active == 0 && !t->reduced)) return 1;
+    if (!t->factored || t->eased > 0.0 || (work->n_active == 0 && !t->reduced)) return 1;
     for (int n = 0; n < REFINED; n++) {
         if (REDUCES && t->reduced) {
-            if (!bend_reduced(t)) return 1;
+            if (!bend_reduced(t, share)) return 1;
             if (!same_rows(t)) {
                 bend_rows(t, t->bend);
                 return 0;
@@ -203,7 +207,7 @@ static int make_up(wbc_tick *t) {
         wbc_tick_find_lost(t, 1);
         for (int a = 0; a < work->n_active; a++) {
             const int i = work->WS[a], k = i - NV, exact = i >= NV && bent[k] == 2 && t->free_low[k] == t->free_high[k];
-            change[a] = exact ? -t->report.lost[k] / t->dt : 0.0;
+            change[a] = exact ? -share * t->report.lost[k] / t->dt : 0.0;
             mu[a] = -change[a] * t->scaling[i];
             if (exact) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
         }
@@ -257,7 +261,7 @@ static int report_lost(wbc_tick *t) {
     int gave_way = 0;
     for (int k = 0; k < MC; k++) {
         const double rate = fabs(t->report.lost[k]) / t->dt;
-        if (rate <= BENDS * row_scale[k]) continue;
+        if (rate <= (bent[k] == 2 ? OPENED / t->dt : BENDS) * row_scale[k]) continue;
         t->report.slack[k] = larger(t->report.slack[k], rate);
         gave_way = 1;
     }

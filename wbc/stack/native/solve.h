@@ -3,7 +3,7 @@
 #define WBC_SOLVE_H
 
 #include "margins.h"
-#include "relax.h"
+#include "ease.h"
 
 #if COMMAND == VELOCITY
 INLINE int brakes_slowly(const wbc_tick *t, int i) { return brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0; }
@@ -26,38 +26,6 @@ INLINE double rest(const wbc_tick *t, int i, double share) {
     (void)share;
     return i < DOFS ? -t->v_last[i] * (ELASTIC ? REST_RATE : 1.0 / t->dt) : t->kept[i];
 #endif
-}
-
-/* Where a row whose bounds have crossed is met: half-way, and of a limit of motion, a row of one joint, where it asks for least */
-INLINE double meeting(const wbc_tick *t, int k) {
-    const double low = t->low[NV + k], high = t->high[NV + k];
-    const int motion = ELASTIC && row_order[k] > HOLDS && a_end[k] - a_start[k] == 1 && a_col[a_start[k]] < DOFS;
-    return motion ? clamp(0.0, high, low) : 0.5 * (low + high);
-}
-
-/* Rows whose bounds have crossed meet them; 1 if any gives way by more than rounding. Actuators never do. */
-static int uncross(wbc_tick *t) {
-    int crossed = 0;
-    for (int k = 0; k < MC; k++) {
-        const double gap = t->low[NV + k] - t->high[NV + k];
-        if (gap <= 0.0) continue;
-        t->low[NV + k] = t->high[NV + k] = meeting(t, k);
-        t->prepared = 0;
-        if (gap <= 4.0 * TOLERANCE * row_scale[k]) continue;
-        crossed = 1;
-        if (row_order[k] == 0) t->unusable = 1.0;
-    }
-    return crossed;
-}
-
-/* The bounds as they were before anything gave way, those that cross met half-way */
-static void own_sides(wbc_tick *t) {
-    form_bounds(t);
-    for (int k = 0; k < MC; k++) {
-        t->low[NV + k] = MINIMISED(k) ? -WBC_INF : t->free_low[k];
-        t->high[NV + k] = MINIMISED(k) ? WBC_INF : t->free_high[k];
-    }
-    uncross(t);
 }
 
 /* Damping and the weight, of a robot whose base floats: the accelerations nearest to -REST_RATE v, which contacts are in accord
@@ -97,6 +65,7 @@ static void damp(wbc_tick *t) {
 static void brake(wbc_tick *t) {
     /* A relaxation may have moved the bounds */
     form_bounds(t);
+    memset(t->report.beyond, 0, sizeof t->report.beyond);
 #if COMMAND == VELOCITY
     const double share = kept_speed(t);
 #else
@@ -155,9 +124,11 @@ static int report_slack(wbc_tick *t, int flag) {
     for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
         const double value = row_at(t, k, t->report.v);
         const double slack = MINIMISED(k) || price_at[k] >= 0 ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
-        t->report.slack[k] = slack > 2.0 * TOLERANCE * row_scale[k] ? slack : 0.0;
+        const double rounding = larger(2.0 * TOLERANCE, bent[k] == 2 ? 2.0 * t->eased / t->dt : 0.0);
+        t->report.slack[k] = slack > rounding * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }
+    for (int i = 0; i < NV; i++) gave_way |= t->report.beyond[i] > 0.0;
     return gave_way;
 }
 
@@ -182,6 +153,8 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
     int flag = uncross(t) ? WBC_RELAXED : WBC_SOLVED;
     t->report.iterations = 0.0;
     t->factored = t->spent = t->alone = t->proven = 0;
+    t->eased = 0.0;
+    memset(t->report.beyond, 0, sizeof t->report.beyond);
     memset(t->elastic, 0, sizeof t->elastic);
     find_idle_rows(t);
     if (t->unusable != 0.0) {
@@ -192,8 +165,7 @@ EXPORT int wbc_tick_solve(wbc_tick *t) {
         const int first = t->spent;
         if (exit_flag >= 0 && mistaken(t)) exit_flag = -1;
         if (exit_flag < 0 && MC > 0 && !first) {
-            flag = WBC_RELAXED;
-            exit_flag = relaxed(t);
+            exit_flag = again_with_room(t, &flag);
         }
         if (t->spent) {
             stop_early(t, first);

@@ -62,6 +62,15 @@ static int primal_of_the_rest(wbc_tick *t, int flag) {
 }
 #endif
 
+#if LEVELS == 0
+/* After a relaxation that nothing gave way in, as rows contradicted each other by rounding only: their own sides */
+static int primal_of_all(wbc_tick *t) {
+    if (ELASTIC) return 0;
+    own_sides(t);
+    return primal(t);
+}
+#endif
+
 /* By how much soft rows are violated; the slack of those that give way by more than is worth a report */
 static void report_soft_rows(wbc_tick *t) {
     for (int k = 0; k < MC; k++) {
@@ -126,7 +135,7 @@ static int answer(wbc_tick *t, int *nameless) {
     flag = all_levels(t, flag);
 #else
 #if BENDING > 0
-    for (int n = 0; n < REFINED && flag == WBC_SOLVED && !make_up(t); n++) flag = wbc_tick_solve(t);
+    for (int n = 0; n < REFINED && flag == WBC_SOLVED && !make_up(t, n < IN_FULL ? 1.0 : 0.5); n++) flag = wbc_tick_solve(t);
 #endif
     wbc_tick_certify(t);
     if (REDUCES && t->reduced && flag == WBC_SOLVED && !good(&t->report)) {
@@ -143,6 +152,10 @@ static int answer(wbc_tick *t, int *nameless) {
         /* The certificate may have refined the command */
         *nameless = !report_slack(t, flag);
     }
+    if (*nameless && primal_of_all(t)) {
+        flag = (int)(t->report.flag = WBC_SOLVED);
+        *nameless = 0;
+    }
 #endif
     return flag;
 }
@@ -152,7 +165,7 @@ static int has_answer(const wbc_tick *t, int flag) { return flag <= WBC_RELAXED 
 #if BENDING > 0
 /* Sides are moved until the rows make up for what they lose, as far as that gets less; what they lose then, as a rate */
 static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
-    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all), off = bent_by(t, worst);
+    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all), off = bent_by(t, worst, t->eased + EXACT);
     for (int n = 0; n < (worst > BENDS ? BENDINGS : REFINED) && off > 1.0 && has_answer(t, *flag); n++) {
         const double before = off;
         for (int k = 0; k < MC; k++) {
@@ -162,7 +175,7 @@ static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
         bend_rows(t, next);
         *flag = answer(t, nameless);
         worst = wbc_tick_find_lost(t, all);
-        off = bent_by(t, worst);
+        off = bent_by(t, worst, t->eased + EXACT);
         if (off < before && has_answer(t, *flag)) continue;
         bend_rows(t, last);
         *flag = answer(t, nameless);
@@ -180,12 +193,12 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
     const int bends = worst > BENDS;
     if (worst > (CALM ? STRETCHED : BENDS) && has_answer(t, flag) && curve_rows(t)) flag = answer(t, nameless);
     worst = correct_rows(t, all, &flag, nameless);
-    for (int n = 0; n < SHORTER && has_answer(t, flag) && (worst > BENDS || (bends && n == 0 && turns_round(t))); n++) {
+    for (int n = 0; n < SHORTER && has_answer(t, flag) && (bent_by(t, worst, OPENED) > 1.0 || (bends && n == 0 && turns_round(t))); n++) {
         shorten(t);
         flag = answer(t, nameless);
         worst = correct_rows(t, all, &flag, nameless);
     }
-    if (worst > BENDS && flag <= WBC_RELAXED && report_lost(t)) flag = (int)(t->report.flag = WBC_RELAXED);
+    if (bent_by(t, worst, OPENED) > 1.0 && flag <= WBC_RELAXED && report_lost(t)) flag = (int)(t->report.flag = WBC_RELAXED);
 #else
     (void)t, (void)nameless;
 #endif

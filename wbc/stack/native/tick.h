@@ -118,6 +118,7 @@ typedef struct {
     double lost_of[NV], lost_there[MC + 1];
     int prepared;                /* R is the factor of H, and y its right-hand side */
     int curved;                  /* H contains curvature */
+    double eased;                /* room that exact rows have, see ease.h */
     int firm;                    /* rows that keep directions, or bend, are firm in R */
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double curvature_entries[NNZK + 1]; /* of its upper triangle */

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wbc import validation
-from wbc.errors import BoundsError, ContinuityError, InfeasibleError, RangeError
+from wbc.errors import BoundsError, ContinuityError, InfeasibleError, RangeError, ShapeError
 from wbc.trajectory.jerk.course import Course
 from wbc.trajectory.jerk.joined_courses import along_line, law_of, standing
 from wbc.trajectory.jerk.state_to_state import StateTask, by_ruckig, by_stops, others, plan
@@ -106,6 +106,8 @@ def sizes_of(limits: MotionLimits) -> tuple[Array, Array, Array]:
 
 def _state(name: str, position: Any, velocity: Any, acceleration: Any, dof: int | None) -> Array:
     given = np.atleast_1d(validation.ordinary_array(name, position))
+    if not given.size:
+        raise ShapeError(name, position, "expected one number for each joint")
     shape = (len(given) if dof is None else dof,)
     rows = [validation.ordinary_array(name, given, shape)]
     for part, value in (("velocity", velocity), ("acceleration", acceleration)):

@@ -164,7 +164,7 @@ class Law:
             off = float(np.abs(getattr(here, name) - getattr(there, name)).max())
             if off > MEETING:
                 raise ContinuityError(
-                    f"law.{name}", off, f"the laws do not meet: {name}s differ by more than {MEETING}"
+                    f"law.{name}", off, f"the laws do not meet: they differ in {name} by more than {MEETING}"
                 )
         moving = (self.moving[0], other.moving[1])
         return Law(path, self.timing.then(other.timing, path.shift), self.limits, self.checks, moving)

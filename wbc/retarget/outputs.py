@@ -1,4 +1,4 @@
-"""A motion as one file of a format, or several as a dataset."""
+"""What a retargeted motion is written as: arrays, tables, MuJoCo's keyframes, logs, and what learners load."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import pathlib
 import pickle
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
@@ -17,17 +18,62 @@ from wbc import extras, validation
 from wbc.errors import ClipFileError, RangeError, ShapeError
 from wbc.log import Log
 from wbc.log.lerobot import write_lerobot_dataset
-from wbc.retarget.outputs.motion import ROOT, JointColumns
+from wbc.multibody import pin
+from wbc.validation import Array
 
 if TYPE_CHECKING:
     import mujoco
 
     from wbc.retarget.retargeted import Retargeted
 
+#: Columns of a root in a table
+ROOT = ("root.x", "root.y", "root.z", "root.qx", "root.qy", "root.qz", "root.qw")
 #: Format -> suffix of its file
 MOTION_FORMATS = {
     "npz": ".npz", "csv": ".csv", "csv-plain": ".csv", "gmr": ".pkl", "keyframes": ".xml", "log": ".npz",
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class JointColumns:
+    """A motion in numbers that need no model.
+
+    Attributes:
+        root: position [m] and quaternion x, y, z, w of the base in the world [frames, 7].
+        names: of the joints' degrees of freedom, in the robot's order.
+        positions: of them [frames, joints] [rad, m]; a joint that turns without end by its angle, a ball joint by its
+            rotation vector.
+    """
+
+    root: Array
+    names: tuple[str, ...]
+    positions: Array
+
+    @property
+    def table(self) -> Array:
+        """Root and joints side by side [frames, 7 + joints]."""
+        return np.column_stack((self.root, self.positions))
+
+    @classmethod
+    def of(cls, motion: Retargeted) -> JointColumns:
+        """Those of a motion."""
+        robot, q = motion.robot, validation.ordinary_array("motion.q", motion.q)
+        model, first = robot.model, robot.base_nv
+        root = q[:, :7] if first else np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(q), 1))
+        places = robot.position_index[first:]
+        turned = np.array([pin.difference(model, pin.neutral(model), row) for row in q])[:, first:]
+        endless = [column - first for column, count in zip(model.idx_vs, model.nqs, strict=True) if count == 2]
+        turned[:, endless] = np.unwrap(turned[:, endless], axis=0)
+        return cls(root, robot.dof_names[first:], np.where(places >= 0, q[:, places], turned))
+
+    def in_order(self, joints: Sequence[str]) -> JointColumns:
+        """The same with joints in another order, or fewer.
+
+        Raises:
+            UnknownNameError: no such joint.
+        """
+        numbers = [self.names.index(validation.one_of("joints", name, self.names)) for name in joints]
+        return replace(self, names=tuple(self.names[k] for k in numbers), positions=self.positions[:, numbers])
 
 
 def write_motion(
@@ -59,9 +105,7 @@ def write_motion(
     validation.one_of("format", kind, MOTION_FORMATS)
     path = validation.file_path("file", file)
     path = path.with_name(path.stem + MOTION_FORMATS[kind])
-    columns = JointColumns.of(motion)
-    if joints is not None:
-        columns = columns.in_order(joints)
+    columns = JointColumns.of(motion) if joints is None else JointColumns.of(motion).in_order(joints)
     if kind == "log":
         return wbc.log.save(log_of(motion), path.parent, "npz", path.stem)
     with validation.replacing("file", path, ClipFileError) as fresh:
@@ -84,31 +128,27 @@ def log_of(motion: Retargeted) -> Log:
     """The motion as a log: columns ``t``, ``q.*`` and ``stance.*``."""
     robot = motion.robot
     dofs = {int(index): dof for dof, index in enumerate(robot.position_index) if index >= 0}
-    columns: dict[str, Any] = {"t": np.asarray(motion.time)}
-    units = {"t": "s"}
-    for k in range(robot.nq):
-        name = f"q.{robot.dof_names[dofs[k]] if k in dofs else k}"
-        columns[name], units[name] = motion.q[:, k].copy(), robot.dof_units[dofs[k]] if k in dofs else ""
-    for limb, stands in motion.stance.items():
-        columns[f"stance.{limb}"], units[f"stance.{limb}"] = np.asarray(stands), ""
+    said = {k: (robot.dof_names[dofs[k]], robot.dof_units[dofs[k]]) if k in dofs else (k, "") for k in range(robot.nq)}
+    columns: dict[str, Any] = {"t": motion.time} | {f"q.{name}": motion.q[:, k] for k, (name, _) in said.items()}
+    units = {"t": "s"} | {f"q.{name}": unit for name, unit in said.values()}
+    columns |= {f"stance.{limb}": stands for limb, stands in motion.stance.items()}
+    units |= {f"stance.{limb}": "" for limb in motion.stance}
     return Log(columns, units, {"robot": robot.name, "rate": motion.rate, "kind": "retargeted"})
 
 
 def _write_arrays(motion: Retargeted, columns: JointColumns, file: pathlib.Path, kind: str) -> None:
     """Npz, or GMR's pickle."""
-    parts: dict[str, Any] = {
-        "root_pos": columns.root_position, "root_rot": columns.root_quaternion, "dof_pos": columns.positions,
-    }  # fmt: skip
+    root, rate, names = columns.root.copy(), motion.rate, columns.names
+    parts: dict[str, Any] = {"root_pos": root[:, :3], "root_rot": root[:, 3:], "dof_pos": columns.positions}
     with file.open("wb") as stream:
         if kind == "gmr":
-            whole = round(motion.rate)
-            parts["fps"] = whole if abs(whole - motion.rate) < 1e-6 else motion.rate
-            parts |= {"local_body_pos": None, "link_body_list": None, "joint_names": list(columns.names)}
+            parts["fps"] = round(rate) if abs(round(rate) - rate) < 1e-6 else rate
+            parts |= {"local_body_pos": None, "link_body_list": None, "joint_names": list(names)}
             pickle.dump(parts, stream)
             return
         parts |= {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
-        parts |= {"q": motion.q, "time": motion.time, "rate": motion.rate}
-        np.savez_compressed(stream, robot=motion.robot.name, joint_names=columns.names, allow_pickle=False, **parts)
+        parts |= {"q": motion.q, "time": motion.time, "rate": rate, "robot": motion.robot.name, "joint_names": names}
+        np.savez_compressed(stream, allow_pickle=False, **parts)
 
 
 def _keyframes(motion: Retargeted, model: mujoco.MjModel | None) -> str:
