@@ -64,12 +64,13 @@ def record_of(plan: ContactPlan) -> Log:
 
 
 def save_plan(plan: ContactPlan, path: str | os.PathLike[str]) -> pathlib.Path:
-    """Write a plan as a log of kind npz, whole or not at all; returns the file.
+    """Write a plan as a log of kind npz, whole or not at all; returns the file, which ends in ``.npz``.
 
     Raises:
-        ShapeError: no plan. LogFileError: it cannot be written.
+        ShapeError: no plan, or no path. LogFileError: it cannot be written.
     """
-    record, file = record_of(validation.instance("plan", plan, ContactPlan, "a ContactPlan")), pathlib.Path(path)
+    record = record_of(validation.instance("plan", plan, ContactPlan, "a ContactPlan"))
+    file = validation.file_path("path", path)
     return wbc.log.save(record, file.parent, "npz", file.stem)
 
 
