@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+import wbc
 from wbc.analysis import BodyRows, ExactModel, JointRows, PitchPlaneRows, Rows, symbolic_jacobian
 from wbc.analysis.jacobians.numeric import NumericRows, rank
 from wbc.errors import RangeError, ShapeError, UnknownNameError
@@ -60,3 +62,17 @@ def test_bad_declarations() -> None:
         symbolic_jacobian(model, [])
     with pytest.raises(UnknownNameError):
         symbolic_jacobian(model, [BodyRows("tip")], axes="nowhere")
+
+
+def test_rows_of_a_robot_of_one_joint_have_one_column() -> None:
+    """Pinocchio gives Jacobians of one degree of freedom as vectors."""
+    model = pin.Model()
+    model.appendBodyToJoint(
+        model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "hip"), pin.Inertia.Random(), pin.SE3.Identity()
+    )
+    for name, x in (("shoulder", 0.0), ("wrist", 1.0)):
+        place = pin.SE3(np.eye(3), np.array([x, 0.0, 0.3]))
+        model.addFrame(pin.Frame(name, 1, place, pin.FrameType.OP_FRAME))
+    robot = wbc.robots.load(model)
+    rows = (PitchPlaneRows("shoulder", "wrist"), BodyRows("wrist"))
+    np.testing.assert_allclose(NumericRows(robot).value(rows, robot.neutral)[:, 0], [0, 0, 1, 0, 0, 0, 1], atol=1e-15)

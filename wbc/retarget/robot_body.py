@@ -104,11 +104,6 @@ class RobotLimb:
         """How its end stands."""
         return "flat" if len(self.corners) > 1 else "point"
 
-    @property
-    def reach(self) -> float:
-        """Base to the end along the limb [m]."""
-        return float(np.linalg.norm(np.diff(self.places, axis=0), axis=1).sum())
-
     @cached_property
     def lengths(self) -> tuple[float, float]:
         """Base to middle, middle to wrist [m]."""
@@ -229,10 +224,6 @@ class RestPose:
         side = NEAR * start + np.einsum("jab,jb->a", across, self.points[joints])
         return np.asarray(np.linalg.solve(NEAR * np.eye(3) + across.sum(axis=0), side))
 
-    def lowest(self, joint: int, up: Array) -> float:
-        """The least height of a link along a direction [m]; that of its joint without bodies."""
-        return float(self.points[joint] @ up) - self.reach(joint, -up)
-
     def reach(self, joint: int, way: Array) -> float:
         """How far a link stands out from its joint along a direction [m]; 0 without bodies."""
         balls = self.balls.get(joint) if joint else None
@@ -278,8 +269,9 @@ def body_of(robot: Robot) -> RobotBody:
         between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < robot.model.njoints]
         waist = rest.meeting(between[:MEETING], np.mean(rest.points[between], axis=0))
     feet = [limb for name, limb in limbs.items() if _is_foot(name, plan, rest.fixed)]
-    balls = rest.balls
-    if feet and rest.lowest(plan.pelvis, up) < min(limb.base @ up - limb.reach for limb in feet):
+    balls, lowest = rest.balls, rest.points[plan.pelvis] @ up - rest.reach(plan.pelvis, -up)
+    stretched = [limb.base @ up - np.linalg.norm(np.diff(limb.places, axis=0), axis=1).sum() for limb in feet]
+    if lowest < min(stretched, default=-np.inf):
         log.warning("%s: its trunk reaches below its soles wherever they are, and is let into the ground", robot.name)
         balls = {joint: own for joint, own in balls.items() if joint != plan.pelvis}
     heights = [limb.places[3] @ up - limb.radius for limb in feet]

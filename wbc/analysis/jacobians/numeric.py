@@ -46,7 +46,8 @@ class NumericRows:
 
     def _pitch_plane(self, shoulder: str, wrist: str) -> Array:
         joint = joint_of(self.robot.model, shoulder)
-        axis = self._data.J[3:, int(self.robot.model.idx_vs[joint])]
+        columns = pin.getJointJacobian(self.robot.model, self._data, joint, pin.WORLD)
+        axis = columns[3:, int(self.robot.model.idx_vs[joint])]
         span = self._placement(wrist).translation - self._placement(shoulder).translation
         row: Array = (span - axis * (axis @ span)) @ self._jacobian(shoulder)[3:]
         return row[None]
